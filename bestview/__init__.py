@@ -5,81 +5,93 @@ from bestview.association.registry.corrections import Merge, Split
 from bestview.association.registry.identity_registry import IdentityRegistry, IdentityUpdate
 from bestview.association.settings import IdentitySettings
 from bestview.association.sightings import Glimpse, LocalTrack
-from bestview.evaluation.object_matching import NOBODY, stands_for
-from bestview.evaluation.true_views import ViewTruth, best_views, true_views
-from bestview.evaluation.view_scores import ViewScore, cuts_of, score_views
-from bestview.geometry.box_contact import touching
-from bestview.geometry.cross_view import Findings, Vantage, WitnessSettings, overlook, witnessed
-from bestview.geometry.detection_probability import Findable
+from bestview.evaluation.object_matching import NO_PERSON, match_objects_to_people
+from bestview.evaluation.true_views import ViewGroundTruth, optimal_views, view_ground_truth
+from bestview.evaluation.view_scores import ViewScore, cut_frames, score_views
+from bestview.geometry.box_contact import boxes_touching_others
+from bestview.geometry.cross_view import (
+    CameraDetections,
+    CameraGeometry,
+    CrossViewSettings,
+    rescore_detections,
+    views_overlap,
+)
+from bestview.geometry.detection_probability import DetectionProbabilityMap
 from bestview.geometry.ground_plane import (
     camera_height,
-    checked_homography,
-    feet,
-    foot_spread,
-    horizon,
+    foot_covariance,
+    foot_points,
+    ground_handedness,
+    horizon_row,
     person_heights,
-    shows_floor,
+    shows_ground,
     to_ground,
-    turns,
+    validate_homography,
 )
-from bestview.geometry.projected_bodies import Bodies, bodies, boxes_seen, feet_seen
+from bestview.geometry.projected_bodies import BodyEstimates, estimate_bodies, project_boxes, project_feet
 from bestview.quality import HIDDEN_COST, QualitySettings, size_quality, view_cost
-from bestview.view_selection.dynamic_program import Gops
-from bestview.view_selection.expected_views import with_expected
-from bestview.view_selection.missed_detections import LastSeen, with_missed
-from bestview.view_selection.selection import NO_CAMERA, NO_VIEW_COST, Choices, choose_by_gops, choose_views
-from bestview.view_selection.sparse_costs import SeenViews
+from bestview.view_selection.dynamic_program import GopCosts
+from bestview.view_selection.expected_views import add_inferred_views
+from bestview.view_selection.missed_detections import LastDetections, add_missed_detections
+from bestview.view_selection.selection import (
+    NO_CAMERA,
+    NO_VIEW_COST,
+    ViewSelection,
+    select_views,
+    select_views_by_gop,
+)
+from bestview.view_selection.sparse_costs import VisibleViews
 
 __all__ = [
     "HIDDEN_COST",
-    "NOBODY",
     "NO_CAMERA",
+    "NO_PERSON",
     "NO_VIEW_COST",
-    "Bodies",
-    "Choices",
+    "BodyEstimates",
+    "CameraDetections",
+    "CameraGeometry",
+    "CrossViewSettings",
+    "DetectionProbabilityMap",
     "EpisodeKey",
-    "Findable",
-    "Findings",
     "Glimpse",
-    "Gops",
+    "GopCosts",
     "IdentityRegistry",
     "IdentitySettings",
     "IdentityUpdate",
-    "LastSeen",
+    "LastDetections",
     "LocalTrack",
     "Merge",
     "QualitySettings",
-    "SeenViews",
     "Split",
     "TrackKey",
-    "Vantage",
+    "ViewGroundTruth",
     "ViewScore",
-    "ViewTruth",
-    "WitnessSettings",
-    "best_views",
-    "bodies",
-    "boxes_seen",
+    "ViewSelection",
+    "VisibleViews",
+    "add_inferred_views",
+    "add_missed_detections",
+    "boxes_touching_others",
     "camera_height",
-    "checked_homography",
-    "choose_by_gops",
-    "choose_views",
-    "cuts_of",
-    "feet",
-    "feet_seen",
-    "foot_spread",
-    "horizon",
-    "overlook",
+    "cut_frames",
+    "estimate_bodies",
+    "foot_covariance",
+    "foot_points",
+    "ground_handedness",
+    "horizon_row",
+    "match_objects_to_people",
+    "optimal_views",
     "person_heights",
+    "project_boxes",
+    "project_feet",
+    "rescore_detections",
     "score_views",
-    "shows_floor",
+    "select_views",
+    "select_views_by_gop",
+    "shows_ground",
     "size_quality",
-    "stands_for",
     "to_ground",
-    "touching",
-    "true_views",
-    "turns",
+    "validate_homography",
     "view_cost",
-    "with_expected",
-    "with_missed",
-    "witnessed",
+    "view_ground_truth",
+    "views_overlap",
 ]

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from benchmarks.bestview.watch import Messages, Rows
-from bestview import IdentitySettings, feet, person_heights, to_ground
+from bestview import IdentitySettings, foot_points, person_heights, to_ground
 from tracking.boxes import Floats
 from tracking.evaluation import perfect_association
 from tracking.evaluation.frames import line_up
@@ -169,7 +169,7 @@ def _walks(rows: Rows, ground: Mapping[str, Floats]) -> tuple[dict[_Key, _Walk],
         if key.camera not in ground:
             continue
         boxes = np.array([row.box for row in found])
-        places = to_ground(ground[key.camera], feet(boxes))
+        places = to_ground(ground[key.camera], foot_points(boxes))
         walks[key] = _Walk(np.array([row.frame for row in found]), places)
         heights.append(person_heights(ground[key.camera], boxes))
     known = np.concatenate(heights) if heights else np.zeros(0)

@@ -11,7 +11,7 @@ from benchmarks.bestview.cases import Case
 from benchmarks.bestview.decide import decide_given
 from benchmarks.bestview.ways import visible_rows
 from benchmarks.report import Report
-from bestview import NO_CAMERA, ViewScore, choose_views, score_views
+from bestview import NO_CAMERA, ViewScore, score_views, select_views
 from server.cli.evaluate.choices_file import views_of
 from server.cli.evaluate.ground_truth import SceneTruth
 from server.config.sections import EncodeSettings, ViewSettings
@@ -100,7 +100,7 @@ def _known_whole(
     """Give the optimum whose cuts are where a GOP begins."""
     people, frames = truth.views.cost.shape[:2]
     starts = np.arange(frames) % gop == 0
-    return choose_views(truth.views.cost, np.full(people, NO_CAMERA), switch_cost, starts).views
+    return select_views(truth.views.cost, np.full(people, NO_CAMERA), switch_cost, starts).views
 
 
 def sweep_tables(report: Report, swept: Mapping[str, Sequence[Swept]]) -> None:

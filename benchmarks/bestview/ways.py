@@ -35,7 +35,7 @@ LEAST_IOU = 0.5
 BRIDGE = 20
 """Frames that somebody may be hidden for and still count as shown."""
 FOUND_ONLY = {"unfound": 0.0}
-LOOKS_ALONE = {"identity": {"travel_cap": 0.0}}
+LOOKS_ALONE = {"identity": {"maximum_travel_evidence": 0.0}}
 TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
 OURS, CALIBRATED, WITHOUT = "MyView", "MyView, calibrated", "no homographies"
 PEER = "ByteTrack"

@@ -49,11 +49,11 @@ def losses(case: Case, truth: SceneTruth, way: Way) -> Losses:
     views = views_of(way.rendering.choices, person_of, truth.people, truth.cameras, visible.shape[1])
     shown = (np.take_along_axis(visible, np.maximum(views, 0)[:, :, None], axis=2)[:, :, 0]) & (views >= 0)
     own, others = _met(truth, way.rendering.tracks, person_of)
-    lost = truth.views.counted & ~shown
+    lost = truth.views.evaluated & ~shown
     mine = lost & own
     wrong = lost & ~own & others
-    frames = max(int(np.count_nonzero(truth.views.counted)), 1)
-    counts = (truth.views.counted & shown, mine, wrong, lost & ~own & ~others)
+    frames = max(int(np.count_nonzero(truth.views.evaluated)), 1)
+    counts = (truth.views.evaluated & shown, mine, wrong, lost & ~own & ~others)
     return Losses(*(np.count_nonzero(it) / frames for it in counts))
 
 
@@ -61,7 +61,7 @@ def _met(
     truth: SceneTruth, tracks: Mapping[str, list[MotRow]], person_of: Mapping[int, int]
 ) -> tuple[Mask, Mask]:
     """Give (K, N) whether people's own number was at them where they are visible, and whether another was."""
-    own: Mask = np.zeros(truth.views.counted.shape, dtype=bool)
+    own: Mask = np.zeros(truth.views.evaluated.shape, dtype=bool)
     others = own.copy()
     frames = own.shape[1]
     for column, camera in enumerate(truth.cameras):

@@ -22,7 +22,7 @@ from benchmarks.recordings import Recording, track
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, parser
 from benchmarks.views import Views, find_views
-from bestview.calibration import CalibrationError, Track, Walk, WalkCalibration, calibrate_walks
+from bestview.calibration import CalibrationError, Walk, WalkCalibration, WalkTrack, calibrate_from_walks
 from server.cli.calibrate.walk_input import VideoFormat, walks_from_tracks
 from server.cli.evaluate.track_scores import evaluate_recordings, read_recordings
 from server.cli.generated_config import config_for_videos
@@ -76,7 +76,7 @@ def _tracked(views: Views, out: Path, config: Path | None) -> Path:
 def out_of_step(walk: Walk) -> Walk:
     """Let a camera's recording begin later."""
     late = _MOVED.get(walk.camera, 0)
-    return replace(walk, tracks=tuple(Track(it.first - late, it.boxes) for it in walk.tracks))
+    return replace(walk, tracks=tuple(WalkTrack(it.first_frame - late, it.boxes) for it in walk.tracks))
 
 
 def room_rows(report: Report, folder: Path, out: Path) -> None:
@@ -85,7 +85,7 @@ def room_rows(report: Report, folder: Path, out: Path) -> None:
     for people in (1, 4):
         room = draw(folder / f"room{people}", people)
         for name, walks in (("true boxes", room.from_boxes), ("own tracks", room.from_tracks)):
-            found = calibrate_walks(
+            found = calibrate_from_walks(
                 [out_of_step(it) for it in walks], walk_settings(_ROOM_FPS, _SHIFT_S), _PERSON
             )
             off = error_of_known(found, room.truth, [out_of_step(it) for it in walks])
@@ -111,7 +111,7 @@ def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
     size = (views.site["width"], views.site["height"])
     tracks = _tracked(views, folder / "terrace", settings)
     walked = walks_from_tracks([tracks], VideoFormat(size, views.site["fps"]))
-    found = calibrate_walks(walked.walks, walk_settings(walked.fps, _SHIFT_S), _PERSON)
+    found = calibrate_from_walks(walked.walks, walk_settings(walked.fps, _SHIFT_S), _PERSON)
     _plot(found, out / "calibration_terrace.png")
     ours = folder / "terrace.json"
     ours.write_text(ground_file_text("m", {it.camera: it.homography for it in found.cameras}))
@@ -153,7 +153,7 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
         given = Recording(camera, source / "det" / f"{camera}.txt.gz", source / "gt" / f"{camera}.txt.gz")
         write_rows(tracks / f"{camera}.txt", track(given))
     walked = walks_from_tracks([tracks], VideoFormat(size, 30.0))
-    found = calibrate_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON)
+    found = calibrate_from_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON)
     _plot(found, out / "calibration_auditorium.png")
     ground = folder / "auditorium.json"
     ground.write_text(ground_file_text("m", {it.camera: it.homography for it in found.cameras}))
@@ -166,8 +166,8 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
         ["cameras", "feet apart, heights", "90 %", "nearest is right, %"],
         rows,
     )
-    for it in found.left_out:
-        report.say(f"auditorium: {it.camera} is left out: {it.why}")
+    for it in found.uncalibrated:
+        report.say(f"auditorium: {it.camera} is left out: {it.reason}")
 
 
 def _cells(seen: Agreement) -> Sequence[str]:

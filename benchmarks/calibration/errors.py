@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import feet, person_heights, to_ground
+from bestview import foot_points, person_heights, to_ground
 from bestview.calibration import Walk, WalkCalibration, fit_homography
-from bestview.calibration.homography import mapped
+from bestview.calibration.homography import apply_homography
 from tracking.motchallenge import read_rows
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,7 @@ def error_of_known(found: WalkCalibration, truth: Mapping[str, Floats], walks: S
     matrices = {it.camera: it.homography for it in found.cameras}
     for walk in walks:
         if walk.camera in matrices:
-            image = np.concatenate([feet(it.boxes) for it in walk.tracks])
+            image = np.concatenate([foot_points(it.boxes) for it in walk.tracks])
             ours.append(to_ground(matrices[walk.camera], image) @ np.array([1, 1j]))
             theirs.append(to_ground(truth[walk.camera], image) @ np.array([1, 1j]))
     x, y = np.concatenate(ours), np.concatenate(theirs)
@@ -96,7 +96,7 @@ def in_common(truth: Path, cameras: Sequence[str], size: tuple[int, int]) -> dic
 
 def _off_plane(here: Floats, there: Floats) -> float:
     """Fit a plane to the nearer half again and again (least trimmed squares), from all of them on."""
-    source, target, tall = feet(here), feet(there), there[:, 3] - there[:, 1]
+    source, target, tall = foot_points(here), foot_points(there), there[:, 3] - there[:, 1]
     kept = np.ones(len(here), dtype=bool)
     median = float("nan")
     for _ in range(_TRIMS):
@@ -104,7 +104,7 @@ def _off_plane(here: Floats, there: Floats) -> float:
             plane = fit_homography(source[kept], target[kept])
         except ValueError:
             return median
-        off = np.nan_to_num(np.hypot(*(mapped(plane, source) - target).T) / tall, nan=np.inf)
+        off = np.nan_to_num(np.hypot(*(apply_homography(plane, source) - target).T) / tall, nan=np.inf)
         median = float(np.nanmin([median, np.median(off)]))
         kept = off <= np.median(off)
     return median
@@ -121,12 +121,12 @@ def _of_two(
 ) -> Agreement:
     mine, its = (np.array([boxes[key] for key in both]) for boxes in (here, there))
     tall = float(np.nanmedian(np.concatenate([person_heights(one, mine), person_heights(other, its)])))
-    at = to_ground(one, feet(mine))
-    apart = np.nan_to_num(np.hypot(*(at - to_ground(other, feet(its))).T) / tall, nan=np.inf)
+    at = to_ground(one, foot_points(mine))
+    apart = np.nan_to_num(np.hypot(*(at - to_ground(other, foot_points(its))).T) / tall, nan=np.inf)
     by_frame = defaultdict(list)
     for frame, person in there:
         by_frame[frame].append(person)
-    places = dict(zip(there, to_ground(other, feet(np.array(list(there.values())))), strict=True))
+    places = dict(zip(there, to_ground(other, foot_points(np.array(list(there.values())))), strict=True))
     right = 0
     for (frame, person), place in zip(both, at, strict=True):
         far = {it: np.hypot(*(places[frame, it] - place)) for it in by_frame[frame]}

@@ -27,7 +27,14 @@ _SEED, _WIDTH, _HEIGHT = 5, 1280, 720
 _WARM = 6
 """Epochs before it counts: the look-ahead has to fill."""
 _ALL = QualitySettings(
-    size=1.0, whole=0.5, unhidden=0.5, central=0.5, sharp=0.5, facing=0.5, sure=0.5, relative=True
+    size=1.0,
+    truncation=0.5,
+    occlusion=0.5,
+    centering=0.5,
+    sharpness=0.5,
+    facing=0.5,
+    confidence=0.5,
+    relative=True,
 )
 
 

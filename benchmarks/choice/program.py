@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bestview import choose_views
+from bestview import select_views
 
 _SEED = 3
 _SWITCH_COST = 7.5
@@ -36,6 +36,6 @@ def frame_time(size: Size, repeats: int) -> float:
     spent = []
     for _ in range(repeats):
         begin = time.process_time()
-        choose_views(cost, previous, _SWITCH_COST, starts, size.least_shot, held, asked=1)
+        select_views(cost, previous, _SWITCH_COST, starts, size.least_shot, held, decided_gops=1)
         spent.append(time.process_time() - begin)
     return float(np.median(spent)) / size.gop

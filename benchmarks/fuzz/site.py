@@ -53,7 +53,11 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
             "backlog_s": 0.2,
             "assist": {"enabled": True},
         },
-        "view": {"lookahead": 2 * GOP, "late_after_s": 0.1, "identity": {"confirm": 1, "regroup": 1}},
+        "view": {
+            "lookahead": 2 * GOP,
+            "late_after_s": 0.1,
+            "identity": {"confirmation_frames": 1, "clustering_interval": 1},
+        },
         **changes,
     }
     if codec == "h264":

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from benchmarks.bestview.watch import Rows
-from bestview import feet, to_ground
+from bestview import foot_points, to_ground
 from bestview.geometry.ground_plane import feet_cut_off
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow
@@ -63,7 +63,7 @@ def _standing(rows: list[MotRow], homography: Floats, height: int) -> dict[int, 
     if not rows:
         return {}
     boxes = np.array([row.box for row in rows])
-    places = to_ground(homography, feet(boxes))
+    places = to_ground(homography, foot_points(boxes))
     places[feet_cut_off(boxes, height)] = np.nan
     frames = np.array([row.frame for row in rows])
     known = np.isfinite(places).all(axis=1)

@@ -85,7 +85,11 @@ class Filmed:
             "view": {
                 "lookahead": _LOOKAHEAD,
                 "buffer_s": seconds(60.0),
-                "identity": {"forget_after": _FORGET, "recent": _FORGET - 50, "travel_frames": _FORGET},
+                "identity": {
+                    "forget_after": _FORGET,
+                    "comparable_frames": _FORGET - 50,
+                    "travel_frames": _FORGET,
+                },
             },
             "record": {
                 "folder": str(recorded),

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from bestview.association.keys import TrackKey
 from bestview.geometry.ground_plane import (
-    as_standing,
-    feet,
     feet_cut_off,
-    foot_spread,
+    foot_covariance,
+    foot_points,
     person_heights,
     to_ground,
+    upright_from_overhead,
 )
 
 
@@ -159,10 +159,10 @@ def line_up(
         edge = np.array([ordered[i].picture_height for i in rows])[:, None]
         above = np.array([keys[i].camera in overhead for i in rows])
         upright = boxes[rows]
-        upright[above] = as_standing(upright[above])
+        upright[above] = upright_from_overhead(upright[above])
         whole = np.where(feet_cut_off(upright, edge)[..., None], np.nan, upright)
-        ground[rows] = to_ground(homography, feet(whole))
-        spread[rows] = foot_spread(homography, whole, foot_error.sideways, foot_error.upwards)
+        ground[rows] = to_ground(homography, foot_points(whole))
+        spread[rows] = foot_covariance(homography, whole, foot_error.sideways, foot_error.upwards)
         heights[rows] = person_heights(homography, whole)
     return Sightings(keys, first, boxes, ground, spread, heights)
 

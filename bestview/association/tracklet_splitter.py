@@ -59,9 +59,9 @@ class Episodes:
             that it is settled to be, 0: it is not.
         """
         rows, firm = np.full(seen.visible.shape, -1), np.zeros(seen.visible.shape, dtype=np.int64)
-        crowded = seen.crowded(self._settings.crowd)
+        crowded = seen.crowded(self._settings.crowd_iou)
         # Where this is 0, a run of one frame is as good as a longer one.
-        whole = min(self._settings.crowd_frames, self._settings.gap) > 0
+        whole = min(self._settings.crowd_frames, self._settings.gap_frames) > 0
         for run in runs_of(seen.visible, crowded, whole=whole):
             key = seen.keys[run.track]
             episode, frame = self._current.get(key), seen.first + run.start
@@ -102,7 +102,7 @@ class Episodes:
             return False
         settings = self._settings
         out_of_crowd = not crowded and episode.crowd >= settings.crowd_frames and episode.free >= _ROOTED
-        return out_of_crowd or frame - episode.end.frame > settings.gap
+        return out_of_crowd or frame - episode.end.frame > settings.gap_frames
 
     def shown(self, tracks: Iterable[TrackKey], people: Collection[int]) -> list[Episode]:
         """Give what these tracks show now where it is one of these people, in the tracks' order."""
@@ -152,21 +152,21 @@ class Episodes:
         """
         settings = self._settings
         ends = np.array([episode.end.frame for episode in self.open], dtype=np.int64)
-        longest = np.argsort(ends, kind="stable")[: max(0, len(ends) - settings.most)]
-        soonest = last_frame - settings.told_after - 2 * settings.regroup
-        old = ends <= last_frame - settings.settled_after
+        longest = np.argsort(ends, kind="stable")[: max(0, len(ends) - settings.maximum_open_tracklets)]
+        soonest = last_frame - settings.publish_after - 2 * settings.clustering_interval
+        old = ends <= last_frame - settings.settle_after
         old[longest[ends[longest] <= soonest]] = True
-        over = len(ends) - int(old.sum()) - settings.most
+        over = len(ends) - int(old.sum()) - settings.maximum_open_tracklets
         if over > 0:
             # Still too many: whoever has been one person for longest stays it until the next crowd.
             sure = [it.told.get(it.number, 0) if it.number == it.mostly else 0 for it in self.open]
             surest = np.argsort(-np.where(old, 0, sure), kind="stable")[:over]
-            old[surest[np.array(sure)[surest] >= _SURE * settings.regroup]] = True
+            old[surest[np.array(sure)[surest] >= _SURE * settings.clustering_interval]] = True
         return [int(row) for row in np.flatnonzero(old)]
 
     def settle(self, old: Iterable[Episode], last_frame: int) -> None:
         """Let go of episodes, of those that go on only as rows; the rows of the others move up."""
-        oldest = last_frame - self._settings.settled_after
+        oldest = last_frame - self._settings.settle_after
         closed = {episode.key for episode in old}
         for episode in self.open:
             if episode.key in closed:

@@ -3,33 +3,33 @@
 from bestview.calibration.homography import Floats, fit_homography
 from bestview.calibration.marked_points import CalibrationError, MarkedPoints, PointSettings
 from bestview.calibration.point_fit import PointFit, fit_cameras, fit_points
-from bestview.calibration.walk import Track, Walk, cut_off, make_walk
+from bestview.calibration.walk import Walk, WalkTrack, boxes_at_edge, build_walk
 from bestview.calibration.walk_calibration import (
-    LeftOut,
-    Spread,
+    CameraCalibration,
+    ErrorSummary,
+    UncalibratedCamera,
     WalkCalibration,
-    WalkedCamera,
-    calibrate_walks,
+    calibrate_from_walks,
 )
 from bestview.calibration.walk_settings import WalkSettings
 
 __all__ = [
     "CalibrationError",
+    "CameraCalibration",
+    "ErrorSummary",
     "Floats",
-    "LeftOut",
     "MarkedPoints",
     "PointFit",
     "PointSettings",
-    "Spread",
-    "Track",
+    "UncalibratedCamera",
     "Walk",
     "WalkCalibration",
     "WalkSettings",
-    "WalkedCamera",
-    "calibrate_walks",
-    "cut_off",
+    "WalkTrack",
+    "boxes_at_edge",
+    "build_walk",
+    "calibrate_from_walks",
     "fit_cameras",
     "fit_homography",
     "fit_points",
-    "make_walk",
 ]

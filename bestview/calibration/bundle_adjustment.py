@@ -8,19 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from bestview.calibration.floor_agreement import Placed, apart, placed
+from bestview.calibration.floor_agreement import FloorPositions, project_to_floor, whitened_differences
 from bestview.calibration.homography import Floats
 from bestview.calibration.pinhole import PARAMETERS, POSE, Pinhole
 from bestview.calibration.priors import height_errors, prior_errors, robust
-from bestview.calibration.samples import Indices, Samples, moments
+from bestview.calibration.samples import Indices, WalkSamples, select_moving_samples
 from bestview.calibration.walk_settings import WalkSettings
-from bestview.geometry.ground_plane import feet
+from bestview.geometry.ground_plane import foot_points
 
 _HEIGHTS = 200
 """Boxes of each camera whose height counts."""
 _MOST_MATCHES = 600
 """Matches of two cameras that count; evenly chosen of more."""
-_NOWHERE = 20.0
+_OFF_FLOOR_ERROR = 20.0
 _SHARPEST = 0.2
 """Standard deviations are never guessed to be smaller than this share of what the settings say."""
 _OFFSET_SPREAD = 100.0
@@ -29,7 +29,7 @@ _EVALUATIONS = 12
 
 
 @dataclass(frozen=True, slots=True)
-class Matches:
+class Correspondences:
     """Moments at which two cameras see one person.
 
     Attributes:
@@ -44,7 +44,7 @@ class Matches:
     there: Indices
     weight: Floats
 
-    def thinned(self) -> Matches:
+    def thinned(self) -> Correspondences:
         """Leave out what is too much."""
         step = max(1, -(-len(self.here) // _MOST_MATCHES))
         return replace(
@@ -53,22 +53,22 @@ class Matches:
 
 
 @dataclass(frozen=True, slots=True)
-class Rig:
+class CameraRig:
     """Cameras on one floor, and the pulse at which each one's frame 0 was taken, (C,)."""
 
     cameras: tuple[Pinhole, ...]
     offsets: Floats
 
 
-def refined(
-    rig: Rig,
-    samples: Sequence[Samples],
-    matches: Sequence[Matches],
+def adjust_bundle(
+    rig: CameraRig,
+    samples: Sequence[WalkSamples],
+    matches: Sequence[Correspondences],
     settings: WalkSettings,
     *,
     sharpness: float = 1.0,
     in_step: bool = False,
-) -> Rig:
+) -> CameraRig:
     """Move the cameras and their offsets; the first one's place, direction and offset stay.
 
     Args:
@@ -88,7 +88,7 @@ def refined(
         free[count * PARAMETERS :] = False
     start = np.concatenate([given, np.zeros(count)])
     thin = [it.thinned() for it in matches]
-    boxes = [moments(it, _HEIGHTS) for it in samples]
+    boxes = [select_moving_samples(it, _HEIGHTS) for it in samples]
     tall = [
         (it.feet[chosen], it.tall[chosen], it.weight[chosen])
         for it, chosen in zip(samples, boxes, strict=True)
@@ -108,49 +108,53 @@ def refined(
     found = scipy.optimize.least_squares(errors, start[free], x_scale="jac", ftol=1e-5, max_nfev=_EVALUATIONS)
     values = start.copy()
     values[free] = found.x
-    return Rig(tuple(_cameras(rig, values)), rig.offsets + values[count * PARAMETERS :])
+    return CameraRig(tuple(_cameras(rig, values)), rig.offsets + values[count * PARAMETERS :])
 
 
-def off_floor(
-    cameras: Sequence[Pinhole], later: Floats, samples: Sequence[Samples], it: Matches, settings: WalkSettings
+def floor_residuals(
+    cameras: Sequence[Pinhole],
+    later: Floats,
+    samples: Sequence[WalkSamples],
+    it: Correspondences,
+    settings: WalkSettings,
 ) -> Floats:
     """How far apart the two cameras put each person, whitened, (M, 2); NaN where nowhere.
 
     `later` is by how many frames each camera's offset is later than the samples were taken with, (C,).
     """
 
-    def end(number: int, index: Indices) -> Placed:
+    def end_frame(number: int, index: Indices) -> FloorPositions:
         boxes = samples[number].boxes[index] - later[number] * samples[number].speed[index]
-        return placed(cameras[number], feet(boxes), boxes[:, 3] - boxes[:, 1], settings)
+        return project_to_floor(cameras[number], foot_points(boxes), boxes[:, 3] - boxes[:, 1], settings)
 
-    return apart(end(it.one, it.here), end(it.other, it.there), settings)
+    return whitened_differences(end_frame(it.one, it.here), end_frame(it.other, it.there), settings)
 
 
 def _match_errors(
     cameras: Sequence[Pinhole],
     later: Floats,
-    samples: Sequence[Samples],
-    it: Matches,
+    samples: Sequence[WalkSamples],
+    it: Correspondences,
     settings: WalkSettings,
     sharpness: float,
 ) -> Floats:
-    off = off_floor(cameras, later, samples, it, settings) * sharpness
+    off = floor_residuals(cameras, later, samples, it, settings) * sharpness
     far = np.hypot(*off.T)
     seen = np.isfinite(far)
-    far = np.where(seen, far, _NOWHERE)
-    off = np.where(seen[:, None], off, _NOWHERE)
+    far = np.where(seen, far, _OFF_FLOOR_ERROR)
+    off = np.where(seen[:, None], off, _OFF_FLOOR_ERROR)
     less = robust(far) / np.maximum(far, 1e-9)
     return np.asarray((off * (less * np.sqrt(it.weight))[:, None]).ravel())
 
 
-def _cameras(rig: Rig, values: Floats) -> list[Pinhole]:
+def _cameras(rig: CameraRig, values: Floats) -> list[Pinhole]:
     return [
         replace(camera, parameters=values[number * PARAMETERS : (number + 1) * PARAMETERS])
         for number, camera in enumerate(rig.cameras)
     ]
 
 
-def sharpness_of(off: Floats) -> float:
+def estimate_sharpness(off: Floats) -> float:
     """How much more exactly feet agree than the settings say, from whitened distances, (M, 2)."""
     typical = float(np.median(np.hypot(*off.T))) / 1.18 if len(off) else 1.0  # Rayleigh's median
     return 1.0 / min(max(typical, _SHARPEST), 1.0)

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from bestview.calibration.walk import Track, Walk
+from bestview.calibration.walk import Walk, WalkTrack
 
 
-def backwards(walk: Walk) -> Walk:
+def time_reversed(walk: Walk) -> Walk:
     """Give the same walk with time running backwards, within the same frames."""
-    return replace(walk, tracks=tuple(Track(walk.end - it.end, it.boxes[::-1]) for it in walk.tracks))
+    return replace(
+        walk, tracks=tuple(WalkTrack(walk.end_frame - it.end_frame, it.boxes[::-1]) for it in walk.tracks)
+    )
 
 
-def late(walk: Walk) -> Walk:
+def halves_swapped(walk: Walk) -> Walk:
     """Give the same walk with its second half before its first."""
-    half = walk.end // 2
+    half = walk.end_frame // 2
     parts = []
     for it in walk.tracks:
-        cut = min(max(half - it.first, 0), len(it.boxes))
-        parts += [Track(it.first + walk.end - half, it.boxes[:cut])] if cut > 1 else []
-        parts += [Track(it.first + cut - half, it.boxes[cut:])] if len(it.boxes) - cut > 1 else []
+        cut = min(max(half - it.first_frame, 0), len(it.boxes))
+        parts += [WalkTrack(it.first_frame + walk.end_frame - half, it.boxes[:cut])] if cut > 1 else []
+        parts += [WalkTrack(it.first_frame + cut - half, it.boxes[cut:])] if len(it.boxes) - cut > 1 else []
     return replace(walk, tracks=tuple(parts))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.calibration.pinhole import Pinhole
-from bestview.calibration.samples import Indices, Samples
+from bestview.calibration.samples import Indices, WalkSamples
 
 _EDGE = 0.04
 """Share of the picture at each edge where somebody may be cut off."""
@@ -16,7 +16,9 @@ _SMALL = 0.06
 """Share of the picture's height below which nobody is found for sure."""
 
 
-def shared(cameras: Sequence[Pinhole], samples: Sequence[Samples], chosen: Sequence[Indices]) -> float:
+def covisible_agreement(
+    cameras: Sequence[Pinhole], samples: Sequence[WalkSamples], chosen: Sequence[Indices]
+) -> float:
     """Give the share of what both cameras could see that they agree about, 0 to 1.
 
     Args:
@@ -27,7 +29,7 @@ def shared(cameras: Sequence[Pinhole], samples: Sequence[Samples], chosen: Seque
     shares = []
     for own, index in ((0, chosen[0]), (1, chosen[1])):
         other = 1 - own
-        within = in_view(cameras[own], samples[own], cameras[other])
+        within = fully_in_view(cameras[own], samples[own], cameras[other])
         if len(samples[other].times):
             within &= samples[own].times >= samples[other].times.min()
             within &= samples[own].times <= samples[other].times.max()
@@ -38,7 +40,7 @@ def shared(cameras: Sequence[Pinhole], samples: Sequence[Samples], chosen: Seque
     return float(np.sqrt(shares[0] * shares[1]))
 
 
-def in_view(camera: Pinhole, samples: Samples, other: Pinhole) -> NDArray[np.bool_]:
+def fully_in_view(camera: Pinhole, samples: WalkSamples, other: Pinhole) -> NDArray[np.bool_]:
     """Tell which of a camera's samples the other camera has wholly in its picture, and large enough, (S,)."""
     feet = other.picture(camera.floor(samples.feet))
     tall = other.heights(feet)

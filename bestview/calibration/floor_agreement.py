@@ -9,27 +9,27 @@ from numpy.typing import NDArray
 
 from bestview.calibration.homography import Floats
 from bestview.calibration.pinhole import Pinhole
-from bestview.calibration.samples import Meetings, Samples
+from bestview.calibration.samples import CandidateMatches, WalkSamples
 from bestview.calibration.walk_settings import WalkSettings
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class FloorPositions:
     """One camera's samples on the floor.
 
     Attributes:
-        place: where each stands, (S, 2) person heights; NaN where nowhere.
-        spread: how badly that is known: east-east, east-north and north-north covariances, (S, 3).
+        position: where each stands, (S, 2) person heights; NaN where nowhere.
+        covariance: how badly that is known: east-east, east-north and north-north covariances, (S, 3).
     """
 
-    place: Floats
-    spread: Floats
+    position: Floats
+    covariance: Floats
 
-    def moved(self, turn: float, shift: Floats) -> Placed:
+    def transformed(self, turn: float, shift: Floats) -> FloorPositions:
         """Turn about the origin (radians), then shift (2,)."""
         cos, sin = np.cos(turn), np.sin(turn)
-        east, north = self.place.T
-        ee, en, nn = self.spread.T
+        east, north = self.position.T
+        ee, en, nn = self.covariance.T
         place = np.column_stack([cos * east - sin * north, sin * east + cos * north]) + shift
         spread = np.column_stack(
             [
@@ -38,10 +38,10 @@ class Placed:
                 sin * sin * ee + 2 * cos * sin * en + cos * cos * nn,
             ]
         )
-        return Placed(place, spread)
+        return FloorPositions(place, spread)
 
 
-def placed(camera: Pinhole, feet: Floats, tall: Floats, settings: WalkSettings) -> Placed:
+def project_to_floor(camera: Pinhole, feet: Floats, tall: Floats, settings: WalkSettings) -> FloorPositions:
     """Put feet (S, 2) of boxes so tall (S,) on the floor."""
     place, steps = camera.floor_and_steps(feet)
     across = steps[..., 0] * (settings.foot_sideways * tall)[:, None]
@@ -53,13 +53,13 @@ def placed(camera: Pinhole, feet: Floats, tall: Floats, settings: WalkSettings) 
             across[:, 1] ** 2 + along[:, 1] ** 2,
         ]
     )
-    return Placed(place, spread)
+    return FloorPositions(place, spread)
 
 
-def apart(one: Placed, other: Placed, settings: WalkSettings) -> Floats:
+def whitened_differences(one: FloorPositions, other: FloorPositions, settings: WalkSettings) -> Floats:
     """How far apart places are, whitened: (P, 2), whose length is in standard deviations; NaN if nowhere."""
-    far = one.place - other.place
-    ee, en, nn = (one.spread + other.spread).T
+    far = one.position - other.position
+    ee, en, nn = (one.covariance + other.covariance).T
     ee, nn = ee + settings.foot_floor**2, nn + settings.foot_floor**2
     # Cholesky: with L Lᵀ the covariance, L⁻¹ of the distance.
     first = np.sqrt(ee)
@@ -69,19 +69,19 @@ def apart(one: Placed, other: Placed, settings: WalkSettings) -> Floats:
     return np.column_stack([x, (far[:, 1] - below * x) / second])
 
 
-def taken(placed_: Placed, index: NDArray[np.intp]) -> Placed:
+def select_positions(placed_: FloorPositions, index: NDArray[np.intp]) -> FloorPositions:
     """Give some of the samples, in another order or repeated."""
-    return Placed(placed_.place[index], placed_.spread[index])
+    return FloorPositions(placed_.position[index], placed_.covariance[index])
 
 
-def tally(off: Floats, meeting: Meetings, gate: float) -> Floats:
+def pair_agreement(off: Floats, meeting: CandidateMatches, gate: float) -> Floats:
     """Count places at which each pair of tracks agrees, less those at which not: (P, 2) -> (K,)."""
     near = 1.0 - (off**2).sum(axis=1) / gate**2
     counted = np.clip(np.nan_to_num(near, nan=-1.0), -1.0, 1.0) * meeting.weight
     return np.asarray(np.bincount(meeting.pair, counted, len(meeting.tracks)))
 
 
-def score(places: Floats, meeting: Meetings) -> float:
+def total_agreement(places: Floats, meeting: CandidateMatches) -> float:
     """Count places at which the cameras agree on the whole; each track has one partner."""
     agree = np.maximum(places, 0.0)
     totals = []
@@ -92,8 +92,8 @@ def score(places: Floats, meeting: Meetings) -> float:
     return min(totals)
 
 
-def matched(
-    off: Floats, places: Floats, one: Samples, other: Samples, meeting: Meetings, gate: float
+def mutual_matches(
+    off: Floats, places: Floats, one: WalkSamples, other: WalkSamples, meeting: CandidateMatches, gate: float
 ) -> NDArray[np.intp]:
     """Choose who is one person: (M,) indices of meetings, one to one at each pulse.
 

@@ -31,27 +31,27 @@ def fit_homography(source: Floats, target: Floats) -> Floats:
     """
     if len(source) < LEAST_POINTS:
         raise ValueError(f"{len(source)} points: a homography takes {LEAST_POINTS}")
-    to_source, from_target = _normaliser(source), _normaliser(target)
+    to_source, from_target = _normalizer(source), _normalizer(target)
     x, y = _apply(to_source, source), _apply(from_target, target)
     # Without the left vectors that are not used: all of them would be a square of twice the points.
     _, sizes, rows = np.linalg.svd(_equations(x, y), full_matrices=False)
     if not sizes[7] > _LEAST_RANK * sizes[0]:
         raise ValueError("the points, or all but one of them, are on a line")
-    found = _bettered(rows[-1].reshape(3, 3), x, y)
+    found = _gauss_newton(rows[-1].reshape(3, 3), x, y)
     found = np.linalg.inv(from_target) @ found @ to_source
     size = np.abs(found).max()
     last = found[2, 2]
     return np.asarray(found / (last if abs(last) > 1e-9 * size else size))
 
 
-def mapped(homography: Floats, points: Floats) -> Floats:
+def apply_homography(homography: Floats, points: Floats) -> Floats:
     """Take points through a homography: (..., 2) -> (..., 2); no horizon is looked for."""
     through = points @ homography[:, :2].T + homography[:, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(through[..., :2] / through[..., 2:])
 
 
-def _normaliser(points: Floats) -> Floats:
+def _normalizer(points: Floats) -> Floats:
     """Give the similarity that moves the points around 0 at a mean distance of the square root of 2."""
     middle = points.mean(axis=0)
     far = float(np.hypot(*(points - middle).T).mean())
@@ -75,7 +75,7 @@ def _equations(x: Floats, y: Floats) -> Floats:
     return np.concatenate([equations, np.zeros((max(0, 9 - len(equations)), 9))])
 
 
-def _bettered(homography: Floats, x: Floats, y: Floats) -> Floats:
+def _gauss_newton(homography: Floats, x: Floats, y: Floats) -> Floats:
     """Take Gauss and Newton's steps, as long as they better the error at the target."""
     best = homography / np.linalg.norm(homography)
     least = _error(best, x, y)
@@ -84,7 +84,7 @@ def _bettered(homography: Floats, x: Floats, y: Floats) -> Floats:
         if not (np.abs(w) > _STILL).all():
             return best
         ones = np.column_stack([x, np.ones(len(x))]) / w
-        none, at = np.zeros_like(ones), mapped(best, x)
+        none, at = np.zeros_like(ones), apply_homography(best, x)
         slopes = np.concatenate(
             [
                 np.column_stack([ones, none, -at[:, :1] * ones]),
@@ -105,4 +105,4 @@ def _bettered(homography: Floats, x: Floats, y: Floats) -> Floats:
 
 
 def _error(homography: Floats, x: Floats, y: Floats) -> float:
-    return float(((mapped(homography, x) - y) ** 2).sum())
+    return float(((apply_homography(homography, x) - y) ** 2).sum())

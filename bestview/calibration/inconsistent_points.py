@@ -8,7 +8,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.calibration.homography import LEAST_POINTS, Floats, fit_homography, mapped
+from bestview.calibration.homography import LEAST_POINTS, Floats, apply_homography, fit_homography
 from bestview.calibration.marked_points import MarkedPoints, PointSettings
 
 _LEAST_TO_BLAME = 6
@@ -18,26 +18,31 @@ _MOST_TRIALS = 500
 _SEED = 1
 
 
-def distances(backwards: Floats, points: MarkedPoints) -> Floats:
+def image_errors(backwards: Floats, points: MarkedPoints) -> Floats:
     """How far each floor point is from its place in the picture, (N,); infinite where it is nowhere."""
-    off = mapped(backwards, points.floor) - points.image
+    off = apply_homography(backwards, points.floor) - points.image
     return np.asarray(np.nan_to_num(np.hypot(*off.T), nan=np.inf))
 
 
-def contradiction(points: MarkedPoints, errors: Floats, allowed: float, settings: PointSettings) -> str:
+def describe_inconsistency(
+    points: MarkedPoints, errors: Floats, allowed: float, settings: PointSettings
+) -> str:
     """Say which pairs are wrong, if that can be told."""
     count = len(points.image)
-    fits = _largest_agreement(points, allowed) if count >= _LEAST_TO_BLAME else np.ones(count, dtype=bool)
+    fits = _consensus(points, allowed) if count >= _LEAST_TO_BLAME else np.ones(count, dtype=bool)
     wrong = np.flatnonzero(~fits)
-    if not 0 < len(wrong) <= settings.wrong * count or count - len(wrong) <= LEAST_POINTS:
+    if (
+        not 0 < len(wrong) <= settings.maximum_inconsistent_share * count
+        or count - len(wrong) <= LEAST_POINTS
+    ):
         return (
             f"camera {points.camera}: the pairs contradict each other, by up to {errors.max():.0f} pixels; "
             f"check them all, or add more ({_LEAST_TO_BLAME} at least), so that the wrong ones can be told"
         )
     backwards = fit_homography(points.floor[fits], points.image[fits])
-    off = distances(backwards, points)
+    off = image_errors(backwards, points)
     named = ", ".join(
-        f"{number + 1} (image {_place(points.image[number])}, floor {_place(points.floor[number])})"
+        f"{number + 1} (image {_point_text(points.image[number])}, floor {_point_text(points.floor[number])})"
         for number in wrong
     )
     one = len(wrong) == 1
@@ -49,13 +54,13 @@ def contradiction(points: MarkedPoints, errors: Floats, allowed: float, settings
     )
 
 
-def _largest_agreement(points: MarkedPoints, allowed: float) -> NDArray[np.bool_]:
+def _consensus(points: MarkedPoints, allowed: float) -> NDArray[np.bool_]:
     """Give which pairs the best homography through four of them agrees with, (N,)."""
     count = len(points.image)
     best, best_score = np.ones(count, dtype=bool), (0, 0.0)
-    for four in _fours(count):
+    for four in _point_quadruples(count):
         try:
-            errors = distances(fit_homography(points.floor[four], points.image[four]), points)
+            errors = image_errors(fit_homography(points.floor[four], points.image[four]), points)
         except (ValueError, np.linalg.LinAlgError):
             continue
         near = errors <= allowed
@@ -65,7 +70,7 @@ def _largest_agreement(points: MarkedPoints, allowed: float) -> NDArray[np.bool_
     return np.asarray(best)
 
 
-def _fours(count: int) -> list[list[int]]:
+def _point_quadruples(count: int) -> list[list[int]]:
     """All fours of so many, or some of them where they are too many."""
     if comb(count, LEAST_POINTS) <= _MOST_TRIALS:
         return [list(four) for four in combinations(range(count), LEAST_POINTS)]
@@ -73,5 +78,5 @@ def _fours(count: int) -> list[list[int]]:
     return [random.choice(count, LEAST_POINTS, replace=False).tolist() for _ in range(_MOST_TRIALS)]
 
 
-def _place(point: Floats) -> str:
+def _point_text(point: Floats) -> str:
     return f"{point[0]:g} {point[1]:g}"

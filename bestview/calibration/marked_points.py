@@ -22,11 +22,11 @@ class PointSettings:
     # How far a pair may be off in the picture, as a share of how far the camera's points are spread there.
     tolerance: float = 0.02
     # The most pairs that may be named as wrong, as a share; where more would have to be, all are doubtful.
-    wrong: float = 0.34
+    maximum_inconsistent_share: float = 0.34
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        if not 0 < self.tolerance < 1 or not 0 <= self.wrong < 1:
+        if not 0 < self.tolerance < 1 or not 0 <= self.maximum_inconsistent_share < 1:
             raise ValueError("point settings: tolerance and wrong are shares, above 0 and below 1")
 
 

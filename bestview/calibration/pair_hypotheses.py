@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bestview.calibration.floor_agreement import Placed
+from bestview.calibration.floor_agreement import FloorPositions
 from bestview.calibration.homography import Floats
-from bestview.calibration.samples import Meetings
+from bestview.calibration.samples import CandidateMatches
 
 _LEAST_MOMENTS = 5
 _LEAST_SPREAD = 0.3
@@ -22,7 +22,7 @@ _NOISE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Guess:
+class RelativePose:
     """The one camera's floor is turned (radians) and then shifted, (2,), onto the other's.
 
     `here` and `there` say which of the views that the cameras may have was taken.
@@ -32,25 +32,29 @@ class Guess:
     here: int
     there: int
     turn: float
-    shift: Floats
+    maximum_offset: Floats
 
 
-def guesses(here: Sequence[Placed], there: Sequence[Placed], meeting: Meetings, most: int) -> list[Guess]:
+def propose_relative_poses(
+    here: Sequence[FloorPositions], there: Sequence[FloorPositions], meeting: CandidateMatches, most: int
+) -> list[RelativePose]:
     """Give the best guesses, best first, for each way in which the two cameras may look down."""
     found = [
         guess
         for a, one in enumerate(here)
         for b, other in enumerate(there)
-        for guess in _guesses(a, one, b, other, meeting)
+        for guess in _poses_of_views(a, one, b, other, meeting)
     ]
     found.sort(key=lambda it: -it.merit)
     return found[:most]
 
 
-def _guesses(a: int, one: Placed, b: int, other: Placed, meeting: Meetings) -> list[Guess]:
+def _poses_of_views(
+    a: int, one: FloorPositions, b: int, other: FloorPositions, meeting: CandidateMatches
+) -> list[RelativePose]:
     """Lay one pair of tracks after another on top of each other, all at once in complex numbers."""
-    x = one.place[meeting.here] @ np.array([1, 1j])
-    y = other.place[meeting.there] @ np.array([1, 1j])
+    x = one.position[meeting.here] @ np.array([1, 1j])
+    y = other.position[meeting.there] @ np.array([1, 1j])
     weight = np.where(np.isfinite(x) & np.isfinite(y), meeting.weight, 0.0)
     x, y = np.nan_to_num(x), np.nan_to_num(y)
     size = len(meeting.tracks)
@@ -76,6 +80,6 @@ def _guesses(a: int, one: Placed, b: int, other: Placed, meeting: Meetings) -> l
     turn = np.angle(together)
     shift = y_mean - x_mean * np.exp(1j * turn)
     return [
-        Guess(float(merit[k]), a, b, float(turn[k]), np.array([shift[k].real, shift[k].imag]))
+        RelativePose(float(merit[k]), a, b, float(turn[k]), np.array([shift[k].real, shift[k].imag]))
         for k in np.flatnonzero(merit > 0)
     ]

@@ -14,7 +14,7 @@ import numpy as np
 from bestview.calibration.homography import Floats
 
 PARAMETERS = 8
-FOCAL, ASPECT, TILT, ROLL, HIGH, PAN, EAST, NORTH = range(PARAMETERS)
+FOCAL, ASPECT, TILT, ROLL, CAMERA_HEIGHT, PAN, EAST, NORTH = range(PARAMETERS)
 """Places in the array of parameters: log of the focal length in picture widths, log of how much taller than
 wide a pixel's picture is, angles of the optical axis below the horizon and about itself, log of the height
 above the floor, direction on the floor, and position there (person heights, radians)."""
@@ -101,7 +101,7 @@ class Pinhole:
     def _projection(self) -> Floats:
         """The (3, 4) matrix from the world to pixels."""
         axes, (focal_x, focal_y) = self._axes(), self._focal()
-        east, north, high = self.parameters[[EAST, NORTH, HIGH]].tolist()
+        east, north, high = self.parameters[[EAST, NORTH, CAMERA_HEIGHT]].tolist()
         shift = -axes @ np.array([east, north, exp(high)])
         width, height = self.size
         lens = np.array([[focal_x, 0, width / 2], [0, focal_y, height / 2], [0, 0, 1]])

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bestview.calibration.homography import LEAST_POINTS, Floats, fit_homography
-from bestview.calibration.inconsistent_points import contradiction, distances
+from bestview.calibration.inconsistent_points import describe_inconsistency, image_errors
 from bestview.calibration.marked_points import CalibrationError, MarkedPoints, PointSettings
-from bestview.geometry.ground_plane import checked_homography, to_ground
+from bestview.geometry.ground_plane import to_ground, validate_homography
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +37,13 @@ def fit_points(points: MarkedPoints, settings: PointSettings | None = None) -> P
     """
     settings = settings or PointSettings()
     _check(points)
-    backwards = _fitted(points.floor, points.image, points.camera)
-    errors = distances(backwards, points)
-    allowed = settings.tolerance * _spread(points.image)
+    backwards = _fit(points.floor, points.image, points.camera)
+    errors = image_errors(backwards, points)
+    allowed = settings.tolerance * _summarize(points.image)
     if errors.max() > allowed:
-        raise CalibrationError(contradiction(points, errors, allowed, settings))
+        raise CalibrationError(describe_inconsistency(points, errors, allowed, settings))
     try:
-        homography = checked_homography(np.linalg.inv(backwards), f"camera {points.camera}")
+        homography = validate_homography(np.linalg.inv(backwards), f"camera {points.camera}")
     except (ValueError, np.linalg.LinAlgError):
         raise CalibrationError(_on_a_line(points.camera)) from None
     homography = homography / np.abs(homography).max()
@@ -107,7 +107,7 @@ def _check(points: MarkedPoints) -> None:
                 )
 
 
-def _fitted(source: Floats, target: Floats, camera: str) -> Floats:
+def _fit(source: Floats, target: Floats, camera: str) -> Floats:
     try:
         return fit_homography(source, target)
     except (ValueError, np.linalg.LinAlgError):
@@ -118,6 +118,6 @@ def _on_a_line(camera: str) -> str:
     return f"camera {camera}: the points, or all but one of them, are on a line; mark some beside it"
 
 
-def _spread(image: Floats) -> float:
+def _summarize(image: Floats) -> float:
     """The diagonal of the points' bounding box."""
     return float(np.hypot(*np.ptp(image, axis=0)))

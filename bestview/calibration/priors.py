@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from bestview.calibration.homography import Floats
-from bestview.calibration.pinhole import ASPECT, FOCAL, HIGH, ROLL, Pinhole
+from bestview.calibration.pinhole import ASPECT, CAMERA_HEIGHT, FOCAL, ROLL, Pinhole
 from bestview.calibration.walk_settings import WalkSettings
 
-_NOWHERE = 3.0
+_OFF_FLOOR_ERROR = 3.0
 """The error, as a logarithm, of the height of somebody who stands above the horizon."""
 _MOST_HEIGHTS = 60.0
 """Heights count as this many independent ones at most: who is tall is tall all the time."""
@@ -22,7 +22,7 @@ def prior_errors(camera: Pinhole, settings: WalkSettings) -> Floats:
             (given[FOCAL] - np.log(settings.focal)) / settings.focal_spread,
             given[ASPECT] / settings.aspect_spread,
             given[ROLL] / settings.roll_spread,
-            (given[HIGH] - np.log(settings.high)) / settings.high_spread,
+            (given[CAMERA_HEIGHT] - np.log(settings.camera_height)) / settings.camera_height_spread,
         ]
     )
 
@@ -33,7 +33,7 @@ def height_errors(
     """How much taller or smaller people are than the camera says, (N,) standard deviations, robust."""
     with np.errstate(invalid="ignore", divide="ignore"):
         off = np.log(camera.heights(feet) / tall)
-    off = np.where(np.isfinite(off), off, _NOWHERE) / settings.height
+    off = np.where(np.isfinite(off), off, _OFF_FLOOR_ERROR) / settings.person_height_spread
     share = weight * min(1.0, _MOST_HEIGHTS / max(float(weight.sum()), 1e-9))
     return np.asarray(robust(off) * np.sqrt(share))
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bestview.calibration.homography import Floats
 from bestview.calibration.walk import Walk
-from bestview.geometry.ground_plane import feet
+from bestview.geometry.ground_plane import foot_points
 
 Indices = NDArray[np.intp]
 
@@ -18,7 +18,7 @@ LEAST_WEIGHT = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Samples:
+class WalkSamples:
     """One camera's boxes at some pulses.
 
     Attributes:
@@ -38,7 +38,7 @@ class Samples:
     @property
     def feet(self) -> Floats:
         """Where they stand, (S, 2) pixels."""
-        return feet(self.boxes)
+        return foot_points(self.boxes)
 
     @property
     def tall(self) -> Floats:
@@ -46,7 +46,7 @@ class Samples:
         return np.asarray(self.boxes[:, 3] - self.boxes[:, 1])
 
 
-def sample(walk: Walk, pulses: Floats, offset: float, step: int, stride: float) -> Samples:
+def sample_walk(walk: Walk, pulses: Floats, offset: float, step: int, stride: float) -> WalkSamples:
     """Look at a walk at some pulses.
 
     Args:
@@ -59,22 +59,26 @@ def sample(walk: Walk, pulses: Floats, offset: float, step: int, stride: float) 
     times, track, boxes, speed = [np.empty(0)], [np.empty(0, np.intp)], [np.empty((0, 4))], [np.empty((0, 4))]
     for number, it in enumerate(walk.tracks):
         at = pulses[
-            np.searchsorted(pulses, it.first + offset) : np.searchsorted(pulses, it.end - 1 + offset, "right")
+            np.searchsorted(pulses, it.first_frame + offset) : np.searchsorted(
+                pulses, it.end_frame - 1 + offset, "right"
+            )
         ]
-        before, after = (np.clip(at - offset + way, it.first, it.end - 1) for way in (-step, step))
+        before, after = (
+            np.clip(at - offset + way, it.first_frame, it.end_frame - 1) for way in (-step, step)
+        )
         times.append(at)
         track.append(np.full(len(at), number))
         boxes.append(it.at(at - offset))
         speed.append((it.at(after) - it.at(before)) / np.maximum(after - before, 1e-9)[:, None])
     joined = np.concatenate(boxes)
     rate = np.concatenate(speed)
-    moved = np.hypot(*feet(rate).T) * step / np.maximum(joined[:, 3] - joined[:, 1], 1e-9)
+    moved = np.hypot(*foot_points(rate).T) * step / np.maximum(joined[:, 3] - joined[:, 1], 1e-9)
     weight = np.clip(moved / stride, LEAST_WEIGHT, 1.0)
-    return Samples(np.concatenate(times), np.concatenate(track), joined, rate, weight)
+    return WalkSamples(np.concatenate(times), np.concatenate(track), joined, rate, weight)
 
 
 @dataclass(frozen=True, slots=True)
-class Meetings:
+class CandidateMatches:
     """All ways in which two cameras' samples of one pulse may be one person.
 
     Attributes:
@@ -92,7 +96,7 @@ class Meetings:
     weight: Floats
 
 
-def meetings(one: Samples, other: Samples) -> Meetings:
+def candidate_matches(one: WalkSamples, other: WalkSamples) -> CandidateMatches:
     """Pair everybody in the one camera with everybody in the other at the same pulse."""
     order = np.argsort(other.times, kind="stable")
     sorted_times = other.times[order]
@@ -104,10 +108,10 @@ def meetings(one: Samples, other: Samples) -> Meetings:
     both = np.column_stack([one.track[here], other.track[there]])
     tracks, pair = np.unique(both, axis=0, return_inverse=True)
     weight = np.maximum(one.weight[here], other.weight[there])
-    return Meetings(here, there, pair.reshape(-1), tracks.reshape(-1, 2), weight)
+    return CandidateMatches(here, there, pair.reshape(-1), tracks.reshape(-1, 2), weight)
 
 
-def moments(samples: Samples, most: int) -> Indices:
+def select_moving_samples(samples: WalkSamples, most: int) -> Indices:
     """Choose samples of people who walk, evenly, (N,) indices; of all, where hardly anybody does."""
     walking = np.flatnonzero(samples.weight >= _WALKING)
     if len(walking) < _FEW:

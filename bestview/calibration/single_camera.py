@@ -6,30 +6,32 @@ import numpy as np
 import scipy
 
 from bestview.calibration.homography import Floats
-from bestview.calibration.pinhole import FOCAL, HIGH, PARAMETERS, TILT, VIEW, Pinhole
+from bestview.calibration.pinhole import CAMERA_HEIGHT, FOCAL, PARAMETERS, TILT, VIEW, Pinhole
 from bestview.calibration.priors import height_errors, prior_errors
-from bestview.calibration.samples import Samples, moments
+from bestview.calibration.samples import WalkSamples, select_moving_samples
 from bestview.calibration.walk_settings import WalkSettings
 
 _TILTS = (0.1, 0.35, 0.8)
-_HIGH = 1.7
+_START_HEIGHT = 1.7
 _MOMENTS = 600
 _FIXED = 0.01
 """Spread of the focal length where it is given."""
 
 
-def view_of(samples: Samples, size: tuple[int, int], focal: float, settings: WalkSettings) -> Pinhole:
+def fit_tilt_and_height(
+    samples: WalkSamples, size: tuple[int, int], focal: float, settings: WalkSettings
+) -> Pinhole:
     """Fit a camera of a given focal length (picture widths) to the heights of people, at the origin.
 
     On a flat floor people of one height are as tall in the picture as they are near: where they would vanish
     is the horizon, and how fast they grow towards the camera says how high it hangs.
     """
-    chosen = moments(samples, _MOMENTS)
+    chosen = select_moving_samples(samples, _MOMENTS)
     feet, tall, weight = samples.feet[chosen], samples.tall[chosen], samples.weight[chosen]
     best, least = None, np.inf
     for tilt in _TILTS:
         start = np.zeros(PARAMETERS)
-        start[[FOCAL, TILT, HIGH]] = np.log(focal), tilt, np.log(_HIGH)
+        start[[FOCAL, TILT, CAMERA_HEIGHT]] = np.log(focal), tilt, np.log(_START_HEIGHT)
 
         def errors(view: Floats, start: Floats = start) -> Floats:
             camera = Pinhole(np.concatenate([view, start[VIEW.stop :]]), size)

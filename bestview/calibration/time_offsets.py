@@ -6,17 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bestview.calibration.bundle_adjustment import Matches, Rig, off_floor
+from bestview.calibration.bundle_adjustment import CameraRig, Correspondences, floor_residuals
 from bestview.calibration.homography import Floats
-from bestview.calibration.samples import Samples
+from bestview.calibration.samples import WalkSamples
 from bestview.calibration.walk_settings import WalkSettings
 
 _PARTS = 8
 _TINY = 1e-6
 
 
-def offset_errors(
-    rig: Rig, samples: Sequence[Samples], matches: Sequence[Matches], settings: WalkSettings
+def offset_standard_errors(
+    rig: CameraRig, samples: Sequence[WalkSamples], matches: Sequence[Correspondences], settings: WalkSettings
 ) -> Floats:
     """Give the standard error of each camera's offset, (C,) frames; 0 of the first, which is the reference.
 
@@ -31,12 +31,12 @@ def offset_errors(
     towards = np.zeros((_PARTS, count))
     for it in matches:
         still = np.zeros(count)
-        off = off_floor(rig.cameras, still, samples, it, settings)
+        off = floor_residuals(rig.cameras, still, samples, it, settings)
         slope = np.zeros((len(off), 2, count))
         for camera in (it.one, it.other):
             later = still.copy()
             later[camera] = 1.0
-            slope[:, :, camera] = off_floor(rig.cameras, later, samples, it, settings) - off
+            slope[:, :, camera] = floor_residuals(rig.cameras, later, samples, it, settings) - off
         weight = it.weight / (1.0 + (off**2).sum(axis=1))
         weight = np.where(np.isfinite(off).all(axis=1) & np.isfinite(slope).all(axis=(1, 2)), weight, 0.0)
         part = (_PARTS * (samples[it.one].times[it.here] - start) / (end - start)).astype(int)

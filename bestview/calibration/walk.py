@@ -11,25 +11,25 @@ from bestview.calibration.homography import Floats
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class WalkTrack:
     """Somebody's boxes in successive frames.
 
     Attributes:
-        first: the frame of the first box.
+        first_frame: the frame of the first box.
         boxes: left, top, right, bottom in pixels, (F, 4); NaN where unseen or of no use.
     """
 
-    first: int
+    first_frame: int
     boxes: Floats
 
     @property
-    def end(self) -> int:
+    def end_frame(self) -> int:
         """The frame after the last."""
-        return self.first + len(self.boxes)
+        return self.first_frame + len(self.boxes)
 
     def at(self, times: Floats) -> Floats:
         """Give the boxes at times that may lie between frames: (N,) -> (N, 4), NaN where there is none."""
-        place = np.asarray(times, dtype=np.float64) - self.first
+        place = np.asarray(times, dtype=np.float64) - self.first_frame
         inside = (place >= 0) & (place <= len(self.boxes) - 1)
         low = np.clip(np.floor(place), 0, len(self.boxes) - 1).astype(np.intp)
         high = np.minimum(low + 1, len(self.boxes) - 1)
@@ -53,15 +53,15 @@ class Walk:
 
     camera: str
     size: tuple[int, int]
-    tracks: tuple[Track, ...]
+    tracks: tuple[WalkTrack, ...]
 
     @property
-    def end(self) -> int:
+    def end_frame(self) -> int:
         """The frame after the last one in which somebody was seen."""
-        return max((it.end for it in self.tracks), default=0)
+        return max((it.end_frame for it in self.tracks), default=0)
 
 
-def make_walk(
+def build_walk(
     camera: str,
     size: tuple[int, int],
     frames: Sequence[int],
@@ -83,7 +83,7 @@ def make_walk(
             the middle of a track; the boxes between are drawn straight.
     """
     at, who = np.asarray(frames, dtype=np.intp), np.asarray(ids, dtype=np.intp)
-    whole = ~cut_off(boxes, size)
+    whole = ~boxes_at_edge(boxes, size)
     tracks = []
     for number in np.unique(who):
         mine = np.flatnonzero((who == number) & whole)
@@ -91,10 +91,10 @@ def make_walk(
         # A gap that is long parts a track in two: who was hidden long may have come back as somebody else.
         parts = np.split(mine, np.flatnonzero(np.diff(at[mine]) > step) + 1)
         tracks += [_track(at[part], boxes[part], step) for part in parts if len(part) > 1]
-    return Walk(camera, size, tuple(sorted(tracks, key=lambda it: (it.first, it.end))))
+    return Walk(camera, size, tuple(sorted(tracks, key=lambda it: (it.first_frame, it.end_frame))))
 
 
-def cut_off(boxes: Floats, size: tuple[int, int]) -> np.ndarray:
+def boxes_at_edge(boxes: Floats, size: tuple[int, int]) -> np.ndarray:
     """Tell which boxes reach the picture's edge, where neither foot nor height nor middle is known.
 
     (N, 4) pixels of a picture of width and height -> (N,).
@@ -107,13 +107,13 @@ def cut_off(boxes: Floats, size: tuple[int, int]) -> np.ndarray:
     )
 
 
-def _track(frames: np.ndarray, boxes: Floats, step: int) -> Track:
+def _track(frames: np.ndarray, boxes: Floats, step: int) -> WalkTrack:
     every = np.arange(frames[0], frames[-1] + 1)
     filled = np.column_stack([np.interp(every, frames, side) for side in boxes.T])
-    return Track(int(frames[0]), _smoothed(filled, step // 2))
+    return WalkTrack(int(frames[0]), _moving_average(filled, step // 2))
 
 
-def _smoothed(boxes: Floats, half: int) -> Floats:
+def _moving_average(boxes: Floats, half: int) -> Floats:
     """Average over `half` frames before and after, over fewer at the ends."""
     sums = np.concatenate([np.zeros((1, 4)), boxes.cumsum(axis=0)])
     index = np.arange(len(boxes))

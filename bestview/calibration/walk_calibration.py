@@ -7,28 +7,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bestview.calibration.bundle_adjustment import Matches
-from bestview.calibration.camera_groups import Group, PairOf, group_up, pairs_of
+from bestview.calibration.bundle_adjustment import Correspondences
+from bestview.calibration.camera_groups import CameraGroup, CameraPair, align_camera_pairs, group_cameras
 from bestview.calibration.homography import Floats
 from bestview.calibration.marked_points import CalibrationError
-from bestview.calibration.time_offsets import offset_errors
+from bestview.calibration.time_offsets import offset_standard_errors
 from bestview.calibration.walk import Walk
 from bestview.calibration.walk_settings import WalkSettings
 
-_APART = 100.0
+_FLOOR_DISTANCE = 100.0
 """Person heights between floors that no camera connects: further than anybody is mistaken by."""
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class ErrorSummary:
     """The middle and the ninth decile of some errors."""
 
     median: float
-    most: float
+    ninth_decile: float
 
 
 @dataclass(frozen=True, slots=True)
-class WalkedCamera:
+class CameraCalibration:
     """A camera that has been calibrated.
 
     Attributes:
@@ -38,11 +38,11 @@ class WalkedCamera:
         offset: the pulse at which its frame 0 was taken, frames, against the first camera of its floor.
         offset_error: the standard error of the offset, frames.
         image: feet that another camera saw too, (N, 2) pixels.
-        place: where the two cameras have them in the middle, (N, 2) on the floor.
+        position: where the two cameras have them in the middle, (N, 2) on the floor.
         heights: how far apart the two have them on the floor, in person heights.
         picture: how far off the other's place is in this picture, as a share of its diagonal.
         thirds: what share of these feet was in the left, middle and right third of the picture, (3,).
-        deep: how many times as tall the nearest of them appear as the farthest.
+        depth_ratio: how many times as tall the nearest of them appear as the farthest.
     """
 
     camera: str
@@ -51,19 +51,19 @@ class WalkedCamera:
     offset: float
     offset_error: float
     image: Floats
-    place: Floats
-    heights: Spread
-    picture: Spread
+    position: Floats
+    heights: ErrorSummary
+    picture: ErrorSummary
     thirds: tuple[float, float, float]
-    deep: float
+    depth_ratio: float
 
 
 @dataclass(frozen=True, slots=True)
-class LeftOut:
+class UncalibratedCamera:
     """A camera that has no place on a floor, and why."""
 
     camera: str
-    why: str
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,18 +72,18 @@ class WalkCalibration:
 
     Attributes:
         cameras: who could be placed, in the order given.
-        left_out: who not.
+        uncalibrated: who not.
         heights: how far apart two cameras have the same feet on the floor, in person heights, over all.
         picture: the same in the pictures, as a share of the diagonal.
     """
 
-    cameras: tuple[WalkedCamera, ...]
-    left_out: tuple[LeftOut, ...]
-    heights: Spread
-    picture: Spread
+    cameras: tuple[CameraCalibration, ...]
+    uncalibrated: tuple[UncalibratedCamera, ...]
+    heights: ErrorSummary
+    picture: ErrorSummary
 
 
-def calibrate_walks(
+def calibrate_from_walks(
     walks: Sequence[Walk], settings: WalkSettings | None = None, person: float = 1.75
 ) -> WalkCalibration:
     """Lay cameras on one floor from what they saw of people who walked about while all of them ran.
@@ -99,42 +99,42 @@ def calibrate_walks(
     settings = settings or WalkSettings()
     if len(walks) < 2:  # noqa: PLR2004 — two cameras
         raise CalibrationError("a walk takes two cameras at least, which see the same floor")
-    pairs = pairs_of(walks, settings)
-    groups = group_up(walks, pairs, settings)
+    pairs = align_camera_pairs(walks, settings)
+    groups = group_cameras(walks, pairs, settings)
     if not groups:
-        raise CalibrationError(_why(walks, max(pairs, key=_hope), settings))
+        raise CalibrationError(_rejection_text(walks, max(pairs, key=_alignment_merit), settings))
     grouped = {number for group in groups for number in group.members}
     left_out = []
     for number in sorted(set(range(len(walks))) - grouped):
-        best = max((it for it in pairs if number in (it.one, it.other)), key=_hope)
-        left_out.append(LeftOut(walks[number].camera, _why(walks, best, settings)))
-    unsure = [offset_errors(it.rig, it.samples, it.matches, settings) for it in groups]
+        best = max((it for it in pairs if number in (it.one, it.other)), key=_alignment_merit)
+        left_out.append(UncalibratedCamera(walks[number].camera, _rejection_text(walks, best, settings)))
+    unsure = [offset_standard_errors(it.rig, it.samples, it.matches, settings) for it in groups]
     found = [
         _camera(walks[number].camera, floor, group, place, errors, person)
         for floor, (group, errors) in enumerate(zip(groups, unsure, strict=True))
         for place, number in enumerate(group.members)
     ]
     order = {walk.camera: number for number, walk in enumerate(walks)}
-    off = [_off(group, it, it.other) for group in groups for it in group.matches]
+    off = [_correspondence_errors(group, it, it.other) for group in groups for it in group.matches]
     return WalkCalibration(
         tuple(sorted(found, key=lambda it: order[it.camera])),
         tuple(left_out),
-        _spread([it.heights for it in off]),
-        _spread([it.picture for it in off]),
+        _summarize([it.heights for it in off]),
+        _summarize([it.picture for it in off]),
     )
 
 
 @dataclass(frozen=True, slots=True)
-class _Off:
+class _CorrespondenceErrors:
     """Errors of one camera's matches with another, (M,) each, and where they are."""
 
     heights: Floats
     picture: Floats
     image: Floats
-    place: Floats
+    position: Floats
 
 
-def _off(group: Group, it: Matches, own: int) -> _Off:
+def _correspondence_errors(group: CameraGroup, it: Correspondences, own: int) -> _CorrespondenceErrors:
     """Give how far one of the two cameras of some matches is off."""
     index, across, there = (it.here, it.other, it.there) if own == it.one else (it.there, it.one, it.here)
     camera = group.rig.cameras[own]
@@ -142,49 +142,51 @@ def _off(group: Group, it: Matches, own: int) -> _Off:
     mine = camera.floor(image)
     other = group.rig.cameras[across].floor(group.samples[across].feet[there])
     aside = np.hypot(*(camera.picture(other) - image).T) / np.hypot(*camera.size)
-    return _Off(np.hypot(*(mine - other).T), aside, image, (mine + other) / 2)
+    return _CorrespondenceErrors(np.hypot(*(mine - other).T), aside, image, (mine + other) / 2)
 
 
-def _camera(name: str, floor: int, group: Group, own: int, errors: Floats, person: float) -> WalkedCamera:
-    off = [_off(group, it, own) for it in group.matches if own in (it.one, it.other)]
-    image, place = np.concatenate([it.image for it in off]), np.concatenate([it.place for it in off])
+def _camera(
+    name: str, floor: int, group: CameraGroup, own: int, errors: Floats, person: float
+) -> CameraCalibration:
+    off = [_correspondence_errors(group, it, own) for it in group.matches if own in (it.one, it.other)]
+    image, place = np.concatenate([it.image for it in off]), np.concatenate([it.position for it in off])
     if not len(image):
         raise CalibrationError(f"{name}: on one floor with all others it agrees with none: try without it")
     tall = group.rig.cameras[own].heights(image)
     third = np.clip((3 * image[:, 0] / group.rig.cameras[own].size[0]).astype(int), 0, 2)
     left, middle, right = (float(it) for it in np.bincount(third, minlength=3) / max(1, len(third)))
-    shift = np.array([floor * _APART, 0.0])
+    shift = np.array([floor * _FLOOR_DISTANCE, 0.0])
     moved = np.eye(3)
     moved[:2, 2] = shift * person
     homography = moved @ group.rig.cameras[own].homography(person)
-    return WalkedCamera(
+    return CameraCalibration(
         camera=name,
         floor=floor,
         homography=homography / np.abs(homography).max(),
         offset=float(group.rig.offsets[own]),
         offset_error=float(errors[own]),
         image=image,
-        place=(place + shift) * person,
-        heights=_spread([it.heights for it in off]),
-        picture=_spread([it.picture for it in off]),
+        position=(place + shift) * person,
+        heights=_summarize([it.heights for it in off]),
+        picture=_summarize([it.picture for it in off]),
         thirds=(left, middle, right),
-        deep=float(np.nanquantile(tall, 0.95) / np.nanquantile(tall, 0.05)),
+        depth_ratio=float(np.nanquantile(tall, 0.95) / np.nanquantile(tall, 0.05)),
     )
 
 
-def _spread(errors: Sequence[Floats]) -> Spread:
+def _summarize(errors: Sequence[Floats]) -> ErrorSummary:
     joined = np.concatenate([np.empty(0), *errors])
     joined = joined[np.isfinite(joined)]
     if not len(joined):
-        return Spread(float("nan"), float("nan"))
-    return Spread(float(np.median(joined)), float(np.quantile(joined, 0.9)))
+        return ErrorSummary(float("nan"), float("nan"))
+    return ErrorSummary(float(np.median(joined)), float(np.quantile(joined, 0.9)))
 
 
-def _hope(pair: PairOf) -> float:
+def _alignment_merit(pair: CameraPair) -> float:
     """Rank pairs by how near they are to belonging together."""
-    return -1.0 if pair.link is None else pair.link.merit
+    return -1.0 if pair.alignment is None else pair.alignment.merit
 
 
-def _why(walks: Sequence[Walk], pair: PairOf, settings: WalkSettings) -> str:
+def _rejection_text(walks: Sequence[Walk], pair: CameraPair, settings: WalkSettings) -> str:
     one, other = walks[pair.one].camera, walks[pair.other].camera
-    return f"{one} and {other}: {pair.why_not(settings)}"
+    return f"{one} and {other}: {pair.rejection(settings)}"

@@ -12,11 +12,11 @@ class WalkSettings:
     Lengths are in person heights, angles in radians.
 
     Raises:
-        ValueError: a setting that is not above 0, or `shift` below it.
+        ValueError: a setting that is not above 0, or `maximum_offset` below it.
     """
 
     # Frames that a camera may be early or late against another; 0: they are in step.
-    shift: int = 75
+    maximum_offset: int = 75
     # Frames between the moments at which feet are compared.
     step: int = 5
     # How well boxes find the feet, standard deviations in box heights, and on the floor in person heights.
@@ -26,32 +26,32 @@ class WalkSettings:
     # Feet within so many standard deviations of each other may be one person's.
     gate: float = 2.0
     # ... and within so many they surely stand at one place, once the cameras are where they should be.
-    sure: float = 1.0
+    final_gate: float = 1.0
     # How much people's boxes differ in height: standard deviation of the logarithm.
-    height: float = 0.1
+    person_height_spread: float = 0.1
     # What cameras are usually like: focal length in picture widths, and how far it may be from that (standard
     # deviation of the logarithm); the same of the ratio of a pixel's sides, of the roll, and of the height.
     focal: float = 0.85
     focal_spread: float = 0.35
     aspect_spread: float = 0.02
     roll_spread: float = 0.05
-    high: float = 2.0
-    high_spread: float = 1.0
+    camera_height: float = 2.0
+    camera_height_spread: float = 1.0
     # Two cameras belong together if they agree at so many places at least (a place is `stride` from the one
     # before), about so large a share of all that both could see, and so many times as well as they do when
     # the other's walk is run backwards, or its second half first.
-    least_places: float = 12.0
+    minimum_places: float = 12.0
     stride: float = 0.15
-    least_share: float = 0.45
-    beyond_chance: float = 1.5
+    minimum_share: float = 0.45
+    minimum_over_chance: float = 1.5
     # ... and have people at one place to within this (median).
-    most_error: float = 0.25
+    maximum_error: float = 0.25
     # A walk less broad than this is a line (standard deviation of its places across its main direction).
-    least_breadth: float = 0.25
+    minimum_breadth: float = 0.25
 
     def __post_init__(self) -> None:
         """Check the ranges."""
         for field in fields(self):
             value = getattr(self, field.name)
-            if not (value >= 0 if field.name == "shift" else value > 0):
+            if not (value >= 0 if field.name == "maximum_offset" else value > 0):
                 raise ValueError(f"walk settings: {field.name}: {value} is not above 0")

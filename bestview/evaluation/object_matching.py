@@ -6,10 +6,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-NOBODY = -1
+NO_PERSON = -1
 
 
-def stands_for(matches: NDArray[np.int64]) -> NDArray[np.int64]:
+def match_objects_to_people(matches: NDArray[np.int64]) -> NDArray[np.int64]:
     """Let each object stand for one person and each person have one object, the best way round.
 
     The total of the matches is largest, as for IDF1 (Ristani et al., 2016), over all cameras together.
@@ -25,7 +25,7 @@ def stands_for(matches: NDArray[np.int64]) -> NDArray[np.int64]:
     """
     if matches.ndim != 2:  # noqa: PLR2004 — people, objects
         raise ValueError(f"matches have shape {matches.shape}, not (people, objects)")
-    people = np.full(matches.shape[1], NOBODY, dtype=np.int64)
+    people = np.full(matches.shape[1], NO_PERSON, dtype=np.int64)
     rows, columns = scipy.optimize.linear_sum_assignment(matches, maximize=True)
     met = matches[rows, columns] > 0
     people[columns[met]] = rows[met]

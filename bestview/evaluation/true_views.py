@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.quality import compared, size_quality, view_cost
-from bestview.view_selection.selection import NO_CAMERA, choose_views
+from bestview.quality import relative_quality, size_quality, view_cost
+from bestview.view_selection.selection import NO_CAMERA, select_views
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ViewTruth:
+class ViewGroundTruth:
     """How well every camera shows every person at every frame, K people, N frames, C cameras.
 
     Attributes:
@@ -25,28 +25,28 @@ class ViewTruth:
     visible: NDArray[np.bool_]
 
     @property
-    def counted(self) -> NDArray[np.bool_]:
+    def evaluated(self) -> NDArray[np.bool_]:
         """(K, N) frames that count: those in which some camera could show the person."""
         return np.asarray(self.visible.any(axis=2))
 
 
-def true_views(
+def view_ground_truth(
     boxes: NDArray[np.float64],
     shown: NDArray[np.float64],
     sizes: NDArray[np.float64],
-    least_shown: float,
-) -> ViewTruth:
+    minimum_visible_share: float,
+) -> ViewGroundTruth:
     """Derive the quality of every view from ground truth.
 
-    A person is visible in a camera where there is a box of which at least `least_shown` shows. Of several
-    such views the largest is worth 1, and the others are compared with it.
+    A person is visible in a camera if they have a box there of which `minimum_visible_share` or more shows.
+    The largest such view has quality 1, and the others are divided by it.
 
     Args:
         boxes: (K, N, C, 4) left, top, right, bottom in pixels of the camera's picture; NaN: there is none.
         shown: (K, N, C) the share of each person that shows, in [0, 1]; negative where it is not known,
             which counts as all of it.
         sizes: (C, 2) width and height of each camera's picture, pixels.
-        least_shown: in [0, 1]; 0: whoever has a box is visible.
+        minimum_visible_share: in [0, 1]; 0: whoever has a box is visible.
 
     Raises:
         ValueError: shapes that do not fit, or a picture without area.
@@ -56,11 +56,11 @@ def true_views(
     quality = np.zeros(shown.shape)
     for camera, (width, height) in enumerate(sizes.tolist()):
         quality[:, :, camera] = size_quality(boxes[:, :, camera], width, height)
-    visible = (quality > 0.0) & ((shown < 0.0) | (shown >= least_shown))
-    return ViewTruth(view_cost(compared(np.where(visible, quality, 0.0), axis=2)), visible)
+    visible = (quality > 0.0) & ((shown < 0.0) | (shown >= minimum_visible_share))
+    return ViewGroundTruth(view_cost(relative_quality(np.where(visible, quality, 0.0), axis=2)), visible)
 
 
-def best_views(truth: ViewTruth, switch_cost: float) -> NDArray[np.int64]:
+def optimal_views(truth: ViewGroundTruth, switch_cost: float) -> NDArray[np.int64]:
     """Give the exact offline optimum of section III: the whole recording is known, a cut may be anywhere.
 
     Frames that do not count are left out: those around such a gap are taken as neighbours.
@@ -72,10 +72,10 @@ def best_views(truth: ViewTruth, switch_cost: float) -> NDArray[np.int64]:
         ValueError: the switching cost is negative, or no number.
     """
     views = np.full(truth.visible.shape[:2], NO_CAMERA, dtype=np.int64)
-    for mine, counted, cost in zip(views, truth.counted, truth.cost, strict=True):
+    for mine, counted, cost in zip(views, truth.evaluated, truth.cost, strict=True):
         frames = int(np.count_nonzero(counted))
         anywhere = np.ones(frames, dtype=bool)
-        mine[counted] = choose_views(cost[None, counted], _UNKNOWN, switch_cost, anywhere).views[0]
+        mine[counted] = select_views(cost[None, counted], _UNKNOWN, switch_cost, anywhere).views[0]
     return views
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.evaluation.true_views import ViewTruth, best_views
+from bestview.evaluation.true_views import ViewGroundTruth, optimal_views
 from bestview.view_selection.selection import NO_CAMERA, NO_VIEW_COST
 
 _SECONDS_PER_MINUTE = 60.0
@@ -45,7 +45,7 @@ class ViewScore:
 
 
 @dataclass(frozen=True, slots=True)
-class _Tally:
+class _ObjectTotals:
     """Sums over the frames of one object that count."""
 
     frames: int
@@ -53,7 +53,7 @@ class _Tally:
     chosen: int
     cost: float
     best_cost: float
-    seen: int
+    visible_frames: int
     cuts: NDArray[np.int64]
     best_cuts: NDArray[np.int64]
 
@@ -87,48 +87,55 @@ def score_views(
         )
     if views.size and not (views.min() >= NO_CAMERA and views.max() < cost.shape[2]):
         raise ValueError(f"the choice names a camera outside -1 .. {cost.shape[2] - 1}")
-    truth = ViewTruth(cost, visible)
-    tallies = [
-        _tally(cost[k][on], visible[k][on], views[k][on], optimum[on], switch_cost)
-        for k, (on, optimum) in enumerate(zip(truth.counted, best_views(truth, switch_cost), strict=True))
+    truth = ViewGroundTruth(cost, visible)
+    totals = [
+        _object_totals(cost[k][on], visible[k][on], views[k][on], optimum[on], switch_cost)
+        for k, (on, optimum) in enumerate(
+            zip(truth.evaluated, optimal_views(truth, switch_cost), strict=True)
+        )
         if on.any()
     ]
-    frames = sum(tally.frames for tally in tallies)
+    frames = sum(total_of_object.frames for total_of_object in totals)
     per_minute = _SECONDS_PER_MINUTE * fps / max(frames, 1)
-    best = sum(tally.best_cost for tally in tallies)
-    total = sum(tally.cost for tally in tallies)
-    shots = [int(np.diff(tally.cuts).min()) for tally in tallies if tally.cuts.size > 1]
+    best = sum(total_of_object.best_cost for total_of_object in totals)
+    total = sum(total_of_object.cost for total_of_object in totals)
+    shots = [
+        int(np.diff(total_of_object.cuts).min())
+        for total_of_object in totals
+        if total_of_object.cuts.size > 1
+    ]
     return ViewScore(
         frames=frames,
-        agreement=sum(tally.agreed for tally in tallies) / max(frames, 1),
+        agreement=sum(total_of_object.agreed for total_of_object in totals) / max(frames, 1),
         regret=_share(total - best, best),
-        visible=sum(tally.seen for tally in tallies) / max(frames, 1),
-        chosen=sum(tally.chosen for tally in tallies) / max(frames, 1),
-        cuts_per_minute=sum(tally.cuts.size for tally in tallies) * per_minute,
-        optimum_cuts_per_minute=sum(tally.best_cuts.size for tally in tallies) * per_minute,
+        visible=sum(total_of_object.visible_frames for total_of_object in totals) / max(frames, 1),
+        chosen=sum(total_of_object.chosen for total_of_object in totals) / max(frames, 1),
+        cuts_per_minute=sum(total_of_object.cuts.size for total_of_object in totals) * per_minute,
+        optimum_cuts_per_minute=sum(total_of_object.best_cuts.size for total_of_object in totals)
+        * per_minute,
         shortest_shot=min(shots, default=0),
         cost=float(total),
         optimum_cost=float(best),
     )
 
 
-def _tally(
+def _object_totals(
     cost: NDArray[np.float64],
     visible: NDArray[np.bool_],
     views: NDArray[np.int64],
     best: NDArray[np.int64],
     switch_cost: float,
-) -> _Tally:
+) -> _ObjectTotals:
     """Sum up one object's (F, C) costs, its (F,) views and the best ones, all of whose frames count."""
     chosen, row = views >= 0, np.arange(len(cost))
-    cuts, best_cuts = cuts_of(views), cuts_of(best)
-    return _Tally(
+    cuts, best_cuts = cut_frames(views), cut_frames(best)
+    return _ObjectTotals(
         frames=len(cost),
         agreed=int(np.count_nonzero(views == best)),
         chosen=int(np.count_nonzero(chosen)),
         cost=float(np.where(chosen, cost[row, views], NO_VIEW_COST).sum() + switch_cost * cuts.size),
         best_cost=float(cost[row, best].sum() + switch_cost * best_cuts.size),
-        seen=int(np.count_nonzero(chosen & visible[row, views])),
+        visible_frames=int(np.count_nonzero(chosen & visible[row, views])),
         cuts=cuts,
         best_cuts=best_cuts,
     )
@@ -141,7 +148,7 @@ def _share(extra: float, whole: float) -> float:
     return float("inf") if extra > _ROUNDING else 0.0
 
 
-def cuts_of(views: NDArray[np.int64]) -> NDArray[np.int64]:
+def cut_frames(views: NDArray[np.int64]) -> NDArray[np.int64]:
     """Give the frames at which (F,) views change the camera; to a frame without a choice is no change."""
     shown = np.flatnonzero(views >= 0)
     return np.asarray(shown[1:][views[shown[1:]] != views[shown[:-1]]])

@@ -13,7 +13,7 @@ _ROWS, _COLUMNS = 36, 64
 """Cells of a picture; boxes touch when they have a cell in common."""
 
 
-def touching(
+def boxes_touching_others(
     boxes: Floats, picture: Ints, others: Floats, theirs: Ints, pictures: int, size: tuple[float, float]
 ) -> Mask:
     """Tell which boxes have a cell in common with any other box in the same picture, (V,).

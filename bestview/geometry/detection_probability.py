@@ -20,7 +20,7 @@ _HIDDEN, _MORE = 0.04, 0.02
 """The share of looks in which people are really hidden, and misses beyond it by which a camera is known."""
 
 
-class Findable:
+class DetectionProbabilityMap:
     """Counts in which share of the looks each camera finds somebody who is known to stand at a place.
 
     A place's share is ``(found + few own) / (looks + few)`` over the cells around it, and the camera's *own*
@@ -67,7 +67,7 @@ class Findable:
         )
         self._shares = (around[1] + self._few * self._own[:, None, None]) / (around[0] + self._few)
 
-    def share(self, camera: Ints, feet: Floats) -> Floats:
+    def probability(self, camera: Ints, feet: Floats) -> Floats:
         """Give in which share of the looks cameras (V,) find people at (V, 2) pixels of their pictures."""
         return self._shares.reshape(-1)[self._cells(camera, feet)]
 
@@ -78,7 +78,7 @@ class Findable:
         there of what it finds elsewhere, and whether it misses anybody at all. Whom a camera does not find
         that finds nearly everybody is hidden.
         """
-        place = np.minimum(self.share(camera, feet) / np.maximum(self._own, _GOOD)[camera], 1.0)
+        place = np.minimum(self.probability(camera, feet) / np.maximum(self._own, _GOOD)[camera], 1.0)
         misses = np.clip((1.0 - self._own - _HIDDEN) / _MORE, 0.0, 1.0)
         return np.asarray(place * misses[camera])
 

@@ -13,7 +13,7 @@ _MAX_CONDITION = 1e12
 """Above this a 3x3 matrix, scaled by rows and columns, has no inverse worth the name in float64."""
 
 
-def checked_homography(matrix: ArrayLike, name: str) -> NDArray[np.float64]:
+def validate_homography(matrix: ArrayLike, name: str) -> NDArray[np.float64]:
     """Return the homography (image pixels -> ground plane) as a (3, 3) float64 array, if it is one.
 
     Args:
@@ -41,12 +41,12 @@ def checked_homography(matrix: ArrayLike, name: str) -> NDArray[np.float64]:
     return homography
 
 
-def feet(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+def foot_points(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Foot point of each box, the middle of its lower edge: (..., 4) -> (..., 2) in pixels."""
     return np.stack([(boxes[..., 0] + boxes[..., 2]) / 2.0, boxes[..., 3]], axis=-1)
 
 
-def as_standing(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+def upright_from_overhead(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Turn boxes of people seen from straight above into those of people who stand upright there: (..., 4).
 
     Who is seen from above stands in the middle of their box, not on its lower edge, and shows shoulders and
@@ -83,14 +83,14 @@ def from_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) ->
     return np.where(there[..., None], pixels, np.nan)
 
 
-def horizon(homography: NDArray[np.float64], x: float) -> float | None:
+def horizon_row(homography: NDArray[np.float64], x: float) -> float | None:
     """Give the row of the picture's column `x` in which the ground plane ends, in pixels; None: in no row."""
     down = float(homography[2, 1])
     row = -(float(homography[2, 0]) * x + float(homography[2, 2])) / down if down else np.inf
     return row if np.isfinite(row) else None
 
 
-def shows_floor(homography: NDArray[np.float64], size: tuple[int, int]) -> bool:
+def shows_ground(homography: NDArray[np.float64], size: tuple[int, int]) -> bool:
     """Tell whether anything of a picture (width, height) lies below the horizon, and so can be floor.
 
     Nothing does of a camera that is tilted past straight down, or hangs upside down: its floor ends below.
@@ -100,7 +100,7 @@ def shows_floor(homography: NDArray[np.float64], size: tuple[int, int]) -> bool:
     return bool((_depth(homography, _homogeneous(homography, corners)) > 0).any())
 
 
-def turns(homography: NDArray[np.float64]) -> int:
+def ground_handedness(homography: NDArray[np.float64]) -> int:
     """Say how the ground's axes turn in the picture, below the horizon: 1 as the picture's own, -1 against.
 
     It is the same in every picture of a floor that is seen from above (Hartley and Zisserman, 2.4.1: the sign
@@ -117,7 +117,7 @@ def camera_height(homography: NDArray[np.float64], x: float) -> float | None:
     At a foot so many rows below the horizon as somebody is tall in the picture, they are as tall as the
     camera is high (square pixels, little roll): ground units per sideways pixel times rows below the horizon.
     """
-    row = horizon(homography, x)
+    row = horizon_row(homography, x)
     if row is None:
         return None
     height = float(person_heights(homography, np.array([x, row, x, row + 100.0])))
@@ -142,11 +142,11 @@ def person_heights(homography: NDArray[np.float64], boxes: NDArray[np.float64]) 
     pixels, a camera without much roll or tilt): box height times ground units per sideways pixel. It
     tells what a "step" is in a ground plane of any unit.
     """
-    sideways = _steps(homography, feet(boxes))[..., 0]
+    sideways = _pixel_steps(homography, foot_points(boxes))[..., 0]
     return np.asarray(np.hypot(sideways[..., 0], sideways[..., 1]) * (boxes[..., 3] - boxes[..., 1]))
 
 
-def foot_spread(
+def foot_covariance(
     homography: NDArray[np.float64], boxes: NDArray[np.float64], sideways: float, upwards: float
 ) -> NDArray[np.float64]:
     """Covariance of each foot point on the ground: (..., 4) -> (..., 2, 2) ground units squared.
@@ -156,13 +156,15 @@ def foot_spread(
     camera knows least.
     """
     tall = boxes[..., 3] - boxes[..., 1]
-    axes = _steps(homography, feet(boxes)) * tall[..., None, None] * np.array([sideways, upwards])
+    axes = (
+        _pixel_steps(homography, foot_points(boxes)) * tall[..., None, None] * np.array([sideways, upwards])
+    )
     x, y = axes[..., 0, :], axes[..., 1, :]
     xx, xy, yy = (x * x).sum(axis=-1), (x * y).sum(axis=-1), (y * y).sum(axis=-1)
     return np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2)
 
 
-def _steps(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _pixel_steps(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Ground vectors of one pixel to the right and one down, as columns: (..., 2) -> (..., 2, 2)."""
     mapped = _homogeneous(homography, points)
     w = np.where(_depth(homography, mapped) > 0, mapped[..., 2], np.nan)[..., None, None]

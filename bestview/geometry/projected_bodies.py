@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.geometry.ground_plane import (
-    feet,
     feet_cut_off,
-    foot_spread,
+    foot_covariance,
+    foot_points,
     from_ground,
     person_heights,
     to_ground,
@@ -25,25 +25,25 @@ _SIDEWAYS, _UPWARDS = 0.05, 0.15
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bodies:
+class BodyEstimates:
     """Where people stand and how large they are: M moments, each one person in one frame.
 
     Attributes:
-        place: (M, 2) ground units; NaN where no camera knows.
-        tall: (M,) height in ground units, likewise.
-        slim: (M,) width of the box over its height, likewise.
+        ground_point: (M, 2) ground units; NaN where no camera knows.
+        height: (M,) height in ground units, likewise.
+        aspect_ratio: (M,) width of the box over its height, likewise.
         known_by: (M, C) whether that camera knows.
     """
 
-    place: Floats
-    tall: Floats
-    slim: Floats
+    ground_point: Floats
+    height: Floats
+    aspect_ratio: Floats
     known_by: Mask
 
 
-def bodies(
+def estimate_bodies(
     boxes: Floats, camera: Ints, moment: Ints, moments: int, homographies: Floats, bottom: Floats
-) -> Bodies:
+) -> BodyEstimates:
     """Gather what boxes say of bodies: means over the cameras, each weighed by how well it knows the place.
 
     That is 1 over the trace of the foot point's covariance on the ground: a camera that somebody is near to
@@ -58,8 +58,8 @@ def bodies(
         bottom: (C,) where each camera's own picture ends, pixels.
     """
     matrix = homographies[camera]
-    place, tall = to_ground(matrix, feet(boxes)), person_heights(matrix, boxes)
-    spread = np.trace(foot_spread(matrix, boxes, _SIDEWAYS, _UPWARDS), axis1=-2, axis2=-1)
+    place, tall = to_ground(matrix, foot_points(boxes)), person_heights(matrix, boxes)
+    spread = np.trace(foot_covariance(matrix, boxes, _SIDEWAYS, _UPWARDS), axis1=-2, axis2=-1)
     with np.errstate(divide="ignore", invalid="ignore"):  # a box may have no height: it is left out below
         slim = (boxes[:, 2] - boxes[:, 0]) / (boxes[:, 3] - boxes[:, 1])
     told = np.column_stack([place, tall, slim])
@@ -76,20 +76,20 @@ def bodies(
     mean = [summed(weight * column[rows]) / total for column in told.T]
     known_by = np.zeros((moments, len(homographies)), dtype=np.bool_)
     known_by[of, camera[rows]] = True
-    return Bodies(np.stack(mean[:2], axis=1), mean[2], mean[3], known_by)
+    return BodyEstimates(np.stack(mean[:2], axis=1), mean[2], mean[3], known_by)
 
 
-def feet_seen(of: Bodies, homographies: Floats) -> Floats:
+def project_feet(of: BodyEstimates, homographies: Floats) -> Floats:
     """Give where bodies stand in each camera's picture, (M, C, 2) pixels; NaN behind it, or where unknown.
 
     Args:
         of: M of them.
         homographies: (C, 3, 3) pixels -> ground.
     """
-    return from_ground(homographies, of.place[:, None])
+    return from_ground(homographies, of.ground_point[:, None])
 
 
-def boxes_seen(of: Bodies, moment: Ints, foot: Floats, homographies: Floats) -> Floats:
+def project_boxes(of: BodyEstimates, moment: Ints, foot: Floats, homographies: Floats) -> Floats:
     """Give the boxes of (V,) of the bodies in the pictures where they stand at (V, 2) pixels: (V, 4).
 
     Args:
@@ -100,6 +100,6 @@ def boxes_seen(of: Bodies, moment: Ints, foot: Floats, homographies: Floats) -> 
     """
     x, y = foot[:, 0], foot[:, 1]
     pixel = person_heights(homographies, np.stack([x, y - 1.0, x, y], axis=1))
-    tall = of.tall[moment] / pixel
-    half = tall * of.slim[moment] / 2.0
+    tall = of.height[moment] / pixel
+    half = tall * of.aspect_ratio[moment] / 2.0
     return np.stack([x - half, y - tall, x + half, y], axis=1)

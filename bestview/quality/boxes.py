@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def areas_inside(boxes: Floats, pictures: Floats) -> Floats:
+def areas_inside_picture(boxes: Floats, pictures: Floats) -> Floats:
     """Give the area of the part of each box that is in its picture: two (..., 4), broadcast to (...)."""
     width = np.minimum(boxes[..., 2], pictures[..., 2]) - np.maximum(boxes[..., 0], pictures[..., 0])
     height = np.minimum(boxes[..., 3], pictures[..., 3]) - np.maximum(boxes[..., 1], pictures[..., 1])
@@ -21,6 +21,6 @@ def areas(boxes: Floats) -> Floats:
     return np.asarray(np.maximum(width, 0.0) * np.maximum(height, 0.0))
 
 
-def shares(parts: Floats, wholes: Floats) -> Floats:
+def area_shares(parts: Floats, wholes: Floats) -> Floats:
     """Divide areas; 0 where there is nothing to have a share of."""
     return np.asarray(np.divide(parts, wholes, out=np.zeros(parts.shape), where=wholes > 0))

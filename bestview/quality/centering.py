@@ -7,7 +7,7 @@ import numpy as np
 from bestview.quality.boxes import Floats
 
 
-def central(boxes: Floats, pictures: Floats) -> Floats:
+def centering_score(boxes: Floats, pictures: Floats) -> Floats:
     """1 in the middle of the picture, 0 in its corners: ``1 - distance of the middles / half the diagonal``.
 
     Args:

@@ -9,66 +9,66 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.quality.boxes import Floats
-from bestview.quality.centering import central
-from bestview.quality.facing import NEUTRAL, facing
-from bestview.quality.occlusion import unhidden
+from bestview.quality.centering import centering_score
+from bestview.quality.facing import NEUTRAL, facing_score
+from bestview.quality.occlusion import unoccluded_share
 from bestview.quality.settings import QualitySettings
 from bestview.quality.size import size_quality
-from bestview.quality.truncation import whole
+from bestview.quality.truncation import visible_share
 
 _SIDES = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Looks:
+class CameraLayout:
     """The cameras of a site, as far as view quality asks. All pixels are those of the boxes.
 
     Attributes:
         size: width and height of the picture that viewers are shown, pixels.
-        pictures: (C, 4) where each camera's own picture lies in it: left, top, right, bottom.
+        picture_boxes: (C, 4) where each camera's own picture lies in it: left, top, right, bottom.
         homographies: from those pixels to the ground, None where it is not known; C of them.
         fps: frames per second.
     """
 
     size: tuple[float, float]
-    pictures: Floats
+    picture_boxes: Floats
     homographies: Sequence[Floats | None]
     fps: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class TrackWindow:
     """T tracks, each of one camera, over a window of N frames.
 
     Attributes:
         boxes: (T, N, 4) pixels, NaN where hidden.
         camera: (T,) whose each track is, by index.
-        sure: (T,) in [0, 1], how surely each track is there.
-        sharp: (T,) in [0, 1], how sharp its picture is; NaN where nobody has measured it: counts as 1.
+        confidence: (T,) in [0, 1], how surely each track is there.
+        sharpness: (T,) in [0, 1], how sharp its picture is; NaN where nobody has measured it: counts as 1.
     """
 
     boxes: Floats
     camera: NDArray[np.int64]
-    sure: Floats
-    sharp: Floats
+    confidence: Floats
+    sharpness: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Quality:
+class ViewQuality:
     """How well each view shows whom it follows.
 
     Attributes:
         quality: (T, N) in [0, 1]; NaN where hidden.
-        names: the terms that weigh something.
+        term_names: the terms that weigh something.
         terms: (terms, T, N) in [0, 1], each of them; NaN where hidden.
     """
 
     quality: Floats
-    names: tuple[str, ...]
+    term_names: tuple[str, ...]
     terms: Floats
 
 
-def view_quality(seen: Seen, looks: Looks, settings: QualitySettings) -> Quality:
+def compute_view_quality(seen: TrackWindow, looks: CameraLayout, settings: QualitySettings) -> ViewQuality:
     """Weigh all terms: the product over the terms *t* of ``1 - weight (1 - t)``.
 
     A product, since what spoils a view is not made good by anything else: somebody covered is not seen,
@@ -80,7 +80,7 @@ def view_quality(seen: Seen, looks: Looks, settings: QualitySettings) -> Quality
     _check(seen, looks)
     # In memory sides are apart, and in each of them frames: it is how the terms read them.
     sides = np.ascontiguousarray(seen.boxes.transpose(2, 1, 0))
-    rows = _Rows(seen, looks, sides.transpose(2, 1, 0))
+    rows = _TermInputs(seen, looks, sides.transpose(2, 1, 0))
     weights = settings.weights
     terms = np.empty((len(settings.terms), *sides.shape[1:])).transpose(0, 2, 1)
     quality = np.ones(sides.shape[1:]).T
@@ -90,50 +90,54 @@ def view_quality(seen: Seen, looks: Looks, settings: QualitySettings) -> Quality
     hidden = np.isnan(rows.boxes[..., 0])
     if hidden.any():
         quality[hidden] = terms[:, hidden] = np.nan
-    return Quality(quality, settings.terms, terms)
+    return ViewQuality(quality, settings.terms, terms)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Rows:
+class _TermInputs:
     """What the terms are worked out from; `boxes` are those of `seen`."""
 
-    seen: Seen
-    looks: Looks
+    seen: TrackWindow
+    looks: CameraLayout
     boxes: Floats
 
     @property
-    def pictures(self) -> Floats:
+    def picture_boxes(self) -> Floats:
         """(T, 1, 4): where the picture of each track's camera lies."""
-        return self.looks.pictures[self.seen.camera][:, None]
+        return self.looks.picture_boxes[self.seen.camera][:, None]
 
 
-def _facing(rows: _Rows) -> Floats:
+def _facing(rows: _TermInputs) -> Floats:
     camera = rows.seen.camera
     whole_window = np.full(len(camera), NEUTRAL)
     for column, homography in enumerate(rows.looks.homographies):
         if homography is not None:
             mine = camera == column
-            whole_window[mine] = facing(rows.seen.boxes[mine], homography, rows.looks.fps)
+            whole_window[mine] = facing_score(rows.seen.boxes[mine], homography, rows.looks.fps)
     return whole_window[:, None]
 
 
-_TERMS: dict[str, Callable[[_Rows], Floats]] = {
+_TERMS: dict[str, Callable[[_TermInputs], Floats]] = {
     "size": lambda rows: size_quality(rows.boxes, *rows.looks.size),
-    "whole": lambda rows: whole(rows.boxes, rows.pictures),
-    "unhidden": lambda rows: unhidden(rows.boxes, rows.seen.camera),
-    "central": lambda rows: central(rows.boxes, rows.pictures),
-    "sharp": lambda rows: np.nan_to_num(rows.seen.sharp, nan=1.0)[:, None],
+    "truncation": lambda rows: visible_share(rows.boxes, rows.picture_boxes),
+    "occlusion": lambda rows: unoccluded_share(rows.boxes, rows.seen.camera),
+    "centering": lambda rows: centering_score(rows.boxes, rows.picture_boxes),
+    "sharpness": lambda rows: np.nan_to_num(rows.seen.sharpness, nan=1.0)[:, None],
     "facing": _facing,
-    "sure": lambda rows: rows.seen.sure[:, None],
+    "confidence": lambda rows: rows.seen.confidence[:, None],
 }
 """Each (T, N), or (T, 1) where it is the same in all frames; anything where hidden."""
 
 
-def _check(seen: Seen, looks: Looks) -> None:
-    shape, cameras = seen.boxes.shape, len(looks.pictures)
+def _check(seen: TrackWindow, looks: CameraLayout) -> None:
+    shape, cameras = seen.boxes.shape, len(looks.picture_boxes)
     if len(shape) != 3 or shape[2] != _SIDES:  # noqa: PLR2004 — tracks, frames, sides
         raise ValueError(f"boxes have shape {shape}, not (tracks, frames, 4)")
-    for name, values in (("camera", seen.camera), ("sure", seen.sure), ("sharp", seen.sharp)):
+    for name, values in (
+        ("camera", seen.camera),
+        ("confidence", seen.confidence),
+        ("sharpness", seen.sharpness),
+    ):
         if values.shape != shape[:1]:
             raise ValueError(f"{name} has shape {values.shape}, not ({shape[0]},)")
     if shape[0] and not 0 <= seen.camera.min() <= seen.camera.max() < cameras:

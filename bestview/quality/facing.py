@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from bestview.geometry.ground_plane import feet, person_heights, to_ground
+from bestview.geometry.ground_plane import foot_points, person_heights, to_ground
 from bestview.quality.boxes import Floats
 
-_STROLL = 0.15
+_HALF_CONFIDENCE_SPEED = 0.15
 """Heights a second (about 0.25 m/s): at this speed the way somebody goes tells half of what it can."""
 
 _PIXEL_DOWN = np.array([0.0, 1.0])
@@ -16,7 +16,7 @@ NEUTRAL = 0.5
 """Of somebody who stands, goes across, or of whom the ground is not known."""
 
 
-def facing(boxes: Floats, homography: Floats, fps: float) -> Floats:
+def facing_score(boxes: Floats, homography: Floats, fps: float) -> Floats:
     """1 for who walks towards the camera, 0 for who walks away, 1/2 for who stands or goes across.
 
     With *v* the velocity of the feet on the ground over the frames given (least squares) and *u* the ground
@@ -32,7 +32,7 @@ def facing(boxes: Floats, homography: Floats, fps: float) -> Floats:
     Returns:
         (K,) values in [0, 1], one for the whole window.
     """
-    ground = to_ground(homography, feet(boxes))
+    ground = to_ground(homography, foot_points(boxes))
     known = ~np.isnan(ground[..., 0])
     count = known.sum(axis=1)
     enough = count > 1
@@ -45,13 +45,13 @@ def facing(boxes: Floats, homography: Floats, fps: float) -> Floats:
     velocity = ((weight * away)[..., None] * place).sum(axis=1) / np.where(enough, spread, 1.0)[:, None]
 
     middle = (weight[..., None] * np.where(known[..., None], boxes, 0.0)).sum(axis=1)
-    foot = feet(middle)
+    foot = foot_points(middle)
     down = to_ground(homography, foot + _PIXEL_DOWN) - to_ground(homography, foot)
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     length = np.hypot(down[:, 0], down[:, 1])
     along = (velocity * down).sum(axis=1)
     # cos |v| / (|v| + stroll): the speed in the cosine's divisor goes out.
-    divisor = length * (speed + _STROLL * person_heights(homography, middle))
+    divisor = length * (speed + _HALF_CONFIDENCE_SPEED * person_heights(homography, middle))
     known_way = enough & (divisor > 0)
     towards = np.divide(along, divisor, out=np.zeros(len(boxes)), where=known_way)
     return np.asarray(NEUTRAL + NEUTRAL * towards)

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.quality.boxes import Floats, shares
+from bestview.quality.boxes import Floats, area_shares
 
 Ints = NDArray[np.int64]
 
-_FEET = 0.05
+_FOOT_TOLERANCE = 0.05
 """Heights by which feet must be lower for somebody to be nearer for sure; boxes do not find feet better."""
 
-_ENOUGH = 0.5
+_FULLY_VISIBLE_SHARE = 0.5
 """The share of a box that has to be left: people do not fill their boxes, and half of one is well seen."""
 
 
-def unhidden(boxes: Floats, cameras: Ints) -> Floats:
+def unoccluded_share(boxes: Floats, cameras: Ints) -> Floats:
     """Share of each box that nobody nearer to the camera covers, twice; 1 from a half on.
 
     Whose feet are lower in the picture is nearer. With *a* somebody else's share of the box and *p*, in
@@ -37,7 +37,7 @@ def unhidden(boxes: Floats, cameras: Ints) -> Floats:
     if not boxes.size:
         return np.ones((tracks, frames))
     left, top, right, bottom = sides = np.ascontiguousarray(boxes.transpose(2, 1, 0))
-    first, second = _near(sides, cameras)
+    first, second = _overlap_candidates(sides, cameras)
     columns = np.minimum(right[:, first], right[:, second]) - np.maximum(left[:, first], left[:, second])
     rows = np.minimum(bottom[:, first], bottom[:, second]) - np.maximum(top[:, first], top[:, second])
     over = np.flatnonzero((columns > 0.0) & (rows > 0.0))
@@ -47,15 +47,15 @@ def unhidden(boxes: Floats, cameras: Ints) -> Floats:
     height = (bottom - top).reshape(-1)
     area, bottom = height * (right - left).reshape(-1), bottom.reshape(-1)
     lower = (bottom[two] - bottom[one]) / np.maximum(height[one], height[two])
-    nearer = np.clip(0.5 + lower / (2.0 * _FEET), 0.0, 1.0)
+    nearer = np.clip(0.5 + lower / (2.0 * _FOOT_TOLERANCE), 0.0, 1.0)
     free = np.ones(area.shape)
     # Pairs are in line by their first track, then their second: who comes before a box, then who comes after.
-    np.multiply.at(free, two, 1.0 - (1.0 - nearer) * shares(common, area[two]))
-    np.multiply.at(free, one, 1.0 - nearer * shares(common, area[one]))
-    return np.asarray(np.minimum(free / _ENOUGH, 1.0).reshape(frames, tracks).T)
+    np.multiply.at(free, two, 1.0 - (1.0 - nearer) * area_shares(common, area[two]))
+    np.multiply.at(free, one, 1.0 - nearer * area_shares(common, area[one]))
+    return np.asarray(np.minimum(free / _FULLY_VISIBLE_SHARE, 1.0).reshape(frames, tracks).T)
 
 
-def _near(sides: Floats, cameras: Ints) -> tuple[Ints, Ints]:
+def _overlap_candidates(sides: Floats, cameras: Ints) -> tuple[Ints, Ints]:
     """List the pairs of tracks of one camera that may overlap: two (P,), each pair once, lower index first.
 
     They do where what each covers in all frames together overlaps. People hardly move in a window, so that
@@ -76,7 +76,9 @@ def _near(sides: Floats, cameras: Ints) -> tuple[Ints, Ints]:
     stretch = cameras[some] * (max(left[some].max(), right[some].max()) - start + 1.0) - start
     begin = stretch + left[some]
     order = np.argsort(begin, kind="stable")
-    one, two = _side_by_side(np.searchsorted(begin[order], (stretch + right[some])[order], side="right"))
+    one, two = _overlapping_intervals(
+        np.searchsorted(begin[order], (stretch + right[some])[order], side="right")
+    )
     line = some[order]
     one, two = line[one], line[two]
     over = np.flatnonzero((top[two] < bottom[one]) & (top[one] < bottom[two]))
@@ -85,7 +87,7 @@ def _near(sides: Floats, cameras: Ints) -> tuple[Ints, Ints]:
     return lined // tracks, lined % tracks
 
 
-def _side_by_side(end: Ints) -> tuple[Ints, Ints]:
+def _overlapping_intervals(end: Ints) -> tuple[Ints, Ints]:
     """List the pairs of tracks in line that share columns, each pair once: two (P,) places in the line.
 
     A track's partners are those right after it that begin before it ends, at place `end`.

@@ -16,12 +16,12 @@ class QualitySettings:
     """
 
     size: float = 1.0  # how large the person is in the picture
-    whole: float = 1.0  # how much of the person the picture's edges leave
-    unhidden: float = 0.25  # how much of the person other people leave to be seen
-    central: float = 0.0  # how near the middle of the picture
-    sharp: float = 0.0  # how much detail there is
+    truncation: float = 1.0  # how much of the person the picture's edges leave
+    occlusion: float = 0.25  # how much of the person other people leave to be seen
+    centering: float = 0.0  # how near the middle of the picture
+    sharpness: float = 0.0  # how much detail there is
     facing: float = 0.0  # walking towards the camera, not away from it; needs the ground
-    sure: float = 0.0  # how surely the track is there: mean score over its window, 0 where hidden
+    confidence: float = 0.0  # how surely the track is there: mean score over its window, 0 where hidden
     relative: bool = True  # a view's cost is measured by the best view of the moment; false is the paper
 
     def __post_init__(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.quality.boxes import Floats, areas_inside
+from bestview.quality.boxes import Floats, areas_inside_picture
 
 
 def size_quality(boxes: Floats, width: float, height: float) -> NDArray[np.float64]:
@@ -30,5 +30,5 @@ def size_quality(boxes: Floats, width: float, height: float) -> NDArray[np.float
         raise ValueError(f"a picture of {width} x {height} pixels has no area")
     if boxes.ndim < 1 or boxes.shape[-1] != 4:  # noqa: PLR2004 — left, top, right, bottom
         raise ValueError(f"boxes have shape {boxes.shape}, not (..., 4)")
-    area = areas_inside(boxes, np.array([0.0, 0.0, width, height]))
+    area = areas_inside_picture(boxes, np.array([0.0, 0.0, width, height]))
     return np.asarray(np.sqrt(np.nan_to_num(area) / (width * height)))

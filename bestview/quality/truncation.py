@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from bestview.quality.boxes import Floats, areas, areas_inside, shares
+from bestview.quality.boxes import Floats, area_shares, areas, areas_inside_picture
 
-_NEAR_EDGE = 0.03
+_EDGE_MARGIN = 0.03
 """Share of the box's height from an edge at which it counts as clear of it."""
-_CUT = 0.05
+_EDGE_PENALTY = 0.05
 """What a box loses that ends at the upper or lower edge: nobody can say how much is beyond it."""
-_LEAST = 1e-6
+_MINIMUM_MARGIN = 1e-6
 """Pixels; a box without any height has this much room, so that none is divided by nothing."""
-_SLIM = 0.37
+_UPRIGHT_ASPECT_RATIO = 0.37
 """Width over height of a box at an upright person: one at a side edge that is slimmer is a part of them."""
 
 
-def whole(boxes: Floats, pictures: Floats) -> Floats:
+def visible_share(boxes: Floats, pictures: Floats) -> Floats:
     """Share of the person inside the picture, as far as their box tells.
 
     ``area(box in picture) / area(box)``, times ``1 - 0.05 n`` for the nearer of the upper and lower edge,
@@ -32,17 +32,17 @@ def whole(boxes: Floats, pictures: Floats) -> Floats:
     Returns:
         (...) values in [0, 1].
     """
-    inside = shares(areas_inside(boxes, pictures), areas(boxes))
+    inside = area_shares(areas_inside_picture(boxes, pictures), areas(boxes))
     left, top, right, bottom = np.moveaxis((boxes - pictures) * np.array([1.0, 1.0, -1.0, -1.0]), -1, 0)
     tall = boxes[..., 3] - boxes[..., 1]
-    ends = _nearness(np.minimum(top, bottom), tall)
+    ends = _edge_proximity(np.minimum(top, bottom), tall)
     beside = np.minimum(left, right)
-    beside = np.where(beside < 0.0, 0.0, _nearness(beside, tall))
-    slim = np.minimum(shares(boxes[..., 2] - boxes[..., 0], _SLIM * tall), 1.0)
-    return np.asarray(inside * (1.0 - _CUT * ends) * (1.0 - beside * (1.0 - slim)))
+    beside = np.where(beside < 0.0, 0.0, _edge_proximity(beside, tall))
+    slim = np.minimum(area_shares(boxes[..., 2] - boxes[..., 0], _UPRIGHT_ASPECT_RATIO * tall), 1.0)
+    return np.asarray(inside * (1.0 - _EDGE_PENALTY * ends) * (1.0 - beside * (1.0 - slim)))
 
 
-def _nearness(gap: Floats, tall: Floats) -> Floats:
+def _edge_proximity(gap: Floats, tall: Floats) -> Floats:
     """Say how near (...) boxes are to an edge that is `gap` away: 1 at it or beyond, 0 clear of it."""
-    room = np.maximum(_NEAR_EDGE * tall, _LEAST)
+    room = np.maximum(_EDGE_MARGIN * tall, _MINIMUM_MARGIN)
     return np.asarray(1.0 - np.clip(gap / room, 0.0, 1.0))

@@ -16,7 +16,7 @@ def view_cost(quality: Floats) -> Floats:
     return np.asarray(HIDDEN_COST - np.clip(quality, 0.0, 1.0))
 
 
-def compared(quality: Floats, axis: int) -> Floats:
+def relative_quality(quality: Floats, axis: int) -> Floats:
     """Divide each view's quality by that of the best view of the same object in the same frame.
 
     The best view is then worth 1 however far away everybody is, and the cost ``1 - quality`` says which share
@@ -33,7 +33,7 @@ def compared(quality: Floats, axis: int) -> Floats:
     return np.asarray(quality / np.where(best > 0, best, 1.0))
 
 
-def compared_views(quality: Floats, moment: NDArray[np.int64], moments: int) -> Floats:
+def relative_view_quality(quality: Floats, moment: NDArray[np.int64], moments: int) -> Floats:
     """Do the same for a list of views.
 
     Args:

@@ -14,28 +14,28 @@ NO_VIEW_COST = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Gops:
+class GopCosts:
     """What the S GOPs of a window cost.
 
     Attributes:
         cost: S times (C, K), the sum over the GOP's frames; infinite where a camera cannot be shown. Objects
             are innermost: they are the long axis, so that every step of the program is one vector operation.
         frames: (S,) float64, how many frames each GOP stands for.
-        blind: S times (C, K), where a camera shows nobody, or cannot be shown; None where nobody asks.
+        shows_nobody: S times (C, K), where a camera shows nobody, or cannot be shown; None where nobody asks.
     """
 
     cost: Sequence[NDArray[np.float64]]
     frames: NDArray[np.float64]
-    blind: Sequence[NDArray[np.bool_] | None]
+    shows_nobody: Sequence[NDArray[np.bool_] | None]
 
-    def of(self, people: NDArray[np.int64]) -> Gops:
+    def for_people(self, people: NDArray[np.int64]) -> GopCosts:
         """Give the same for some of the people, by index."""
-        blind = [None if it is None else it[:, people] for it in self.blind]
-        return Gops([it[:, people] for it in self.cost], self.frames, blind)
+        blind = [None if it is None else it[:, people] for it in self.shows_nobody]
+        return GopCosts([it[:, people] for it in self.cost], self.frames, blind)
 
 
-def solve(
-    gops: Gops, previous: NDArray[np.int64], switch_cost: float, asked: int
+def solve_dynamic_program(
+    gops: GopCosts, previous: NDArray[np.int64], switch_cost: float, decided_gops: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Give the cameras (asked, K) of the first GOPs, -1 where none is possible, and what all cost (K,).
 
@@ -43,15 +43,15 @@ def solve(
     can be given to the camera that is being shown, which the paper's forward recursion leaves open.
     """
     count, (cameras, objects) = len(gops.cost), gops.cost[0].shape
-    onward = np.empty((asked, cameras, objects))  # the cost from GOP s on, by the camera shown in it
+    onward = np.empty((decided_gops, cameras, objects))  # the cost from GOP s on, by the camera shown in it
     best = np.empty((count, objects))  # the least of these over the cameras
     later = np.empty((cameras, objects))  # the same for GOPs that nobody asks for
     ahead = np.zeros((cameras, objects))  # the least cost after GOP s, by the camera shown last
     start = np.zeros(objects)  # the same where no camera was shown before
     if not objects:
-        return np.empty((asked, 0), dtype=np.int64), start
+        return np.empty((decided_gops, 0), dtype=np.int64), start
     for s in range(count - 1, -1, -1):
-        value = np.add(gops.cost[s], ahead, out=onward[s] if s < asked else later)
+        value = np.add(gops.cost[s], ahead, out=onward[s] if s < decided_gops else later)
         np.minimum.reduce(value, axis=0, out=best[s])
         if best[s].max() == np.inf:
             hole = np.isinf(best[s])
@@ -64,11 +64,11 @@ def solve(
     every = np.arange(objects)
     total = np.where(previous >= 0, ahead[previous, every], start)
 
-    possible = np.isfinite(best[:asked])
-    leave = best[:asked] + switch_cost
-    views = np.empty((asked, objects), dtype=np.int64)
+    possible = np.isfinite(best[:decided_gops])
+    leave = best[:decided_gops] + switch_cost
+    views = np.empty((decided_gops, objects), dtype=np.int64)
     current = previous.copy()
-    for s in range(asked):
+    for s in range(decided_gops):
         goes_on = np.take(onward[s], np.maximum(current, 0) * objects + every) <= leave[s]
         cut = np.flatnonzero(possible[s] & ~(goes_on & (current >= 0)))
         if cut.size:

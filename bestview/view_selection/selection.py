@@ -8,14 +8,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.view_selection.dynamic_program import NO_CAMERA, NO_VIEW_COST, Gops, solve
-from bestview.view_selection.minimum_shot import solve_with_shots
+from bestview.view_selection.dynamic_program import NO_CAMERA, NO_VIEW_COST, GopCosts, solve_dynamic_program
+from bestview.view_selection.minimum_shot import solve_with_minimum_shot
 
-__all__ = ["NO_CAMERA", "NO_VIEW_COST", "Choices", "choose_by_gops", "choose_views"]
+__all__ = ["NO_CAMERA", "NO_VIEW_COST", "ViewSelection", "select_views", "select_views_by_gop"]
 
 
 @dataclass(frozen=True, slots=True)
-class Choices:
+class ViewSelection:
     """The cameras chosen for a window of N frames and K objects.
 
     Attributes:
@@ -29,16 +29,16 @@ class Choices:
     costs: NDArray[np.float64]
 
 
-def choose_views(
+def select_views(
     cost: NDArray[np.float64],
     previous: NDArray[np.int64],
     switch_cost: float,
     cut_allowed: NDArray[np.bool_],
-    least_shot: int = 0,
-    held: NDArray[np.int64] | None = None,
+    minimum_shot_gops: int = 0,
+    shot_ages: NDArray[np.int64] | None = None,
     weight: NDArray[np.float64] | None = None,
-    asked: int | None = None,
-) -> Choices:
+    decided_gops: int | None = None,
+) -> ViewSelection:
     """Minimise the sum of view costs and of cuts over the window, for all objects at once (section III).
 
     The cost is ``sum_n c(n, b_n) + lambda * sum_n [b_n != b_(n-1)]``. A cut may only happen at a frame
@@ -62,12 +62,12 @@ def choose_views(
         previous: (K,) b_(-1), the camera index just before the window; -1: none yet.
         switch_cost: lambda, the cost of one cut, in units of one frame's view cost.
         cut_allowed: (N,) where a cut may happen; entry 0 says whether frame 0 may differ from `previous`.
-        least_shot: GOPs that a shot lasts at least; up to 1 is the paper's program.
-        held: (K,) for how many GOPs `previous` has been shown, at least 1; None: long enough to be left.
+        minimum_shot_gops: GOPs that a shot lasts at least; up to 1 is the paper's program.
+        shot_ages: (K,) for how many GOPs `previous` has been shown, at least 1; None: long enough to be left.
         weight: (N,) for how many frames each frame stands, above 0; None: one. Above 1 for the last ones, the
             window is taken to go on as it ends: a view that stays better is worth a cut then.
-        asked: of how many GOPs the views are asked for, at least 1: all before the next GOP; None: of all. It
-            saves time where a window moves on by a GOP and the rest is decided again.
+        decided_gops: for how many GOPs views are returned, at least 1; None: for all. Saves time where the
+            window moves on by one GOP and the rest is decided again.
 
     Raises:
         ValueError: shapes that do not fit, a cost that is not a number, a negative switching cost, or a
@@ -75,47 +75,57 @@ def choose_views(
     """
     _check(cost, previous, switch_cost, cut_allowed)
     objects, frames, cameras = cost.shape
-    if held is not None and held.shape != (objects,):
-        raise ValueError(f"held has shape {held.shape}, not ({objects},)")
-    if asked is not None and asked < 1:
-        raise ValueError(f"views of {asked} GOPs are asked for")
+    if shot_ages is not None and shot_ages.shape != (objects,):
+        raise ValueError(f"shot_ages has shape {shot_ages.shape}, not ({objects},)")
+    if decided_gops is not None and decided_gops < 1:
+        raise ValueError(f"views of {decided_gops} GOPs are asked for")
     views = np.full((objects, frames), NO_CAMERA, dtype=np.int64)
-    lasting = np.ones(frames) if weight is None else weight
-    if lasting.shape != (frames,) or not (lasting > 0).all():
-        raise ValueError(f"weight has shape {lasting.shape}, not ({frames},), or is not above 0")
+    frame_weights = np.ones(frames) if weight is None else weight
+    if frame_weights.shape != (frames,) or not (frame_weights > 0).all():
+        raise ValueError(f"weight has shape {frame_weights.shape}, not ({frames},), or is not above 0")
     if not cameras or not frames:
-        return Choices(views, np.full(objects, NO_VIEW_COST * lasting.sum()))
+        return ViewSelection(views, np.full(objects, NO_VIEW_COST * frame_weights.sum()))
     starts = np.flatnonzero(cut_allowed)
     running = int(starts[0]) if starts.size else frames
-    costs = _go_on(cost[:, :running], lasting[:running], previous, views) if running else np.zeros(objects)
+    costs = (
+        _continue_running_gop(cost[:, :running], frame_weights[:running], previous, views)
+        if running
+        else np.zeros(objects)
+    )
     if starts.size:
-        gops = _gops(cost, lasting, starts, blind=least_shot > 1)
-        shown, ahead = choose_by_gops(gops, previous, switch_cost, least_shot, held, asked)
+        gops = _sum_by_gop(cost, frame_weights, starts, mark_empty=minimum_shot_gops > 1)
+        shown, ahead = select_views_by_gop(
+            gops, previous, switch_cost, minimum_shot_gops, shot_ages, decided_gops
+        )
         lengths = np.diff(starts, append=frames)[: len(shown)]
         views = views[:, : running + int(lengths.sum())]
         views[:, running:] = np.repeat(shown, lengths, axis=0).T
         costs += ahead
-    return Choices(views, costs)
+    return ViewSelection(views, costs)
 
 
-def choose_by_gops(
-    gops: Gops,
+def select_views_by_gop(
+    gops: GopCosts,
     previous: NDArray[np.int64],
     switch_cost: float,
-    least_shot: int = 0,
-    held: NDArray[np.int64] | None = None,
-    asked: int | None = None,
+    minimum_shot_gops: int = 0,
+    shot_ages: NDArray[np.int64] | None = None,
+    decided_gops: int | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Choose where the costs of whole GOPs are known; arguments as above.
 
     Returns:
         (asked, K) cameras of the first GOPs, -1 where none is possible, and (K,) what the window costs.
     """
-    count = len(gops.cost) if asked is None else min(asked, len(gops.cost))
-    if least_shot > 1:
-        ages = np.full(len(previous), least_shot) if held is None else np.clip(held, 1, least_shot)
-        return solve_with_shots(gops, previous, ages, switch_cost, least_shot, count)
-    return solve(gops, previous, switch_cost, count)
+    count = len(gops.cost) if decided_gops is None else min(decided_gops, len(gops.cost))
+    if minimum_shot_gops > 1:
+        ages = (
+            np.full(len(previous), minimum_shot_gops)
+            if shot_ages is None
+            else np.clip(shot_ages, 1, minimum_shot_gops)
+        )
+        return solve_with_minimum_shot(gops, previous, ages, switch_cost, minimum_shot_gops, count)
+    return solve_dynamic_program(gops, previous, switch_cost, count)
 
 
 def _check(
@@ -140,9 +150,9 @@ def _check(
         raise ValueError("a view cost is not a number, or minus infinity")
 
 
-def _go_on(
+def _continue_running_gop(
     cost: NDArray[np.float64],
-    lasting: NDArray[np.float64],
+    frame_weights: NDArray[np.float64],
     previous: NDArray[np.int64],
     views: NDArray[np.int64],
 ) -> NDArray[np.float64]:
@@ -155,27 +165,31 @@ def _go_on(
     mine = np.take_along_axis(cost, np.maximum(previous, 0)[:, None, None], axis=2)[:, :, 0]
     shown = np.logical_and.accumulate(np.isfinite(mine) & (previous >= 0)[:, None], axis=1)
     views[:, :running] = np.where(shown, previous[:, None], NO_CAMERA)
-    return np.asarray((np.where(shown, mine, NO_VIEW_COST) * lasting).sum(axis=1))
+    return np.asarray((np.where(shown, mine, NO_VIEW_COST) * frame_weights).sum(axis=1))
 
 
-def _gops(
-    cost: NDArray[np.float64], lasting: NDArray[np.float64], starts: NDArray[np.int64], *, blind: bool
-) -> Gops:
+def _sum_by_gop(
+    cost: NDArray[np.float64],
+    frame_weights: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    *,
+    mark_empty: bool,
+) -> GopCosts:
     """Sum the (K, N, C) costs, each frame as often as it lasts, over each GOP that starts in the window."""
     by_frame = cost.transpose(1, 2, 0)
     first = int(starts[0])
-    inside, starts, lasting = by_frame[first:], starts - first, lasting[first:]
-    cost_of_gops, blind_gops = [], []
+    inside, starts, frame_weights = by_frame[first:], starts - first, frame_weights[first:]
+    gop_costs, gops_without_object = [], []
     for start, end in pairwise([*starts.tolist(), len(inside)]):
         # Frame after frame, so that the order of the sums does not depend on how many objects there are.
-        total = _lasting(inside[start], lasting[start])
+        total = _weighted(inside[start], frame_weights[start])
         for n in range(start + 1, end):
-            total = total + _lasting(inside[n], lasting[n])
-        cost_of_gops.append(total)
-        nobody = inside[start:end].min(axis=0) >= NO_VIEW_COST if blind else None
-        blind_gops.append(nobody if nobody is None else nobody | np.isinf(total))
-    return Gops(cost_of_gops, np.add.reduceat(lasting, starts), blind_gops)
+            total = total + _weighted(inside[n], frame_weights[n])
+        gop_costs.append(total)
+        nobody = inside[start:end].min(axis=0) >= NO_VIEW_COST if mark_empty else None
+        gops_without_object.append(nobody if nobody is None else nobody | np.isinf(total))
+    return GopCosts(gop_costs, np.add.reduceat(frame_weights, starts), gops_without_object)
 
 
-def _lasting(cost: NDArray[np.float64], frames: float) -> NDArray[np.float64]:
+def _weighted(cost: NDArray[np.float64], frames: float) -> NDArray[np.float64]:
     return cost if frames == 1 else cost * frames

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.view_selection.dynamic_program import NO_VIEW_COST, Gops
+from bestview.view_selection.dynamic_program import NO_VIEW_COST, GopCosts
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SeenViews:
+class VisibleViews:
     """R views that show somebody, of K people in N frames of C cameras. All other views are worth nothing.
 
     Of one camera and person there is at most one view in a frame.
@@ -23,21 +23,21 @@ class SeenViews:
         frame: (R,) 0 to N - 1.
         camera: (R,) by index.
         person: (R,) by index.
-        worth: (R,) above 0, at most 1: a view costs ``1 - worth``.
-        shown: (N, C) where a camera's frame can be shown at all; there are no views elsewhere.
-        people: K.
-        found: the first so many show somebody for sure, the others are only taken to; None: all do.
+        quality: (R,) above 0, at most 1: a view costs ``1 - worth``.
+        available: (N, C) where a camera's frame can be shown at all; there are no views elsewhere.
+        person_count: K.
+        detected_count: the first so many show somebody for sure, the others are only taken to; None: all do.
     """
 
     frame: Ints
     camera: Ints
     person: Ints
-    worth: Floats
-    shown: NDArray[np.bool_]
-    people: int
-    found: int | None = None
+    quality: Floats
+    available: NDArray[np.bool_]
+    person_count: int
+    detected_count: int | None = None
 
-    def gops(self, first: int, starts: NDArray[np.bool_], weight: Floats, *, blind: bool) -> Gops:
+    def gops(self, first: int, starts: NDArray[np.bool_], weight: Floats, *, mark_empty: bool) -> GopCosts:
         """Sum the costs over the GOPs of a window.
 
         A GOP costs ``sum of w(n) - sum of w(n) worth(n)``, each sum view after view; infinitely much where
@@ -47,23 +47,27 @@ class SeenViews:
             first: frame at which the window begins, which is the first of a GOP.
             starts: (M,) where GOPs begin in the window; the first entry is true.
             weight: (M,) for how many frames each frame stands.
-            blind: whether to tell where a camera is found to show nobody.
+            mark_empty: whether to tell where a camera is found to show nobody.
         """
-        frames, cameras = len(weight), self.shown.shape[1]
+        frames, cameras = len(weight), self.available.shape[1]
         gop = np.cumsum(starts) - 1
         count = int(gop[-1]) + 1
         rows = np.flatnonzero((self.frame >= first) & (self.frame < first + frames))
         at = self.frame[rows] - first
-        cell = (gop[at] * cameras + self.camera[rows]) * self.people + self.person[rows]
-        cells = count * cameras * self.people
+        cell = (gop[at] * cameras + self.camera[rows]) * self.person_count + self.person[rows]
+        cells = count * cameras * self.person_count
         # bincount adds row after row, so that no sum depends on how many others there are.
-        saved = np.bincount(cell, self.worth[rows] * weight[at], cells).reshape(count, cameras, self.people)
-        lasting: Floats = np.bincount(gop, weight).astype(np.float64)
-        cost = NO_VIEW_COST * lasting[:, None, None] - saved
-        missing = ~np.logical_and.reduceat(self.shown[first : first + frames], np.flatnonzero(starts), axis=0)
+        saved = np.bincount(cell, self.quality[rows] * weight[at], cells).reshape(
+            count, cameras, self.person_count
+        )
+        frame_weights: Floats = np.bincount(gop, weight).astype(np.float64)
+        cost = NO_VIEW_COST * frame_weights[:, None, None] - saved
+        missing = ~np.logical_and.reduceat(
+            self.available[first : first + frames], np.flatnonzero(starts), axis=0
+        )
         cost[missing] = np.inf
-        if not blind:
-            return Gops(list(cost), lasting, [None] * count)
-        sure = cell if self.found is None else cell[rows < self.found]
+        if not mark_empty:
+            return GopCosts(list(cost), frame_weights, [None] * count)
+        sure = cell if self.detected_count is None else cell[rows < self.detected_count]
         nobody = np.bincount(sure, minlength=cells).reshape(cost.shape) == 0
-        return Gops(list(cost), lasting, list(nobody | missing[:, :, None]))
+        return GopCosts(list(cost), frame_weights, list(nobody | missing[:, :, None]))

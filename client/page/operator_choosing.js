@@ -16,12 +16,12 @@ const FIELDS = [
   ['unfound', 'Unfound', 'What a view counts for of somebody whom only other cameras find, 0 to 1.'],
   ['min_shot_s', 'Shortest shot, s', 'For how long a camera is shown at least.'],
   ['quality.size', 'Size', 'How large the person is in the picture.'],
-  ['quality.whole', 'Whole', "How much of the person the picture's edges leave."],
-  ['quality.unhidden', 'Unhidden', 'How much of the person other people leave to be seen.'],
-  ['quality.central', 'Central', 'How near the middle of the picture.'],
-  ['quality.sharp', 'Sharp', 'How much detail there is; cameras measure it only where the file has a weight for it.'],
+  ['quality.truncation', 'Truncation', "How much of the person the picture's edges leave."],
+  ['quality.occlusion', 'Occlusion', 'How much of the person other people leave to be seen.'],
+  ['quality.centering', 'Centering', 'How near the middle of the picture.'],
+  ['quality.sharpness', 'Sharpness', 'How much detail there is; cameras measure it only where the file has a weight for it.'],
   ['quality.facing', 'Facing', 'Walking towards the camera, not away from it; needs the ground.'],
-  ['quality.sure', 'Sure', 'How surely the track is there.'],
+  ['quality.confidence', 'Confidence', 'How surely the track is there.'],
   ['quality.relative', 'Relative', 'A view is measured by the best view of the moment.'],
 ];
 

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from bestview import camera_height, horizon
+from bestview import camera_height, horizon_row
 from server.config.ground_unit import UNITS_PER_METER
 from server.config.sections import CameraSettings
 from server.config.sections.detect import DetectSettings
@@ -79,7 +79,7 @@ def _floor(config: Config, camera: CameraSettings, fit: Letterbox) -> Floor | No
     homography = np.array(camera.ground, dtype=np.float64)
     width, height = config.site.width, config.site.height
     middle = float(fit.to_own(np.array([width / 2.0, 0.0]))[0])
-    row = horizon(homography, middle)
+    row = horizon_row(homography, middle)
     if row is None:
         return None
     seen = float(fit.to_site(np.array([middle, row]))[1])

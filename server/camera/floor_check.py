@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bestview import shows_floor
+from bestview import shows_ground
 from server.config.sections import CameraSettings
 from server.system.errors import UserError
 
@@ -15,7 +15,7 @@ def check_floor(camera: CameraSettings, size: tuple[int, int]) -> None:
     Raises:
         UserError: it is such a one: nobody would ever stand anywhere.
     """
-    if camera.ground is not None and not shows_floor(np.array(camera.ground, dtype=np.float64), size):
+    if camera.ground is not None and not shows_ground(np.array(camera.ground, dtype=np.float64), size):
         raise UserError(
             f"camera {camera.id}: ground: all of its picture, {size[0]}x{size[1]}, lies above the horizon: "
             "its homography is of a camera tilted past straight down, or of another picture; leave it out"

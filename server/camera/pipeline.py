@@ -108,7 +108,7 @@ class CameraPipeline:
         )
         self._tracker = Stepping(tracker, self._detector.bins, track.window.stride)
         self._reporter = Reporter(camera_id, boot, self.source.size, track.window.stride)
-        self._sharpness = Sharpness() if config.view.quality.sharp > 0 else None
+        self._sharpness = Sharpness() if config.view.quality.sharpness > 0 else None
         self.witness = (
             Witness(config, camera_id, self.source.size, boot) if config.witnesses(camera_id) else None
         )

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 from pydantic_settings import SettingsError
 
-from bestview import checked_homography, turns
+from bestview import ground_handedness, validate_homography
 from server.config.duplicate_keys import DuplicateKeyError, parse_json
 from server.config.environment import check_environment
 from server.config.ground_unit import check_unit
@@ -163,7 +163,11 @@ def _one_side(cameras: Sequence[CameraSettings]) -> None:
     Raises:
         ValueError: there are such.
     """
-    sides = {it.id: turns(np.array(it.ground, dtype=np.float64)) for it in cameras if it.ground is not None}
+    sides = {
+        it.id: ground_handedness(np.array(it.ground, dtype=np.float64))
+        for it in cameras
+        if it.ground is not None
+    }
     ways = [[camera for camera, side in sides.items() if side == way] for way in (1, -1)]
     fewer, others = sorted(ways, key=len)
     if fewer:
@@ -191,7 +195,7 @@ def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]],
     for camera_id, matrix in matrices.items():
         check_camera_name(camera_id, f"{where}: ground: {path}")
         try:
-            checked_homography(matrix, f"camera {camera_id}")
+            validate_homography(matrix, f"camera {camera_id}")
         except ValueError as error:
             raise UserError(f"{where}: ground: {path}: {error}") from error
     try:

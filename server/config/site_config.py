@@ -119,10 +119,10 @@ class Config(BaseSettings):
     @model_validator(mode="after")
     def _nobody_is_settled_untold(self) -> Self:
         identity = self.view.identity
-        least = identity.told_after + 2 * identity.regroup
-        if identity.settled_after < least:
+        least = identity.publish_after + 2 * identity.clustering_interval
+        if identity.settle_after < least:
             raise ValueError(
-                f"view.identity.settled_after: is {identity.settled_after} frames but must be "
+                f"view.identity.settle_after: is {identity.settle_after} frames but must be "
                 f"at least {least} (told_after + 2 * regroup), "
                 "so that whoever is settled has been told to be somebody"
             )
@@ -147,7 +147,7 @@ class Config(BaseSettings):
     def witnesses(self, camera_id: str) -> Sequence[str]:
         """Give the cameras that may look at the same ground as this one, if it goes by what others find."""
         looks = {it.id for it in self.cameras if it.ground is not None} - self.overhead
-        if not self.track.witness.use or camera_id not in looks:
+        if not self.track.cross_view.enabled or camera_id not in looks:
             return ()
         return tuple(it for it in self.camera_ids if it in looks and it != camera_id)
 

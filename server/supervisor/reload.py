@@ -69,7 +69,9 @@ def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
     # Whose H.264 can pass depends on the site's codec: with another one, that waits, too.
     names_of_own = tuple(it for it in _OF_A_CAMERA if not (it == "h264" and "encode.codec" in keys))
     own = {it: _of(keys, [f"cameras.{it}.{name}" for name in names_of_own]) for it in running.camera_ids}
-    sharp = (running.view.quality.sharp > 0) != (view.quality.sharp > 0)  # cameras measure it, or do not
+    sharp = (running.view.quality.sharpness > 0) != (
+        view.quality.sharpness > 0
+    )  # cameras measure it, or do not
     anew = tuple(camera for camera in running.camera_ids if shared or sharp or own[camera])
     done = {*live, *shared, *(key for names in own.values() for key in names)}
     waiting = tuple(key for key in keys if key not in done)

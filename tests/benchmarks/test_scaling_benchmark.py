@@ -12,7 +12,7 @@ from benchmarks.scaling.__main__ import exponent
 from benchmarks.scaling.hall import STRIDE, WINDOW, Hall, Tracker
 from benchmarks.scaling.service import REST, STAGES, Times
 from benchmarks.scaling.site import carry
-from bestview import feet, to_ground
+from bestview import foot_points, to_ground
 from server.messaging.messages import CameraTracks
 from server.service.ingest.validation import makes_sense
 
@@ -33,7 +33,7 @@ def test_boxes_stand_where_people_are() -> None:
     for camera in range(9):
         view = hall.view(camera, places, 3)
         there = ~np.isnan(view.boxes[..., 0])
-        found = to_ground(hall.grounds[camera], feet(view.boxes))
+        found = to_ground(hall.grounds[camera], foot_points(view.boxes))
         off = np.hypot(*np.moveaxis(found - places[view.people], -1, 0))[there]
         assert np.median(off) < 0.5
 

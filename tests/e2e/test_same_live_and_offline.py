@@ -32,7 +32,7 @@ async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path) 
     config = configuration(
         tmp_path,
         recording,
-        track={"witness_wait_s": 60},
+        track={"cross_view_wait_s": 60},
         view={"late_after_s": 60},
         zenoh={"lease_s": 60},
     )

@@ -47,7 +47,11 @@ def small_config(cameras: Sequence[str | dict[str, Any]] = CAMERAS, **changes: A
         "encode": {"gop": GOP},
         "cameras": [{"id": it, "source": "scene:room"} if isinstance(it, str) else it for it in cameras],
         "track": {"window": {"window": 5, "stride": STRIDE, "birth_window": 5}},
-        "view": {"lookahead": 2 * GOP, "switch_cost_s": 0.04, "identity": {"confirm": 1, "regroup": 1}},
+        "view": {
+            "lookahead": 2 * GOP,
+            "switch_cost_s": 0.04,
+            "identity": {"confirmation_frames": 1, "clustering_interval": 1},
+        },
     }
     for section, value in changes.items():
         content[section] = {**content.get(section, {}), **value} if isinstance(value, dict) else value

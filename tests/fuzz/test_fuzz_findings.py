@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from benchmarks.fuzz.site import KEYS, STRIDE, Fed, pictures, site, video
-from bestview import checked_homography
+from bestview import validate_homography
 from client.fmp4 import Mp4Error
 from client.mp4_writer import write_plain
 from client.webm import ElementReader, WebmError, cluster_time
@@ -146,7 +146,7 @@ def test_a_ground_file_that_cannot_be_read_is_refused_in_a_line(tmp_path: Path, 
 
 def test_a_homography_of_numbers_too_large_is_refused() -> None:
     with pytest.raises(ValueError, match="not a 3x3 matrix of numbers"):
-        checked_homography([[10**400] * 3] * 3, "c0")
+        validate_homography([[10**400] * 3] * 3, "c0")
 
 
 @pytest.mark.parametrize("name", ["$x$\n", "\ud800", "c" * 65, ""])

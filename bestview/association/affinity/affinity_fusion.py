@@ -32,8 +32,10 @@ class Weighing:
 
     def __init__(self, settings: IdentitySettings, calibrated: Mapping[str, bool], pace: float) -> None:
         self._settings, self._calibrated, self._pace = settings, calibrated, pace
-        self._scales = LookScales(settings.look_frames)
-        self._weights = LookWeights(settings.look, settings.look_cap, settings.look_frames)
+        self._scales = LookScales(settings.appearance_frames)
+        self._weights = LookWeights(
+            settings.appearance_evidence, settings.maximum_appearance_evidence, settings.appearance_frames
+        )
 
     def grouped(
         self,
@@ -66,7 +68,7 @@ class Weighing:
                 batch.linked,
                 batch.looks,
                 self._weights,
-                self._settings.join,
+                self._settings.merge_threshold,
             )
             group[batch.rows] = batch.rows[label]
         return group

@@ -40,15 +40,22 @@ class PairTables:
     """
 
     def __init__(self, settings: IdentitySettings) -> None:
-        self._cap, self._memory, self._cap_alike = settings.ground_cap, settings.memory, settings.cap
-        self._frames = settings.ground_frames
+        self._cap, self._memory, self._cap_alike = (
+            settings.maximum_ground_evidence,
+            settings.cross_camera_memory,
+            settings.maximum_cross_camera_evidence,
+        )
+        self._frames = settings.ground_correlation_frames
         self._place: dict[Row, int] = {}
         # What the tables call each row, and no other one later.
         self._name: Ints = np.zeros(0, dtype=np.int64)
         self._names = 0
-        self._presence = Presence(settings.recent + _BEFORE)
+        self._presence = Presence(settings.comparable_frames + _BEFORE)
         # Frames of being elsewhere after which more of them say nothing more.
-        self._enough = max(_LEAST_COMMON, math.ceil(settings.ground_cap * settings.ground_frames / -WORST))
+        self._enough = max(
+            _LEAST_COMMON,
+            math.ceil(settings.maximum_ground_evidence * settings.ground_correlation_frames / -WORST),
+        )
         self._apart = PairTable()
         self._alike = PairTable()
         # Evidence of standing on the same ground, and in how many frames; no more than says anything.

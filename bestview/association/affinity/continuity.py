@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bestview.association.settings import IdentitySettings
 from bestview.association.tracklet import Episode
-from bestview.geometry.ground_plane import feet
+from bestview.geometry.ground_plane import foot_points
 
 Floats = NDArray[np.float64]
 
@@ -26,9 +26,9 @@ def goes_on(episode: Episode, settings: IdentitySettings) -> float:
     Somebody's word is worth as much as the ground can say against it.
     """
     if episode.sure:
-        return settings.ground_cap
-    worth = settings.goes_on * np.exp(-episode.crowded / settings.goes_on_frames)
-    return float(worth if episode.gap <= settings.gap else worth * np.exp(-episode.gap / _UNSEEN))
+        return settings.maximum_ground_evidence
+    worth = settings.continuation_evidence * np.exp(-episode.crowded / settings.continuation_decay_frames)
+    return float(worth if episode.gap <= settings.gap_frames else worth * np.exp(-episode.gap / _UNSEEN))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,9 +101,9 @@ def lost_and_found(
     later = places.first[two] > places.last[one]
     lost, found = np.where(later, one, two), np.where(later, two, one)
     gap = places.first[found] - places.last[lost]
-    pair = np.flatnonzero((gap > 0) & (gap <= settings.found_frames))
+    pair = np.flatnonzero((gap > 0) & (gap <= settings.reappearance_frames))
     lost, found, gap = lost[pair], found[pair], gap[pair]
-    reach = settings.reach_heights + pace * gap
+    reach = settings.reappearance_reach_heights + pace * gap
     same_camera = places.camera[lost] == places.camera[found]
     apart = np.hypot(*(places.end_ground[lost] - places.begin_ground[found]).T) / height
     # A camera that has a ground but does not see the feet knows nothing: pixels would not tell better.
@@ -111,7 +111,7 @@ def lost_and_found(
     apart[in_picture] = _picture_heights(places.end[lost[in_picture]], places.begin[found[in_picture]])
     share = apart / reach
     known = ~np.isnan(share)
-    worth = np.where(same_camera, settings.found * np.maximum(1.0 - share, 0.0), 0.0)
+    worth = np.where(same_camera, settings.reappearance_evidence * np.maximum(1.0 - share, 0.0), 0.0)
     evidence[pair[known]] = worth[known]
     too_far[pair[known]] = share[known] > _TOO_FAR
     return evidence, too_far
@@ -120,4 +120,4 @@ def lost_and_found(
 def _picture_heights(one: Floats, two: Floats) -> Floats:
     """Distance between the feet of (P, 4) boxes in heights of the taller one."""
     tall = np.maximum(np.maximum(one[:, 3] - one[:, 1], two[:, 3] - two[:, 1]), 1.0)
-    return np.asarray(np.hypot(*(feet(one) - feet(two)).T) / tall)
+    return np.asarray(np.hypot(*(foot_points(one) - foot_points(two)).T) / tall)

@@ -106,5 +106,5 @@ class Evidence:
         too_far[goes_on_] = False
         same = (self._number[one] == self._number[two]) & (self._number[one] > 0)
         near, alike = self._tables.near(one, two), self._tables.alike(one, two)
-        evidence = order + (near + alike + self._settings.told * same)
+        evidence = order + (near + alike + self._settings.id_persistence_evidence * same)
         return evidence, self._tables.apart(one, two) | too_far

@@ -90,8 +90,8 @@ class TravelTimes:
         goes_there = self._cameras * (ways + _PRIOR / self._cameras) / (exits.count + _PRIOR)
         width = float(self.edges[place + 1] - self.edges[place]) / float(self.edges[-1] - self.edges[0])
         in_that_time = (here / width + _PRIOR) / (ways + _PRIOR)
-        known = exits.count / (exits.count + self._settings.travel_known) if exits.count else 0.0
-        cap = self._settings.travel_cap
+        known = exits.count / (exits.count + self._settings.travel_half_weight_count) if exits.count else 0.0
+        cap = self._settings.maximum_travel_evidence
         return float(known * np.clip(np.log(goes_there * in_that_time), -cap, cap))
 
     def _bin(self, frames: int) -> int:

@@ -41,7 +41,7 @@ class LooksBetween:
     @property
     def gate(self) -> float:
         """Distance below which two looks are likely one person's."""
-        return self.appearances.gate(self._settings.appearance_gate, self._settings.appearance_share)
+        return self.appearances.gate(self._settings.appearance_gate, self._settings.appearance_gate_share)
 
     def share_ground(self, one: Iterable[str], two: Iterable[str]) -> bool:
         """Say whether two of these cameras have a common ground."""

@@ -21,7 +21,7 @@ from bestview.association.settings import IdentitySettings
 from bestview.association.sightings import FootError, LocalTrack, Sightings, line_up
 from bestview.association.tracklet_groups import Group, groups_of
 from bestview.association.tracklet_splitter import Episodes
-from bestview.geometry.ground_plane import checked_homography
+from bestview.geometry.ground_plane import validate_homography
 from bestview.geometry.person_height import HeightScale
 
 
@@ -77,7 +77,7 @@ class IdentityRegistry:
         self._settings, self._overhead = settings, frozenset(overhead)
         self._foot_error = FootError(settings.foot_sideways, settings.foot_upwards)
         self._homographies = {
-            camera: None if matrix is None else checked_homography(matrix, f"camera {camera}")
+            camera: None if matrix is None else validate_homography(matrix, f"camera {camera}")
             for camera, matrix in sorted(homographies.items())
         }
         self._camera = {camera: i for i, camera in enumerate(self._homographies)}
@@ -92,7 +92,7 @@ class IdentityRegistry:
         )
         self._pictures: Mapping[str, tuple[int, int]] = {}
         self._tables = PairTables(settings)
-        self._weighing = Weighing(settings, calibrated, settings.speed_heights / fps)
+        self._weighing = Weighing(settings, calibrated, settings.maximum_speed_heights / fps)
         self._corrections = Corrections()
         self._here: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self._last_frame: int | None = None
@@ -130,11 +130,13 @@ class IdentityRegistry:
         born: tuple[int, ...] = ()
         merged: tuple[Merge, ...] = ()
         told: dict[EpisodeKey, int] = {}
-        every = self._settings.regroup
+        every = self._settings.clustering_interval
         anew = before is None or last_frame // every > before // every
         if anew:
             born, merged = self._regroup(last_frame)
-            told = {it.key: it.number for it in episodes if it.tell(last_frame - self._settings.told_after)}
+            told = {
+                it.key: it.number for it in episodes if it.tell(last_frame - self._settings.publish_after)
+            }
         returned, gone = self._people.comings_and_goings(episodes, last_frame)
         split = self._corrections.update(told, merged)
         numbers = {episode.key: episode.number for episode in episodes}
@@ -214,7 +216,11 @@ class IdentityRegistry:
     def _gate(self) -> float:
         """Distance between feet at which they are as likely one person's as two's, ground units."""
         settings = self._settings
-        return settings.gate if settings.gate is not None else settings.gate_heights * self._scale.height
+        return (
+            settings.gate_distance
+            if settings.gate_distance is not None
+            else settings.gate_heights * self._scale.height
+        )
 
     def _silent(self, group: Group) -> int:
         return self._doubt.silent(group, self._pictures, self._scale.height)

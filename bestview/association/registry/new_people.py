@@ -52,7 +52,7 @@ class Newcomers:
 
     def see_at_once(self, groups: Iterable[Group], frame: int) -> None:
         """Note which cameras see the same people by now: these have a view in common."""
-        since = frame - self._settings.regroup
+        since = frame - self._settings.clustering_interval
         for group in groups:
             here = {it.key.camera for it in group.episodes if it.end.frame >= since}
             self._meeting.update(combinations(sorted(here), 2))
@@ -74,14 +74,18 @@ class Newcomers:
         first, last = [_first(it) for it in new], [it.person.sight for it in lost]
         time = self._travel.evidence(first, last)
         by_looks = find_again(between.appearances, *looks, possible, between.gate)
-        nearer = np.exp(-time / self._settings.travel_look)
+        nearer = np.exp(-time / self._settings.travel_appearance_weight)
         found = find_again(between.appearances, *looks, possible, between.gate, nearer)
         for i, match in enumerate(by_looks):
             if match < 0:
                 continue
             # Only what looks alone say teaches times, or these would prove themselves.
             self._travel.learn(last[match], first[i])
-            if found[i] < 0 and match not in found and time[i, match] > -self._settings.travel_cap / 2.0:
+            if (
+                found[i] < 0
+                and match not in found
+                and time[i, match] > -self._settings.maximum_travel_evidence / 2.0
+            ):
                 found[i] = match
         return found
 
@@ -90,7 +94,7 @@ class Newcomers:
         before = lost.group
         if before is None:
             # Who has no group though they are compared with everybody is in somebody else's.
-            return lost.person.last < frame - self._settings.recent
+            return lost.person.last < frame - self._settings.comparable_frames
         # Where there was something to compare by, grouping has had its say.
         compared = bool(new.cameras & before.cameras) or (
             between.share_ground(new.cameras, before.cameras) and self._share_view(new, before)

@@ -35,7 +35,7 @@ class People:
 
     def recent(self, frame: int) -> list[Person]:
         """List those who are compared like everybody, by number: some episode of theirs is settled."""
-        oldest = frame - self._settings.recent
+        oldest = frame - self._settings.comparable_frames
         return [it for _, it in sorted(self._persons.items()) if it.settled and it.last >= oldest]
 
     def name(
@@ -81,7 +81,7 @@ class People:
         lost = [
             Lost(person, here.get(number))
             for number, person in sorted(self._persons.items())
-            if number not in here or here[number].last < frame - self._settings.gap
+            if number not in here or here[number].last < frame - self._settings.gap_frames
         ]
         found = self._newcomers.match(new, lost, tables, between, frame)
         born = []
@@ -98,10 +98,13 @@ class People:
     def _is_sure(self, new: Group, frame: int, silent: Callable[[Group], int]) -> bool:
         """Say whether a group is seen lately, and was seen often enough to be somebody."""
         settings = self._settings
-        if new.frames < settings.confirm or new.last < frame - settings.gap - settings.regroup:
+        if (
+            new.frames < settings.confirmation_frames
+            or new.last < frame - settings.gap_frames - settings.clustering_interval
+        ):
             return False
-        doubted = max(0, silent(new) - len(new.cameras) + 1) if settings.doubt else 0
-        return new.frames >= settings.confirm * (1.0 + settings.doubt * doubted)
+        doubted = max(0, silent(new) - len(new.cameras) + 1) if settings.ghost_penalty else 0
+        return new.frames >= settings.confirmation_frames * (1.0 + settings.ghost_penalty * doubted)
 
     def _merge(self, groups: Sequence[Group], frame: int) -> tuple[Merge, ...]:
         """Merge numbers that have been nobody's for long: whoever had them is in somebody else's group."""
@@ -167,7 +170,7 @@ class People:
         returned: list[int] = []
         gone: list[int] = []
         for number, person in sorted(self._persons.items()):
-            away = frame - person.last > self._settings.gone_after
+            away = frame - person.last > self._settings.departed_after
             if away != person.gone:
                 (gone if away else returned).append(number)
                 person.gone = away
@@ -176,11 +179,11 @@ class People:
     def forget(self, frame: int) -> None:
         """Forget whoever was gone for too long."""
         settings = self._settings
-        settled = frame - settings.settled_after
+        settled = frame - settings.settle_after
         gone = sorted(
             (it.last, number) for number, it in self._persons.items() if it.gone and it.last < settled
         )
-        surplus = len(gone) - settings.remember
+        surplus = len(gone) - settings.maximum_departed_people
         for i, (last, number) in enumerate(gone):
             if i < surplus or frame - last > settings.forget_after:
                 del self._persons[number]

@@ -19,7 +19,7 @@ class Load:
     def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
         track = config.track
         self._camera, self._stride, self._gop = camera_id, track.window.stride, config.encode.gop
-        waits = track.witness_wait_s if config.witnesses(camera_id) else 0.0
+        waits = track.cross_view_wait_s if config.witnesses(camera_id) else 0.0
         waits += 1.0 / config.site.fps
         bounds = Bounds(waits + _BEHIND * track.backlog_s, waits + _ABREAST * track.backlog_s)
         all_rungs = rungs(self._stride, live=live) if track.shed_load else (Rung(),)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import Findings, Vantage, overlook, witnessed
+from bestview import CameraDetections, CameraGeometry, rescore_detections, views_overlap
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.messages import FRAME_DETECTIONS_MAX, FrameDetections
@@ -36,7 +36,7 @@ class Witness:
         site = config.site
         self._fit = Letterbox(size, (site.width, site.height))
         self._own = _vantage(config, camera_id, size)
-        self._others: dict[str, tuple[tuple[int, int], Vantage | None]] = {}
+        self._others: dict[str, tuple[tuple[int, int], CameraGeometry | None]] = {}
         """The others' sizes of picture, and where they look from; None: at none of this camera's ground."""
 
     def word(self, pulse: int, detections: Detections | None, *, ended: bool = False) -> FrameDetections:
@@ -64,27 +64,32 @@ class Witness:
             for word in words
             if word.boxes is not None and (vantage := self._vantage_of(word)) is not None
         ]
-        found = Findings(self._fit.boxes_to_own(detections.boxes), detections.scores)
-        return replace(detections, scores=witnessed(self._own, found, others, self._config.track.witness))
+        found = CameraDetections(self._fit.boxes_to_own(detections.boxes), detections.scores)
+        return replace(
+            detections, scores=rescore_detections(self._own, found, others, self._config.track.cross_view)
+        )
 
-    def _vantage_of(self, word: FrameDetections) -> Vantage | None:
+    def _vantage_of(self, word: FrameDetections) -> CameraGeometry | None:
         known = self._others.get(word.camera)
         if known is None or known[0] != word.size:
             vantage = _vantage(self._config, word.camera, word.size)
-            known = self._others[word.camera] = (word.size, vantage if overlook(self._own, vantage) else None)
+            known = self._others[word.camera] = (
+                word.size,
+                vantage if views_overlap(self._own, vantage) else None,
+            )
         return known[1]
 
 
-def _vantage(config: Config, camera_id: str, size: tuple[int, int]) -> Vantage:
+def _vantage(config: Config, camera_id: str, size: tuple[int, int]) -> CameraGeometry:
     camera, site = config.camera(camera_id), config.site
     fit = Letterbox(size, (site.width, site.height))
     own = [np.array(polygon, dtype=np.float64) for polygon in camera.ignore]
     shared = [fit.to_own(np.array(polygon, dtype=np.float64)) for polygon in config.detect.ignore]
-    return Vantage(np.array(camera.ground, dtype=np.float64), size, (*own, *shared))
+    return CameraGeometry(np.array(camera.ground, dtype=np.float64), size, (*own, *shared))
 
 
-def _findings(rows: Sequence[tuple[float, ...]]) -> Findings:
+def _findings(rows: Sequence[tuple[float, ...]]) -> CameraDetections:
     """Give boxes and scores as arrays, without boxes that have no size."""
     table = np.array(rows, dtype=np.float64).reshape(-1, 5)
     table = table[(table[:, 0] < table[:, 2]) & (table[:, 1] < table[:, 3])]
-    return Findings(table[:, :4], table[:, 4])
+    return CameraDetections(table[:, :4], table[:, 4])

@@ -37,7 +37,7 @@ class Exchange:
         self._config, self._camera = config, camera_id
         self._keys = ZenohKeys(config.site.name)
         self._others = config.witnesses(camera_id) if witness else ()
-        self._patience = config.track.witness_wait_s
+        self._patience = config.track.cross_view_wait_s
         looks_here = witness.looks_here if witness else lambda _: False
         self._earshot = Earshot(self._others, most, looks_here)
         self._listening: set[str] = set()

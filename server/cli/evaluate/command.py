@@ -87,7 +87,7 @@ def _judge(
     facts = collect_site_info(choices_file, cameras, videos, asked.site)
     rows = {camera: it.truth for camera, it in recordings.items()}
     truth = build_truth(rows, facts.sizes, asked.least_shown)
-    if not truth.views.counted.any():
+    if not truth.views.evaluated.any():
         raise UserError("--gt: nobody is ever visible in it")
     if asked.tracks:
         person_of = people_of_objects(truth.people, recordings, asked.least_iou)

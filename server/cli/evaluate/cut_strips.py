@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import cuts_of
+from bestview import cut_frames
 from server.camera.sources import open_source
 from server.cli.evaluate.ground_truth import SceneTruth
 from server.cli.evaluate.view_scores import ViewEvaluation
@@ -70,7 +70,7 @@ def plot_strips(
 def _strips(views: NDArray[np.int64], fps: float) -> list[_Strip]:
     """Give the strips of (N,) views."""
     strips = []
-    for cut in cuts_of(views)[:MOST_CUTS].tolist():
+    for cut in cut_frames(views)[:MOST_CUTS].tolist():
         around = {cut - 1, *(cut + round(seconds * fps) for seconds in _AROUND_S)}
         inside = [frame for frame in sorted(around) if 0 <= frame < len(views) and views[frame] >= 0]
         strips.append(_Strip(cut, tuple(_BestViewFrame(int(views[frame]), frame) for frame in inside)))

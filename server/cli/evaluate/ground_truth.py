@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import NOBODY, ViewTruth, stands_for, true_views
+from bestview import NO_PERSON, ViewGroundTruth, match_objects_to_people, view_ground_truth
 from server.cli.render.video_info import Size
 from server.system.errors import UserError
 from tracking.evaluation import Recording
@@ -34,7 +34,7 @@ class SceneTruth:
     people: tuple[int, ...]
     cameras: tuple[str, ...]
     boxes: NDArray[np.float64]
-    views: ViewTruth
+    views: ViewGroundTruth
 
 
 def build_truth(
@@ -60,7 +60,7 @@ def build_truth(
             boxes[place[row.id], row.frame - 1, camera] = row.box
             shown[place[row.id], row.frame - 1, camera] = row.visible
     pictures = np.array([sizes[camera] for camera in counted], dtype=np.float64).reshape(-1, 2)
-    views = true_views(boxes, shown, pictures, least_shown)
+    views = view_ground_truth(boxes, shown, pictures, least_shown)
     return SceneTruth(tuple(people), tuple(counted), boxes, views)
 
 
@@ -85,7 +85,9 @@ def people_of_objects(
             for row, column in zip(*np.nonzero(frame.similarity >= least_iou), strict=True):
                 person, thing = int(frame.truth[row]), int(frame.tracks[column])
                 matches[person_at[person], object_at[thing]] += 1
-    standing = stands_for(matches).tolist()
+    standing = match_objects_to_people(matches).tolist()
     return {
-        number: people[person] for number, person in zip(objects, standing, strict=True) if person != NOBODY
+        number: people[person]
+        for number, person in zip(objects, standing, strict=True)
+        if person != NO_PERSON
     }

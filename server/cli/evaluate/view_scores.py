@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from bestview import ViewScore, best_views, score_views
+from bestview import ViewScore, optimal_views, score_views
 from server.cli.evaluate.choices_file import Choice, views_of
 from server.cli.evaluate.ground_truth import SceneTruth
 from server.cli.render.site_file import SiteInfo
@@ -56,11 +56,11 @@ def evaluate_views(
     return ViewEvaluation(
         objects={person: number for number, person in person_of.items()},
         views=views,
-        best=best_views(truth.views, facts.switch_cost),
+        best=optimal_views(truth.views, facts.switch_cost),
         people={
             person: score(slice(row, row + 1))
             for row, person in enumerate(truth.people)
-            if truth.views.counted[row].any()
+            if truth.views.evaluated[row].any()
         },
         total=score(slice(None)),
         strangers=len({choice.object for choice in choices} - set(person_of)),

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat, ValidationInfo, field_validator
 
-from bestview import WitnessSettings, checked_homography
+from bestview import CrossViewSettings, validate_homography
 from server.config.dataclass_section import validated
 from server.config.ground_unit import check_unit
 from server.config.sections.base import Identifier, Polygon, Section
@@ -57,7 +57,7 @@ class CameraSettings(Section):
         cls, ground: list[list[float]] | None, info: ValidationInfo
     ) -> list[list[float]] | None:
         if ground is not None:
-            checked_homography(ground, f"camera {info.data.get('id', '?')}")
+            validate_homography(ground, f"camera {info.data.get('id', '?')}")
         return ground
 
 
@@ -77,9 +77,9 @@ class TrackSettings(Section):
     """The tracker of that name: person-to-blob matching over some seconds."""
     assist: Annotated[AssistSettings, validated(AssistSettings)] = AssistSettings()
     """What is foreseen for an operator to look at, and what their pointing weighs."""
-    witness: Annotated[WitnessSettings, validated(WitnessSettings)] = WitnessSettings()
+    cross_view: Annotated[CrossViewSettings, validated(CrossViewSettings)] = CrossViewSettings()
     """How a camera goes by what others find that look at the same ground."""
-    witness_wait_s: NonNegativeFloat = 0.3
+    cross_view_wait_s: NonNegativeFloat = 0.3
     """Seconds after a frame was taken until which it waits for what the others found in it."""
 
     def lag(self, fps: float) -> int:

@@ -12,7 +12,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import msgspec
 import numpy as np
 
-from bestview.calibration import CalibrationError, Walk, make_walk
+from bestview.calibration import CalibrationError, Walk, build_walk
 from server.service.calibration.calibration_report import (
     RecordedWalk,
     calibrate_walk,
@@ -48,7 +48,7 @@ def done(task: CalibrationTask) -> CalibrationResult:
 def _walk(seen: CameraBoxes, fps: float) -> Walk:
     frames, who = np.frombuffer(seen.frames, dtype=np.int64), np.frombuffer(seen.who, dtype=np.int64)
     boxes = np.frombuffer(seen.boxes, dtype=np.float64).reshape(-1, 4)
-    return make_walk(seen.camera, seen.size, frames.tolist(), who.tolist(), boxes, comparison_step(fps))
+    return build_walk(seen.camera, seen.size, frames.tolist(), who.tolist(), boxes, comparison_step(fps))
 
 
 def main() -> None:

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bestview.calibration import (
+    CameraCalibration,
+    ErrorSummary,
     Floats,
-    Spread,
     Walk,
     WalkCalibration,
-    WalkedCamera,
     WalkSettings,
-    calibrate_walks,
+    calibrate_from_walks,
 )
 
 _MOMENT_S = 0.2
@@ -40,7 +40,7 @@ class RecordedWalk:
 
 def walk_settings(fps: float, shift: float) -> WalkSettings:
     """Give the settings for recordings of so many frames a second, out of step by `shift` seconds at most."""
-    return WalkSettings(shift=round(shift * fps), step=comparison_step(fps))
+    return WalkSettings(maximum_offset=round(shift * fps), step=comparison_step(fps))
 
 
 def comparison_step(fps: float) -> int:
@@ -82,14 +82,14 @@ def calibrate_walk(walked: RecordedWalk, settings: WalkSettings, person: float) 
     Raises:
         CalibrationError: the walk says too little.
     """
-    found = calibrate_walks(walked.walks, settings, person)
-    missing = [line for it in found.cameras for line in coverage_gaps(it.camera, it.thirds, it.deep)]
+    found = calibrate_from_walks(walked.walks, settings, person)
+    missing = [line for it in found.cameras for line in coverage_gaps(it.camera, it.thirds, it.depth_ratio)]
     homographies = {it.camera: it.homography for it in found.cameras}
     return CalibrationReport(
         found,
         (*report_lines(walked, found, settings), *(it.words for it in missing)),
         next((it.words for it in missing if it.serious), ""),
-        offset_lines(walked, found) if settings.shift else "",
+        offset_lines(walked, found) if settings.maximum_offset else "",
         ground_file_text("m", homographies, details(walked, found, person)),
     )
 
@@ -114,7 +114,7 @@ class CoverageGap:
 
 
 def coverage_gaps(camera: str, thirds: Sequence[float], deep: float) -> Iterator[CoverageGap]:
-    """Say where somebody should walk, too; `thirds` and `deep` are as of a `WalkedCamera`."""
+    """Say where somebody should walk, too; `thirds` and `deep` are as of a `CameraCalibration`."""
     bare = [name for name, share in zip(_THIRDS, thirds, strict=True) if share < _LITTLE]
     if bare:
         where = " and the ".join(bare)
@@ -135,17 +135,17 @@ def report_lines(walked: RecordedWalk, found: WalkCalibration, settings: WalkSet
         left, middle, right = (f"{100 * share:.0f}" for share in it.thirds)
         lines.append(
             f"{it.camera}: {_heights(it.heights)}, {_shares(it.picture)}; of the walk {left} % in the left, "
-            f"{middle} % in the middle and {right} % in the right third, the nearest {it.deep:.1f} times as "
-            "tall as the farthest"
+            f"{middle} % in the middle and {right} % in the right third, the nearest {it.depth_ratio:.1f} "
+            "times as tall as the farthest"
         )
-    lines += [f"{it.camera}: left out: {it.why}" for it in found.left_out]
+    lines += [f"{it.camera}: left out: {it.reason}" for it in found.uncalibrated]
     lines += _floors(found)
     if walked.guessed:
         sizes = ", ".join(f"{it.camera} {it.size[0]}x{it.size[1]}" for it in walked.walks)
         lines.append(f"the pictures' size is guessed from the boxes ({sizes}); --size says it better")
     if walked.rate_guessed:
         lines.append(f"{walked.fps:g} frames a second are taken for granted; --fps says it better")
-    if settings.shift:
+    if settings.maximum_offset:
         lines += _offsets(walked, found)
     return lines
 
@@ -160,7 +160,7 @@ def details(walked: RecordedWalk, found: WalkCalibration, person: float) -> dict
             it.camera: {"heights": _numbers(it.heights), "picture": _numbers(it.picture)}
             for it in found.cameras
         },
-        "left_out": {it.camera: it.why for it in found.left_out},
+        "left_out": {it.camera: it.reason for it in found.uncalibrated},
     }
 
 
@@ -197,7 +197,7 @@ def offset_lines(walked: RecordedWalk, found: WalkCalibration) -> str:
     return "".join(["cameras:\n", *lines]) if lines else ""
 
 
-def _offset(walked: RecordedWalk, camera: WalkedCamera) -> dict[str, float]:
+def _offset(walked: RecordedWalk, camera: CameraCalibration) -> dict[str, float]:
     return {
         "frames": round(camera.offset, 2),
         "error": round(camera.offset_error, 2),
@@ -205,22 +205,22 @@ def _offset(walked: RecordedWalk, camera: WalkedCamera) -> dict[str, float]:
     }
 
 
-def _use(walked: RecordedWalk, camera: WalkedCamera) -> int:
+def _use(walked: RecordedWalk, camera: CameraCalibration) -> int:
     """Give the offset to write: what was found comes on top of what the frames have in them already."""
     return walked.offsets.get(camera.camera, 0) + (round(camera.offset) if _moved(camera) else 0)
 
 
-def _moved(camera: WalkedCamera) -> bool:
+def _moved(camera: CameraCalibration) -> bool:
     return abs(camera.offset) > _SURE * camera.offset_error and round(camera.offset) != 0
 
 
-def _heights(spread: Spread) -> str:
-    return f"{spread.median:.2f} person heights (median; 90 % below {spread.most:.2f})"
+def _heights(spread: ErrorSummary) -> str:
+    return f"{spread.median:.2f} person heights (median; 90 % below {spread.ninth_decile:.2f})"
 
 
-def _shares(spread: Spread) -> str:
-    return f"{100 * spread.median:.1f} % (90 % below {100 * spread.most:.1f} %)"
+def _shares(spread: ErrorSummary) -> str:
+    return f"{100 * spread.median:.1f} % (90 % below {100 * spread.ninth_decile:.1f} %)"
 
 
-def _numbers(spread: Spread) -> dict[str, float]:
-    return {"median": round(spread.median, 4), "p90": round(spread.most, 4)}
+def _numbers(spread: ErrorSummary) -> dict[str, float]:
+    return {"median": round(spread.median, 4), "p90": round(spread.ninth_decile, 4)}

@@ -45,7 +45,9 @@ class FloorPlanCamera:
 
 def floor_plan_cameras(found: WalkCalibration) -> list[FloorPlanCamera]:
     """Give what there is to draw of a calibration from walks."""
-    return [FloorPlanCamera(it.camera, it.homography, it.image, it.place, it.floor) for it in found.cameras]
+    return [
+        FloorPlanCamera(it.camera, it.homography, it.image, it.position, it.floor) for it in found.cameras
+    ]
 
 
 def plot_floor_plan(views: Sequence[FloorPlanCamera], unit: str, out: Path | BinaryIO) -> None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import feet
-from bestview.calibration import Floats, cut_off
+from bestview import foot_points
+from bestview.calibration import Floats, boxes_at_edge
 from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks
 from server.service.calibration.worker import CameraBoxes
@@ -95,9 +95,9 @@ class CameraWalk:
         return WalkSamples(self._moments[0], self._third[0], self._tall[0])
 
     def _sample(self, frames: Ints, boxes: Floats, size: tuple[int, int]) -> None:
-        taken = (frames % self._step == 0) & ~cut_off(boxes, size)
+        taken = (frames % self._step == 0) & ~boxes_at_edge(boxes, size)
         whole = boxes[taken]
         self._moments.append(frames[taken] // self._step)
-        across = _THIRDS * feet(whole)[:, 0] / size[0]
+        across = _THIRDS * foot_points(whole)[:, 0] / size[0]
         self._third.append(np.clip(across.astype(np.int64), 0, _THIRDS - 1))
         self._tall.append(whole[:, 3] - whole[:, 1])

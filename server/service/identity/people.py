@@ -60,7 +60,7 @@ class People:
     ) -> None:
         self._registry = IdentityRegistry(settings, homographies, overhead, fps)
         self._remembered = settings.forget_after
-        self.roll = Roll(settings.remember)
+        self.roll = Roll(settings.maximum_departed_people)
         """Everybody, also those whom another service decides for."""
         self._share = share
         self._histories = {camera: History[CameraWindow]() for camera in cameras}

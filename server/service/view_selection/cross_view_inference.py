@@ -8,8 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import Findable, bodies, boxes_seen, feet_seen, touching
-from bestview.quality import Looks, QualitySettings, Seen, view_quality
+from bestview import (
+    DetectionProbabilityMap,
+    boxes_touching_others,
+    estimate_bodies,
+    project_boxes,
+    project_feet,
+)
+from bestview.quality import CameraLayout, QualitySettings, TrackWindow, compute_view_quality
 from server.config.site_config import Config
 from server.service.view_selection.undetected_views import Tested, Unfound
 from server.service.view_selection.view_quality_buffer import Sight
@@ -44,7 +50,7 @@ class Elsewhere:
         self._every = max(1, round(_EVERY_S * self._fps))
         self._size = (float(config.site.width), float(config.site.height))
         few, many = _FEW_S * self._fps, _MANY_S * self._fps
-        self._findable = Findable(len(self._cameras), self._size, _PRIOR, few, many)
+        self._findable = DetectionProbabilityMap(len(self._cameras), self._size, _PRIOR, few, many)
 
     def look(self, line: Line, person: Ints, frames: int) -> Unfound:
         """Find the views in the outlook's frames; `person` (L,) says who is at each place in line, or -1."""
@@ -56,8 +62,8 @@ class Elsewhere:
             return Unfound.nobody()
         known, shape = told.person >= 0, told.found.shape
         moment = told.person[known] * shape[1] + told.time[known]
-        bottom = floor.looks.pictures[:, 3]
-        body = bodies(
+        bottom = floor.looks.picture_boxes[:, 3]
+        body = estimate_bodies(
             told.boxes[known],
             told.camera[known],
             moment,
@@ -65,8 +71,8 @@ class Elsewhere:
             floor.homographies,
             bottom,
         )
-        feet = feet_seen(body, floor.homographies).reshape(*shape, 2)
-        corners = floor.looks.pictures
+        feet = project_feet(body, floor.homographies).reshape(*shape, 2)
+        corners = floor.looks.picture_boxes
         inside = ((feet >= corners[:, :2]) & (feet <= corners[:, 2:])).all(axis=-1)
         others = body.known_by.sum(axis=1)[:, None] > body.known_by
         asked = np.nonzero(inside & told.said & others.reshape(shape))
@@ -75,9 +81,13 @@ class Elsewhere:
         trust = self._findable.trust(floor.cameras[view[2]], feet[view])
         good = trust >= _LEAST
         of, time, camera = (side[good] for side in view)
-        expected = boxes_seen(body, of * shape[1] + time, feet[of, time, camera], floor.homographies[camera])
+        expected = project_boxes(
+            body, of * shape[1] + time, feet[of, time, camera], floor.homographies[camera]
+        )
         picture, theirs = time * shape[2] + camera, told.time * shape[2] + told.camera
-        touched = touching(expected, picture, told.boxes, theirs, shape[1] * shape[2], self._size)
+        touched = boxes_touching_others(
+            expected, picture, told.boxes, theirs, shape[1] * shape[2], self._size
+        )
         quality = _quality(expected, camera, floor.looks, self._sight.settings)
         quality *= trust[good] * np.where(touched, 1.0, _NO_BOX)
         # Each view stands for the frames up to the next look.
@@ -104,7 +114,7 @@ class Elsewhere:
         matrices = [looks.homographies[at] for at in known]
         return _Floor(
             np.array([spoken[at] for at in known], dtype=np.int64),
-            replace(looks, pictures=looks.pictures[known], homographies=matrices),
+            replace(looks, picture_boxes=looks.picture_boxes[known], homographies=matrices),
             np.array(matrices, dtype=np.float64).reshape(-1, 3, 3),
         )
 
@@ -120,7 +130,7 @@ class _Floor:
     """
 
     cameras: Ints
-    looks: Looks
+    looks: CameraLayout
     homographies: Floats
 
 
@@ -166,12 +176,12 @@ def _told(line: Line, person: Ints, cameras: Ints, count: int, every: int, frame
     return _Told(who, line.boxes(places), place, time, camera, said, found)
 
 
-def _quality(boxes: Floats, camera: Ints, looks: Looks, settings: QualitySettings) -> Floats:
+def _quality(boxes: Floats, camera: Ints, looks: CameraLayout, settings: QualitySettings) -> Floats:
     """Weigh views by their boxes (V, 4), each by itself, (V,).
 
     Who hides whom is left out: where two overlap and one is not found, the box may be either's.
     """
-    if not any(weight for name, weight in settings.weights.items() if name != "unhidden"):
+    if not any(weight for name, weight in settings.weights.items() if name != "occlusion"):
         return np.ones(len(boxes))
-    seen = Seen(boxes[:, None], camera, np.ones(len(boxes)), np.full(len(boxes), np.nan))
-    return view_quality(seen, looks, replace(settings, unhidden=0.0)).quality[:, 0]
+    seen = TrackWindow(boxes[:, None], camera, np.ones(len(boxes)), np.full(len(boxes), np.nan))
+    return compute_view_quality(seen, looks, replace(settings, occlusion=0.0)).quality[:, 0]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import NO_CAMERA, Merge, Split, choose_by_gops
+from bestview import NO_CAMERA, Merge, Split, select_views_by_gop
 from server.config.sections import LIVE_VIEW_SETTINGS, ViewSettings
 from server.config.site_config import Config
 from server.messaging.messages import NumberedBox
@@ -191,8 +191,8 @@ class Decider:
         before = self._shots.of(part.numbers)
         starts = np.arange(lookahead) % self._config.encode.gop == 0
         gops = part.gops(starts, weight, blind=self.least_shot > 1)
-        (views,), _ = choose_by_gops(
-            gops, before.cameras, self.switch_cost, self.least_shot, before.held, asked=1
+        (views,), _ = select_views_by_gop(
+            gops, before.cameras, self.switch_cost, self.least_shot, before.held, decided_gops=1
         )
         self._shots = before.then(views)
         self._next_gop = first + self._config.encode.gop

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import NO_VIEW_COST, Gops, SeenViews, with_expected, with_missed
-from bestview.quality import compared_views
+from bestview import NO_VIEW_COST, GopCosts, VisibleViews, add_inferred_views, add_missed_detections
+from bestview.quality import relative_view_quality
 from server.service.identity.people import People
 from server.service.view_selection.cross_view_inference import Elsewhere
 from server.service.view_selection.recent_views import Lately
@@ -75,13 +75,13 @@ class Outlook:
         extra = np.minimum(other.quality, 1.0)
         if relative:
             moment = np.concatenate([frame * everybody + person, other.frame * everybody + other.person])
-            both = compared_views(np.concatenate([worth, extra]), moment, len(pulses) * everybody)
+            both = relative_view_quality(np.concatenate([worth, extra]), moment, len(pulses) * everybody)
             worth, extra = both[: len(worth)], both[len(worth) :]
-        self.views = SeenViews(frame, line.camera[row], person, worth, shown, everybody)
+        self.views = VisibleViews(frame, line.camera[row], person, worth, shown, everybody)
         self.before = lately.of(self.numbers, len(cameras), first)
         """How everybody was seen before the first frame."""
-        missed = with_missed(self.views, self.before, lasts)
-        self.taken = with_expected(missed, other.frame, other.camera, other.person, extra)
+        missed = add_missed_detections(self.views, self.before, lasts)
+        self.taken = add_inferred_views(missed, other.frame, other.camera, other.person, extra)
         """The views, and those that are taken to be there though somebody was missed, or is not found."""
 
     def lately(self, pulse: int) -> Lately:
@@ -118,10 +118,10 @@ class Part:
         """(K,) the people's numbers, rising."""
         return self.outlook.numbers[self.people]
 
-    def gops(self, starts: Mask, weight: Floats, *, blind: bool) -> Gops:
+    def gops(self, starts: Mask, weight: Floats, *, blind: bool) -> GopCosts:
         """Give what the GOPs cost that begin where the mask (N,) says, each frame by its weight (N,)."""
-        gops = self.outlook.taken.gops(self.first, starts, weight, blind=blind)
-        return gops if len(self.people) == len(self.outlook.numbers) else gops.of(self.people)
+        gops = self.outlook.taken.gops(self.first, starts, weight, mark_empty=blind)
+        return gops if len(self.people) == len(self.outlook.numbers) else gops.for_people(self.people)
 
     def views(self, number: int) -> Ints:
         """Give one person's views, (R,) indices into the outlook's.
@@ -146,11 +146,11 @@ class Part:
             KeyError: this part is not about that person.
         """
         views, rows = self.outlook.taken, self._rows(self.outlook.taken, number)
-        cost = np.where(views.shown[self.first : self.first + self.frames], NO_VIEW_COST, np.inf)
-        cost[views.frame[rows] - self.first, views.camera[rows]] -= views.worth[rows]
+        cost = np.where(views.available[self.first : self.first + self.frames], NO_VIEW_COST, np.inf)
+        cost[views.frame[rows] - self.first, views.camera[rows]] -= views.quality[rows]
         return cost
 
-    def _rows(self, views: SeenViews | Unfound, number: int) -> Ints:
+    def _rows(self, views: VisibleViews | Unfound, number: int) -> Ints:
         person = self.people[self.numbers == number]
         if not person.size:
             raise KeyError(number)

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import LastSeen, SeenViews
+from bestview import LastDetections, VisibleViews
 
 Ints = NDArray[np.int64]
 
 
-def _nothing() -> LastSeen:
-    return LastSeen(np.zeros((0, 0)), np.zeros((0, 0)))
+def _nothing() -> LastDetections:
+    return LastDetections(np.zeros((0, 0)), np.zeros((0, 0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,18 +28,18 @@ class Lately:
 
     pulse: int = 0
     numbers: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    last: LastSeen = field(default_factory=_nothing)
+    last: LastDetections = field(default_factory=_nothing)
 
-    def of(self, numbers: Ints, cameras: int, pulse: int) -> LastSeen:
+    def of(self, numbers: Ints, cameras: int, pulse: int) -> LastDetections:
         """Give what was seen of these people, (K,) rising, before a pulse; who is new has not been seen."""
         ago, worth = np.full((cameras, len(numbers)), np.inf), np.zeros((cameras, len(numbers)))
         _, old, new = np.intersect1d(self.numbers, numbers, assume_unique=True, return_indices=True)
         if old.size:
-            ago[:, new] = self.last.ago[:, old] + (pulse - self.pulse)
-            worth[:, new] = self.last.worth[:, old]
-        return LastSeen(ago, worth)
+            ago[:, new] = self.last.age[:, old] + (pulse - self.pulse)
+            worth[:, new] = self.last.quality[:, old]
+        return LastDetections(ago, worth)
 
     @staticmethod
-    def after(numbers: Ints, last: LastSeen, views: SeenViews, first: int, pulse: int) -> Lately:
+    def after(numbers: Ints, last: LastDetections, views: VisibleViews, first: int, pulse: int) -> Lately:
         """Give the same before a later pulse, by the views from `first` on."""
-        return Lately(pulse, numbers, last.later(views, pulse - first))
+        return Lately(pulse, numbers, last.advanced_to(views, pulse - first))

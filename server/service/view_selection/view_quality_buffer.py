@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.quality import Looks, Quality, QualitySettings, Seen, view_quality
+from bestview.quality import CameraLayout, QualitySettings, TrackWindow, ViewQuality, compute_view_quality
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.service.identity.camera_window import CameraWindow
@@ -89,11 +89,11 @@ class Sight:
             seen.append(SeenWindow(window, quality[rows, tracks], terms[:, rows, tracks]))
         return seen
 
-    def _weigh(self, windows: Sequence[CameraWindow], start: int) -> Quality:
+    def _weigh(self, windows: Sequence[CameraWindow], start: int) -> ViewQuality:
         """Weigh the views of all windows at once, track after track; frames that one lacks are hidden."""
         tracks = [track for window in windows for track in window.message.tracks]
-        return view_quality(
-            Seen(
+        return compute_view_quality(
+            TrackWindow(
                 _side_by_side(windows, start),
                 np.repeat(np.arange(len(windows)), [len(window.keys) for window in windows]),
                 np.clip(np.array([it.confidence for it in tracks], dtype=np.float64), 0.0, 1.0),
@@ -104,10 +104,10 @@ class Sight:
             self.settings,
         )
 
-    def looks(self, cameras: Sequence[str]) -> Looks:
+    def looks(self, cameras: Sequence[str]) -> CameraLayout:
         """Give what view quality asks of cameras that have spoken."""
         pictures = np.array([self._picture(camera) for camera in cameras]).reshape(-1, 4)
-        return Looks(self._size, pictures, [self._ground(camera) for camera in cameras], self._fps)
+        return CameraLayout(self._size, pictures, [self._ground(camera) for camera in cameras], self._fps)
 
     def _picture(self, camera: str) -> tuple[float, float, float, float]:
         """Say where a camera's own picture lies in the site's: in its middle."""

@@ -14,8 +14,8 @@ from bestview.association.presence import Presence
 from bestview.association.sightings import Sightings
 
 FRAMES = 4
-SETTINGS = IdentitySettings(ground_cap=5.0, ground_frames=2.0, recent=100)
-CAP = SETTINGS.ground_cap
+SETTINGS = IdentitySettings(maximum_ground_evidence=5.0, ground_correlation_frames=2.0, comparable_frames=100)
+CAP = SETTINGS.maximum_ground_evidence
 ROWS = range(10)
 
 PAIR = st.tuples(st.integers(0, 9), st.integers(0, 9)).filter(lambda pair: pair[0] != pair[1])
@@ -39,7 +39,7 @@ class Plain:
     def elsewhere(self, one: Row, two: Row) -> tuple[float, int]:
         """What there is to say of two who never met: they were about at once."""
         common = len(self.stood[one] & self.stood[two])
-        return max(-2.0 * common / SETTINGS.ground_frames, -CAP), min(common, 3)
+        return max(-2.0 * common / SETTINGS.ground_correlation_frames, -CAP), min(common, 3)
 
     def near(self, one: Row, two: Row) -> tuple[float, int]:
         return self.met.get(frozenset((one, two)), self.elsewhere(one, two))
@@ -94,7 +94,7 @@ def test_tables_keep_what_is_known_of_pairs_however_rows_come_and_go(data: st.Da
             score, frames = data.draw(st.integers(-9, 9)), data.draw(st.integers(1, 2))
             tables.add_near(np.array([one]), np.array([two]), np.array([float(score)]), np.array([frames]))
             evidence, common = plain.near(rows[one], rows[two])
-            evidence = min(max(evidence + score / SETTINGS.ground_frames, -CAP), CAP)
+            evidence = min(max(evidence + score / SETTINGS.ground_correlation_frames, -CAP), CAP)
             plain.met[pair] = evidence, min(common + frames, 3)
         for row in data.draw(st.lists(st.integers(0, len(rows) - 1), max_size=4, unique=True)):
             frames_of = data.draw(st.sets(st.integers(0, 9), max_size=8))

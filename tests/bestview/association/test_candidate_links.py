@@ -27,7 +27,9 @@ from bestview.association.tracklet import End, Episode
 
 CAMERAS = {"c0": True, "c1": True, "c2": False}
 SETTINGS = IdentitySettings(crowd_frames=1)
-WEIGHTS = LookWeights(SETTINGS.look, SETTINGS.look_cap, SETTINGS.look_frames)
+WEIGHTS = LookWeights(
+    SETTINGS.appearance_evidence, SETTINGS.maximum_appearance_evidence, SETTINGS.appearance_frames
+)
 HEIGHT, FRAMES, COATS = 1.8, 100, 4
 PACE = 0.06
 
@@ -117,7 +119,7 @@ def plainly(site: Site, gone: np.ndarray) -> tuple[set[tuple[int, int]], list[in
         )
     is_open = np.arange(rows) < count
     linked = (value + alike > 0) & ~apart & (is_open[:, None] | is_open) & ~np.eye(rows, dtype=np.bool_)
-    label = cluster(value, apart, gone, linked, site.looks, WEIGHTS, SETTINGS.join)
+    label = cluster(value, apart, gone, linked, site.looks, WEIGHTS, SETTINGS.merge_threshold)
     return {(int(i), int(j)) for i, j in zip(*np.nonzero(np.triu(linked)), strict=True)}, label.tolist()
 
 
@@ -134,7 +136,13 @@ def test_chains_of_links_give_the_groups_of_everybody_at_once(site: Site, seed: 
     label = np.arange(rows)
     for batch in batches(found, evidence, site.looks, least=3):
         own = cluster(
-            batch.evidence, batch.apart, gone[batch.rows], batch.linked, batch.looks, WEIGHTS, SETTINGS.join
+            batch.evidence,
+            batch.apart,
+            gone[batch.rows],
+            batch.linked,
+            batch.looks,
+            WEIGHTS,
+            SETTINGS.merge_threshold,
         )
         label[batch.rows] = batch.rows[own]
     assert label.tolist() == groups

@@ -16,7 +16,7 @@ from fakes.bestview.identity_scenes import CALIBRATED, STRIDE, VIEWS, Stay, both
 
 WIDE, HIGH, TALL = 640, 440, 1.75
 SPEAKING = dict.fromkeys(VIEWS, (WIDE, HIGH))
-SETTINGS = IdentitySettings(confirm=25, doubt=4.0, regroup=5)
+SETTINGS = IdentitySettings(confirmation_frames=25, ghost_penalty=4.0, clustering_interval=5)
 
 
 def born(stays: list[Stay], speaking: dict[str, tuple[int, int]], *blind: str) -> list[int]:
@@ -87,6 +87,6 @@ def test_a_plan_view_without_horizon_is_asked_too() -> None:
 
 @pytest.mark.parametrize("doubt", [0.0, 1e-9])
 def test_without_doubt_everybody_is_counted_alike(doubt: float) -> None:
-    registry = IdentityRegistry(replace(SETTINGS, doubt=doubt), CALIBRATED)
+    registry = IdentityRegistry(replace(SETTINGS, ghost_penalty=doubt), CALIBRATED)
     seen = play(registry, [Stay("south", 1, 0, 999, (0, 0))], 60, speaking=SPEAKING)
     assert sum(len(update.born) for update in seen) == 1

@@ -44,14 +44,14 @@ def test_a_person_has_one_number_in_every_camera(most: int) -> None:
         Stay("south", 5, 0, 999, (3, 1)),
         Stay("west", 8, 0, 999, (3, 1)),
     ]
-    last = known(play(registry(most=most), stays, 60))
+    last = known(play(registry(maximum_open_tracklets=most), stays, 60))
     assert last["south", 4] == last["west", 9]
     assert last["south", 5] == last["west", 8]
     assert sorted(last.values()) == [1, 1, 2, 2]
 
 
 def test_numbers_are_shown_only_when_confirmed_and_born_once() -> None:
-    seen = play(registry(confirm=25, regroup=5), both(1, (0, 0)), 60)
+    seen = play(registry(confirmation_frames=25, clustering_interval=5), both(1, (0, 0)), 60)
     # Two cameras see 10 frames together in every update.
     assert [update.born for update in seen] == [(), (), (1,)] + [()] * 9
     assert [len(numbers(update)) for update in seen[:4]] == [0, 0, 2, 2]
@@ -60,7 +60,7 @@ def test_numbers_are_shown_only_when_confirmed_and_born_once() -> None:
 @HOWEVER_MANY
 def test_two_people_seen_side_by_side_in_one_camera_are_two_however_close(most: int) -> None:
     stays = [*both(1, (0, 0)), *both(2, (0.3, 0.3))]
-    last = known(play(registry(most=most), stays, 100))
+    last = known(play(registry(maximum_open_tracklets=most), stays, 100))
     assert last["south", 1] != last["south", 2]
     assert last["west", 1] != last["west", 2]
     assert last["south", 1] == last["west", 1]
@@ -72,7 +72,7 @@ def test_a_restarted_camera_finds_everybody_again(most: int) -> None:
     stays = [Stay("south", 1 + i, 0, 999, at) for i, at in enumerate(people)]
     stays += [Stay("west", 1 + i, 0, 99, at) for i, at in enumerate(people)]
     stays += [Stay("west", 101 + i, 150, 999, at) for i, at in enumerate(people)]
-    seen = play(registry(most=most), stays, 200)
+    seen = play(registry(maximum_open_tracklets=most), stays, 200)
     again = known(seen[: (150 // STRIDE) + 5])  # five updates after it came back
     assert [again["west", 101 + i] for i in range(3)] == [again["south", 1 + i] for i in range(3)]
     assert max(max(update.numbers.values(), default=0) for update in seen) == 3
@@ -91,7 +91,9 @@ def test_who_turns_up_elsewhere_at_once_is_somebody_else() -> None:
     assert numbers(play(registry(), stays, 200)[-1]) == {("south", 1): 1, ("south", 2): 2}
 
 
-@pytest.mark.parametrize("settings", [{}, {"recent": 250}], ids=["compared like everybody", "found again"])
+@pytest.mark.parametrize(
+    "settings", [{}, {"comparable_frames": 250}], ids=["compared like everybody", "found again"]
+)
 def test_who_returns_in_the_same_coat_gets_the_number_back(settings: dict[str, int]) -> None:
     stays = [Stay("south", coat, 0, 150, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
     stays += [Stay("south", 10, 450, 999, (4, 2), coat=3), Stay("south", 11, 450, 999, (-4, 2), coat=7)]
@@ -105,14 +107,16 @@ def test_in_a_crowd_dressed_alike_nobody_gets_anothers_number_back() -> None:
     stays = [Stay("south", local, 0, 150, (local - 3.0, 0), coat=3) for local in (1, 2, 3)]
     stays += [Stay("south", 10, 400, 999, (4, 2), coat=3)]
     assert numbers(play(registry(), stays, 600)[-1]) == {("south", 10): 4}
-    assert numbers(play(registry(recent=250), stays, 600)[-1]) == {("south", 10): 4}
+    assert numbers(play(registry(comparable_frames=250), stays, 600)[-1]) == {("south", 10): 4}
 
 
 @pytest.mark.parametrize(("fps", "people"), [(5.0, 1), (25.0, 2)])
 def test_how_far_somebody_walks_unseen_goes_by_the_time_and_not_the_frames(fps: float, people: int) -> None:
     here = Stay("south", 1, 0, 30, (-4, 0), coat=3)
     there = Stay("south", 2, 46, 999, (1.7, 0), coat=3)
-    who = IdentityRegistry(replace(IdentitySettings(), confirm=5, regroup=5), CALIBRATED, fps=fps)
+    who = IdentityRegistry(
+        replace(IdentitySettings(), confirmation_frames=5, clustering_interval=5), CALIBRATED, fps=fps
+    )
     assert len({*known(play(who, [here, there], 200)).values()}) == people
 
 
@@ -154,7 +158,7 @@ def test_a_track_that_takes_one_for_the_other_in_a_crowd_is_two_episodes(most: i
     ]
     stays += [meeting("south", 1, -3, 0.03, end=100), meeting("south", 2, 3, -0.03, end=100)]
     stays += [meeting("south", 2, -3, 0.03, begin=101), meeting("south", 1, 3, -0.03, begin=101)]
-    seen = play(registry(most=most), stays, 200)
+    seen = play(registry(maximum_open_tracklets=most), stays, 200)
     before, after = known(seen[: 80 // STRIDE]), known(seen)
     assert len({before["south", 1], before["south", 2]}) == 2
     assert after["south", 1] == before["south", 2]
@@ -227,7 +231,11 @@ def test_two_tracks_seen_at_once_in_one_camera_never_share_a_number(data: st.Dat
 
 @HOWEVER_MANY
 def test_who_is_settled_while_they_go_on_is_seen_and_not_gone(most: int) -> None:
-    seen = play(registry(most=most, gone_after=60, settled_after=100), both(1, (0, 0), end=400), 600)
+    seen = play(
+        registry(maximum_open_tracklets=most, departed_after=60, settle_after=100),
+        both(1, (0, 0), end=400),
+        600,
+    )
     assert [update.gone for update in seen if update.gone] == [(1,)]
     gone = next(i for i, update in enumerate(seen) if update.gone)
     assert 400 + 60 < STRIDE * gone + STRIDE - 1 <= 400 + 60 + 2 * STRIDE
@@ -235,7 +243,13 @@ def test_who_is_settled_while_they_go_on_is_seen_and_not_gone(most: int) -> None
 
 
 def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
-    who = registry(forget_after=200, remember=5, recent=100, settled_after=100, gone_after=50)
+    who = registry(
+        forget_after=200,
+        maximum_departed_people=5,
+        comparable_frames=100,
+        settle_after=100,
+        departed_after=50,
+    )
     stays = [Stay("south", i, 30 * i, 30 * i + 25, (4.0 * (-1) ** i, i % 5 - 2)) for i in range(100)]
     sizes = []
     for _ in updates(who, stays, 3000):
@@ -250,16 +264,16 @@ def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
     [
         {name: 0}
         for name in (
-            "confirm",
-            "recent",
-            "most",
-            "told_after",
+            "confirmation_frames",
+            "comparable_frames",
+            "maximum_open_tracklets",
+            "publish_after",
             "merge_after",
-            "gap",
-            "crowd",
+            "gap_frames",
+            "crowd_iou",
         )
     ]
-    + [{"confirm": 0, "recent": 5000, "merge_after": 500, "settled_after": 20}],
+    + [{"confirmation_frames": 0, "comparable_frames": 5000, "merge_after": 500, "settle_after": 20}],
     ids=", ".join,
 )
 def test_any_setting_may_be_at_its_least_and_cameras_may_come_and_go(nothing: Mapping[str, int]) -> None:
@@ -304,9 +318,9 @@ def test_what_makes_no_sense_is_refused_in_one_line() -> None:
     with pytest.raises(ValueError, match="comes after"):
         who.update([track], 14)
     with pytest.raises(ValueError, match="memory"):
-        IdentitySettings(memory=1.5)
+        IdentitySettings(cross_camera_memory=1.5)
     with pytest.raises(ValueError, match="gate"):
-        IdentitySettings(gate=0.0)
+        IdentitySettings(gate_distance=0.0)
 
 
 def test_no_tracks_are_no_people() -> None:
@@ -338,9 +352,9 @@ def test_the_time_of_the_way_tells_apart_who_looks_alike() -> None:
         yield Stay("west", 21, 3500, 3600, (0, 0), coat=6.4)
 
     def who(**changes: float) -> dict[tuple[str, int], int]:
-        return known(play(registry(BLIND, recent=20, **changes), list(stays()), 3600))
+        return known(play(registry(BLIND, comparable_frames=20, **changes), list(stays()), 3600))
 
-    times, alone = who(), who(travel_cap=0.0)
+    times, alone = who(), who(maximum_travel_evidence=0.0)
     assert times["south", 21] != times["south", 22]
     assert times["west", 21] == times["south", 22]
     assert alone["west", 21] not in {alone["south", 21], alone["south", 22]}, "by looks it may be either"

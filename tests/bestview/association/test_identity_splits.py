@@ -21,7 +21,7 @@ def told(updates: Sequence[IdentityUpdate]) -> list[Split]:
 
 @HOWEVER_MANY
 def test_whom_a_camera_shows_is_somebody_new_and_stays_it(most: int) -> None:
-    who, stays = registry(most=most), both(1, (0, 0))
+    who, stays = registry(maximum_open_tracklets=most), both(1, (0, 0))
     assert known(play(who, stays, 100)) == {("south", 1): 1, ("west", 1): 1}
     assert who.part([WEST], [1]) == 2
     after = play(who, stays, 400, begin=100)
@@ -36,7 +36,7 @@ def test_whom_a_camera_shows_is_somebody_new_and_stays_it(most: int) -> None:
 
 @HOWEVER_MANY
 def test_all_that_is_shown_may_be_somebody_new_together(most: int) -> None:
-    who, stays = registry(most=most), both(1, (0, 0))
+    who, stays = registry(maximum_open_tracklets=most), both(1, (0, 0))
     play(who, stays, 100)
     assert who.part([WEST, TrackKey("south", 1)], [1]) == 2
     after = play(who, stays, 300, begin=100)

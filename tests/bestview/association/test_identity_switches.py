@@ -40,7 +40,7 @@ def meeting(apart: float, coats: tuple[int, int] = (3, 3)) -> list[Stay]:
 @pytest.mark.parametrize("apart", [0.8, 3.0], ids=["in a crowd", "side by side"])
 @pytest.mark.parametrize("told", [115, 170], ids=["soon", "later"])
 def test_numbers_follow_the_people(most: int, apart: float, told: int) -> None:
-    who, stays = registry(BLIND, most=most), meeting(apart)
+    who, stays = registry(BLIND, maximum_open_tracklets=most), meeting(apart)
     before = known(play(who, stays, told))
     assert before == {ONE: 1, TWO: 2}
     more = known(play(who, stays, told + 5, begin=told))

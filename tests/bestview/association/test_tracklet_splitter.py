@@ -75,7 +75,9 @@ def test_looks_in_a_crowd_do_not_count() -> None:
 
 
 def test_of_too_many_those_unseen_for_longest_are_old_sooner_but_not_before_they_were_told() -> None:
-    few = IdentitySettings(most=2, settled_after=100, told_after=5, regroup=10)
+    few = IdentitySettings(
+        maximum_open_tracklets=2, settle_after=100, publish_after=5, clustering_interval=10
+    )
     tracks = [track(n, 0, [(50.0 * n, 0.0, 50.0 * n + 10, 20.0)] * (10 * n)) for n in range(1, 6)]
     episodes = Episodes(few)
     episodes.take(line_up(tracks, {"c0": None}, FEET), {})

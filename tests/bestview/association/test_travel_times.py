@@ -15,7 +15,7 @@ from bestview import IdentitySettings
 from bestview.association.affinity.travel_times import Sight, TravelTimes, time_bins
 
 CAMERAS = ("c0", "c1", "c2")
-SETTINGS = IdentitySettings(travel_frames=1000, travel_known=5.0, travel_cap=4.0)
+SETTINGS = IdentitySettings(travel_frames=1000, travel_half_weight_count=5.0, maximum_travel_evidence=4.0)
 WAY = st.tuples(st.sampled_from(CAMERAS), st.sampled_from(CAMERAS), st.integers(-50, 1500))
 
 
@@ -90,7 +90,9 @@ def test_bins_cover_all_times_without_holes(longest: int) -> None:
 
 
 def test_any_settings_may_be_at_their_least() -> None:
-    travel = TravelTimes(replace(SETTINGS, travel_frames=0, travel_known=0.0, travel_cap=0.0), 0)
+    travel = TravelTimes(
+        replace(SETTINGS, travel_frames=0, travel_half_weight_count=0.0, maximum_travel_evidence=0.0), 0
+    )
     travel.learn(Sight("c0", 0), Sight("c1", 1))
     assert travel.evidence([Sight("c1", 1)], [Sight("c0", 0)]).tolist() == [[0.0]]
     assert travel.evidence([], []).shape == (0, 0)

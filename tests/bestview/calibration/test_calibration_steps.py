@@ -7,17 +7,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import foot_spread, to_ground
-from bestview.calibration import Track, Walk, WalkSettings, make_walk
-from bestview.calibration.bundle_adjustment import Matches, Rig
-from bestview.calibration.camera_pairs import breadth
-from bestview.calibration.chance_agreement import backwards, late
-from bestview.calibration.floor_agreement import apart, matched, placed, score, tally
-from bestview.calibration.pair_hypotheses import guesses
+from bestview import foot_covariance, to_ground
+from bestview.calibration import Walk, WalkSettings, WalkTrack, build_walk
+from bestview.calibration.bundle_adjustment import CameraRig, Correspondences
+from bestview.calibration.camera_pairs import walk_breadth
+from bestview.calibration.chance_agreement import halves_swapped, time_reversed
+from bestview.calibration.floor_agreement import (
+    mutual_matches,
+    pair_agreement,
+    project_to_floor,
+    total_agreement,
+    whitened_differences,
+)
+from bestview.calibration.pair_hypotheses import propose_relative_poses
 from bestview.calibration.pinhole import Pinhole
-from bestview.calibration.samples import meetings, sample
-from bestview.calibration.time_offsets import offset_errors
-from bestview.geometry.ground_plane import feet
+from bestview.calibration.samples import candidate_matches, sample_walk
+from bestview.calibration.time_offsets import offset_standard_errors
+from bestview.geometry.ground_plane import foot_points
 from fakes.bestview.walkers import SIZE, Noise, camera_at, seen, stroll
 
 seeds = st.integers(0, 10_000).map(np.random.default_rng)
@@ -55,9 +61,9 @@ def test_how_badly_a_foot_is_known_is_what_identity_says(random: np.random.Gener
     camera, place = any_camera(random), random.uniform(-1, 1, (10, 2))
     image, tall = camera.picture(place), random.uniform(20, 90, 10)
     boxes = np.column_stack([image[:, 0] - 5, image[:, 1] - tall, image[:, 0] + 5, image[:, 1]])
-    assert np.allclose(feet(boxes), image)
-    spread = placed(camera, image, tall, SETTINGS).spread
-    same = foot_spread(camera.homography(), boxes, SETTINGS.foot_sideways, SETTINGS.foot_upwards)
+    assert np.allclose(foot_points(boxes), image)
+    spread = project_to_floor(camera, image, tall, SETTINGS).covariance
+    same = foot_covariance(camera.homography(), boxes, SETTINGS.foot_sideways, SETTINGS.foot_upwards)
     assert np.allclose(spread, np.stack([same[:, 0, 0], same[:, 0, 1], same[:, 1, 1]], axis=1))
 
 
@@ -66,19 +72,19 @@ def test_how_badly_a_foot_is_known_is_what_identity_says(random: np.random.Gener
 def test_distances_are_those_of_mahalanobis(random: np.random.Generator) -> None:
     place, tall = random.uniform(-1, 1, (8, 2)), random.uniform(20, 90, 8)
     one, other = any_camera(random), any_camera(random)
-    here = placed(one, one.picture(place), tall, SETTINGS)
-    there = placed(other, other.picture(place + random.normal(0, 0.2, (8, 2))), tall, SETTINGS)
-    off = apart(here, there, SETTINGS)
+    here = project_to_floor(one, one.picture(place), tall, SETTINGS)
+    there = project_to_floor(other, other.picture(place + random.normal(0, 0.2, (8, 2))), tall, SETTINGS)
+    off = whitened_differences(here, there, SETTINGS)
     for index in range(8):
-        ee, en, nn = here.spread[index] + there.spread[index]
+        ee, en, nn = here.covariance[index] + there.covariance[index]
         covariance = np.array([[ee, en], [en, nn]]) + SETTINGS.foot_floor**2 * np.eye(2)
-        away = here.place[index] - there.place[index]
+        away = here.position[index] - there.position[index]
         assert off[index] @ off[index] == pytest.approx(away @ np.linalg.solve(covariance, away))
 
 
-def tracks(random: np.random.Generator, count: int) -> tuple[Track, ...]:
+def tracks(random: np.random.Generator, count: int) -> tuple[WalkTrack, ...]:
     return tuple(
-        Track(
+        WalkTrack(
             int(random.integers(0, 40)),
             random.uniform(10, 200, (int(random.integers(2, 50)), 4)).cumsum(axis=1),
         )
@@ -91,9 +97,9 @@ def tracks(random: np.random.Generator, count: int) -> tuple[Track, ...]:
 def test_samples_meet_who_is_sampled_at_the_same_pulse(random: np.random.Generator, offset: float) -> None:
     one, other = (Walk(name, SIZE, tracks(random, 3)) for name in "ab")
     pulses = np.arange(-20.0, 120.0, 4.0)
-    here = sample(one, pulses, 0.0, 2, 0.15)
-    there = sample(other, pulses, offset, 2, 0.15)
-    met = meetings(here, there)
+    here = sample_walk(one, pulses, 0.0, 2, 0.15)
+    there = sample_walk(other, pulses, offset, 2, 0.15)
+    met = candidate_matches(here, there)
     expected = {
         (a, b)
         for a in range(len(here.times))
@@ -110,8 +116,8 @@ def test_samples_meet_who_is_sampled_at_the_same_pulse(random: np.random.Generat
 @given(seeds)
 def test_between_frames_boxes_are_interpolated(random: np.random.Generator) -> None:
     (track,) = tracks(random, 1)
-    times = random.uniform(track.first - 3, track.end + 3, 30)
-    frames = np.arange(track.first, track.end)
+    times = random.uniform(track.first_frame - 3, track.end_frame + 3, 30)
+    frames = np.arange(track.first_frame, track.end_frame)
     for time, box in zip(times, track.at(times), strict=True):
         if frames[0] <= time <= frames[-1]:
             assert np.allclose(box, [np.interp(time, frames, side) for side in track.boxes.T])
@@ -126,13 +132,13 @@ def test_one_persons_two_curves_say_how_the_cameras_stand(
 ) -> None:
     camera, path = camera_at(-4, -1), stroll(random, 300)
     image, tall = camera.picture(path), camera.heights(camera.picture(path))
-    track = Track(0, np.column_stack([image[:, 0] - 5, image[:, 1] - tall, image[:, 0] + 5, image[:, 1]]))
-    samples = sample(Walk("a", SIZE, (track,)), np.arange(0.0, 300.0, 5.0), 0.0, 5, 0.15)
-    here = placed(camera, samples.feet, samples.tall, SETTINGS)
-    there = here.moved(turn, np.array([east, 2.0]))
-    (best, *_) = guesses([here], [there], meetings(samples, samples), 5)
+    track = WalkTrack(0, np.column_stack([image[:, 0] - 5, image[:, 1] - tall, image[:, 0] + 5, image[:, 1]]))
+    samples = sample_walk(Walk("a", SIZE, (track,)), np.arange(0.0, 300.0, 5.0), 0.0, 5, 0.15)
+    here = project_to_floor(camera, samples.feet, samples.tall, SETTINGS)
+    there = here.transformed(turn, np.array([east, 2.0]))
+    (best, *_) = propose_relative_poses([here], [there], candidate_matches(samples, samples), 5)
     assert np.exp(1j * best.turn) == pytest.approx(np.exp(1j * turn))
-    assert best.shift == pytest.approx([east, 2.0])
+    assert best.maximum_offset == pytest.approx([east, 2.0])
 
 
 @settings(deadline=None, max_examples=30)
@@ -140,18 +146,18 @@ def test_one_persons_two_curves_say_how_the_cameras_stand(
 def test_matches_are_one_to_one_at_each_pulse_and_near(random: np.random.Generator) -> None:
     one, other = (Walk(name, SIZE, tracks(random, 4)) for name in "ab")
     pulses = np.arange(0.0, 90.0, 3.0)
-    here, there = (sample(walk, pulses, 0.0, 3, 0.15) for walk in (one, other))
-    met = meetings(here, there)
+    here, there = (sample_walk(walk, pulses, 0.0, 3, 0.15) for walk in (one, other))
+    met = candidate_matches(here, there)
     off = random.normal(0, 1.0, (len(met.here), 2))
-    places = tally(off, met, 2.0)
+    places = pair_agreement(off, met, 2.0)
     for pair in range(len(met.tracks)):
         mine = met.pair == pair
         counted = np.clip(1 - (off[mine] ** 2).sum(axis=1) / 4, -1, 1) * met.weight[mine]
         assert places[pair] == pytest.approx(counted.sum())
-    chosen = matched(off, places, here, there, met, 2.0)
+    chosen = mutual_matches(off, places, here, there, met, 2.0)
     assert len(set(met.here[chosen])) == len(set(met.there[chosen])) == len(chosen)
     assert (np.hypot(*off[chosen].T) < 2.0).all()
-    assert score(places, met) <= np.maximum(places, 0).sum() + 1e-9
+    assert total_agreement(places, met) <= np.maximum(places, 0).sum() + 1e-9
 
 
 @settings(deadline=None, max_examples=20)
@@ -159,11 +165,11 @@ def test_matches_are_one_to_one_at_each_pulse_and_near(random: np.random.Generat
 def test_walks_in_a_wrong_order_hold_the_same_boxes(random: np.random.Generator) -> None:
     walk = Walk("a", SIZE, tracks(random, 4))
     count = sum(len(it.boxes) for it in walk.tracks)
-    assert sum(len(it.boxes) for it in backwards(walk).tracks) == count
-    assert count - 2 * len(walk.tracks) <= sum(len(it.boxes) for it in late(walk).tracks) <= count
-    for wrong in (backwards(walk), late(walk)):
-        assert all(it.first >= 0 for it in wrong.tracks)
-        assert wrong.end <= walk.end
+    assert sum(len(it.boxes) for it in time_reversed(walk).tracks) == count
+    assert count - 2 * len(walk.tracks) <= sum(len(it.boxes) for it in halves_swapped(walk).tracks) <= count
+    for wrong in (time_reversed(walk), halves_swapped(walk)):
+        assert all(it.first_frame >= 0 for it in wrong.tracks)
+        assert wrong.end_frame <= walk.end_frame
 
 
 def test_boxes_that_the_edge_cuts_are_left_out_and_long_gaps_part_a_track() -> None:
@@ -171,10 +177,10 @@ def test_boxes_that_the_edge_cuts_are_left_out_and_long_gaps_part_a_track() -> N
     frames = [*range(20), *range(40, 60)]
     boxes = np.array([box] * 40)
     boxes[5] = [100.0, 260.0, 140.0, 360.0]  # at the lower edge
-    walk = make_walk("a", SIZE, frames, [1] * 40, boxes)
-    assert [(it.first, it.end) for it in walk.tracks] == [(0, 20), (40, 60)]
+    walk = build_walk("a", SIZE, frames, [1] * 40, boxes)
+    assert [(it.first_frame, it.end_frame) for it in walk.tracks] == [(0, 20), (40, 60)]
     assert np.allclose(walk.tracks[0].boxes[5], box)  # between its neighbours
-    assert make_walk("a", SIZE, [0, 1], [1, 1], np.array([[0.0, 10, 40, 90]] * 2)).tracks == ()
+    assert build_walk("a", SIZE, [0, 1], [1, 1], np.array([[0.0, 10, 40, 90]] * 2)).tracks == ()
 
 
 @settings(deadline=None, max_examples=20)
@@ -183,22 +189,22 @@ def test_a_walk_of_another_rate_is_averaged_over_the_same_time(
     random: np.random.Generator, step: int
 ) -> None:
     boxes = np.array([100.0, 80, 140, 200]) + random.uniform(-9, 9, (30, 4))
-    (track,) = make_walk("a", SIZE, range(30), [1] * 30, boxes, step).tracks
+    (track,) = build_walk("a", SIZE, range(30), [1] * 30, boxes, step).tracks
     half = step // 2
     middle = [boxes[at - half : at + half + 1].mean(axis=0) for at in range(half, 30 - half)]
     assert np.allclose(track.boxes[half : 30 - half], middle)
-    apart = make_walk(
+    whitened_differences = build_walk(
         "a", SIZE, [0, 1, 1 + step, 2 + step, 3 + 2 * step, 4 + 2 * step], [1] * 6, boxes[:6], step
     )
-    assert [it.first for it in apart.tracks] == [0, 3 + 2 * step]
+    assert [it.first_frame for it in whitened_differences.tracks] == [0, 3 + 2 * step]
 
 
 def test_a_line_has_no_breadth() -> None:
     along = np.linspace(0, 9, 50)
-    assert breadth(np.column_stack([along, 2 * along]), np.ones(50)) == pytest.approx(0.0, abs=1e-9)
-    assert breadth(np.empty((0, 2)), np.empty(0)) == 0.0
+    assert walk_breadth(np.column_stack([along, 2 * along]), np.ones(50)) == pytest.approx(0.0, abs=1e-9)
+    assert walk_breadth(np.empty((0, 2)), np.empty(0)) == 0.0
     square = np.random.default_rng(0).uniform(-1, 1, (4000, 2))
-    assert breadth(square, np.ones(4000)) == pytest.approx(1 / np.sqrt(3), rel=0.05)
+    assert walk_breadth(square, np.ones(4000)) == pytest.approx(1 / np.sqrt(3), rel=0.05)
 
 
 def test_how_sure_an_offset_is_grows_with_the_noise() -> None:
@@ -207,10 +213,10 @@ def test_how_sure_an_offset_is_grows_with_the_noise() -> None:
         random = np.random.default_rng(3)
         cameras, path = (camera_at(-4, -1), camera_at(1, -4.5)), stroll(np.random.default_rng(3), 500)
         views = [seen("c", it, [path], random, noise=Noise(noise, noise)) for it in cameras]
-        samples = [sample(it, np.arange(0.0, 500.0, 5.0), 0.0, 5, 0.15) for it in views]
-        met = meetings(*samples)
-        matches = Matches(0, 1, met.here, met.there, met.weight)
-        first, second = offset_errors(Rig(cameras, np.zeros(2)), samples, [matches], SETTINGS)
+        samples = [sample_walk(it, np.arange(0.0, 500.0, 5.0), 0.0, 5, 0.15) for it in views]
+        met = candidate_matches(*samples)
+        matches = Correspondences(0, 1, met.here, met.there, met.weight)
+        first, second = offset_standard_errors(CameraRig(cameras, np.zeros(2)), samples, [matches], SETTINGS)
         assert first == 0.0
         errors.append(second)
     assert 0.0 < 3 * errors[0] < errors[1] < 2.0

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bestview.calibration import CalibrationError, Floats, Track, Walk, WalkSettings, calibrate_walks
+from bestview.calibration import CalibrationError, Floats, Walk, WalkSettings, WalkTrack, calibrate_from_walks
 from bestview.calibration.pinhole import Pinhole
 from fakes.bestview.walkers import SIZE, camera_at, error_on_floor, seen, stroll
 
@@ -29,8 +29,8 @@ def walks(
 def test_one_person_walking_about_places_two_cameras_in_space_and_time(seed: int, offset: int) -> None:
     random = np.random.default_rng(seed)
     given = walks(random, (WEST, SOUTH), [stroll(random, 450)], (0, offset))
-    found = calibrate_walks(given, WalkSettings(shift=30), PERSON)
-    assert found.left_out == ()
+    found = calibrate_from_walks(given, WalkSettings(maximum_offset=30), PERSON)
+    assert found.uncalibrated == ()
     errors = error_on_floor([it.homography for it in found.cameras], (WEST, SOUTH), MIDDLE, PERSON)
     assert np.median(errors) < 0.1  # person heights
     assert errors.max() < 0.4
@@ -44,9 +44,9 @@ def test_several_people_who_are_nobody_by_name_and_a_ghost_do_as_well() -> None:
     given = walks(random, (WEST, SOUTH), [stroll(random, 400) for _ in range(3)], (0, 0))
     box = np.array([300.0, 150.0, 330.0, 230.0])
     sway = 15 * np.sin(np.arange(400) / 9.0)[:, None] * np.array([1, 0.3, 1, 0.3])
-    ghost = Track(0, box + sway)
+    ghost = WalkTrack(0, box + sway)
     given[1] = replace(given[1], tracks=(*given[1].tracks, ghost))
-    found = calibrate_walks(given, WalkSettings(shift=0), PERSON)
+    found = calibrate_from_walks(given, WalkSettings(maximum_offset=0), PERSON)
     errors = error_on_floor([it.homography for it in found.cameras], (WEST, SOUTH), MIDDLE, PERSON)
     assert np.median(errors) < 0.1
     assert [it.offset for it in found.cameras] == [0.0, 0.0]
@@ -55,8 +55,8 @@ def test_several_people_who_are_nobody_by_name_and_a_ghost_do_as_well() -> None:
 def test_the_same_walk_gives_the_same_numbers() -> None:
     random = np.random.default_rng(9)
     given = walks(random, (WEST, SOUTH), [stroll(random, 120)], (0, 0))
-    brief = WalkSettings(shift=0, least_places=5.0, least_breadth=0.02)
-    first, second = (calibrate_walks(given, brief, PERSON) for _ in range(2))
+    brief = WalkSettings(maximum_offset=0, minimum_places=5.0, minimum_breadth=0.02)
+    first, second = (calibrate_from_walks(given, brief, PERSON) for _ in range(2))
     for one, other in zip(first.cameras, second.cameras, strict=True):
         assert one.homography.tobytes() == other.homography.tobytes()
 
@@ -65,11 +65,11 @@ def test_a_camera_that_sees_other_people_elsewhere_is_left_out() -> None:
     random = np.random.default_rng(8)
     given = walks(random, (WEST, SOUTH), [stroll(random, 300)], (0, 0))
     elsewhere = seen("c2", WEST, [stroll(random, 300)], random)
-    found = calibrate_walks([given[0], elsewhere, given[1]], WalkSettings(shift=0), PERSON)
+    found = calibrate_from_walks([given[0], elsewhere, given[1]], WalkSettings(maximum_offset=0), PERSON)
     assert [it.camera for it in found.cameras] == ["c0", "c1"]
-    (left_out,) = found.left_out
+    (left_out,) = found.uncalibrated
     assert left_out.camera == "c2"
-    assert "c2" in left_out.why
+    assert "c2" in left_out.reason
 
 
 def straight(frames: int) -> Floats:
@@ -82,21 +82,21 @@ def test_a_straight_line_is_refused() -> None:
     random = np.random.default_rng(1)
     given = walks(random, (WEST, SOUTH), [straight(400)], (0, 0))
     with pytest.raises(CalibrationError, match="c0 and c1: the walk that both saw is a straight line"):
-        calibrate_walks(given, WalkSettings(shift=0))
+        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
 
 
 def test_standing_still_is_refused() -> None:
     random = np.random.default_rng(1)
     given = walks(random, (WEST, SOUTH), [np.zeros((400, 2))], (0, 0))
     with pytest.raises(CalibrationError, match=r"nobody was seen walking by both|walk longer where both see"):
-        calibrate_walks(given, WalkSettings(shift=0))
+        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
 
 
 def test_being_seen_by_one_after_the_other_is_refused() -> None:
     random = np.random.default_rng(1)
     given = walks(random, (WEST, SOUTH), [stroll(random, 300)], (0, -1000))
     with pytest.raises(CalibrationError, match="nobody was seen walking by both at once"):
-        calibrate_walks(given, WalkSettings(shift=0))
+        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
 
 
 def test_strangers_are_refused() -> None:
@@ -105,12 +105,12 @@ def test_strangers_are_refused() -> None:
         seen(name, camera, [stroll(random, 400)], random) for name, camera in (("c0", WEST), ("c1", SOUTH))
     ]
     with pytest.raises(CalibrationError, match="c0 and c1"):
-        calibrate_walks(given, WalkSettings(shift=0))
+        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
 
 
 def test_nobody_and_one_camera_are_refused() -> None:
     nobody = [Walk(name, SIZE, ()) for name in ("c0", "c1")]
     with pytest.raises(CalibrationError, match="nobody was seen walking by both at once"):
-        calibrate_walks(nobody)
+        calibrate_from_walks(nobody)
     with pytest.raises(CalibrationError, match="two cameras at least"):
-        calibrate_walks(nobody[:1])
+        calibrate_from_walks(nobody[:1])

@@ -9,23 +9,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import NOBODY, ViewTruth, best_views, stands_for, true_views
+from bestview import NO_PERSON, ViewGroundTruth, match_objects_to_people, optimal_views, view_ground_truth
 
 BOX = [0.0, 0.0, 50.0, 50.0]  # a quarter of a picture of 100 x 100: its size is one half
 NOWHERE = [np.nan] * 4
 SQUARE, WIDE = [100.0, 100.0], [200.0, 200.0]
 
 
-def truth_of(boxes: list[list[float]], shown: list[float], least: float = 0.25) -> ViewTruth:
+def truth_of(boxes: list[list[float]], shown: list[float], least: float = 0.25) -> ViewGroundTruth:
     """Give one person's views in one frame of several cameras."""
     laid = np.array(boxes)[None, None]
     sizes = np.array([SQUARE] * len(boxes))
-    return true_views(laid, np.array(shown)[None, None], sizes, least)
+    return view_ground_truth(laid, np.array(shown)[None, None], sizes, least)
 
 
 def test_a_view_costs_what_it_lacks_of_the_one_in_whose_picture_the_person_is_largest() -> None:
     boxes = np.array([BOX, BOX])[None, None]
-    truth = true_views(boxes, np.ones((1, 1, 2)), np.array([SQUARE, WIDE]), 0.25)
+    truth = view_ground_truth(boxes, np.ones((1, 1, 2)), np.array([SQUARE, WIDE]), 0.25)
     assert truth.cost.ravel().tolist() == [0.0, 0.5]
     assert truth.visible.all()
 
@@ -34,7 +34,7 @@ def test_who_is_hidden_or_not_there_costs_one_and_is_not_visible() -> None:
     truth = truth_of([BOX, BOX, NOWHERE, [-9.0, 0.0, -1.0, 9.0]], [0.2, 0.0, 1.0, 1.0])
     assert truth.cost.ravel().tolist() == [1.0] * 4
     assert not truth.visible.any()
-    assert not truth.counted.any()
+    assert not truth.evaluated.any()
 
 
 def test_views_are_compared_with_the_best_of_those_that_show_somebody() -> None:
@@ -50,7 +50,7 @@ def test_an_unknown_share_counts_as_all_and_the_threshold_is_the_callers() -> No
 
 def test_shapes_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ValueError, match="shapes"):
-        true_views(np.zeros((1, 1, 2, 4)), np.zeros((1, 1, 2)), np.ones((1, 2)), 0.5)
+        view_ground_truth(np.zeros((1, 1, 2, 4)), np.zeros((1, 1, 2)), np.ones((1, 2)), 0.5)
 
 
 @settings(deadline=None, max_examples=60)
@@ -59,8 +59,8 @@ def test_the_optimum_is_the_cheapest_of_all_sequences(seed: int, switch_cost: fl
     rng = np.random.default_rng(seed)
     visible = rng.random((2, 5, 3)) < 0.7
     cost = np.where(visible, rng.random((2, 5, 3)), 1.0)
-    truth = ViewTruth(cost, visible)
-    views = best_views(truth, switch_cost)
+    truth = ViewGroundTruth(cost, visible)
+    views = optimal_views(truth, switch_cost)
     for person in range(2):
         on = visible[person].any(axis=1)
         assert (views[person] >= 0).tolist() == on.tolist()
@@ -78,15 +78,15 @@ def total(cost: np.ndarray, views: tuple[int, ...] | list[int], switch_cost: flo
 @given(st.integers(1, 4), st.integers(1, 4), st.integers(0, 10_000))
 def test_numbers_stand_for_people_the_best_way_round(people: int, objects: int, seed: int) -> None:
     matches = np.random.default_rng(seed).integers(0, 5, (people, objects))
-    found = stands_for(matches).tolist()
-    somebody = [it for it in found if it != NOBODY]
+    found = match_objects_to_people(matches).tolist()
+    somebody = [it for it in found if it != NO_PERSON]
     assert len(set(somebody)) == len(somebody), "one person has one object"
-    reached = sum(int(matches[person, thing]) for thing, person in enumerate(found) if person != NOBODY)
+    reached = sum(int(matches[person, thing]) for thing, person in enumerate(found) if person != NO_PERSON)
     square = np.zeros((4, 4), dtype=np.int64)
     square[:people, :objects] = matches
     assert reached == max(sum(int(square[a, b]) for b, a in enumerate(way)) for way in permutations(range(4)))
 
 
 def test_who_was_never_met_is_nobody() -> None:
-    assert stands_for(np.array([[0, 3, 1], [0, 0, 2]])).tolist() == [NOBODY, 0, 1]
-    assert stands_for(np.zeros((0, 2), dtype=np.int64)).tolist() == [NOBODY, NOBODY]
+    assert match_objects_to_people(np.array([[0, 3, 1], [0, 0, 2]])).tolist() == [NO_PERSON, 0, 1]
+    assert match_objects_to_people(np.zeros((0, 2), dtype=np.int64)).tolist() == [NO_PERSON, NO_PERSON]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import choose_views, score_views
+from bestview import score_views, select_views
 
 EVERYWHERE = np.ones((1, 6, 2), dtype=bool)
 COST = np.array([[[0.2, 0.8], [0.2, 0.8], [0.2, 0.8], [0.8, 0.2], [0.8, 0.2], [0.8, 0.2]]])
@@ -61,7 +61,7 @@ def test_nothing_is_better_than_the_optimum_and_a_window_comes_close(seed: int) 
     cost = rng.random((2, 20, 3))
     visible = np.ones(cost.shape, dtype=bool)
     anything = score_views(cost, visible, rng.integers(-1, 3, (2, 20)), 0.7, 25.0)
-    optimum = choose_views(cost, np.array([-1, -1]), 0.7, np.ones(20, dtype=bool))
+    optimum = select_views(cost, np.array([-1, -1]), 0.7, np.ones(20, dtype=bool))
     exact = score_views(cost, visible, optimum.views, 0.7, 25.0)
     assert anything.regret >= 0.0
     assert exact.regret == pytest.approx(0.0, abs=1e-12)

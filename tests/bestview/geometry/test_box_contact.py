@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import touching
+from bestview import boxes_touching_others
 
 SIZE = (640.0, 360.0)
 CELL = 10.0
@@ -36,7 +36,7 @@ def test_they_touch_where_they_share_a_cell(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     boxes, others = drawn(rng, 12), drawn(rng, count)
     picture, theirs = rng.integers(0, 3, 12), rng.integers(0, 3, count)
-    told = touching(boxes, picture, others, theirs, 3, SIZE)
+    told = boxes_touching_others(boxes, picture, others, theirs, 3, SIZE)
     for box, at, touched in zip(boxes, picture, told, strict=True):
         beside = [cells(box) & cells(it) for it, there in zip(others, theirs, strict=True) if there == at]
         assert touched == any(beside)

@@ -11,15 +11,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from bestview import Findings, Vantage, WitnessSettings, overlook, witnessed
-from bestview.geometry.ground_plane import feet, foot_spread, from_ground, person_heights, to_ground
+from bestview import CameraDetections, CameraGeometry, CrossViewSettings, rescore_detections, views_overlap
+from bestview.geometry.ground_plane import (
+    foot_covariance,
+    foot_points,
+    from_ground,
+    person_heights,
+    to_ground,
+)
 
 SIZE = (640.0, 480.0)
 FOCAL, TALL, ABOVE = 400.0, 1.75, 3.0
-DEFAULT = WitnessSettings()
+DEFAULT = CrossViewSettings()
 
 
-def looking(x: float, y: float, yaw: float) -> Vantage:
+def looking(x: float, y: float, yaw: float) -> CameraGeometry:
     """Give a level camera above (x, y), looking along +Y turned to the left by so many degrees; metres."""
     turn = math.radians(yaw)
     across, along = (math.cos(turn), math.sin(turn)), (-math.sin(turn), math.cos(turn))
@@ -32,7 +38,7 @@ def looking(x: float, y: float, yaw: float) -> Vantage:
             depth,
         ]
     )
-    return Vantage(np.linalg.inv(ground_to_image), SIZE)
+    return CameraGeometry(np.linalg.inv(ground_to_image), SIZE)
 
 
 FRONT, SIDE = looking(0, 0, 0), looking(10, 10, 90)
@@ -40,7 +46,7 @@ FRONT, SIDE = looking(0, 0, 0), looking(10, 10, 90)
 AWAY = looking(0, -5, 180)
 
 
-def boxes_of(vantage: Vantage, *places: tuple[float, float]) -> NDArray[np.float64]:
+def boxes_of(vantage: CameraGeometry, *places: tuple[float, float]) -> NDArray[np.float64]:
     """Give the boxes of people who stand there."""
     foot = from_ground(vantage.homography, np.array(places, dtype=np.float64).reshape(-1, 2))
     pixel = np.concatenate([foot - (0.0, 1.0), foot], axis=-1)
@@ -49,26 +55,32 @@ def boxes_of(vantage: Vantage, *places: tuple[float, float]) -> NDArray[np.float
     return np.stack([foot[:, 0] - half, foot[:, 1] - tall, foot[:, 0] + half, foot[:, 1]], axis=-1)
 
 
-def found(vantage: Vantage, *places: tuple[float, float], score: float = 0.5) -> Findings:
+def found(vantage: CameraGeometry, *places: tuple[float, float], score: float = 0.5) -> CameraDetections:
     boxes = boxes_of(vantage, *places)
-    return Findings(boxes, np.full(len(boxes), score))
+    return CameraDetections(boxes, np.full(len(boxes), score))
 
 
-def score_of(other: Findings | None, vantage: Vantage = SIDE, place: tuple[float, float] = (0, 10)) -> float:
+def score_of(
+    other: CameraDetections | None, vantage: CameraGeometry = SIDE, place: tuple[float, float] = (0, 10)
+) -> float:
     """Give the score that the front camera's box of 0.5 has then."""
     others = [] if other is None else [(vantage, other)]
-    [score] = witnessed(FRONT, found(FRONT, place), others, DEFAULT)
+    [score] = rescore_detections(FRONT, found(FRONT, place), others, DEFAULT)
     return float(score)
 
 
 def test_who_stands_there_for_another_camera_too_is_likelier() -> None:
-    assert score_of(found(SIDE, (0, 10), score=1.0)) == pytest.approx(0.5 + DEFAULT.raised * 0.5, abs=0.01)
+    assert score_of(found(SIDE, (0, 10), score=1.0)) == pytest.approx(
+        0.5 + DEFAULT.confirmation_boost * 0.5, abs=0.01
+    )
     assert 0.5 < score_of(found(SIDE, (0, 10), score=0.4)) < score_of(found(SIDE, (0, 10), score=0.8))
 
 
 def test_where_another_camera_plainly_sees_the_empty_floor_somebody_is_less_likely() -> None:
-    assert score_of(found(SIDE)) == pytest.approx(0.5 * (1 - DEFAULT.lowered))
-    assert score_of(found(SIDE, (0, 14), score=1.0)) == pytest.approx(0.5 * (1 - DEFAULT.lowered), abs=0.02)
+    assert score_of(found(SIDE)) == pytest.approx(0.5 * (1 - DEFAULT.absence_penalty))
+    assert score_of(found(SIDE, (0, 14), score=1.0)) == pytest.approx(
+        0.5 * (1 - DEFAULT.absence_penalty), abs=0.02
+    )
 
 
 def test_a_camera_that_is_not_there_says_nothing() -> None:
@@ -84,58 +96,63 @@ def test_what_a_camera_cannot_see_it_does_not_deny() -> None:
     left, top, right, bottom = boxes_of(SIDE, (0, 10))[0]
     corners = [[left, top], [right, top], [right, bottom], [left, bottom]]
     polygon = np.array(corners) + np.array([[-9, -9], [9, -9], [9, 9], [-9, 9]])
-    assert score_of(found(SIDE), replace(SIDE, ignored=(polygon,))) == 0.5
-    elsewhere = replace(SIDE, ignored=(polygon + np.array([300.0, 0.0]),))
+    assert score_of(found(SIDE), replace(SIDE, ignored_regions=(polygon,))) == 0.5
+    elsewhere = replace(SIDE, ignored_regions=(polygon + np.array([300.0, 0.0]),))
     assert score_of(found(SIDE), elsewhere) < 0.5
 
 
 def test_nothing_is_said_of_who_stands_nowhere() -> None:
     [left, top, right, _] = boxes_of(FRONT, (0, 10))[0]
     for bottom in (SIZE[1], 200.0):  # cut off by the picture's lower edge, and above the horizon
-        own = Findings(np.array([[left, min(top, bottom - 90), right, bottom]]), np.array([0.5]))
-        assert witnessed(FRONT, own, [(SIDE, found(SIDE))], DEFAULT).tolist() == [0.5]
+        own = CameraDetections(np.array([[left, min(top, bottom - 90), right, bottom]]), np.array([0.5]))
+        assert rescore_detections(FRONT, own, [(SIDE, found(SIDE))], DEFAULT).tolist() == [0.5]
 
 
 def test_a_camera_goes_by_whoever_is_surest() -> None:
     west = looking(-10, 10, -90)
     here, nobody = found(SIDE, (0, 10), score=1.0), found(west)
-    [both] = witnessed(FRONT, found(FRONT, (0, 10)), [(SIDE, here), (west, nobody)], DEFAULT)
-    [turned] = witnessed(FRONT, found(FRONT, (0, 10)), [(west, nobody), (SIDE, here)], DEFAULT)
+    [both] = rescore_detections(FRONT, found(FRONT, (0, 10)), [(SIDE, here), (west, nobody)], DEFAULT)
+    [turned] = rescore_detections(FRONT, found(FRONT, (0, 10)), [(west, nobody), (SIDE, here)], DEFAULT)
     assert both == turned
     assert score_of(found(SIDE)) < both < score_of(here)
 
 
 def test_cameras_overlook_each_other_where_they_see_the_same_ground() -> None:
-    assert overlook(FRONT, SIDE)
-    assert overlook(SIDE, FRONT)
-    assert not overlook(FRONT, AWAY)
-    assert not overlook(AWAY, FRONT)
+    assert views_overlap(FRONT, SIDE)
+    assert views_overlap(SIDE, FRONT)
+    assert not views_overlap(FRONT, AWAY)
+    assert not views_overlap(AWAY, FRONT)
 
 
-@pytest.mark.parametrize("name", ["raised", "lowered", "sure", "plain"])
+@pytest.mark.parametrize(
+    "name", ["confirmation_boost", "absence_penalty", "minimum_occluder_score", "clear_view_share"]
+)
 @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan")])
 def test_shares_are_from_0_to_1(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"{name}: is .* but must be from 0 to 1"):
-        WitnessSettings(**{name: value})
+        CrossViewSettings(**{name: value})
 
 
 @pytest.mark.parametrize("name", ["gate_heights", "foot_sideways", "foot_upwards"])
 @pytest.mark.parametrize("value", [0.0, float("inf"), float("nan")])
 def test_lengths_are_above_0(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"{name}: is .* but must be above 0"):
-        WitnessSettings(**{name: value})
+        CrossViewSettings(**{name: value})
 
 
 def plainly(
-    own: Vantage, box: NDArray[np.float64], score: float, others: list[tuple[Vantage, Findings]]
+    own: CameraGeometry,
+    box: NDArray[np.float64],
+    score: float,
+    others: list[tuple[CameraGeometry, CameraDetections]],
 ) -> float:
     """Read the rule for one box, point by point."""
     if abs(box[3] / own.size[1] - 1) < 0.01:
         return score
-    place = to_ground(own.homography, feet(box))
+    place = to_ground(own.homography, foot_points(box))
     if np.isnan(place).any():
         return score
-    spread = foot_spread(own.homography, box, DEFAULT.foot_sideways, DEFAULT.foot_upwards)
+    spread = foot_covariance(own.homography, box, DEFAULT.foot_sideways, DEFAULT.foot_upwards)
     height = float(person_heights(own.homography, box))
     there, nobody = 0.0, 0.0
     for vantage, seen in others:
@@ -143,9 +160,9 @@ def plainly(
         for other, sure in zip(seen.boxes, seen.scores, strict=True):
             if abs(other[3] / vantage.size[1] - 1) < 0.01:
                 continue
-            theirs = foot_spread(vantage.homography, other, DEFAULT.foot_sideways, DEFAULT.foot_upwards)
+            theirs = foot_covariance(vantage.homography, other, DEFAULT.foot_sideways, DEFAULT.foot_upwards)
             about = spread + theirs + np.eye(2) * (DEFAULT.gate_heights * height) ** 2
-            away = place - to_ground(vantage.homography, feet(other))
+            away = place - to_ground(vantage.homography, foot_points(other))
             if not np.isnan(away).any():
                 near = max(near, float(sure * np.exp(-0.5 * away @ np.linalg.solve(about, away))))
         there = max(there, near)
@@ -159,25 +176,25 @@ def plainly(
             for across in (-0.25, 0.0, 0.25):
                 x, y = foot[0] + across * 0.38 * tall, foot[1] - (row + 0.5) / 6 * tall
                 covered = any(
-                    sure >= DEFAULT.sure and left <= x <= right and top <= y <= bottom
+                    sure >= DEFAULT.minimum_occluder_score and left <= x <= right and top <= y <= bottom
                     for (left, top, right, bottom), sure in zip(seen.boxes, seen.scores, strict=True)
                 )
                 shown += 0 <= x <= vantage.size[0] and 0 <= y <= vantage.size[1] and not covered
-        share = max((shown / 18 - DEFAULT.plain) / (1 - DEFAULT.plain), 0.0)
+        share = max((shown / 18 - DEFAULT.clear_view_share) / (1 - DEFAULT.clear_view_share), 0.0)
         nobody = max(nobody, (1 - near) * share)
-    return score + DEFAULT.raised * there * (1 - score) - DEFAULT.lowered * nobody * score
+    return score + DEFAULT.confirmation_boost * there * (1 - score) - DEFAULT.absence_penalty * nobody * score
 
 
 PLACE = st.tuples(st.floats(-8, 8), st.floats(3, 16), st.floats(0, 1), st.floats(0.7, 1.4))
 PEOPLE = st.lists(PLACE, max_size=4)
 
 
-def drawn(vantage: Vantage, people: list[tuple[float, float, float, float]]) -> Findings:
+def drawn(vantage: CameraGeometry, people: list[tuple[float, float, float, float]]) -> CameraDetections:
     boxes = boxes_of(vantage, *((x, y) for x, y, _, _ in people))
     there = ~np.isnan(boxes).any(axis=1)
     factors = np.array([factor for *_, factor in people]).reshape(-1)
     boxes[:, 1] = boxes[:, 3] - factors * (boxes[:, 3] - boxes[:, 1])
-    return Findings(boxes[there], np.array([score for _, _, score, _ in people]).reshape(-1)[there])
+    return CameraDetections(boxes[there], np.array([score for _, _, score, _ in people]).reshape(-1)[there])
 
 
 @settings(deadline=None, max_examples=60)
@@ -190,7 +207,7 @@ def test_it_is_the_rule_read_box_by_box_and_point_by_point(
     corner = looking(-8, 2, -45)
     others = [(SIDE, drawn(SIDE, one)), (corner, drawn(corner, two))]
     mine = drawn(FRONT, own)
-    scores = witnessed(FRONT, mine, others, DEFAULT)
+    scores = rescore_detections(FRONT, mine, others, DEFAULT)
     read = [plainly(FRONT, box, score, others) for box, score in zip(mine.boxes, mine.scores, strict=True)]
     assert scores == pytest.approx(read, abs=1e-9)
     assert ((scores >= 0) & (scores <= 1)).all()

@@ -7,23 +7,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import Findable
+from bestview import DetectionProbabilityMap
 
 SIZE = (640.0, 360.0)
 HERE, NEAR, FAR = np.array([[310.0, 170.0], [330.0, 170.0], [40.0, 350.0]])
 
 
-def findable(prior: float = 0.6, few: float = 10.0, many: float = 50.0) -> Findable:
-    return Findable(2, SIZE, prior, few, many)
+def findable(prior: float = 0.6, few: float = 10.0, many: float = 50.0) -> DetectionProbabilityMap:
+    return DetectionProbabilityMap(2, SIZE, prior, few, many)
 
 
-def look(it: Findable, place: np.ndarray, *, found: bool, times: int = 1, camera: int = 0) -> None:
+def look(
+    it: DetectionProbabilityMap, place: np.ndarray, *, found: bool, times: int = 1, camera: int = 0
+) -> None:
     for _ in range(times):
         it.learn(np.array([camera]), place[None], np.array([found]), 1.0, 1.0)
 
 
-def share(it: Findable, place: np.ndarray, camera: int = 0) -> float:
-    return float(it.share(np.array([camera]), place[None])[0])
+def share(it: DetectionProbabilityMap, place: np.ndarray, camera: int = 0) -> float:
+    return float(it.probability(np.array([camera]), place[None])[0])
 
 
 def test_of_an_unknown_camera_the_prior_is_taken() -> None:
@@ -89,7 +91,7 @@ def test_looks_may_each_stand_for_as_many_as_they_like() -> None:
     assert [share(one, it) for it in (HERE, FAR)] == pytest.approx([share(other, it) for it in (HERE, FAR)])
 
 
-def trust(it: Findable, place: np.ndarray, camera: int = 0) -> float:
+def trust(it: DetectionProbabilityMap, place: np.ndarray, camera: int = 0) -> float:
     return float(it.trust(np.array([camera]), place[None])[0])
 
 

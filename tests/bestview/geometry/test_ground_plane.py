@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 
 from bestview import (
     camera_height,
-    checked_homography,
-    feet,
-    foot_spread,
-    horizon,
+    foot_covariance,
+    foot_points,
+    ground_handedness,
+    horizon_row,
     person_heights,
-    shows_floor,
+    shows_ground,
     to_ground,
-    turns,
+    validate_homography,
 )
-from bestview.geometry.ground_plane import as_standing, feet_cut_off, from_ground
+from bestview.geometry.ground_plane import feet_cut_off, from_ground, upright_from_overhead
 
 
 def looking_along(height: float = 3.0, focal: float = 400.0) -> NDArray[np.float64]:
@@ -48,15 +48,15 @@ def test_nobody_stands_on_or_above_the_horizon(scale: float) -> None:
 
 @pytest.mark.parametrize("scale", [1.0, -2.5])
 def test_the_horizon_is_where_the_ground_ends(scale: float) -> None:
-    assert horizon(scale * looking_along(), 320.0) == pytest.approx(240.0)
+    assert horizon_row(scale * looking_along(), 320.0) == pytest.approx(240.0)
     tilted = looking_along() @ np.array([[1.0, 0.0, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]])
     for x in (0.0, 320.0, 640.0):
-        row = horizon(tilted, x)
+        row = horizon_row(tilted, x)
         assert row == pytest.approx(240.0 - 0.1 * x)
         above, below = to_ground(tilted, np.array([[x, row - 1.0], [x, row + 1.0]]))
         assert np.isnan(above).all()
         assert np.isfinite(below).all()
-    assert horizon(np.diag([0.02, 0.02, 1.0]), 0.0) is None
+    assert horizon_row(np.diag([0.02, 0.02, 1.0]), 0.0) is None
 
 
 @settings(deadline=None, max_examples=60)
@@ -79,9 +79,9 @@ def test_a_camera_tilted_past_straight_down_has_the_floor_mirrored_and_shows_non
     floor = np.array([[mirror, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -3.0]])
     lens = np.array([[400.0, 0.0, 320.0], [0.0, 400.0, 240.0], [0.0, 0.0, 1.0]])
     homography = scale * np.linalg.inv(lens @ axes @ floor)
-    assert turns(homography) == (-mirror if tilt < straight else mirror)
+    assert ground_handedness(homography) == (-mirror if tilt < straight else mirror)
     horizon_row = 240.0 - 400.0 * np.tan(tilt)
-    assert shows_floor(homography, (640, 480)) == (horizon_row < 480.0)
+    assert shows_ground(homography, (640, 480)) == (horizon_row < 480.0)
 
 
 @pytest.mark.parametrize("high", [1.9, 7.5])
@@ -92,7 +92,7 @@ def test_the_camera_is_as_high_as_the_horizon_is_above_the_feet_of_somebody_as_t
 
 
 def test_feet_are_in_the_middle_of_the_lower_edge() -> None:
-    assert feet(np.array([[10, 20, 30, 80]], float)).tolist() == [[20, 80]]
+    assert foot_points(np.array([[10, 20, 30, 80]], float)).tolist() == [[20, 80]]
 
 
 def test_a_person_is_as_tall_on_the_ground_as_in_the_picture() -> None:
@@ -104,7 +104,7 @@ def test_a_person_is_as_tall_on_the_ground_as_in_the_picture() -> None:
 
 def test_how_far_off_somebody_stands_is_less_certain_than_in_which_direction() -> None:
     near, far = (np.array([310.0, 240 + 1200 / y - 700 / y, 330.0, 240 + 1200 / y]) for y in (5.0, 10.0))
-    spreads = foot_spread(looking_along(), np.array([near, far]), sideways=0.05, upwards=0.05)
+    spreads = foot_covariance(looking_along(), np.array([near, far]), sideways=0.05, upwards=0.05)
     across, along = np.sqrt(spreads[:, 0, 0]), np.sqrt(spreads[:, 1, 1])
     assert across == pytest.approx([0.05 * 1.75] * 2)  # a share of the person's height, near or far
     assert (along > across).all()
@@ -124,21 +124,21 @@ def test_how_far_off_somebody_stands_is_less_certain_than_in_which_direction() -
 )
 def test_a_matrix_that_is_no_homography_is_refused_by_name(matrix: object, match: str) -> None:
     with pytest.raises(ValueError, match=match) as refusal:
-        checked_homography(matrix, "door")  # type: ignore[arg-type]
+        validate_homography(matrix, "door")  # type: ignore[arg-type]
     assert "\n" not in str(refusal.value)
 
 
 def test_a_homography_in_any_unit_is_accepted() -> None:
     for unit in (1e-3, 1.0, 1e4):
         scaled = np.diag([unit, unit, 1.0]) @ looking_along()
-        assert np.array_equal(checked_homography(scaled.tolist(), "door"), scaled)
+        assert np.array_equal(validate_homography(scaled.tolist(), "door"), scaled)
 
 
 def test_the_recordings_homographies_are_accepted(shared_data: Path) -> None:
     for scene in ("campus4", "lab4", "pets09", "terrace"):
         ground = json.loads((shared_data / scene / "ground.json").read_text())
         for camera, matrix in ground["homography"].items():
-            checked_homography(matrix, camera)
+            validate_homography(matrix, camera)
 
 
 @settings(deadline=None, max_examples=60)
@@ -164,14 +164,14 @@ def test_feet_on_the_lower_edge_are_cut_off_and_boxes_that_reach_beyond_it_are_b
 
 def test_who_is_seen_from_above_stands_in_the_middle_and_is_as_tall_as_others() -> None:
     from_above = np.array([[100.0, 200.0, 140.0, 240.0], [np.nan] * 4])
-    upright = as_standing(from_above)
-    assert feet(upright)[0].tolist() == [120.0, 220.0]
+    upright = upright_from_overhead(from_above)
+    assert foot_points(upright)[0].tolist() == [120.0, 220.0]
     plan = np.diag([0.02, 0.02, 1.0])  # metres a pixel
     assert 1.5 < person_heights(plan, upright)[0] < 2.0
     assert np.isnan(upright[1]).all()
-    assert not feet_cut_off(as_standing(np.array([[10.0, 440.0, 50.0, 480.0]])), 480.0).any()
+    assert not feet_cut_off(upright_from_overhead(np.array([[10.0, 440.0, 50.0, 480.0]])), 480.0).any()
 
 
 def test_a_box_from_above_that_is_inside_out_is_nobody_and_no_fault() -> None:
     inside_out = np.array([[140.0, 200.0, 100.0, 240.0]])  # warnings are errors in tests
-    assert as_standing(inside_out).tolist() == [[140.0, 220.0, 100.0, 220.0]]
+    assert upright_from_overhead(inside_out).tolist() == [[140.0, 220.0, 100.0, 220.0]]

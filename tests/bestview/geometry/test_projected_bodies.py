@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import Bodies, bodies, boxes_seen, feet_seen
+from bestview import BodyEstimates, estimate_bodies, project_boxes, project_feet
 from bestview.calibration.pinhole import Pinhole
 from fakes.bestview.walkers import SIZE, camera_at
 
@@ -24,10 +24,10 @@ def box_in(camera: Pinhole, place: np.ndarray, slim: float = 0.4) -> np.ndarray:
     return np.array([x - slim * tall / 2, y - tall, x + slim * tall / 2, y])
 
 
-def in_all(body: Bodies, grounds: np.ndarray) -> np.ndarray:
+def in_all(body: BodyEstimates, grounds: np.ndarray) -> np.ndarray:
     """Give the boxes of one body in all cameras, (C, 4)."""
-    foot, everyone = feet_seen(body, grounds)[0], np.zeros(len(grounds), int)
-    return boxes_seen(body, everyone, foot, grounds)
+    foot, everyone = project_feet(body, grounds)[0], np.zeros(len(grounds), int)
+    return project_boxes(body, everyone, foot, grounds)
 
 
 @settings(deadline=None, max_examples=60)
@@ -37,8 +37,8 @@ def test_what_one_camera_sees_is_expected_there_again_and_where_they_are_in_the_
 ) -> None:
     place = np.array([east, north])
     own, other = (box_in(it, place) for it in (CAMERAS[camera], CAMERAS[1 - camera]))
-    body = bodies(own[None], np.array([camera]), np.array([0]), 1, GROUNDS, BOTTOM)
-    assert body.place[0] == pytest.approx(place, abs=1e-6)
+    body = estimate_bodies(own[None], np.array([camera]), np.array([0]), 1, GROUNDS, BOTTOM)
+    assert body.ground_point[0] == pytest.approx(place, abs=1e-6)
     assert body.known_by[0].tolist() == [camera == 0, camera == 1]
     boxes = in_all(body, GROUNDS)
     assert boxes[camera] == pytest.approx(own, abs=1e-6)
@@ -52,8 +52,8 @@ def test_the_camera_that_they_are_near_to_says_more() -> None:
     near, far = camera_at(2.5, 0.0), camera_at(-9.0, 0.0)
     grounds = np.array([it.homography() for it in (near, far)])
     boxes = np.array([box_in(near, np.array([0.0, 0.0])), box_in(far, np.array([0.5, 0.0]))])
-    body = bodies(boxes, np.array([0, 1]), np.array([0, 0]), 1, grounds, BOTTOM)
-    assert 0.0 < body.place[0, 0] < 0.1
+    body = estimate_bodies(boxes, np.array([0, 1]), np.array([0, 0]), 1, grounds, BOTTOM)
+    assert 0.0 < body.ground_point[0, 0] < 0.1
     assert body.known_by.tolist() == [[True, True]]
 
 
@@ -62,17 +62,17 @@ def test_feet_that_the_picture_cuts_off_and_boxes_that_are_none_stand_nowhere() 
     empty = np.array([300.0, 200.0, 300.0, 200.0])
     above = np.array([300.0, -90.0, 340.0, -10.0])
     moments = np.arange(3)
-    body = bodies(np.array([cut, empty, above]), np.zeros(3, int), moments, 4, GROUNDS, BOTTOM)
-    assert np.isnan(body.place).all()
+    body = estimate_bodies(np.array([cut, empty, above]), np.zeros(3, int), moments, 4, GROUNDS, BOTTOM)
+    assert np.isnan(body.ground_point).all()
     assert not body.known_by.any()
-    assert np.isnan(feet_seen(body, GROUNDS)).all()
+    assert np.isnan(project_feet(body, GROUNDS)).all()
 
 
 def test_a_camera_does_not_see_what_is_behind_it() -> None:
     place = np.array([0.0, 0.0])
     away = camera_at(1.0, 0.0, towards=(5.0, 0.0))
     grounds = np.array([SOUTH.homography(), away.homography()])
-    body = bodies(box_in(SOUTH, place)[None], np.array([0]), np.array([0]), 1, grounds, BOTTOM)
+    body = estimate_bodies(box_in(SOUTH, place)[None], np.array([0]), np.array([0]), 1, grounds, BOTTOM)
     seen = in_all(body, grounds)
     assert np.isfinite(seen[0]).all()
     assert np.isnan(seen[1]).all()
@@ -85,16 +85,18 @@ def test_means_are_those_of_one_moment_after_the_other(seed: int) -> None:
     places = rng.uniform(-0.8, 0.8, (20, 2))
     camera, moment = rng.integers(0, 2, 20), rng.integers(0, 6, 20)
     boxes = np.array([box_in(CAMERAS[c], place) for c, place in zip(camera, places, strict=True)])
-    together = bodies(boxes, camera, moment, 6, GROUNDS, BOTTOM)
+    together = estimate_bodies(boxes, camera, moment, 6, GROUNDS, BOTTOM)
     for one in range(6):
         mine = moment == one
-        alone = bodies(boxes[mine], camera[mine], np.zeros(mine.sum(), int), 1, GROUNDS, BOTTOM)
+        alone = estimate_bodies(boxes[mine], camera[mine], np.zeros(mine.sum(), int), 1, GROUNDS, BOTTOM)
         for told, known in zip(
-            (together.place[one], together.tall[one], together.known_by[one]),
-            (alone.place[0], alone.tall[0], alone.known_by[0]),
+            (together.ground_point[one], together.height[one], together.known_by[one]),
+            (alone.ground_point[0], alone.height[0], alone.known_by[0]),
             strict=True,
         ):
             assert np.array_equal(told, known, equal_nan=True), "to the bit: whoever else is there"
         if mine.any():
             low, high = places[mine].min(axis=0), places[mine].max(axis=0)
-            assert ((together.place[one] >= low - 1e-6) & (together.place[one] <= high + 1e-6)).all()
+            assert (
+                (together.ground_point[one] >= low - 1e-6) & (together.ground_point[one] <= high + 1e-6)
+            ).all()

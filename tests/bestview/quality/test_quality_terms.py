@@ -9,11 +9,18 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import QualitySettings, size_quality
-from bestview.quality import Looks, Seen, compared, compared_views, view_cost, view_quality
-from bestview.quality.centering import central
-from bestview.quality.facing import facing
-from bestview.quality.occlusion import unhidden
-from bestview.quality.truncation import whole
+from bestview.quality import (
+    CameraLayout,
+    TrackWindow,
+    compute_view_quality,
+    relative_quality,
+    relative_view_quality,
+    view_cost,
+)
+from bestview.quality.centering import centering_score
+from bestview.quality.facing import facing_score
+from bestview.quality.occlusion import unoccluded_share
+from bestview.quality.truncation import visible_share
 
 WIDTH, HEIGHT, FPS = 100.0, 80.0, 25.0
 PICTURE = np.array([0.0, 0.0, WIDTH, HEIGHT])
@@ -31,15 +38,15 @@ def walk(x: float, y: float, frames: int = 15) -> NDArray[np.float64]:
     return np.array([box(50, 200)]) + steps[None]
 
 
-def looks(*homographies: NDArray[np.float64] | None) -> Looks:
+def looks(*homographies: NDArray[np.float64] | None) -> CameraLayout:
     cameras = homographies or (None,)
-    return Looks((WIDTH, HEIGHT), np.tile(PICTURE, (len(cameras), 1)), cameras, FPS)
+    return CameraLayout((WIDTH, HEIGHT), np.tile(PICTURE, (len(cameras), 1)), cameras, FPS)
 
 
-def seen(boxes: NDArray[np.float64], sure: float = 1.0, sharp: float = np.nan) -> Seen:
+def seen(boxes: NDArray[np.float64], sure: float = 1.0, sharp: float = np.nan) -> TrackWindow:
     """Give tracks of camera 0."""
     tracks = len(boxes)
-    return Seen(boxes, np.zeros(tracks, dtype=np.int64), np.full(tracks, sure), np.full(tracks, sharp))
+    return TrackWindow(boxes, np.zeros(tracks, dtype=np.int64), np.full(tracks, sure), np.full(tracks, sharp))
 
 
 def only(**weights: float) -> QualitySettings:
@@ -49,33 +56,35 @@ def only(**weights: float) -> QualitySettings:
 
 def test_who_is_inside_the_picture_and_clear_of_its_edges_is_whole() -> None:
     boxes = np.array([box(20, 20), box(-5, 20), box(20, 40), box(20, 0), box(20, 60), box(200, 20)])
-    assert whole(boxes, PICTURE) == pytest.approx([1.0, 0.5, 0.95, 0.95, 0.475, 0.0])
+    assert visible_share(boxes, PICTURE) == pytest.approx([1.0, 0.5, 0.95, 0.95, 0.475, 0.0])
 
 
 def test_the_edge_counts_gradually() -> None:
-    values = whole(np.array([box(20, 40 - gap) for gap in (0.0, 0.3, 0.6, 1.2, 5.0)]), PICTURE)
+    values = visible_share(np.array([box(20, 40 - gap) for gap in (0.0, 0.3, 0.6, 1.2, 5.0)]), PICTURE)
     assert values == pytest.approx([0.95, 0.9625, 0.975, 1.0, 1.0])
 
 
 def test_who_ends_at_a_side_is_as_much_of_a_person_as_the_box_is_wide() -> None:
     slim, wide = 0.37 * 40.0 / 2.0, 0.37 * 40.0
     boxes = np.array([box(0, 20, slim), box(WIDTH - slim, 20, slim), box(0, 20, wide), box(0, 20, 2 * wide)])
-    assert whole(boxes, PICTURE) == pytest.approx([0.5, 0.5, 1.0, 1.0])
+    assert visible_share(boxes, PICTURE) == pytest.approx([0.5, 0.5, 1.0, 1.0])
     away = np.array([box(gap, 20, slim) for gap in (0.0, 0.6, 1.2, 30.0)])
-    assert whole(away, PICTURE) == pytest.approx([0.5, 0.75, 1.0, 1.0]), "clear of it, people may be slim"
+    assert visible_share(away, PICTURE) == pytest.approx([0.5, 0.75, 1.0, 1.0]), (
+        "clear of it, people may be slim"
+    )
     beyond = np.array([box(-slim / 2, 20, slim), box(WIDTH - slim / 2, 20, slim)])
-    assert whole(beyond, PICTURE) == pytest.approx([0.5, 0.5]), "the part outside is told once"
+    assert visible_share(beyond, PICTURE) == pytest.approx([0.5, 0.5]), "the part outside is told once"
 
 
 def test_who_is_in_the_middle_is_central() -> None:
     boxes = np.array([box(45, 20), [-5.0, -20.0, 5.0, 20.0], [20.0, 20.0, 30.0, 60.0]])
-    assert central(boxes, PICTURE) == pytest.approx([1.0, 0.0, 1 - 25 / np.hypot(50, 40)])
+    assert centering_score(boxes, PICTURE) == pytest.approx([1.0, 0.0, 1 - 25 / np.hypot(50, 40)])
 
 
 def left_of(*boxes: list[float], cameras: tuple[int, ...] | None = None) -> list[float]:
     """Give how much of each box is left in one frame, all in one picture unless said otherwise."""
     of = np.array(cameras or [0] * len(boxes), dtype=np.int64)
-    return [float(it) for it in unhidden(np.array(boxes)[:, None], of)[:, 0]]
+    return [float(it) for it in unoccluded_share(np.array(boxes)[:, None], of)[:, 0]]
 
 
 def test_whose_feet_are_lower_hides_whom_they_cover() -> None:
@@ -130,12 +139,12 @@ def test_the_fast_way_finds_whom_the_slow_way_finds_hidden(
 ) -> None:
     cameras = np.array([camera for camera, _ in tracks], dtype=np.int64)
     boxes = np.array([boxes for _, boxes in tracks]).reshape(-1, 3, 4)
-    assert unhidden(boxes, cameras).tolist() == slowly(boxes, cameras).tolist(), "to the bit"
+    assert unoccluded_share(boxes, cameras).tolist() == slowly(boxes, cameras).tolist(), "to the bit"
 
 
 def test_who_comes_faces_the_camera_and_who_goes_does_not() -> None:
     comes, goes, across, stands = (
-        facing(walk(*way), FLOOR, FPS)[0] for way in ((0.0, 3.0), (0.0, -3.0), (3.0, 0.0), (0.0, 0.0))
+        facing_score(walk(*way), FLOOR, FPS)[0] for way in ((0.0, 3.0), (0.0, -3.0), (3.0, 0.0), (0.0, 0.0))
     )
     assert comes > 0.9
     assert goes == pytest.approx(1 - comes)
@@ -143,24 +152,24 @@ def test_who_comes_faces_the_camera_and_who_goes_does_not() -> None:
 
 
 def test_slow_steps_say_less_than_fast_ones_and_hidden_frames_nothing() -> None:
-    slow, fast = (facing(walk(0.0, speed), FLOOR, FPS)[0] for speed in (0.2, 2.0))
+    slow, fast = (facing_score(walk(0.0, speed), FLOOR, FPS)[0] for speed in (0.2, 2.0))
     assert 0.5 < slow < fast < 1.0
     gaps = walk(0.0, 2.0)
     gaps[0, 3:9] = np.nan
-    assert facing(gaps, FLOOR, FPS)[0] == pytest.approx(fast)
-    assert facing(np.full((2, 15, 4), np.nan), FLOOR, FPS).tolist() == [0.5, 0.5]
+    assert facing_score(gaps, FLOOR, FPS)[0] == pytest.approx(fast)
+    assert facing_score(np.full((2, 15, 4), np.nan), FLOOR, FPS).tolist() == [0.5, 0.5]
 
 
 def test_what_is_towards_the_camera_is_read_off_the_ground() -> None:
     turned = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    assert facing(walk(0.0, 3.0), turned, FPS)[0] == facing(walk(0.0, 3.0), FLOOR, FPS)[0]
+    assert facing_score(walk(0.0, 3.0), turned, FPS)[0] == facing_score(walk(0.0, 3.0), FLOOR, FPS)[0]
 
 
 def test_size_alone_without_comparing_is_the_papers() -> None:
     boxes = np.random.default_rng(1).uniform(0, 80, (3, 4, 4))
     boxes[..., 2:] += boxes[..., :2]
-    found = view_quality(seen(boxes), looks(None, None), only(size=1.0))
-    assert found.names == ("size",)
+    found = compute_view_quality(seen(boxes), looks(None, None), only(size=1.0))
+    assert found.term_names == ("size",)
     np.testing.assert_allclose(found.quality, size_quality(boxes, WIDTH, HEIGHT))
 
 
@@ -175,37 +184,42 @@ def test_the_quality_is_the_product_of_what_each_term_leaves(weights: dict[str, 
     boxes[..., 2:] = boxes[..., :2] + rng.uniform(1, 60, (6, 5, 2))
     boxes[rng.random((6, 5)) < 0.3] = np.nan
     terms = QualitySettings(**{**weights, "size": 1.0})
-    tracks = Seen(boxes, rng.integers(0, 2, 6), rng.random(6), rng.random(6))
-    found = view_quality(tracks, looks(FLOOR, None), terms)
+    tracks = TrackWindow(boxes, rng.integers(0, 2, 6), rng.random(6), rng.random(6))
+    found = compute_view_quality(tracks, looks(FLOOR, None), terms)
     there = ~np.isnan(boxes[..., 0])
     expected = np.ones(there.shape)
-    for name, term in zip(found.names, found.terms, strict=True):
+    for name, term in zip(found.term_names, found.terms, strict=True):
         assert ((term[there] >= 0) & (term[there] <= 1)).all(), name
         assert np.isnan(term[~there]).all()
         expected *= 1 - terms.weights[name] * (1 - term)
     np.testing.assert_allclose(found.quality[there], expected[there])
     assert np.isnan(found.quality[~there]).all()
-    assert set(found.names) == {name for name, weight in terms.weights.items() if weight > 0}
+    assert set(found.term_names) == {name for name, weight in terms.weights.items() if weight > 0}
 
 
 def test_what_nobody_has_measured_counts_as_sharp_and_a_doubtful_track_for_less() -> None:
     boxes = np.array(box(20, 20)).reshape(1, 1, 4)
-    assert view_quality(seen(boxes), looks(), only(sharp=1.0)).quality.item() == 1.0
-    assert view_quality(seen(boxes, sharp=0.4), looks(), only(sharp=0.5)).quality.item() == pytest.approx(0.7)
-    assert view_quality(seen(boxes, sure=0.4), looks(), only(sure=1.0)).quality.item() == pytest.approx(0.4)
+    assert compute_view_quality(seen(boxes), looks(), only(sharpness=1.0)).quality.item() == 1.0
+    assert compute_view_quality(
+        seen(boxes, sharp=0.4), looks(), only(sharpness=0.5)
+    ).quality.item() == pytest.approx(0.7)
+    assert compute_view_quality(
+        seen(boxes, sure=0.4), looks(), only(confidence=1.0)
+    ).quality.item() == pytest.approx(0.4)
 
 
 def test_views_are_compared_with_the_best_of_the_moment() -> None:
     quality = np.array([[[0.1, 0.2], [0.0, 0.0]]])
-    assert compared(quality, axis=2).tolist() == [[[0.5, 1.0], [0.0, 0.0]]]
-    assert view_cost(compared(quality, axis=2)).tolist() == [[[0.5, 0.0], [1.0, 1.0]]]
+    assert relative_quality(quality, axis=2).tolist() == [[[0.5, 1.0], [0.0, 0.0]]]
+    assert view_cost(relative_quality(quality, axis=2)).tolist() == [[[0.5, 0.0], [1.0, 1.0]]]
 
 
 def test_views_in_a_list_are_compared_alike() -> None:
     quality = np.round(np.random.default_rng(2).uniform(-0.5, 1, (4, 6, 3)), 1).clip(0)
     moment = np.arange(24).repeat(3)
     assert (
-        compared_views(quality.reshape(-1), moment, 24).tolist() == compared(quality, 2).reshape(-1).tolist()
+        relative_view_quality(quality.reshape(-1), moment, 24).tolist()
+        == relative_quality(quality, 2).reshape(-1).tolist()
     )
 
 
@@ -216,8 +230,12 @@ def test_weights_and_shapes_that_make_no_sense_are_refused() -> None:
         only()
     of = np.zeros(2, dtype=np.int64)
     with pytest.raises(ValueError, match="boxes have shape"):
-        view_quality(seen(np.zeros((1, 2))), looks(), QualitySettings())
-    with pytest.raises(ValueError, match="sure has shape"):
-        view_quality(Seen(np.zeros((2, 1, 4)), of, np.ones(1), np.ones(2)), looks(), QualitySettings())
+        compute_view_quality(seen(np.zeros((1, 2))), looks(), QualitySettings())
+    with pytest.raises(ValueError, match="confidence has shape"):
+        compute_view_quality(
+            TrackWindow(np.zeros((2, 1, 4)), of, np.ones(1), np.ones(2)), looks(), QualitySettings()
+        )
     with pytest.raises(ValueError, match=r"a camera outside 0 \.\. 0"):
-        view_quality(Seen(np.zeros((2, 1, 4)), of + 1, np.ones(2), np.ones(2)), looks(), QualitySettings())
+        compute_view_quality(
+            TrackWindow(np.zeros((2, 1, 4)), of + 1, np.ones(2), np.ones(2)), looks(), QualitySettings()
+        )

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import SeenViews, with_expected
+from bestview import VisibleViews, add_inferred_views
 
 SHAPE = FRAMES, CAMERAS, PEOPLE = 4, 2, 3
 View = tuple[int, int, int]
@@ -29,13 +29,13 @@ def test_every_view_is_there_once_and_with_the_larger_worth(seed: int) -> None:
     columns = [np.array(side) for side in line_up(found | missed)]
     shown = np.ones((FRAMES, CAMERAS), dtype=np.bool_)
     frames, cameras, people, worths = columns
-    views = SeenViews(frames, cameras, people, worths, shown, PEOPLE, found=len(found))
+    views = VisibleViews(frames, cameras, people, worths, shown, PEOPLE, detected_count=len(found))
     frame, camera, person, extra = (np.array(side) for side in line_up(expected))
-    views = with_expected(
+    views = add_inferred_views(
         views, frame.astype(int), camera.astype(int), person.astype(int), extra.astype(float)
     )
     at = zip(views.frame.tolist(), views.camera.tolist(), views.person.tolist(), strict=True)
-    both = dict(zip(at, views.worth.tolist(), strict=True))
+    both = dict(zip(at, views.quality.tolist(), strict=True))
     assert len(both) == len(views.frame), "each view once"
-    assert dict(list(both.items())[: views.found]) == found
+    assert dict(list(both.items())[: views.detected_count]) == found
     assert both == found | {it: max(missed.get(it, 0.0), expected.get(it, 0.0)) for it in missed | expected}

@@ -7,12 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from bestview import Gops, SeenViews, choose_by_gops, choose_views
+from bestview import GopCosts, VisibleViews, select_views, select_views_by_gop
 
 FRAMES, CAMERAS, PEOPLE = 7, 3, 4
 
 
-def drawn(seed: int) -> tuple[SeenViews, NDArray[np.float64]]:
+def drawn(seed: int) -> tuple[VisibleViews, NDArray[np.float64]]:
     """Draw views of some worth, and give each frame's worth (N, C, K); NaN where there is no view."""
     rng = np.random.default_rng(seed)
     worth = rng.choice([np.nan, 0.1, 0.3, 1.0, rng.random()], (FRAMES, CAMERAS, PEOPLE))
@@ -21,30 +21,34 @@ def drawn(seed: int) -> tuple[SeenViews, NDArray[np.float64]]:
     frame, camera, person = np.nonzero(~np.isnan(worth))
     line = np.lexsort((person, frame, camera))  # camera by camera, as windows are read
     frame, camera, person = frame[line], camera[line], person[line]
-    return SeenViews(frame, camera, person, worth[frame, camera, person], shown, PEOPLE), worth
+    return VisibleViews(frame, camera, person, worth[frame, camera, person], shown, PEOPLE), worth
 
 
 def slowly(
-    views: SeenViews, worth: NDArray[np.float64], first: int, starts: list[bool], weight: NDArray[np.float64]
-) -> Gops:
+    views: VisibleViews,
+    worth: NDArray[np.float64],
+    first: int,
+    starts: list[bool],
+    weight: NDArray[np.float64],
+) -> GopCosts:
     """Sum one cell after the other."""
     begins = [n for n, start in enumerate(starts) if start]
     ends = [*begins[1:], len(starts)]
     cost = np.zeros((len(begins), CAMERAS, PEOPLE))
     blind = np.zeros(cost.shape, dtype=np.bool_)
-    lasting = np.zeros(len(begins))
+    frame_weights = np.zeros(len(begins))
     for s, (begin, end) in enumerate(zip(begins, ends, strict=True)):
         for n in range(begin, end):
-            lasting[s] += weight[n]
+            frame_weights[s] += weight[n]
         for c, k in np.ndindex(CAMERAS, PEOPLE):
             seen = [n for n in range(begin, end) if not np.isnan(worth[first + n, c, k])]
             saved = 0.0
             for n in seen:
                 saved += worth[first + n, c, k] * weight[n]
-            missing = not views.shown[first + begin : first + end, c].all()
-            cost[s, c, k] = np.inf if missing else lasting[s] - saved
+            missing = not views.available[first + begin : first + end, c].all()
+            cost[s, c, k] = np.inf if missing else frame_weights[s] - saved
             blind[s, c, k] = missing or not seen
-    return Gops(list(cost), lasting, list(blind))
+    return GopCosts(list(cost), frame_weights, list(blind))
 
 
 @settings(deadline=None, max_examples=100)
@@ -54,24 +58,26 @@ def test_gops_cost_the_same_to_the_bit(seed: int, first: int, data: st.DataObjec
     frames = data.draw(st.integers(1, FRAMES - first))
     starts = [True, *data.draw(st.lists(st.booleans(), min_size=frames - 1, max_size=frames - 1))]
     weight = np.random.default_rng(seed).uniform(0.5, 5.0, frames)
-    found = views.gops(first, np.array(starts), weight, blind=True)
+    found = views.gops(first, np.array(starts), weight, mark_empty=True)
     expected = slowly(views, worth, first, starts, weight)
     assert np.array(found.cost).tolist() == np.array(expected.cost).tolist()
-    assert np.array(found.blind).tolist() == np.array(expected.blind).tolist()
+    assert np.array(found.shows_nobody).tolist() == np.array(expected.shows_nobody).tolist()
     assert found.frames.tolist() == expected.frames.tolist()
 
 
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 3))
-def test_what_is_chosen_by_gops_costs_what_is_chosen_by_frames(seed: int, least_shot: int) -> None:
+def test_what_is_chosen_by_gops_costs_what_is_chosen_by_frames(seed: int, minimum_shot_gops: int) -> None:
     views, worth = drawn(seed)
     rng = np.random.default_rng(seed)
     starts = np.arange(FRAMES) % 3 == 0
-    weight, held = rng.uniform(0.5, 5.0, FRAMES), rng.integers(1, 4, PEOPLE)
+    weight, shot_ages = rng.uniform(0.5, 5.0, FRAMES), rng.integers(1, 4, PEOPLE)
     previous = rng.integers(-1, CAMERAS, PEOPLE)
-    cost = np.where(views.shown[:, :, None], 1.0 - np.nan_to_num(worth), np.inf).transpose(2, 0, 1)
-    by_frames = choose_views(cost, previous, 0.7, starts, least_shot, held, weight)
-    _, costs = choose_by_gops(views.gops(0, starts, weight, blind=True), previous, 0.7, least_shot, held)
+    cost = np.where(views.available[:, :, None], 1.0 - np.nan_to_num(worth), np.inf).transpose(2, 0, 1)
+    by_frames = select_views(cost, previous, 0.7, starts, minimum_shot_gops, shot_ages, weight)
+    _, costs = select_views_by_gop(
+        views.gops(0, starts, weight, mark_empty=True), previous, 0.7, minimum_shot_gops, shot_ages
+    )
     np.testing.assert_allclose(costs, by_frames.costs, rtol=1e-12)
 
 
@@ -79,8 +85,8 @@ def test_some_of_the_people_cost_what_they_cost_among_all() -> None:
     views, _ = drawn(3)
     starts, weight = np.arange(FRAMES) % 2 == 0, np.ones(FRAMES)
     everybody, some = (
-        views.gops(0, starts, weight, blind=True),
-        views.gops(0, starts, weight, blind=True).of(np.array([1, 3])),
+        views.gops(0, starts, weight, mark_empty=True),
+        views.gops(0, starts, weight, mark_empty=True).for_people(np.array([1, 3])),
     )
     assert np.array(some.cost).tolist() == np.array(everybody.cost)[:, :, [1, 3]].tolist()
-    assert np.array(some.blind).tolist() == np.array(everybody.blind)[:, :, [1, 3]].tolist()
+    assert np.array(some.shows_nobody).tolist() == np.array(everybody.shows_nobody)[:, :, [1, 3]].tolist()

@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from bestview import NO_VIEW_COST, Choices, choose_views
+from bestview import NO_VIEW_COST, ViewSelection, select_views
 
 INF = np.inf
 
 
 def choose(cost: list[list[float]], previous: int, switch_cost: float, cuts: list[bool]) -> list[int]:
     """Choose for one object, from its (N, C) costs."""
-    choices = choose_views(np.array([cost], float), np.array([previous]), switch_cost, np.array(cuts))
+    choices = select_views(np.array([cost], float), np.array([previous]), switch_cost, np.array(cuts))
     return [int(view) for view in choices.views[0]]
 
 
@@ -30,20 +30,27 @@ def price(
 ) -> float:
     """Cost of one object's views over its (N, C) costs, written the slow and obvious way."""
     total, current = 0.0, previous
-    lasting = np.ones(len(cost)) if weight is None else weight
+    frame_weights = np.ones(len(cost)) if weight is None else weight
     for frame, view in enumerate(views):
         if view < 0:
-            total += NO_VIEW_COST * lasting[frame]
+            total += NO_VIEW_COST * frame_weights[frame]
             continue
-        total += cost[frame, view] * lasting[frame] + (switch_cost if current not in (-1, view) else 0.0)
+        total += cost[frame, view] * frame_weights[frame] + (
+            switch_cost if current not in (-1, view) else 0.0
+        )
         current = view
     return total
 
 
 def keeps(  # every shot is long enough, or was left where its camera showed nobody
-    cost: NDArray[np.float64], views: tuple[int, ...], starts: list[int], previous: int, least: int, held: int
+    cost: NDArray[np.float64],
+    views: tuple[int, ...],
+    starts: list[int],
+    previous: int,
+    least: int,
+    shot_ages: int,
 ) -> bool:
-    current, age = previous, held
+    current, age = previous, shot_ages
     for start, end in pairwise([*starts, len(cost)]):
         view = views[start]
         if view in (-1, current) or current == -1:
@@ -62,8 +69,8 @@ def exhaustive(
     previous: int,
     switch_cost: float,
     cuts: list[bool],
-    least_shot: int = 0,
-    held: int = 1,
+    minimum_shot_gops: int = 0,
+    shot_ages: int = 1,
     weight: NDArray[np.float64] | None = None,
 ) -> tuple[float, tuple[int, ...]]:
     """Try every sequence that the rules allow; ties: stay with the camera, else the lowest index."""
@@ -86,7 +93,9 @@ def exhaustive(
         return price(cost, views, previous, switch_cost, weight), order
 
     every = [tuple(head) + tuple(v for gop in parts for v in gop) for parts in product(*options)]
-    best = min((it for it in every if keeps(cost, it, bounds[:-1], previous, least_shot, held)), key=rank)
+    best = min(
+        (it for it in every if keeps(cost, it, bounds[:-1], previous, minimum_shot_gops, shot_ages)), key=rank
+    )
     return rank(best)[0], best
 
 
@@ -117,7 +126,7 @@ def test_no_sequence_of_cameras_is_better(
     window: tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]],
 ) -> None:
     cost, previous, switch_cost, cuts = window
-    choices = choose_views(cost, previous, switch_cost, np.array(cuts))
+    choices = select_views(cost, previous, switch_cost, np.array(cuts))
     for k in range(len(cost)):
         best_cost, best = exhaustive(cost[k], int(previous[k]), switch_cost, cuts)
         assert tuple(choices.views[k]) == best
@@ -128,48 +137,52 @@ def test_no_sequence_of_cameras_is_better(
 @given(windows(most_frames=6), st.integers(0, 4), st.integers(1, 4), st.data())
 def test_no_sequence_that_keeps_the_least_shot_is_better(
     window: tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]],
-    least_shot: int,
+    minimum_shot_gops: int,
     age: int,
     data: st.DataObject,
 ) -> None:
     cost, previous, switch_cost, cuts = window
-    lasting = st.lists(st.sampled_from([1.0, 1.0, 2.0, 3.5]), min_size=len(cuts), max_size=len(cuts))
-    held, weight = np.full(len(cost), age), np.array(data.draw(lasting))
-    choices = choose_views(cost, previous, switch_cost, np.array(cuts), least_shot, held, weight)
+    frame_weights = st.lists(st.sampled_from([1.0, 1.0, 2.0, 3.5]), min_size=len(cuts), max_size=len(cuts))
+    shot_ages, weight = np.full(len(cost), age), np.array(data.draw(frame_weights))
+    choices = select_views(cost, previous, switch_cost, np.array(cuts), minimum_shot_gops, shot_ages, weight)
     for k in range(len(cost)):
-        best = exhaustive(cost[k], int(previous[k]), switch_cost, cuts, least_shot, age, weight)
+        best = exhaustive(cost[k], int(previous[k]), switch_cost, cuts, minimum_shot_gops, age, weight)
         assert (choices.costs[k], tuple(choices.views[k])) == best
 
 
 def test_without_a_word_about_its_age_a_camera_may_be_left() -> None:
     cost, cuts = np.array([[[0.5, 0.0]] * 2]), np.ones(2, bool)
-    assert choose_views(cost, np.array([0]), 0.25, cuts, least_shot=3).views.tolist() == [[1, 1]]
-    young = choose_views(cost, np.array([0]), 0.25, cuts, least_shot=3, held=np.array([2]))
+    assert select_views(cost, np.array([0]), 0.25, cuts, minimum_shot_gops=3).views.tolist() == [[1, 1]]
+    young = select_views(cost, np.array([0]), 0.25, cuts, minimum_shot_gops=3, shot_ages=np.array([2]))
     assert young.views.tolist() == [[0, 1]], "shown for one GOP more, then left"
 
 
 def test_a_shot_may_be_short_where_its_camera_shows_nobody_any_more() -> None:
     cost, cuts = np.array([[[1.0, 0.25]] * 3]), np.ones(3, bool)
-    assert choose_views(cost, np.array([0]), 0.25, cuts, 9, np.array([1])).views.tolist() == [[1, 1, 1]]
+    assert select_views(cost, np.array([0]), 0.25, cuts, 9, np.array([1])).views.tolist() == [[1, 1, 1]]
 
 
 def test_what_is_seen_last_may_be_taken_to_go_on() -> None:
     cost, cuts = np.array([[[0.5, 0.5], [0.5, 0.25]]]), np.ones(2, bool)
-    assert choose_views(cost, np.array([0]), 1.0, cuts).views.tolist() == [[0, 0]]
-    lasting = choose_views(cost, np.array([0]), 1.0, cuts, weight=np.array([1.0, 8.0]))
-    assert lasting.views.tolist() == [[0, 1]]
-    assert lasting.costs.tolist() == [0.5 + 1.0 + 8 * 0.25]
+    assert select_views(cost, np.array([0]), 1.0, cuts).views.tolist() == [[0, 0]]
+    frame_weights = select_views(cost, np.array([0]), 1.0, cuts, weight=np.array([1.0, 8.0]))
+    assert frame_weights.views.tolist() == [[0, 1]]
+    assert frame_weights.costs.tolist() == [0.5 + 1.0 + 8 * 0.25]
 
 
 @settings(deadline=None, max_examples=100)
 @given(windows(), st.integers(0, 3), st.integers(1, 3))
 def test_the_first_gops_are_the_same_where_only_they_are_asked_for(
-    window: tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]], least_shot: int, asked: int
+    window: tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]],
+    minimum_shot_gops: int,
+    decided_gops: int,
 ) -> None:
     cost, previous, switch_cost, cuts = window
-    whole = choose_views(cost, previous, switch_cost, np.array(cuts), least_shot)
-    part = choose_views(cost, previous, switch_cost, np.array(cuts), least_shot, asked=asked)
-    after = [frame for frame, cut in enumerate(cuts) if cut][asked:]
+    whole = select_views(cost, previous, switch_cost, np.array(cuts), minimum_shot_gops)
+    part = select_views(
+        cost, previous, switch_cost, np.array(cuts), minimum_shot_gops, decided_gops=decided_gops
+    )
+    after = [frame for frame, cut in enumerate(cuts) if cut][decided_gops:]
     assert part.views.shape[1] == (after[0] if after else len(cuts))
     assert np.array_equal(part.views, whole.views[:, : part.views.shape[1]])
     assert np.array_equal(part.costs, whole.costs)
@@ -181,17 +194,17 @@ def test_objects_do_not_influence_each_other(
     window: tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]],
 ) -> None:
     cost, previous, switch_cost, cuts = window
-    together = choose_views(cost, previous, switch_cost, np.array(cuts))
+    together = select_views(cost, previous, switch_cost, np.array(cuts))
     for k in range(len(cost)):
-        alone = choose_views(cost[k : k + 1], previous[k : k + 1], switch_cost, np.array(cuts))
+        alone = select_views(cost[k : k + 1], previous[k : k + 1], switch_cost, np.array(cuts))
         assert np.array_equal(alone.views[0], together.views[k])
 
 
 def test_a_short_better_view_is_not_worth_a_cut_and_a_long_one_is() -> None:
     glimpse = [[0.5, 0.5], [0.5, 0.1], [0.5, 0.5], [0.5, 0.5]]
-    lasting = [[0.5, 0.5], [0.5, 0.1], [0.5, 0.1], [0.5, 0.1]]
+    frame_weights = [[0.5, 0.5], [0.5, 0.1], [0.5, 0.1], [0.5, 0.1]]
     assert choose(glimpse, 0, 1.0, [True] * 4) == [0, 0, 0, 0]
-    assert choose(lasting, 0, 1.0, [True] * 4) == [0, 1, 1, 1]
+    assert choose(frame_weights, 0, 1.0, [True] * 4) == [0, 1, 1, 1]
 
 
 def test_without_a_switching_cost_every_frame_takes_its_best_view() -> None:
@@ -228,8 +241,8 @@ def test_a_stream_cannot_begin_in_the_middle_of_a_gop() -> None:
 
 
 def test_nothing_to_choose_from_gives_no_view() -> None:
-    nobody = choose_views(np.zeros((0, 3, 2)), np.zeros(0, int), 1.0, np.ones(3, bool))
-    blind = choose_views(np.zeros((2, 3, 0)), np.full(2, -1), 1.0, np.ones(3, bool))
+    nobody = select_views(np.zeros((0, 3, 2)), np.zeros(0, int), 1.0, np.ones(3, bool))
+    blind = select_views(np.zeros((2, 3, 0)), np.full(2, -1), 1.0, np.ones(3, bool))
     assert nobody.views.shape == (0, 3)
     assert (blind.views == -1).all()
     assert blind.costs.tolist() == [3.0, 3.0]
@@ -238,7 +251,7 @@ def test_nothing_to_choose_from_gives_no_view() -> None:
 def test_the_caller_keeps_its_arrays() -> None:
     cost, previous = np.array([[[0.5, 0.1]] * 3]), np.array([0])
     before = cost.copy()
-    choose_views(cost, previous, 0.1, np.ones(3, bool))
+    select_views(cost, previous, 0.1, np.ones(3, bool))
     assert np.array_equal(cost, before)
     assert previous.tolist() == [0]
 
@@ -248,7 +261,7 @@ def test_what_makes_no_sense_is_refused() -> None:
 
     def refused(match: str, *arguments: object) -> None:
         with pytest.raises(ValueError, match=match):
-            choose_views(*arguments)  # type: ignore[arg-type]
+            select_views(*arguments)  # type: ignore[arg-type]
 
     refused("not a number", np.full((1, 2, 2), np.nan), np.array([0]), 1.0, cuts)
     refused("outside", cost, np.array([2]), 1.0, cuts)
@@ -256,13 +269,13 @@ def test_what_makes_no_sense_is_refused() -> None:
     refused("cut_allowed", cost, np.array([0]), 1.0, np.ones(3, bool))
     refused("previous", cost, np.array([0, 1]), 1.0, cuts)
     refused("cost has shape", np.zeros((2, 2)), np.array([0]), 1.0, cuts)
-    refused("held", cost, np.array([0]), 1.0, cuts, 2, np.array([1, 1]))
+    refused("shot_ages", cost, np.array([0]), 1.0, cuts, 2, np.array([1, 1]))
     refused("weight", cost, np.array([0]), 1.0, cuts, 0, None, np.array([1.0, 0.0]))
 
 
 def test_a_thousand_objects_are_chosen_for_at_once() -> None:
     rng = np.random.default_rng(7)
     cost = rng.random((1000, 25, 16))
-    choices = choose_views(cost, rng.integers(-1, 16, 1000), 2.0, np.arange(25) % 5 == 2)
-    assert isinstance(choices, Choices)
+    choices = select_views(cost, rng.integers(-1, 16, 1000), 2.0, np.arange(25) % 5 == 2)
+    assert isinstance(choices, ViewSelection)
     assert choices.views.shape == (1000, 25)

@@ -40,7 +40,7 @@ async def test_where_somebody_is_not_found_that_is_a_column_of_its_own(browser: 
         await visit.playing(2)
         await visit.page.keyboard.press("w")
         why = visit.page.locator("#why")
-        await expect(why.locator("thead")).to_have_text("cameracostseesunfoundsizewhole")
+        await expect(why.locator("thead")).to_have_text("cameracostseesunfoundsizetruncation")
         await expect(why.locator("tr[aria-current]")).to_have_text("c20.001.000.251.001.00")
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bestview import to_ground
-from bestview.calibration import Floats, Track, Walk
-from bestview.calibration.pinhole import ASPECT, EAST, FOCAL, HIGH, NORTH, PAN, ROLL, TILT, Pinhole
+from bestview.calibration import Floats, Walk, WalkTrack
+from bestview.calibration.pinhole import ASPECT, CAMERA_HEIGHT, EAST, FOCAL, NORTH, PAN, ROLL, TILT, Pinhole
 
 SIZE = (640, 360)
 STEP = 0.032  # person heights a frame: 1.4 m/s at 25 frames a second
@@ -31,7 +31,7 @@ def camera_at(
     away = np.array(towards) - (east, north)
     parameters[FOCAL] = np.log(focal)
     parameters[ASPECT] = parameters[ROLL] = 0.0
-    parameters[HIGH] = np.log(1.7)
+    parameters[CAMERA_HEIGHT] = np.log(1.7)
     parameters[TILT] = np.arctan2(1.1, np.hypot(*away))
     parameters[PAN] = np.arctan2(away[1], away[0])
     parameters[[EAST, NORTH]] = east, north
@@ -75,7 +75,7 @@ def seen(
             (boxes[:, 0] > 2) & (boxes[:, 1] > 2) & (boxes[:, 2] < SIZE[0] - 2) & (boxes[:, 3] < SIZE[1] - 2)
         )
         parts = np.split(np.arange(len(path)), np.flatnonzero(np.diff(whole.astype(int))) + 1)
-        tracks += [Track(int(it[0]) - offset, boxes[it]) for it in parts if whole[it[0]] and len(it) > 10]
+        tracks += [WalkTrack(int(it[0]) - offset, boxes[it]) for it in parts if whole[it[0]] and len(it) > 10]
     return Walk(name, SIZE, tuple(tracks))
 
 

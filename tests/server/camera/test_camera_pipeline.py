@@ -205,7 +205,7 @@ def test_a_recording_that_ends_before_the_first_pulse_is_refused_offline(recordi
 def test_sharpness_is_measured_where_it_counts_alone(recording: Path) -> None:
     config = config_of(recording)
     weighs = config.model_copy(
-        update={"view": config.view.model_copy(update={"quality": QualitySettings(sharp=0.5)})}
+        update={"view": config.view.model_copy(update={"quality": QualitySettings(sharpness=0.5)})}
     )
     for given, measured in ((config, False), (weighs, True)):
         tracks = [track for word in live(given)[1] for track in word.tracks]

@@ -140,14 +140,14 @@ def test_lookahead_shorter_than_the_trackers_lag_is_refused_with_the_least_that_
 
 
 def test_who_is_settled_must_have_been_told_first() -> None:
-    identity = {"told_after": 7, "regroup": 4, "settled_after": 14}
-    assert "view.identity.settled_after: is 14 frames but must be at least 15" in complaint(
+    identity = {"publish_after": 7, "clustering_interval": 4, "settle_after": 14}
+    assert "view.identity.settle_after: is 14 frames but must be at least 15" in complaint(
         site(view={"identity": identity})
     )
     config = build_config(
-        site(view={"identity": identity | {"settled_after": 15}}), where="site.yaml", folder=Path()
+        site(view={"identity": identity | {"settle_after": 15}}), where="site.yaml", folder=Path()
     )
-    assert config.view.identity.settled_after == 15
+    assert config.view.identity.settle_after == 15
 
 
 @pytest.mark.parametrize(

@@ -39,10 +39,10 @@ LIVE, CAMERA, ALL_CAMERAS, BEST_VIEW, SITE = "live", "camera c1", "all cameras",
 
 CHANGES: dict[str, tuple[str, Any]] = {
     "view.switch_cost_s": (LIVE, 2.0),
-    "view.quality.central": (LIVE, 0.5),
+    "view.quality.centering": (LIVE, 0.5),
     "view.lookahead": (LIVE, 20),
     "view.buffer_s": (BEST_VIEW, 20.0),
-    "view.identity.join": (BEST_VIEW, 1.0),
+    "view.identity.merge_threshold": (BEST_VIEW, 1.0),
     "http.port": (BEST_VIEW, 8123),
     "record.keep_s": (BEST_VIEW, 5.0),
     "cameras.c1.source": (CAMERA, "rtsp://elsewhere/1"),
@@ -64,7 +64,10 @@ CHANGES: dict[str, tuple[str, Any]] = {
 def changed(keys: set[str]) -> Config:
     content: dict[str, Any] = {}
     cameras: dict[str, dict[str, Any]] = {it: {"id": it, "source": "scene:room"} for it in CAMERAS}
-    small = {"view": {"identity": {"confirm": 1, "regroup": 1}}, "track": {"window": WINDOW}}
+    small = {
+        "view": {"identity": {"confirmation_frames": 1, "clustering_interval": 1}},
+        "track": {"window": WINDOW},
+    }
     for key in keys:
         first, *way, name = key.split(".")
         inner = cameras[way.pop(0)] if first == "cameras" else content.setdefault(first, {})
@@ -121,8 +124,8 @@ def test_other_cameras_wait_and_those_that_run_stay_as_they_are() -> None:
 
 
 def test_cameras_begin_anew_where_sharpness_begins_to_count() -> None:
-    reload = plan_reload(small_config(), small_config(view={"quality": {"sharp": 0.5}}))
-    assert (reload.live, reload.cameras) == (("view.quality.sharp",), CAMERAS)
+    reload = plan_reload(small_config(), small_config(view={"quality": {"sharpness": 0.5}}))
+    assert (reload.live, reload.cameras) == (("view.quality.sharpness",), CAMERAS)
 
 
 def write(path: Path, **changes: Any) -> None:

@@ -63,7 +63,7 @@ def config_of(
         "cameras": cameras,
         "detect": {} if ahead else {"ahead_frames": 0},
         "ground": "ground.json",
-        "track": {"backlog_s": PATIENCE, "witness": {"use": use}, "witness_wait_s": wait},
+        "track": {"backlog_s": PATIENCE, "cross_view": {"enabled": use}, "cross_view_wait_s": wait},
         "view": {"late_after_s": PATIENCE},
     }
     return build_config(content, where="hall", folder=recording)

@@ -374,7 +374,7 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         await page.get_by_label("Central").fill("0.5")
         await page.keyboard.press("Enter")
         await expect(page.locator("#choosing-state")).to_have_text("2 tried out, not as the file says.")
-        assert (decider.view.switch_cost_s, decider.view.quality.central) == (2.0, 0.5)
+        assert (decider.view.switch_cost_s, decider.view.quality.centering) == (2.0, 0.5)
         assert "switch_cost_s: 2.0" in await lines.input_value()
         ahead = page.get_by_label("Look-ahead, frames")
         await ahead.fill(str(hall.service.most_lookahead + 1))

@@ -43,7 +43,7 @@ def decided(config: Config, tuned: ViewSettings | None = None, after: int = 0) -
     return decisions
 
 
-TRIED = small_config(view={"switch_cost_s": 3.0, "quality": {"central": 0.7, "size": 0.0}}).view
+TRIED = small_config(view={"switch_cost_s": 3.0, "quality": {"centering": 0.7, "size": 0.0}}).view
 
 
 def test_tuned_from_the_beginning_is_configured_so() -> None:
@@ -140,8 +140,8 @@ async def open_hall() -> AsyncIterator[Hall]:
 async def test_the_configuration_says_what_differs_and_no_secret(open_hall: Hall) -> None:
     settings = {it["key"]: it for it in (await open_hall.get_json("/api/operator/config"))["settings"]}
     assert settings["encode.gop"] == {"key": "encode.gop", "value": "5", "default": "10", "differs": True}
-    assert settings["view.quality.whole"]["differs"] is False
-    assert settings["view.quality.whole"]["value"] == str(QualitySettings().whole)
+    assert settings["view.quality.truncation"]["differs"] is False
+    assert settings["view.quality.truncation"]["value"] == str(QualitySettings().truncation)
     source, options = settings[f"cameras.{A}.source"], settings[f"cameras.{A}.options"]
     assert source["value"] == "rtsp://10.0.0.1/..."
     assert (source["default"], source["differs"]) == (None, False)

@@ -44,7 +44,7 @@ def test_whoever_is_said_to_be_one_stays_one(steps: list[tuple[bool, int, int]])
 
 
 def dictated(*updates: IdentityUpdate) -> People:
-    it = people(gone_after=10)
+    it = people(departed_after=10)
     it._registry = Dictated(*updates)  # type: ignore[assignment]
     return it
 

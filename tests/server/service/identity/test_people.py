@@ -179,7 +179,7 @@ def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None
 
 def test_of_merged_numbers_the_newest_are_remembered() -> None:
     """Whoever stays all day has many short tracks merged into them."""
-    it = people(remember=5)
+    it = people(maximum_departed_people=5)
     for lost in range(2, 40):
         it.merge(1, lost)
     assert it.roll.merged == dict.fromkeys(range(35, 40), 1)
@@ -225,7 +225,7 @@ def test_two_tracks_of_one_person_in_one_picture_give_one_box() -> None:
 
 
 def test_people_who_were_gone_for_long_are_forgotten_with_all_that_is_known_of_them() -> None:
-    it = people(gone_after=STRIDE, forget_after=3 * STRIDE)
+    it = people(departed_after=STRIDE, forget_after=3 * STRIDE)
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
     [number] = it.known
     for epoch in range(1, 4):

@@ -110,7 +110,7 @@ def test_it_holds_every_view_once_and_compares_it_with_the_best(
             views.camera,
             views.person,
             outlook.quality.tolist(),
-            views.worth.tolist(),
+            views.quality.tolist(),
             strict=True,
         )
     }
