@@ -18,7 +18,6 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from server.system.atomic_write import atomic_folder
 from synthetic.ground_truth import CameraTruth
 from synthetic.scene import Scene
 
@@ -31,22 +30,25 @@ Progress = Callable[[int, int], None]
 
 
 def write_recording(scene: Scene, out: Path, seconds: float, progress: Progress | None = None) -> None:
-    """Write the first `seconds` of a scene into the folder `out`, all of it or nothing.
+    """Write the first `seconds` of a scene into the folder `out`, which is new or empty.
 
-    `progress` is told the frames done and the frames to do, after each frame.
+    `progress` is called after each frame with the numbers of frames written and of all frames. After an error
+    the folder holds a part of the recording.
 
     Raises:
-        ValueError: where `seconds` holds no frame, or where a side of the picture is odd.
-        UserError: where `out` is a file or a folder that is not empty, or cannot be made.
-        OSError: where the disk refuses.
+        ValueError: `seconds` holds no frame, or the width or height is odd. Nothing is written.
+        FileExistsError: `out` is a file, or a folder that is not empty.
+        OSError: the folder or a file cannot be written.
     """
     frames = round(seconds * scene.fps)
     if frames < 1:
         raise ValueError(f"a recording needs at least one frame; {seconds} s at {scene.fps:g} fps has none")
     if scene.width % 2 or scene.height % 2:
         raise ValueError(f"a video's width and height must be even, not {scene.width} x {scene.height}")
-    with atomic_folder(out) as draft:
-        _write(scene, draft, frames, progress)
+    out.mkdir(parents=True, exist_ok=True)
+    if any(out.iterdir()):
+        raise FileExistsError(f"{out}: is not an empty folder")
+    _write(scene, out, frames, progress)
 
 
 def _write(scene: Scene, folder: Path, frames: int, progress: Progress | None) -> None:

@@ -167,14 +167,15 @@ def scene(
     """
     from server.cli.progress import bar
     from server.cli.render.video_info import parse_size
+    from server.system.atomic_write import atomic_folder
     from synthetic import Scene, has_ground, write_recording
 
     try:
         drawn = Scene(name, cameras, objects, seed, *parse_size(size), fps)
-        with bar("frames") as progress:
+        with atomic_folder(out) as draft, bar("frames") as progress:
             task = progress.add_task("drawing", total=None)
             write_recording(
-                drawn, out, seconds, lambda done, total: progress.update(task, completed=done, total=total)
+                drawn, draft, seconds, lambda done, total: progress.update(task, completed=done, total=total)
             )
     except (ValueError, OSError) as error:
         raise UserError(str(error)) from error

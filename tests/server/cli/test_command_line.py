@@ -13,15 +13,17 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
+from numpy.typing import NDArray
 
 from fakes.command_line import Run, refusal
 from fakes.media.videos import write_video
 from fakes.system.ports import free
 from fakes.timeouts import PATIENCE
 from server.system.errors import UnavailableError
-from synthetic import scene_names
+from synthetic import Scene, scene_names
 
 
 @pytest.fixture
@@ -223,7 +225,30 @@ def test_scene_writes_a_recording_or_refuses(run: Run, tmp_path: Path) -> None:
     assert "must be even" in refusal(run("scene", "room", "--out", "new", "--size", "129x72"))
     assert "cameras must be" in refusal(run("scene", "room", "--out", "new", "--cameras", 100))
     assert "cannot write there" in refusal(run("scene", "room", "--out", "room/c0.mp4/x", *small))
+    assert "not an empty folder" in refusal(run("scene", "room", "--out", "room/c0.mp4", *small))
+    assert "at least one frame" in refusal(
+        run("scene", "room", "--out", "new", "--fps", 1, *small, "--seconds", 0.4)
+    )
     assert written(tmp_path) == {"room"}
+
+
+def test_a_scene_that_is_interrupted_leaves_nothing_half_written(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[int] = []
+    image = Scene.image
+
+    def interrupted(scene: Scene, camera: int, frame: int) -> NDArray[np.uint8]:
+        drawn.append(frame)
+        if frame == 3:
+            raise KeyboardInterrupt
+        return image(scene, camera, frame)
+
+    monkeypatch.setattr(Scene, "image", interrupted)
+    ended = run("scene", "room", "--out", "room", "--cameras", 1, "--objects", 1, "--size", "128x72")
+    assert ended.code == 130
+    assert drawn == [0, 1, 2, 3]
+    assert written(tmp_path) == set()
 
 
 def test_track_writes_a_file_or_refuses(run: Run, tmp_path: Path) -> None:
