@@ -1,1 +1,0 @@
-"""Containers and codecs, as far as streams are written by hand."""
