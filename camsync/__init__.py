@@ -1,23 +1,23 @@
 """Frame pulses over TCP: every camera takes frame n when pulse n comes."""
 
 from camsync.client import PulseClient
+from camsync.client_connection import ClientInfo
 from camsync.clock import steady_unix_clock
 from camsync.limits import ServerLimits
-from camsync.log_throttle import Ended, Spell
-from camsync.messages import Listener
-from camsync.peer import ClientInfo
-from camsync.proof import Login
+from camsync.login import Credentials
+from camsync.messages import ListedClient
 from camsync.protocol import VERSION
 from camsync.pulse import (
     AxisLostError,
     ClientSettings,
+    LoginError,
     Pulse,
     ReplacedError,
     SyncError,
     SyncStatus,
     VersionError,
 )
-from camsync.query import clients_of
+from camsync.query import query_clients
 from camsync.server import PulseServer
 
 __all__ = [
@@ -25,18 +25,17 @@ __all__ = [
     "AxisLostError",
     "ClientInfo",
     "ClientSettings",
-    "Ended",
-    "Listener",
-    "Login",
+    "Credentials",
+    "ListedClient",
+    "LoginError",
     "Pulse",
     "PulseClient",
     "PulseServer",
     "ReplacedError",
     "ServerLimits",
-    "Spell",
     "SyncError",
     "SyncStatus",
     "VersionError",
-    "clients_of",
+    "query_clients",
     "steady_unix_clock",
 ]

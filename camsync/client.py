@@ -4,27 +4,38 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import ssl
 from collections import deque
 from types import TracebackType
 from typing import Self
 
 from camsync.clock import Clock, steady_unix_clock
 from camsync.clock_offset import ClockOffset
-from camsync.follower import Follower
-from camsync.link import Link
-from camsync.log_throttle import Spell
-from camsync.messages import Beat, Challenge, Greeting, Hello, Pong, Refusal, ServerLine, Wait
-from camsync.proof import Login
+from camsync.login import Credentials
+from camsync.messages import (
+    ErrorMessage,
+    Greeting,
+    Hello,
+    LoginRequest,
+    Pong,
+    PulseMessage,
+    ServerLine,
+    WaitMessage,
+)
 from camsync.protocol import VERSION, is_name
 from camsync.pulse import (
     AxisLostError,
     ClientSettings,
+    LoginError,
     Pulse,
     ReplacedError,
     SyncError,
     SyncStatus,
     VersionError,
 )
+from camsync.pulse_counter import PulseCounter
+from camsync.server_connection import ServerConnection
+from logthrottle import LogThrottle
 
 _log = logging.getLogger(__name__)
 _STALLED = 0.02  # seconds that a timer may be late in a process that runs
@@ -44,14 +55,15 @@ class PulseClient:
     silent, the client counts on at the server's rate by its own clock (``Pulse.own``), reconnects by itself,
     and falls back into step. A consumer that is slow loses the oldest pulses and is told how many.
 
-    With a ``login``, whose user is ``name``, it believes a closed server that knows it, and nobody else.
+    With ``credentials``, whose user is ``name``, it logs in to a server that asks for it; with ``tls`` the
+    server has to prove itself by its certificate.
 
     ``name`` is 1 to 64 letters, digits, ``.``, ``_``, ``-``; ``fps_hint`` is the rate (pulses per second)
     for counting alone before any server was heard. Not thread-safe: one event loop, one consumer.
 
     Raises:
-        ValueError: a name that the protocol cannot carry, or another's login, or a rate not above zero.
-        ReplacedError, VersionError, AxisLostError: while iterating; starting anew is the only remedy.
+        ValueError: a name that the protocol cannot carry or that is not the user's, or a rate not above zero.
+        ReplacedError, VersionError, LoginError, AxisLostError: while iterating; only a new client can go on.
     """
 
     def __init__(
@@ -63,24 +75,26 @@ class PulseClient:
         fps_hint: float = 25.0,
         settings: ClientSettings | None = None,
         clock: Clock | None = None,
-        login: Login | None = None,
+        credentials: Credentials | None = None,
+        tls: ssl.SSLContext | None = None,
     ) -> None:
-        if not is_name(name) or (login is not None and login.user != name):
+        if not is_name(name) or (credentials is not None and credentials.user != name):
             raise ValueError(f"{name!r} cannot be a client's name: letters, digits, '.', '_', '-'")
         if not fps_hint > 0.0:
             raise ValueError(f"fps_hint must be above zero, not {fps_hint}")
         self._host = host
         self._port = port
         self._name = name
-        self._login = login
+        self._credentials = credentials
+        self._tls = tls
         self._fps = fps_hint
         self._settings = settings or ClientSettings()
         self._clock = clock or steady_unix_clock()
-        self._follower = Follower(fps_hint, self._settings.catch_up)
+        self._follower = PulseCounter(fps_hint, self._settings.catch_up)
         self._offset = ClockOffset()
         self._queue: deque[Pulse] = deque(maxlen=max(1, self._settings.queue))
         self._wake = asyncio.Event()
-        self._link: Link | None = None
+        self._link: ServerConnection | None = None
         self._task: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._failure: SyncError | None = None
@@ -89,7 +103,7 @@ class PulseClient:
         self._started_at = self._connected_at = self._clock()
         self._missed = self._own = self._connections = 0
         self._waiting_for: tuple[str, ...] = ()
-        self._away, self._refused = Spell(self._clock, calm=0.0), Spell(self._clock)
+        self._away, self._refused = LogThrottle(self._clock, quiet_s=0.0), LogThrottle(self._clock)
 
     @property
     def missed(self) -> int:
@@ -171,7 +185,7 @@ class PulseClient:
             greeted, why = await self._connection()
             if greeted:
                 backoff = self._settings.backoff_first
-            if self._failure is None and (more := self._away.happened(why)) is not None:
+            if self._failure is None and (more := self._away.record(why)) is not None:
                 _log.warning("pulse server %s:%d is away: %s%s", self._host, self._port, why, more)
             self._schedule()
             await asyncio.sleep(backoff)
@@ -181,11 +195,13 @@ class PulseClient:
         """Connect once and stay; give whether it was a pulse server, and why it ended."""
         settings = self._settings
         pings = settings.ping_interval
-        link = Link(self._heard, self._hello, self._clock, pings, settings.silence, self._login)
+        link = ServerConnection(
+            self._receive, self._hello, self._clock, pings, settings.silence, self._credentials
+        )
         loop = asyncio.get_running_loop()
         try:
             async with asyncio.timeout(settings.connect_timeout):
-                await loop.create_connection(lambda: link, self._host, self._port)
+                await loop.create_connection(lambda: link, self._host, self._port, ssl=self._tls)
             self._link = link
             why = await link.lost
         except (OSError, TimeoutError) as error:
@@ -198,20 +214,20 @@ class PulseClient:
     def _hello(self) -> Hello:
         return Hello(self._name, self._follower.known(self._clock()))
 
-    def _heard(self, message: ServerLine, now: float) -> None:
+    def _receive(self, message: ServerLine, now: float) -> None:
         match message:
-            case Beat(number, due):
+            case PulseMessage(number, due):
                 self._beat(number, due - (self._offset.offset or 0.0), now)
             case Pong(sent, server):
                 self._offset.ponged(sent, server, now)
             case Greeting():
                 self._greeted(message, now)
-            case Challenge():
-                self._fail(VersionError("the pulse server asks for a password, and this client has none"))
-            case Wait(names):
+            case LoginRequest():
+                self._fail(LoginError("the pulse server needs a login, and this client has none"))
+            case WaitMessage(names):
                 self._waiting_for = names
-            case Refusal(code, text):
-                if (more := self._refused.happened(text)) is not None:
+            case ErrorMessage(code, text):
+                if (more := self._refused.record(text)) is not None:
                     _log.warning("pulse server: %s%s", text, more)
                 if code == "replaced":
                     self._fail(ReplacedError(f"{self._name} has given way: {text}"))
@@ -229,7 +245,7 @@ class PulseClient:
         self._offset.greeted(greeting.now, now)
         self._fps = greeting.fps
         self._follower.set_rate(greeting.fps)
-        if (ended := self._away.over()) or self._connections == 1:
+        if (ended := self._away.end()) or self._connections == 1:
             rate = f"{greeting.fps:g} pulses per second" + (f", after {ended.seconds:.0f} s" if ended else "")
             _log.info("pulse server %s:%d: %s", self._host, self._port, rate)
 

@@ -1,16 +1,16 @@
-"""What the pulse server and its clients say to each other; ``protocol`` writes and reads it as lines.
+"""Messages between the pulse server and its clients; ``protocol`` encodes and parses them as lines.
 
 All times are unix seconds.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
-    """The axis a client has counted on: pulse ``number`` was due ``ago`` seconds before the line was sent."""
+class CountedPulse:
+    """The last pulse that a client has counted: ``number``, due ``ago`` seconds before the line was sent."""
 
     number: int
     ago: float
@@ -18,10 +18,10 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """A client gives its name and is ready; ``known`` if it has counted pulses before."""
+    """A client is ready for pulses under a name; ``known`` if it has counted pulses before."""
 
     name: str
-    known: Known | None = None
+    known: CountedPulse | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,29 +32,28 @@ class Ping:
 
 
 @dataclass(frozen=True, slots=True)
-class Who:
-    """A client asks who else is there."""
+class ClientsRequest:
+    """A client asks for the list of clients."""
 
 
 @dataclass(frozen=True, slots=True)
-class Prove:
-    """A client of a closed server says who it is, its line sealed: the proof. ``nonce`` is its own."""
+class LoginMessage:
+    """A client logs in."""
 
     user: str
-    nonce: str
+    password: str = field(repr=False)
 
 
 @dataclass(frozen=True, slots=True)
-class Challenge:
-    """A closed server's first line: who comes has to prove who they are; ``now`` is the server clock."""
+class LoginRequest:
+    """The first line of a server that needs a login; ``now`` is the server clock."""
 
-    nonce: str
     now: float
 
 
 @dataclass(frozen=True, slots=True)
 class Greeting:
-    """An open server's first line, or a closed one's to who has proven themselves.
+    """The server's first line to a client that needs no login, or has logged in.
 
     ``pulse`` is the last pulse sent, None before the first.
     """
@@ -66,14 +65,14 @@ class Greeting:
 
 
 @dataclass(frozen=True, slots=True)
-class Wait:
+class WaitMessage:
     """The server has not begun: it waits for ``names``."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Beat:
+class PulseMessage:
     """Pulse ``number``, due at ``due`` on the server clock."""
 
     number: int
@@ -89,27 +88,27 @@ class Pong:
 
 
 @dataclass(frozen=True, slots=True)
-class Listener:
-    """A client of the server: ``name`` is None where it only listens; ``behind`` pulses it has just lost."""
+class ListedClient:
+    """A client of the server: ``name`` is None before HELLO; ``behind`` is how many pulses it just lost."""
 
     name: str | None
     behind: int
 
 
 @dataclass(frozen=True, slots=True)
-class Clients:
-    """The answer to Who: everybody but who asks, in the order of joining."""
+class ClientList:
+    """The answer to ClientsRequest: all other clients, in the order of joining."""
 
-    clients: tuple[Listener, ...]
+    clients: tuple[ListedClient, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class ErrorMessage:
     """The server's ERROR line: ``code`` for programs, ``text`` for people."""
 
     code: str
     text: str
 
 
-ClientLine = Hello | Ping | Who | Prove
-ServerLine = Challenge | Greeting | Wait | Beat | Pong | Clients | Refusal
+ClientLine = Hello | Ping | ClientsRequest | LoginMessage
+ServerLine = LoginRequest | Greeting | WaitMessage | PulseMessage | Pong | ClientList | ErrorMessage

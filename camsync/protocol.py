@@ -14,12 +14,10 @@ A client may say, and the server answers::
     WHO                    CLIENTS c0:0,-:7       who else is there, and how many pulses behind
     anything else          ERROR malformed ...                           a code, then a sentence
 
-A closed server tells nothing to who has not proven to know a password. Its first line is of another version,
-so that older clients say so and end; from PROVE on every line is sealed (``seal``) and else as above::
+A server that has users asks for a login first, over TLS (``login``), and greets who has logged in::
 
-    MYVIEW-SYNC 2 nonce=9f… now=1732159200.000000
-    PROVE c0 nonce=41… mac=…
-    HELLO 1 c0 mac=…       MYVIEW-SYNC 1 fps=25 now=1732159200.250000 pulse=- mac=…
+    LOGIN-REQUIRED 1 now=1732159200.000000
+    LOGIN c0 <password>    MYVIEW-SYNC 1 fps=25 now=1732159200.250000 pulse=-
 
 All times are unix seconds. ``ago`` is a span, not a time, so that it means the same on a server whose clock
 differs. Unknown ``key=value`` words and unknown words of the server are passed over: room for later versions.
@@ -31,38 +29,38 @@ import re
 from collections.abc import Callable
 
 from camsync.messages import (
-    Beat,
-    Challenge,
     ClientLine,
-    Clients,
+    ClientList,
+    ClientsRequest,
+    CountedPulse,
+    ErrorMessage,
     Greeting,
     Hello,
-    Known,
-    Listener,
+    ListedClient,
+    LoginMessage,
+    LoginRequest,
     Ping,
     Pong,
-    Prove,
-    Refusal,
+    PulseMessage,
     ServerLine,
-    Wait,
-    Who,
+    WaitMessage,
 )
 
 VERSION = 1
-CLOSED = 2  # the version of a closed server's first line
 MAX_LINE = 256  # bytes, without the line end
 MAX_SERVER_LINE = 32768  # bytes: WAIT and CLIENTS name every camera of a site
 _GREETING = "MYVIEW-SYNC"
+_LOGIN_REQUIRED = "LOGIN-REQUIRED"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 LAST_PULSE = 2**40
 """Enough for centuries at any camera's rate; times in ticks of a clock stay within 64 bits, numbers exact."""
 _NUMBER = re.compile(r"\d{1,13}")
 _TIME = re.compile(r"-?\d{1,12}(\.\d{1,20})?")  # seconds
-_NONCE = re.compile(r"[0-9a-f]{32}")
+_PASSWORD = re.compile(r"[!-~]{1,128}")  # printable ASCII without a space: a line has to hold it
 _CODE = re.compile(r"[a-z]{1,20}")
 _FPS = re.compile(r"\d{1,6}(\.\d{1,20})?")  # pulses per second; no exponent: people read it
-_NONCE_IS = "nonce="
 _UNNAMED = "-"  # stands for a client without a name, which no name can be
+_PASSWORD_SYNTAX = "a password has 1 to 128 printable ASCII characters, none of them a space"  # noqa: S105
 _SHOWN = 40  # characters of a wrong word that an error repeats
 MIN_FPS, MAX_FPS = 1e-6, 10_000.0  # pulses per second that a server may have as its rate
 
@@ -76,12 +74,17 @@ class ProtocolError(ValueError):
 
 
 def is_name(text: str) -> bool:
-    """Say whether ``text`` may name a client: letters, digits, ``.``, ``_``, ``-``; at most 64."""
+    """Return whether ``text`` may name a client: letters, digits, ``.``, ``_``, ``-``; at most 64."""
     return _NAME.fullmatch(text) is not None
 
 
+def is_password(text: str) -> bool:
+    """Return whether ``text`` may be a password: 1 to 128 printable ASCII characters without a space."""
+    return _PASSWORD.fullmatch(text) is not None
+
+
 def encode(message: ClientLine | ServerLine) -> bytes:
-    """Give the line of a message, line end included."""
+    """Encode a message as a line, line end included."""
     text = _client_text(message) if isinstance(message, ClientLine) else _server_text(message)
     return text.encode("ascii", "replace") + b"\n"
 
@@ -93,36 +96,36 @@ def _client_text(message: ClientLine) -> str:
             return f"HELLO {VERSION} {name}{counted}"
         case Ping(sent):
             return f"PING {sent:.6f}"
-        case Who():
+        case ClientsRequest():
             return "WHO"
-        case Prove(user, nonce):
-            return f"PROVE {user} {_NONCE_IS}{nonce}"
+        case LoginMessage(user, password):
+            return f"LOGIN {user} {password}"
 
 
 def _server_text(message: ServerLine) -> str:  # noqa: PLR0911 — one return per message
     match message:
-        case Challenge(nonce, now):
-            return f"{_GREETING} {CLOSED} {_NONCE_IS}{nonce} now={now:.6f}"
+        case LoginRequest(now):
+            return f"{_LOGIN_REQUIRED} {VERSION} now={now:.6f}"
         case Greeting(version, fps, now, pulse):
             last = "-" if pulse is None else pulse
             return f"{_GREETING} {version} fps={_plain(fps)} now={now:.6f} pulse={last}"
-        case Wait(names):
+        case WaitMessage(names):
             return f"WAIT {','.join(names)}"
-        case Beat(number, due):
+        case PulseMessage(number, due):
             return f"PULSE {number} {due:.6f}"
         case Pong(sent, now):
             return f"PONG {sent:.6f} {now:.6f}"
-        case Clients(clients):
+        case ClientList(clients):
             return " ".join(["CLIENTS", ",".join(f"{it.name or _UNNAMED}:{it.behind}" for it in clients)])
-        case Refusal(code, text):
+        case ErrorMessage(code, text):
             return f"ERROR {code} {text}"
 
 
 def parse_client_line(line: bytes) -> ClientLine:
-    """Read a line that a client sent, without its line end.
+    """Parse a line that a client sent, without its line end.
 
     Raises:
-        ProtocolError: the line is none of HELLO, PING, WHO and PROVE, or its words are wrong.
+        ProtocolError: the line is none of HELLO, PING, WHO and LOGIN, or its words are wrong.
     """
     match _words(line):
         case ["HELLO", version, name, *rest]:
@@ -134,9 +137,11 @@ def parse_client_line(line: bytes) -> ClientLine:
         case ["PING", sent]:
             return Ping(_time(sent))
         case ["WHO"]:
-            return Who()
-        case ["PROVE", user, nonce, *_] if nonce.startswith(_NONCE_IS):
-            return Prove(_match(_NAME, user, "name"), _match(_NONCE, nonce.removeprefix(_NONCE_IS), "nonce"))
+            return ClientsRequest()
+        case ["LOGIN", user, password]:
+            if not is_password(password):
+                raise ProtocolError("malformed", _PASSWORD_SYNTAX)
+            return LoginMessage(_match(_NAME, user, "name"), password)
         case _:
             raise ProtocolError(
                 "malformed", "say HELLO 1 <name> [last=<pulse> ago=<seconds>], PING <time> or WHO"
@@ -144,7 +149,7 @@ def parse_client_line(line: bytes) -> ClientLine:
 
 
 def parse_server_line(line: bytes) -> ServerLine | None:
-    """Read a line that the server sent, without its line end; None for a word of a later version.
+    """Parse a line that the server sent, without its line end; None for a word of a later version.
 
     Raises:
         ProtocolError: a known word with wrong words after it.
@@ -159,11 +164,14 @@ def parse_server_line(line: bytes) -> ServerLine | None:
         raise ProtocolError("malformed", f"{words[0]}: {error}") from error
 
 
-def _greeting(words: list[str]) -> Challenge | Greeting:
+def _login_request(words: list[str]) -> LoginRequest:
+    _match(_NUMBER, words[0] if words else "", "version")
+    return LoginRequest(_time(_keys(words[1:])["now"]))
+
+
+def _greeting(words: list[str]) -> Greeting:
     version = int(_match(_NUMBER, words[0] if words else "", "version"))
     keys = _keys(words[1:])
-    if version == CLOSED:
-        return Challenge(_match(_NONCE, keys["nonce"], "nonce"), _time(keys["now"]))
     if version != VERSION:  # only the version itself is sure to mean the same in all versions
         return Greeting(version, 1.0, 0.0, None)
     fps = float(_match(_FPS, keys["fps"], "rate"))
@@ -173,14 +181,14 @@ def _greeting(words: list[str]) -> Challenge | Greeting:
     return Greeting(version, fps, _time(keys["now"]), pulse)
 
 
-def _wait(words: list[str]) -> Wait:
+def _wait(words: list[str]) -> WaitMessage:
     (names,) = words
-    return Wait(tuple(_match(_NAME, name, "name") for name in names.split(",")))
+    return WaitMessage(tuple(_match(_NAME, name, "name") for name in names.split(",")))
 
 
-def _beat(words: list[str]) -> Beat:
+def _beat(words: list[str]) -> PulseMessage:
     number, due = words
-    return Beat(_number(number), _time(due))
+    return PulseMessage(_number(number), _time(due))
 
 
 def _pong(words: list[str]) -> Pong:
@@ -188,22 +196,23 @@ def _pong(words: list[str]) -> Pong:
     return Pong(_time(sent), _time(now))
 
 
-def _clients(words: list[str]) -> Clients:
-    return Clients(tuple(_listener(it) for it in "".join(words).split(",") if it))
+def _clients(words: list[str]) -> ClientList:
+    return ClientList(tuple(_listener(it) for it in "".join(words).split(",") if it))
 
 
-def _listener(text: str) -> Listener:
+def _listener(text: str) -> ListedClient:
     name, _, behind = text.partition(":")
-    return Listener(None if name == _UNNAMED else _match(_NAME, name, "name"), _number(behind))
+    return ListedClient(None if name == _UNNAMED else _match(_NAME, name, "name"), _number(behind))
 
 
-def _refusal(words: list[str]) -> Refusal:
+def _refusal(words: list[str]) -> ErrorMessage:
     code, *text = words
-    return Refusal(_match(_CODE, code, "code"), " ".join(text))
+    return ErrorMessage(_match(_CODE, code, "code"), " ".join(text))
 
 
 _SERVER_WORDS: dict[str, Callable[[list[str]], ServerLine]] = {
     _GREETING: _greeting,
+    _LOGIN_REQUIRED: _login_request,
     "WAIT": _wait,
     "PULSE": _beat,
     "PONG": _pong,
@@ -212,11 +221,11 @@ _SERVER_WORDS: dict[str, Callable[[list[str]], ServerLine]] = {
 }
 
 
-def _known(keys: dict[str, str]) -> Known:
+def _known(keys: dict[str, str]) -> CountedPulse:
     ago = _time(keys.get("ago", "0"))
     if ago < 0.0:
         raise ProtocolError("malformed", "ago is a span in seconds, not below zero")
-    return Known(_number(keys["last"]), ago)
+    return CountedPulse(_number(keys["last"]), ago)
 
 
 def _plain(fps: float) -> str:

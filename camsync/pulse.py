@@ -17,6 +17,10 @@ class VersionError(SyncError):
     """The server speaks another version of the protocol."""
 
 
+class LoginError(SyncError):
+    """The server needs a login, or refuses this one."""
+
+
 class AxisLostError(SyncError):
     """The server counts far behind what this client has counted, and goes on so."""
 

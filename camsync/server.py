@@ -4,37 +4,39 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import ssl
 from collections.abc import Collection, Mapping
 from types import TracebackType
 from typing import Self
 
-from camsync.claims import INEXACT, Claims
+from camsync.axis_claims import INEXACT, AxisClaims
+from camsync.client_connection import ClientInfo
+from camsync.client_registry import ClientRegistry
 from camsync.clock import Clock, steady_unix_clock
-from camsync.door import Door
-from camsync.hub import Hub
 from camsync.limits import ServerLimits
-from camsync.log_throttle import Spell
-from camsync.messages import Beat, Greeting, Hello, Wait
-from camsync.peer import ClientInfo
+from camsync.login import LoginGate
+from camsync.messages import Greeting, Hello, PulseMessage, WaitMessage
 from camsync.protocol import MAX_FPS, MIN_FPS, VERSION, encode, is_name
 from camsync.pulse_axis import PulseAxis
+from logthrottle import LogThrottle
 
 _log = logging.getLogger(__name__)
 
 
 class PulseServer:
-    """Sends pulse n to every client when it is due, at ``epoch + n / fps``, and waits for none of them.
+    """Sends pulse n to every client when it is due, at ``epoch + n / fps``, and waits for no client.
 
     Pulse 0 is sent once all clients named in ``expect`` have said HELLO, or ``start_timeout`` seconds after
-    ``start()`` (0, or nobody expected: at once). Who joins later gets the current pulse next.
+    ``start()`` (at once where that is 0 or no client is expected). A client that joins later gets the current
+    pulse next.
 
     The numbers only rise. They skip when the machine slept or stalled for more than ``limits.catch_up``
     (no burst of old pulses), and when clients that have counted further return to a restarted server: when
     enough have, that ends the wait, and the axis goes on where their own count has got to. No client decides
     that alone (``claims``).
 
-    With ``users``, passwords by name, the server is closed: who comes has to prove that they know one, before
-    they are told anything, and can say HELLO under that name alone. What is said then is sealed (``seal``).
+    With ``users``, passwords by name, a client has to log in first, and can say HELLO under its user's name
+    alone. With ``tls`` all of it is encrypted; without, whoever overhears a login knows the password.
 
     ``host`` None listens on all interfaces; ``port`` 0 takes a free one (see ``port``). With ``max_pulses``
     the server falls silent before that pulse number. Not thread-safe: one event loop.
@@ -55,6 +57,7 @@ class PulseServer:
         limits: ServerLimits | None = None,
         clock: Clock | None = None,
         users: Mapping[str, str] | None = None,
+        tls: ssl.SSLContext | None = None,
     ) -> None:
         if not MIN_FPS <= fps <= MAX_FPS:
             raise ValueError(f"fps must be between {MIN_FPS:g} and {MAX_FPS:g}, not {fps}")
@@ -69,10 +72,20 @@ class PulseServer:
         self._max_pulses = max_pulses
         self._limits = limits or ServerLimits()
         self._clock = clock or steady_unix_clock()
-        self._door = None if users is None else Door(users, self._limits, self._clock)
-        kept = self._expect.union(users or ())
-        self._hub = Hub(self._clock, self._limits, self._greet, self._heard, self._changed, self._door, kept)
-        self._claims = Claims(fps, self._expect, self._limits, self._clock)
+        self._gate = None
+        if users is not None or tls is not None:
+            self._gate = LoginGate(users, self._limits, self._clock)
+        self._registry = ClientRegistry(
+            self._clock,
+            self._limits,
+            self._greet,
+            self._on_hello,
+            self._on_change,
+            self._gate,
+            tls,
+            self._expect.union(users or ()),
+        )
+        self._claims = AxisClaims(fps, self._expect, self._limits, self._clock)
         self._server: asyncio.Server | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._settling: asyncio.TimerHandle | None = None
@@ -81,7 +94,7 @@ class PulseServer:
         self._next = 0
         self._pulse: int | None = None
         self._skipped = 0
-        self._stalls = Spell(self._clock)
+        self._stalls = LogThrottle(self._clock)
         self._begun = asyncio.Event()
         self._ended = asyncio.Event()
 
@@ -113,16 +126,16 @@ class PulseServer:
 
     @property
     def refused(self) -> int:
-        """How many have come to a closed server and did not know a password."""
-        return 0 if self._door is None else self._door.refused
+        """Connections that failed to log in."""
+        return 0 if self._gate is None else self._gate.refused
 
     def clients(self) -> tuple[ClientInfo, ...]:
-        """Give everybody connected, in the order of joining."""
-        return self._hub.clients()
+        """Return all connected clients, in the order of joining."""
+        return self._registry.clients()
 
     def missing(self) -> tuple[str, ...]:
-        """Give the expected names that are not connected, sorted."""
-        return tuple(sorted(self._expect - self._hub.names()))
+        """Return the expected names that are not connected, sorted."""
+        return tuple(sorted(self._expect - self._registry.names()))
 
     async def start(self) -> None:
         """Listen.
@@ -132,7 +145,7 @@ class PulseServer:
         """
         loop = asyncio.get_running_loop()
         try:
-            self._server = await loop.create_server(self._hub.new_peer, self._host, self._port)
+            self._server = await loop.create_server(self._registry.new_connection, self._host, self._port)
         except OSError as error:
             where = f"{self._host or '*'}:{self._port}"
             raise OSError(
@@ -151,7 +164,7 @@ class PulseServer:
         if self._server is None:
             return
         self._server.close()
-        self._hub.close()
+        self._registry.close()
         await self._server.wait_closed()
         self._server = None
 
@@ -178,13 +191,13 @@ class PulseServer:
 
     def _wait_line(self) -> bytes:
         missing = self.missing()
-        return encode(Wait(missing)) if missing else b""
+        return encode(WaitMessage(missing)) if missing else b""
 
-    def _heard(self, hello: Hello) -> None:
-        """Go on with the axis that clients bring from before this server was started."""
+    def _on_hello(self, hello: Hello) -> None:
+        """Continue the axis that clients have from before this server was started."""
         if not self._claims.note(hello):
             return
-        self._claims.keep(self._hub.names())
+        self._claims.keep(self._registry.names())
         if self._axis is not None:
             self._move_forward(self._axis)
         elif self._settling is None and self._claims.agreed() is not None:
@@ -202,22 +215,22 @@ class PulseServer:
             self._skipped += max(0, first - self._next)
             self._axis, self._next = axis, first
             self._schedule()
-        self._claims.tell_of_others(self._axis or before)
+        self._claims.log_minority(self._axis or before)
 
     def _settle(self) -> None:
-        """Go on where the clients have got to, if they are still here."""
+        """Continue from the clients' count, if they are still connected."""
         self._settling = None
-        self._claims.keep(self._hub.names())
+        self._claims.keep(self._registry.names())
         if self._claims.agreed() is not None:
             self._begin()
 
-    def _changed(self) -> None:
-        """Begin if nobody is missing any more, or say who is."""
+    def _on_change(self) -> None:
+        """Begin if all expected clients are connected; else tell the clients which are missing."""
         if self._axis is not None or self._ended.is_set():
             return
         line = self._wait_line()
         if line:
-            self._hub.tell(line)
+            self._registry.broadcast(line)
         else:
             self._begin()
 
@@ -226,16 +239,16 @@ class PulseServer:
         self._begin()
 
     def _begin(self) -> None:
-        """Begin with pulse 0, or where the clients have got to."""
+        """Begin with pulse 0, or where the clients have counted to."""
         self._cancel_settling()
         self._begun_at = now = self._clock()
-        self._claims.keep(self._hub.names())
+        self._claims.keep(self._registry.names())
         agreed = self._claims.agreed()
         self._axis = agreed or PulseAxis(now, self._fps)
         if agreed is not None:
             self._next = agreed.number_at(now) + 1
             _log.info("clients have counted to %d: going on from there", self._next - 1)
-        self._claims.tell_of_others(self._axis)
+        self._claims.log_minority(self._axis)
         self._begun.set()
         self._schedule()
 
@@ -263,12 +276,12 @@ class PulseServer:
         now = self._clock()
         current = self._axis.number_at(now)
         if now - self._axis.due(self._next) > self._limits.catch_up:
-            if (more := self._stalls.happened()) is not None:
+            if (more := self._stalls.record()) is not None:
                 _log.warning("late by %d pulses: skipping to %d%s", current - self._next, current, more)
             self._skipped += current - self._next
             self._next = current
         while self._next <= current and not self._full():
-            self._hub.pulse(encode(Beat(self._next, self._axis.due(self._next))))
+            self._registry.send_pulse(encode(PulseMessage(self._next, self._axis.due(self._next))))
             self._pulse = self._next
             self._next += 1
         self._schedule()

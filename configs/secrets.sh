@@ -7,11 +7,11 @@
 # already stays as it is, so that a camera can be added: run it again with that camera's name. It needs openssl.
 #
 #   authority.key            makes the certificates below; keep it elsewhere, no process needs it
-#   public/                  certificates: the authority's, the router's, and https.pem, which yours may replace
+#   public/                  certificates: the authority's, the router's, the pulse server's, and https.pem, which yours may replace
 #   web/                     tokens.yaml, who may watch and operate, and https.key
 #   web/pulses               the best view's own password of the pulses
-#   router.key, bus          the router's key, and who may come to the bus: name:password
-#   pulses                   who may follow the pulses, in the same way
+#   router.key, bus          the router's key, and the users of the bus: name:password
+#   sync.key, pulses         the pulse server's key, and the users of the pulses: name:password
 #   cameras/ID/bus, pulses   a camera's own passwords
 #   cameras/ID/token         a token to see whether it is well
 set -eu
@@ -79,6 +79,7 @@ if [ ! -e public/authority.pem ]; then
     chmod 400 authority.key
 fi
 pair public/router.pem router.key "$also,DNS:bestview"
+pair public/sync.pem sync.key "$also,DNS:sync"
 pair public/https.pem web/https.key "$also"
 password bestview pulses web/pulses
 if [ ! -e web/tokens.yaml ]; then

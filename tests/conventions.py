@@ -17,7 +17,7 @@ from statistics import median
 ROOT = Path(__file__).resolve().parents[1]
 PRODUCT = ("camsync", "tracking", "bestview", "synthetic", "server", "client")
 _SOURCES = (".py", ".js")
-_WORD = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*")
+_WORD = re.compile(r"[^\W\d_]+(?:['-][^\W\d_]+)*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ def parsed(*folders: str) -> Iterator[tuple[Path, ast.Module]]:
 
 
 def shared_class_names() -> dict[str, list[str]]:
-    """Return the public classes of the product whose name another class of the same room has, by room and name."""
+    """Return the public classes whose name another class of the same room has: paths by room and name."""
     places: dict[str, list[str]] = defaultdict(list)
     for path, tree in parsed(*PRODUCT):
         for node in tree.body:
@@ -117,15 +117,15 @@ def main() -> None:
     print(f"{'room':28}{'files':>6}{'median':>8}{'largest':>9}  {'':34}{'lines':>8}")
     for room in rooms():
         print(
-            f"{room.name:28}{room.files:6}{room.median:8.0f}{room.largest:9}  {room.largest_file:34}{room.lines:8}"
+            f"{room.name:28}{room.files:6}{room.median:8.0f}{room.largest:9}  "
+            f"{room.largest_file:34}{room.lines:8}"
         )
     product = sum(room.lines for room in rooms() if room.name.split("/")[0] in PRODUCT)
     print(f"\nlines of product: {product}")
     print(f"folders with more than 20 files: {flat_folders(20) or 'none'}")
     print(f"public classes that share a name within a room: {shared_class_names() or 'none'}")
-    print(
-        f"docstrings that begin with Give, Tell or Say: {len(docstrings_beginning_with(('Give', 'Tell', 'Say'), '.'))}"
-    )
+    riddles = docstrings_beginning_with(("Give", "Tell", "Say"), ".")
+    print(f"docstrings that begin with Give, Tell or Say: {len(riddles)}")
     print(f"words: README {words_of('README.md')}, docs {words_of('docs')}")
 
 

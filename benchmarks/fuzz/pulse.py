@@ -5,6 +5,6 @@ from __future__ import annotations
 from benchmarks.fuzz.pulse_lines import Lines
 from benchmarks.fuzz.pulse_sessions import ClientSessions, ServerSessions
 from benchmarks.fuzz.pulse_sockets import Sockets
-from benchmarks.fuzz.pulse_strangers import Between, Strangers
+from benchmarks.fuzz.pulse_strangers import Strangers
 
-TARGETS = (Lines, ServerSessions, ClientSessions, Strangers, Between, Sockets)
+TARGETS = (Lines, ServerSessions, ClientSessions, Strangers, Sockets)

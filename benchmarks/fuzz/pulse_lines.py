@@ -8,19 +8,19 @@ from typing import Any, cast
 from benchmarks.fuzz.mutate import damaged
 from benchmarks.fuzz.target import Target, refused
 from camsync.messages import (
-    Beat,
-    Challenge,
-    Clients,
+    ClientList,
+    ClientsRequest,
+    CountedPulse,
+    ErrorMessage,
     Greeting,
     Hello,
-    Known,
-    Listener,
+    ListedClient,
+    LoginMessage,
+    LoginRequest,
     Ping,
     Pong,
-    Prove,
-    Refusal,
-    Wait,
-    Who,
+    PulseMessage,
+    WaitMessage,
 )
 from camsync.protocol import MAX_LINE, ProtocolError, encode, parse_client_line, parse_server_line
 
@@ -28,11 +28,11 @@ CLIENT_LINES = tuple(
     encode(it)
     for it in (
         Hello("c0"),
-        Hello("c1", Known(123, 0.52)),
-        Hello("c0", Known(2**39, 4.0)),
+        Hello("c1", CountedPulse(123, 0.52)),
+        Hello("c0", CountedPulse(2**39, 4.0)),
         Ping(1732159201.5),
-        Who(),
-        Prove("c0", "5b" * 16),
+        ClientsRequest(),
+        LoginMessage("c0", "5b" * 16),
     )
 )
 SERVER_LINES = tuple(
@@ -40,13 +40,13 @@ SERVER_LINES = tuple(
     for it in (
         Greeting(1, 25.0, 1000.0, None),
         Greeting(1, 25.0, 1000.0, 7),
-        Wait(("c0", "c1")),
-        Beat(8, 1000.32),
-        Beat(9, 1000.36),
+        WaitMessage(("c0", "c1")),
+        PulseMessage(8, 1000.32),
+        PulseMessage(9, 1000.36),
         Pong(1000.0, 1000.01),
-        Clients((Listener("c0", 0), Listener(None, 7))),
-        Refusal("malformed", "say something else"),
-        Challenge("0f" * 16, 1000.0),
+        ClientList((ListedClient("c0", 0), ListedClient(None, 7))),
+        ErrorMessage("malformed", "say something else"),
+        LoginRequest(1000.0),
     )
 )
 WORDS = (
@@ -81,8 +81,8 @@ class Lines(Target):
                 message = parse(data[: 16 * MAX_LINE])
             except ProtocolError as error:
                 refused(error)
-                answer = encode(Refusal(error.code, str(error)))
-                assert isinstance(parse_server_line(answer[:-1]), Refusal), answer
+                answer = encode(ErrorMessage(error.code, str(error)))
+                assert isinstance(parse_server_line(answer[:-1]), ErrorMessage), answer
             else:
                 taken = message is not None or taken
                 if message is not None:

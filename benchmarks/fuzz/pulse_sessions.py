@@ -11,8 +11,8 @@ from benchmarks.fuzz.pulse_lines import CLIENT_LINES, SERVER_LINES, some_line
 from benchmarks.fuzz.pulse_wire import Clock, Wire
 from benchmarks.fuzz.target import Scripts
 from camsync import ClientSettings, PulseClient, PulseServer
-from camsync.link import Link
 from camsync.protocol import parse_client_line, parse_server_line
+from camsync.server_connection import ServerConnection
 from server.messaging.number_types import Pulse
 
 _pulse = msgspec.json.Decoder(Pulse)
@@ -50,9 +50,9 @@ class ServerSessions(Scripts):
     async def _session(self, script: Script) -> bool:
         clock = Clock()
         server = PulseServer(25.0, expect=("c0",), clock=clock)
-        hub = server._hub
+        hub = server._registry
         wires = [Wire() for _ in range(3)]
-        peers = [hub.new_peer() for _ in wires]
+        peers = [hub.new_connection() for _ in wires]
         for peer, wire in zip(peers, wires, strict=True):
             peer.connection_made(wire)
         for who, said in script:
@@ -106,7 +106,7 @@ class ClientSessions(Scripts):
     async def _session(self, script: Script) -> bool:
         clock = Clock()
         client = PulseClient("nowhere", 1, "c0", settings=ClientSettings(queue=10_000), clock=clock)
-        link = Link(client._heard, client._hello, clock, 1.0, 5.0)
+        link = ServerConnection(client._receive, client._hello, clock, 1.0, 5.0)
         client._link = link
         wire = Wire()
         link.connection_made(wire)

@@ -9,8 +9,8 @@ from random import Random
 from benchmarks.fuzz.loop import HurryingLoop, leaves_no_trace
 from benchmarks.fuzz.pulse_lines import CLIENT_LINES, SERVER_LINES, some_line
 from benchmarks.fuzz.target import Scripts, refused
-from camsync import PulseClient, PulseServer, SyncError, clients_of
-from camsync.messages import Clients, Refusal
+from camsync import PulseClient, PulseServer, SyncError, query_clients
+from camsync.messages import ClientList, ErrorMessage
 from camsync.protocol import parse_server_line
 
 _OTHERS_EVERY = 20
@@ -56,13 +56,13 @@ class Sockets(Scripts):
             async with asyncio.timeout(0.3):
                 while line := await reader.readline():
                     heard.append(parse_server_line(line.rstrip(b"\n")))
-                    if isinstance(heard[-1], Clients) or _ended(heard[-1]):
+                    if isinstance(heard[-1], ClientList) or _ended(heard[-1]):
                         break
         writer.transport.abort()
         self._fed += 1
         if self._fed % _OTHERS_EVERY == 0 or not heard:
-            await clients_of("127.0.0.1", self._server.port)
-        return not any(isinstance(it, Refusal) for it in heard)
+            await query_clients("127.0.0.1", self._server.port)
+        return not any(isinstance(it, ErrorMessage) for it in heard)
 
     async def _say(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         leaves_no_trace(writer.get_extra_info("socket"))
@@ -100,4 +100,4 @@ class Sockets(Scripts):
 
 
 def _ended(message: object) -> bool:
-    return isinstance(message, Refusal) and message.code in {"flood", "overlong", "stopped", "full"}
+    return isinstance(message, ErrorMessage) and message.code in {"flood", "overlong", "stopped", "full"}

@@ -7,7 +7,7 @@ from collections import deque
 
 import msgspec
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.messaging.inbox import Message
 from server.messaging.messages import DECODE_ERRORS
 from server.messaging.operator_messages import OPERATOR_POINTS_MAX, OperatorPoints
@@ -27,7 +27,7 @@ class Pointed:
         self.taken = 0
         """Places that the tracker was given."""
         self.bad_messages = 0
-        self._bad = Spell()
+        self._bad = LogThrottle()
 
     def put(self, message: Message) -> None:
         """Take a message in; what is said of another run's tracks is of nobody here."""
@@ -35,13 +35,13 @@ class Pointed:
             said = _DECODER.decode(message.payload)
         except DECODE_ERRORS as error:
             self.bad_messages += 1
-            if (more := self._bad.happened(str(error))) is not None:
+            if (more := self._bad.record(str(error))) is not None:
                 told = "camera %s: a message on %s is none: %s%s"
                 log.warning(told, self._camera, message.key, error, more)
             return
-        if ended := self._bad.over():
+        if ended := self._bad.end():
             told = "camera %s: where somebody points is understood again; %d messages were not"
-            log.info(told, self._camera, ended.times)
+            log.info(told, self._camera, ended.count)
         if said.boot == self._boot:
             self._waiting.extend(Pointing(it.pulse, it.track, it.x, it.y, it.reach) for it in said.points)
 

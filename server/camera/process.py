@@ -24,7 +24,7 @@ from server.camera.retained_state import Keeping
 from server.camera.sources import Image, SourceEnded
 from server.camera.status_meter import Meter
 from server.camera.thumbnails import thumbnails
-from server.config.pulse_passwords import pulse_login
+from server.config.pulse_access import pulse_client_tls, pulse_credentials
 from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.messages import (
@@ -75,7 +75,8 @@ class CameraProcess:
 
     def __init__(self, config: Config, camera_id: str) -> None:
         self._config, self._id = config, camera_id
-        self._login = pulse_login(config, camera_id)
+        self._pulse_credentials = pulse_credentials(config, camera_id)
+        self._pulse_tls = pulse_client_tls(config)
         self._boot = time.time_ns() // 1_000_000
         self._clock = steady_unix_clock()  # of pulses and all that is measured from them
         self._keys = ZenohKeys(config.site.name)
@@ -173,7 +174,8 @@ class CameraProcess:
             fps_hint=fps,
             settings=settings,
             clock=self._clock,
-            login=self._login,
+            credentials=self._pulse_credentials,
+            tls=self._pulse_tls,
         )
         async with client as pulses:
             self._meter.watch(pulses)

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -18,12 +18,20 @@ from bestview import ground_handedness, validate_homography
 from server.config.duplicate_keys import DuplicateKeyError, parse_json
 from server.config.environment import check_environment
 from server.config.ground_unit import check_unit
-from server.config.sections import CameraSettings, ViewSettings, ZenohSettings, ZenohTlsSettings
+from server.config.sections import (
+    CameraSettings,
+    ProcessTlsSettings,
+    SyncSettings,
+    ViewSettings,
+    ZenohSettings,
+)
 from server.config.site_config import Config
 from server.config.source_address import resolve_source
 from server.config.values import abbreviate, check_camera_name, check_numbers, check_values
 from server.config.yaml_file import read_yaml
 from server.system.errors import UserError
+
+ProcessSection = TypeVar("ProcessSection", SyncSettings, ZenohSettings)
 
 
 def load_config(path: Path) -> Config:
@@ -100,21 +108,21 @@ def _who_may(config: Config, folder: Path) -> dict[str, Any]:
     return {
         "access": access,
         "http": config.http.model_copy(update={"tls": tls}),
-        "sync": config.sync.model_copy(update={"users": _users(config.sync.users, folder)}),
-        "zenoh": _bus_files(config.zenoh, folder),
+        "sync": _process_files(config.sync, folder),
+        "zenoh": _process_files(config.zenoh, folder),
     }
 
 
-def _bus_files(zenoh: ZenohSettings, folder: Path) -> ZenohSettings:
-    named = {name: getattr(zenoh.tls, name) for name in ZenohTlsSettings.model_fields}
-    tls = ZenohTlsSettings(
-        **{name: None if it is None else (folder / it).absolute() for name, it in named.items()}
+def _process_files(section: ProcessSection, folder: Path) -> ProcessSection:
+    """Resolve the paths of a section that has ``users`` and ``tls``."""
+
+    def resolved(path: Path | None) -> Path | None:
+        return None if path is None else (folder / path).absolute()
+
+    tls = ProcessTlsSettings(
+        **{name: resolved(getattr(section.tls, name)) for name in ProcessTlsSettings.model_fields}
     )
-    return zenoh.model_copy(update={"tls": tls, "users": _users(zenoh.users, folder)})
-
-
-def _users(path: Path | None, folder: Path) -> Path | None:
-    return None if path is None else (folder / path).absolute()
+    return section.model_copy(update={"tls": tls, "users": resolved(section.users)})
 
 
 def change_view_settings(view: ViewSettings, changes: Mapping[str, Any], where: str) -> ViewSettings:

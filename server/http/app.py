@@ -10,7 +10,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 
 from aiohttp import web
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.config.running_config import ConfigFileState
 from server.config.sections import HttpSettings
 from server.config.site_config import Config
@@ -47,7 +47,7 @@ from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
-_MISTAKES = web.AppKey("mistakes", Spell)
+_MISTAKES = web.AppKey("mistakes", LogThrottle)
 _BEGUN = web.RequestKey("begun", web.StreamResponse)
 """The answer to a request, once its head has been sent."""
 _ASKED_BYTES = 65_536
@@ -76,7 +76,7 @@ async def one_line_errors(
     except (ConnectionError, asyncio.CancelledError):
         raise
     except Exception as error:
-        if (more := request.app[_MISTAKES].happened(repr(error))) is not None:
+        if (more := request.app[_MISTAKES].record(repr(error))) is not None:
             log.exception("answering %s %s failed%s", request.method, request.path, more)
         begun: web.StreamResponse | None = request.get(_BEGUN)
         if begun is None:
@@ -110,7 +110,7 @@ def make_app(
         client_max_size=_ASKED_BYTES,
     )
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), RenderPool(service)
-    app[ON_DISK], app[_MISTAKES] = on_disk, Spell()
+    app[ON_DISK], app[_MISTAKES] = on_disk, LogThrottle()
     app[openapi.DESCRIBED] = openapi.Described(app)
     app[WATCHING], app[LISTENING] = Shares(), Shares()
     app[READERS] = Readers(service.splicer.plan.target_s, app[WATCHING])

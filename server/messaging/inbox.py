@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from camsync import Spell
+from logthrottle import LogThrottle
 
 log = logging.getLogger(__name__)
 
@@ -64,7 +64,7 @@ class Inbox(Generic[Item]):
         self._bytes: Counter[str] = Counter()
         self._woken = False
         self.lost = 0
-        self._failing = Spell()
+        self._failing = LogThrottle()
 
     @property
     def waiting(self) -> int:
@@ -114,7 +114,7 @@ class Inbox(Generic[Item]):
             try:
                 self._handler(item)
             except Exception as error:  # one bad item must not keep back those behind it
-                if (more := self._failing.happened(repr(error))) is not None:
+                if (more := self._failing.record(repr(error))) is not None:
                     log.exception("handling what came failed%s", more)
             if time.perf_counter() >= until:
                 self._loop.call_soon(self._drain)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import ssl
 import time
 from collections.abc import Callable
 from functools import partial
@@ -12,8 +13,9 @@ from pathlib import Path
 
 import msgspec
 
-from camsync import Login, PulseClient, Spell
-from server.config.pulse_passwords import pulse_login
+from camsync import Credentials, PulseClient
+from logthrottle import LogThrottle
+from server.config.pulse_access import pulse_client_tls, pulse_credentials
 from server.config.sections import ViewSettings
 from server.config.site_config import Config
 from server.media.codec import agreement_for
@@ -70,7 +72,7 @@ class BestViewService:
         self._keeping_up = KeepingUp(frames - config.view.lookahead - config.encode.gop)
         self.left_out = 0
         """Epochs that were not decided, since there was more to decide than could be."""
-        self._leaving_out = Spell()
+        self._leaving_out = LogThrottle()
         self.splicer = Splicer(self.shelves, self.agreement, config, self.sound)
         self.intake = Intake(
             self.shelves,
@@ -111,7 +113,8 @@ class BestViewService:
         self._out = out
         self._recorder: LiveDecisionWriter | None = None
         self._bus: Bus | None = None
-        self.pulse_login: Login | None = None  # of whom the pulse server asks for none
+        self.pulse_credentials: Credentials | None = None
+        self.pulse_tls: ssl.SSLContext | None = None
         self._keys = ZenohKeys(config.site.name)
         self._changed = asyncio.Event()
         self._without_pulses = False
@@ -124,7 +127,8 @@ class BestViewService:
             UserError: its address is in use, or a file of passwords cannot be read.
         """
         index, zenoh = self.config.view.share.index, self.config.zenoh
-        self.pulse_login = pulse_login(self.config, pulse_client(index))
+        self.pulse_credentials = pulse_credentials(self.config, pulse_client(index))
+        self.pulse_tls = pulse_client_tls(self.config)
         if index:
             self._bus = bus = Bus.second(zenoh, pulse_client(index))
         else:
@@ -206,7 +210,7 @@ class BestViewService:
         if not self._keeping_up.is_lost(behind):
             return
         self.left_out += self.aligner.leave_out(self.pulse)
-        if (more := self._leaving_out.happened()) is not None:
+        if (more := self._leaving_out.record()) is not None:
             told = "decisions are %.1f s behind, and do not catch up%s: they go on with now"
             log.warning(told, behind / self.config.site.fps, more)
 
@@ -267,7 +271,9 @@ class BestViewService:
     async def _follow_pulses(self) -> None:
         sync, fps = self.config.sync, self.config.site.fps
         name = pulse_client(self.config.view.share.index)
-        async with PulseClient(sync.host, sync.port, name, fps_hint=fps, login=self.pulse_login) as pulses:
+        async with PulseClient(
+            sync.host, sync.port, name, fps_hint=fps, credentials=self.pulse_credentials, tls=self.pulse_tls
+        ) as pulses:
             self._clock = pulses.now
             async for pulse in pulses:
                 self.pulse = pulse.number

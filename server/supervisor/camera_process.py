@@ -6,7 +6,8 @@ import asyncio
 import contextlib
 import logging
 
-from camsync import Spell, SyncError
+from camsync import SyncError
+from logthrottle import LogThrottle
 from server.camera.process import CameraProcess
 from server.config.camera_password import fill_in_password
 from server.config.running_config import ActiveConfig
@@ -54,13 +55,13 @@ async def _made(running: ActiveConfig, camera_id: str, anew: asyncio.Event, *, b
     To end instead, and be started again, would load all libraries each time. Once the site has begun, as it
     does while a camera is waited for, what is wrong with one camera ends that one alone.
     """
-    away, pause = Spell(calm=0.0), _RETRY_FIRST_S
+    away, pause = LogThrottle(quiet_s=0.0), _RETRY_FIRST_S
     while True:
         anew.clear()
         try:
             camera = await asyncio.to_thread(_opened, running.now, camera_id)
         except UnavailableError as error:
-            if (more := away.happened(str(error))) is not None:
+            if (more := away.record(str(error))) is not None:
                 log.warning("%s%s; it is tried again", error, more)
             begun = True
         except UserError as error:
@@ -68,7 +69,7 @@ async def _made(running: ActiveConfig, camera_id: str, anew: asyncio.Event, *, b
                 raise
             raise UnavailableError(str(error)) from error  # whoever looks after this process starts it again
         else:
-            if ended := away.over():
+            if ended := away.end():
                 log.info("camera %s: it answers, after %.0f s", camera_id, ended.seconds)
             return camera
         with contextlib.suppress(TimeoutError):

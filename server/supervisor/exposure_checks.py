@@ -29,14 +29,15 @@ def check_viewers(config: Config) -> None:
 
 
 def check_pulses(config: Config) -> None:
-    """Refuse to send pulses to other machines, unless they have to prove who they are, or are trusted.
+    """Refuse to send pulses to other machines, unless they log in over TLS, or are trusted.
 
     Raises:
         UserError: `sync.bind` is not of this machine alone.
     """
-    if config.sync.users is None and not is_loopback(config.sync.bind):
-        what = f"sync.bind: {config.sync.bind} lets other machines listen to the pulses"
-        _check_network(config, what, "name a file of passwords in sync.users")
+    sync = config.sync
+    if (sync.users is None or sync.tls.key is None) and not is_loopback(sync.bind):
+        what = f"sync.bind: {sync.bind} lets other machines listen to the pulses"
+        _check_network(config, what, "name a file of passwords in sync.users, and a certificate in sync.tls")
 
 
 def check_bus(config: Config) -> None:

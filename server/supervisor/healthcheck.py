@@ -11,6 +11,7 @@ lets in.
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import json
 import os
@@ -38,8 +39,13 @@ def check_pulses() -> None:
         OSError: nobody is there.
     """
     address = "127.0.0.1", int(os.environ.get("MYVIEW_SYNC__PORT", _SYNC_PORT))
-    with socket.create_connection(address, timeout=_TIMEOUT_S) as server:
-        if not server.recv(64).startswith(b"MYVIEW-SYNC"):
+    with contextlib.ExitStack() as opened:
+        server = opened.enter_context(socket.create_connection(address, timeout=_TIMEOUT_S))
+        if authority := os.environ.get("MYVIEW_SYNC__TLS__AUTHORITY"):
+            tls = ssl.create_default_context(cafile=authority)
+            tls.check_hostname = False  # the certificate names the host at which other machines connect
+            server = opened.enter_context(tls.wrap_socket(server))
+        if not server.recv(64).startswith((b"MYVIEW-SYNC", b"LOGIN-REQUIRED")):
             raise UnhealthyError("what answers is no pulse server")
 
 

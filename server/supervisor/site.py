@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.config.running_config import (
     ACTIVE_CONFIG_VARIABLE,
     ActiveConfig,
@@ -37,7 +37,7 @@ async def run_up(running: ActiveConfig, environment: Mapping[str, str], out: Pat
         UserError: a process refused its input.
     """
     with _folder() as folder:
-        kept, failing = Path(folder) / "site.yaml", Spell()
+        kept, failing = Path(folder) / "site.yaml", LogThrottle()
         # Anew each time: what is old and temporary may be tidied away, and sites run for months.
         supervisor = Supervisor(
             running.path,
@@ -98,7 +98,7 @@ def _check(wanted: Config, reload: ReloadPlan) -> None:
         check_recording(reload.now, camera)
 
 
-def _keep(running: ActiveConfig, kept: Path, failing: Spell) -> None:
+def _keep(running: ActiveConfig, kept: Path, failing: LogThrottle) -> None:
     """Write down what the site runs by, for processes that begin: all of it or nothing."""
     new = kept.with_suffix(".new")
     try:
@@ -108,5 +108,5 @@ def _keep(running: ActiveConfig, kept: Path, failing: Spell) -> None:
         new.write_text(serialize_config(running.now, running.path.parent), encoding="utf-8")
         new.replace(kept)
     except OSError as error:
-        if (more := failing.happened(str(error.strerror))) is not None:
+        if (more := failing.record(str(error.strerror))) is not None:
             log.warning("%s: cannot write what is in force: %s%s", kept, error.strerror, more)

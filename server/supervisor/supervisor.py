@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.config.site_config import Config
 from server.supervisor.shutdown import EXIT_FINISHED, SUPERVISED_VARIABLE
 from server.supervisor.startup_signal import STARTED_FD_VARIABLE, open_startup_pipe
@@ -43,7 +43,7 @@ class Child:
     """By how much it yields to the supervisor, and to those that are started as the supervisor is."""
     process: asyncio.subprocess.Process | None = None
     restarts: int = 0
-    dies: Spell = field(default_factory=Spell)
+    dies: LogThrottle = field(default_factory=LogThrottle)
     started: asyncio.Event = field(default_factory=asyncio.Event)
     """It has loaded once, or had the time to."""
     done: asyncio.Event = field(default_factory=asyncio.Event)
@@ -121,7 +121,7 @@ class Supervisor:
             if loop.time() - started > _SETTLED_S:
                 pause = _RETRY_FIRST_S
             cause = _cause(code)
-            if (more := child.dies.happened(cause)) is not None:
+            if (more := child.dies.record(cause)) is not None:
                 log.warning("%s %s%s; starting it again in %.1f s", child.name, cause, more, pause)
             await asyncio.sleep(pause)
             pause = min(2 * pause, _RETRY_MAX_S)

@@ -6,7 +6,7 @@ import errno
 import logging
 
 from camsync import PulseServer
-from server.config.pulse_passwords import pulse_clients, pulse_users
+from server.config.pulse_access import pulse_clients, pulse_server_tls, pulse_users
 from server.config.running_config import ActiveConfig
 from server.supervisor.exposure_checks import check_pulses
 from server.supervisor.sighup import reloads
@@ -34,6 +34,7 @@ async def sync_process(running: ActiveConfig) -> None:
         host=sync.bind,
         port=sync.port,
         users=pulse_users(config),
+        tls=pulse_server_tls(config),
     )
     try:
         await server.start()

@@ -7,7 +7,7 @@ import errno
 import logging
 from typing import Any
 
-from camsync import Spell
+from logthrottle import LogThrottle
 
 log = logging.getLogger(__name__)
 
@@ -24,12 +24,12 @@ class AcceptErrors:
     """Logs that connections cannot be accepted: at once, then seldom, with a count."""
 
     def __init__(self) -> None:
-        self._failing = Spell()
+        self._failing = LogThrottle()
 
     def failed(self, error: OSError) -> None:
         """Note that one was not."""
         reason = error.strerror or str(error)
-        if (more := self._failing.happened(reason)) is not None:
+        if (more := self._failing.record(reason)) is not None:
             log.error("a connection cannot be accepted: %s%s", reason, more)
 
     def __call__(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:

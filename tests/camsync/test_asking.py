@@ -8,8 +8,8 @@ from contextlib import suppress
 
 import pytest
 
-from camsync import Listener, PulseServer, SyncError, clients_of
-from camsync.messages import Clients, Greeting, Pong
+from camsync import ListedClient, PulseServer, SyncError, query_clients
+from camsync.messages import ClientList, Greeting, Pong
 from camsync.protocol import MAX_SERVER_LINE, encode, parse_server_line
 from fakes.pulses import Connect
 from fakes.timeouts import PATIENCE
@@ -19,19 +19,19 @@ FPS = 50.0
 
 async def test_everybody_but_who_asks_is_named_in_the_order_of_coming(by_hand: Connect) -> None:
     async with PulseServer(FPS, expect={"c0", "c1"}) as server:
-        assert await clients_of("127.0.0.1", server.port) == ()
+        assert await query_clients("127.0.0.1", server.port) == ()
         for line in (b"HELLO 1 c0\n", b"", b"HELLO 1 bestview\n"):
             client = await by_hand(server.port)
             assert isinstance(await client.message(), Greeting)
             client.say(line + b"PING 1\n")
             while not isinstance(await client.other(), Pong):
                 pass
-        told = await clients_of("127.0.0.1", server.port)
-        assert told == (Listener("c0", 0), Listener(None, 0), Listener("bestview", 0))
+        told = await query_clients("127.0.0.1", server.port)
+        assert told == (ListedClient("c0", 0), ListedClient(None, 0), ListedClient("bestview", 0))
 
 
 async def test_a_full_server_of_long_names_can_be_asked() -> None:
-    most = Clients(tuple(Listener(f"{place:064d}", 10**6) for place in range(256)))
+    most = ClientList(tuple(ListedClient(f"{place:064d}", 10**6) for place in range(256)))
     line = encode(most)
     assert len(line) <= MAX_SERVER_LINE
     assert parse_server_line(line[:-1]) == most
@@ -42,7 +42,7 @@ async def test_where_there_is_no_server_the_error_says_so() -> None:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     with pytest.raises(SyncError, match=f"no pulse server at 127.0.0.1:{port}"):
-        await clients_of("127.0.0.1", port)
+        await query_clients("127.0.0.1", port)
 
 
 @pytest.mark.parametrize(
@@ -71,5 +71,5 @@ async def test_what_is_no_pulse_server_is_given_up(said: bytes, error: str) -> N
     async with await asyncio.start_server(answer, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
         with pytest.raises(SyncError, match=error):
-            await clients_of("127.0.0.1", port, patience=0.3 if error == "does not answer" else PATIENCE)
+            await query_clients("127.0.0.1", port, timeout_s=0.3 if error == "does not answer" else PATIENCE)
         await over.wait()

@@ -23,7 +23,7 @@ from camsync import (
     VersionError,
 )
 from camsync.clock import steady_unix_clock
-from camsync.messages import Beat, Greeting
+from camsync.messages import Greeting, PulseMessage
 from camsync.protocol import encode
 from camsync.pulse_axis import PulseAxis
 from fakes.pulses import BUSY, FPS, QUICK, JumpingClock, pretended_server, take
@@ -217,7 +217,7 @@ async def test_a_server_that_falls_silent_is_left_and_sought_again() -> None:
 
     def one_pulse() -> bytes:
         number = axis.number_at(clock())
-        beat = Beat(number, axis.due(number))
+        beat = PulseMessage(number, axis.due(number))
         return encode(Greeting(1, FPS, clock(), None)) + encode(beat)
 
     async with (

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camsync import PulseServer, ServerLimits
-from camsync.messages import Beat, Greeting, Pong, Refusal, Wait
+from camsync.messages import ErrorMessage, Greeting, Pong, PulseMessage, WaitMessage
 from camsync.protocol import parse_server_line
 from fakes.pulses import Connect, JumpingClock
 from fakes.timeouts import PATIENCE
@@ -24,7 +24,7 @@ async def test_who_says_nothing_gets_pulses_from_the_first_on(by_hand: Connect) 
         greeting = await listener.message()
         assert isinstance(greeting, Greeting)
         assert (greeting.fps, greeting.pulse) == (FPS, None)
-        assert await listener.message() == Wait(("c0",))
+        assert await listener.message() == WaitMessage(("c0",))
         (await by_hand(server.port)).say(b"HELLO 1 c0\n")
         assert [(await listener.beat()).number for _ in range(50)] == list(range(50))
 
@@ -49,14 +49,14 @@ async def test_it_begins_when_all_have_said_hello(by_hand: Connect) -> None:
     async with PulseServer(FPS, expect={"c0", "c1", "bestview"}, start_timeout=1000.0) as server:
         listener = await by_hand(server.port)
         await listener.message()
-        assert await listener.message() == Wait(("bestview", "c0", "c1"))
+        assert await listener.message() == WaitMessage(("bestview", "c0", "c1"))
         for name, missing in (
             ("c1", ("bestview", "c0")),
             ("stranger", ("bestview", "c0")),
             ("c0", ("bestview",)),
         ):
             (await by_hand(server.port)).say(f"HELLO 1 {name}\n".encode())
-            assert await listener.message() == Wait(missing)
+            assert await listener.message() == WaitMessage(missing)
         assert server.pulse is None
         (await by_hand(server.port)).say(b"HELLO 1 bestview\n")
         assert (await listener.beat()).number == 0
@@ -69,9 +69,9 @@ async def test_who_leaves_before_the_beginning_is_waited_for_again(by_hand: Conn
         await listener.message()
         gone = await by_hand(server.port)
         gone.say(b"HELLO 1 c0\n")
-        assert await listener.message() == Wait(("c1",))
+        assert await listener.message() == WaitMessage(("c1",))
         gone.writer.transport.abort()
-        assert await listener.message() == Wait(("c0", "c1"))
+        assert await listener.message() == WaitMessage(("c0", "c1"))
 
 
 async def test_it_begins_without_the_missing_after_the_timeout(
@@ -123,7 +123,7 @@ async def test_a_wrong_line_is_answered_and_the_pulses_go_on(by_hand: Connect) -
         await client.message()
         client.say(b"GET / HTTP/1.1\nHELLO 9 c0\nHELLO 1 c0\nHELLO 1 c1\n")
         codes = [await client.other() for _ in range(3)]
-        assert [error.code for error in codes if isinstance(error, Refusal)] == [
+        assert [error.code for error in codes if isinstance(error, ErrorMessage)] == [
             "malformed",
             "version",
             "malformed",
@@ -273,7 +273,7 @@ async def _disturb(pieces: list[bytes]) -> None:
         for line in said[0].splitlines() if isinstance(said[0], bytes) else ():
             assert parse_server_line(line) is not None
         beats = [parse_server_line((await quiet.readline())[:-1]) for _ in range(6)]
-        numbers = [message.number for message in beats if isinstance(message, Beat)]
+        numbers = [message.number for message in beats if isinstance(message, PulseMessage)]
         assert numbers == list(range(numbers[0], numbers[0] + 5))
         for writer in (quiet_out, loud_out):
             writer.transport.abort()

@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camsync import ClientSettings, Login, PulseClient, PulseServer, ServerLimits, SyncError
-from camsync.claims import Claims
-from camsync.messages import Hello, Known, Pong
-from camsync.proof import Proof
-from camsync.protocol import LAST_PULSE, ProtocolError, parse_client_line, parse_server_line
+from camsync import ClientSettings, Credentials, PulseClient, PulseServer, ServerLimits, SyncError
+from camsync.axis_claims import AxisClaims
+from camsync.messages import CountedPulse, Hello, LoginMessage, LoginRequest, Pong
+from camsync.protocol import LAST_PULSE, ProtocolError, encode, parse_client_line, parse_server_line
 from camsync.pulse_axis import PulseAxis
 from fakes.pulses import BUSY, ByHand, Connect
 from fakes.timeouts import PATIENCE
@@ -32,28 +31,25 @@ QUICK = ClientSettings(backoff_first=0.01, backoff_most=0.05, queue=100_000)
 class Liar:
     """A user that says anything."""
 
-    def __init__(self, connection: ByHand, proof: Proof) -> None:
-        self._connection, self._proof = connection, proof
+    def __init__(self, connection: ByHand) -> None:
+        self._connection = connection
 
     async def says(self, line: str) -> None:
         """Say a line, and wait until it was heard."""
-        self._connection.say(self._proof.sealed(f"{line}\nPING 1\n".encode()))
-        while not isinstance(await self._message(), Pong):
+        self._connection.say(f"{line}\nPING 1\n".encode())
+        while not isinstance(await self._connection.message(), Pong):
             pass
-
-    async def _message(self) -> object:
-        return parse_server_line(self._proof.opened((await self._connection.line()).rstrip()))
 
 
 async def come(connect: Connect, port: int, user: str) -> Liar:
     connection = await connect(port)
-    proof = Proof(Login(user, USERS[user]))
-    connection.say(proof.proven(await connection.message()))
-    return Liar(connection, proof)
+    assert isinstance(await connection.message(), LoginRequest)
+    connection.say(encode(LoginMessage(user, USERS[user])))
+    return Liar(connection)
 
 
 def client_of(port: int, name: str) -> PulseClient:
-    return PulseClient(HERE, port, name, settings=QUICK, login=Login(name, USERS[name]))
+    return PulseClient(HERE, port, name, settings=QUICK, credentials=Credentials(name, USERS[name]))
 
 
 async def counted(client: PulseClient, count: int) -> list[int]:
@@ -127,7 +123,7 @@ async def test_a_camera_that_says_it_has_counted_little_holds_nobody_back(by_han
 async def test_one_who_alone_remembers_a_count_begins_anew_with_the_others() -> None:
     """Whether it lies nobody knows; it is told so, and can start anew."""
     settings = ClientSettings(backoff_first=0.01, backoff_most=0.05, ahead_most=0.1, settle=0.05)
-    alone = PulseClient(HERE, 1, "c0", settings=settings, login=Login("c0", USERS["c0"]))
+    alone = PulseClient(HERE, 1, "c0", settings=settings, credentials=Credentials("c0", USERS["c0"]))
     alone._follower.heard(10**6, alone.now())
     async with PulseServer(FPS, expect=NAMES, start_timeout=0.0, users=USERS) as server:
         alone._port = server.port
@@ -140,9 +136,9 @@ async def test_one_who_alone_remembers_a_count_begins_anew_with_the_others() -> 
 def agreed(counts: Sequence[int | None], expect: int, *, at: int | None = None) -> int | None:
     """Return where claims lead, by name c0, c1, …: None claims nothing; a server ``at`` a pulse has begun."""
     names = [f"c{number}" for number in range(len(counts))]
-    claims = Claims(1.0, [f"c{number}" for number in range(expect)], ServerLimits(), lambda: 0.0)
+    claims = AxisClaims(1.0, [f"c{number}" for number in range(expect)], ServerLimits(), lambda: 0.0)
     for name, count in zip(names, counts, strict=True):
-        claims.note(Hello(name, None if count is None else Known(count, 0.0)))
+        claims.note(Hello(name, None if count is None else CountedPulse(count, 0.0)))
     claims.keep(names)
     axis = claims.agreed(None if at is None else PulseAxis.through(at, 0.0, 1.0))
     return None if axis is None else axis.number_at(0.0)

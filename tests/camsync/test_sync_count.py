@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camsync.clock_offset import ClockOffset
-from camsync.follower import Follower
 from camsync.pulse_axis import PulseAxis
+from camsync.pulse_counter import PulseCounter
 
 rates = st.sampled_from([1.0, 12.5, 25.0, 30000 / 1001, 60.0, 500.0])
 epochs = st.floats(1.7e9, 1.9e9)
@@ -39,7 +39,7 @@ happenings = st.lists(st.integers(0, 400) | st.floats(0.0, 3.0), max_size=40)
 @settings(deadline=None, max_examples=60)
 @given(rates, happenings)
 def test_numbers_only_rise_whatever_happens(fps: float, what: list[int | float]) -> None:
-    follower = Follower(fps, catch_up=0.5)
+    follower = PulseCounter(fps, catch_up=0.5)
     now = 1.7e9
     numbers: list[int] = []
     for event in what:
@@ -56,7 +56,7 @@ def test_numbers_only_rise_whatever_happens(fps: float, what: list[int | float])
 @settings(deadline=None, max_examples=60)
 @given(rates, st.integers(0, 10**6), st.integers(1, 200))
 def test_counting_alone_goes_on_at_the_rate_of_the_server(fps: float, number: int, more: int) -> None:
-    follower = Follower(fps, catch_up=1000.0)
+    follower = PulseCounter(fps, catch_up=1000.0)
     assert follower.heard(number, 1.8e9)
     own = list(follower.own(1.8e9 + (more + 0.5) / fps))
     assert [number for number, _ in own] == list(range(number + 1, number + more + 1))
@@ -65,7 +65,7 @@ def test_counting_alone_goes_on_at_the_rate_of_the_server(fps: float, number: in
 
 
 def test_a_stalled_client_skips_to_the_present_instead_of_making_up_for_hours() -> None:
-    follower = Follower(25.0, catch_up=0.5)
+    follower = PulseCounter(25.0, catch_up=0.5)
     follower.heard(10, 1000.0)
     assert [number for number, _ in follower.own(1000.0 + 3600.0)] == [10 + 3600 * 25]
 
@@ -73,7 +73,7 @@ def test_a_stalled_client_skips_to_the_present_instead_of_making_up_for_hours() 
 @settings(deadline=None, max_examples=60)
 @given(rates, st.integers(0, 10**6), st.integers(1, 300))
 def test_a_short_gap_is_made_good_and_a_long_one_is_not(fps: float, last: int, ahead: int) -> None:
-    follower = Follower(fps, catch_up=0.5)
+    follower = PulseCounter(fps, catch_up=0.5)
     follower.heard(last, 1.8e9)
     number = last + ahead
     made = list(follower.gap(number, 1.8e9 + ahead / fps))
@@ -84,14 +84,14 @@ def test_a_short_gap_is_made_good_and_a_long_one_is_not(fps: float, last: int, a
 
 
 def test_who_never_heard_a_pulse_counts_nothing() -> None:
-    follower = Follower(25.0, catch_up=0.5)
+    follower = PulseCounter(25.0, catch_up=0.5)
     assert list(follower.own(1e9)) == []
     assert follower.known(1e9) is None
     assert follower.next_due() is None
 
 
 def test_a_new_rate_holds_from_the_last_pulse_on() -> None:
-    follower = Follower(25.0, catch_up=10.0)
+    follower = PulseCounter(25.0, catch_up=10.0)
     follower.heard(100, 1000.0)
     follower.set_rate(50.0)
     assert follower.next_due() == pytest.approx(1000.02)

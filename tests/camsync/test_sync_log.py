@@ -8,7 +8,7 @@ import pytest
 
 from camsync import PulseClient, PulseServer
 from camsync.clock import steady_unix_clock
-from camsync.messages import Beat, Greeting, Pong
+from camsync.messages import Greeting, Pong, PulseMessage
 from camsync.protocol import encode
 from camsync.pulse_axis import PulseAxis
 from fakes.pulses import FPS, QUICK, Connect, JumpingClock, pretended_server, take
@@ -24,7 +24,7 @@ async def test_a_server_that_comes_and_goes_is_not_told_of_each_time(
 
     def one_pulse() -> bytes:
         number = axis.number_at(clock())
-        return encode(Greeting(1, FPS, clock(), None)) + encode(Beat(number, axis.due(number)))
+        return encode(Greeting(1, FPS, clock(), None)) + encode(PulseMessage(number, axis.due(number)))
 
     async with (
         pretended_server(one_pulse) as (port, _),
@@ -34,7 +34,7 @@ async def test_a_server_that_comes_and_goes_is_not_told_of_each_time(
             await take(client, 1)
     there, away, back = caplog.messages
     assert there.endswith(f": {FPS:g} pulses per second")
-    assert away.endswith(" is away: nothing heard for 0.3 seconds")
+    assert away.endswith(" is away: nothing received for 0.3 seconds")
     assert f": {FPS:g} pulses per second, after " in back
 
 
@@ -47,7 +47,7 @@ async def test_who_says_hello_again_and_again_has_come_once(
         client.say(b"HELLO 1 c0\n" * 10 + b"PING 1\n")
         while not isinstance(await client.message(), Pong):
             pass
-    assert caplog.messages == ["c0 is here"]
+    assert caplog.messages == ["c0 connected"]
 
 
 async def test_who_claims_too_much_again_and_again_is_told_of_once(

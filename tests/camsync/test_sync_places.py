@@ -8,11 +8,10 @@ import socket
 
 import pytest
 
-from camsync import ClientSettings, Login, PulseClient, PulseServer, ServerLimits, clients_of
-from camsync.client_eviction import who_makes_room
-from camsync.messages import Challenge, Greeting, Pong
-from camsync.proof import Proof
-from camsync.protocol import parse_server_line
+from camsync import ClientSettings, Credentials, PulseClient, PulseServer, ServerLimits, query_clients
+from camsync.limits import select_evicted
+from camsync.messages import Greeting, LoginMessage, LoginRequest, Pong
+from camsync.protocol import encode
 from fakes.pulses import ByHand, Connect
 from fakes.timeouts import PATIENCE
 
@@ -24,21 +23,21 @@ MANY = 300
 """More connections than a server has places."""
 
 
-async def proven(connect: Connect, port: int, user: str, *, hello: bool = False) -> tuple[ByHand, Proof]:
-    """Come as a user, by hand, and wait until the server has let them in."""
+async def logged_in(connect: Connect, port: int, user: str, *, hello: bool = False) -> ByHand:
+    """Log in by hand, and wait for the greeting."""
     client = await connect(port)
-    proof = Proof(Login(user, USERS[user]))
-    client.say(proof.proven(await client.message()))
-    if hello:
-        client.say(proof.sealed(f"HELLO 1 {user}\n".encode()))
-    greeting = parse_server_line(proof.opened((await client.line()).rstrip()))
-    assert isinstance(greeting, Greeting)
-    return client, proof
+    assert isinstance(await client.message(), LoginRequest)
+    client.say(encode(LoginMessage(user, USERS[user])) + (f"HELLO 1 {user}\n".encode() if hello else b""))
+    assert isinstance(await client.message(), Greeting)
+    return client
 
 
-async def first_pulses(port: int, name: str, login: Login | None = None) -> None:
+async def first_pulses(port: int, name: str, credentials: Credentials | None = None) -> None:
     """Come as somebody who follows pulses, and get some."""
-    async with asyncio.timeout(PATIENCE), PulseClient(HERE, port, name, settings=PATIENT, login=login) as it:
+    async with (
+        asyncio.timeout(PATIENCE),
+        PulseClient(HERE, port, name, settings=PATIENT, credentials=credentials) as it,
+    ):
         for _ in range(3):
             await anext(it)
         assert it.status().connected
@@ -52,10 +51,10 @@ async def test_one_login_that_comes_again_and_again_keeps_nobody_else_out(by_han
     limits = ServerLimits(clients=16, login_places=3, catch_up=PATIENCE)
     async with PulseServer(FPS, users=USERS, limits=limits) as server:
         for _ in range(40):
-            await proven(by_hand, server.port, "c0")
+            await logged_in(by_hand, server.port, "c0")
         assert len(server.clients()) == 3
         for user, password in USERS.items():
-            await first_pulses(server.port, user, Login(user, password))
+            await first_pulses(server.port, user, Credentials(user, password))
 
 
 async def test_one_login_with_more_connections_than_there_are_places_keeps_nobody_out(
@@ -64,31 +63,31 @@ async def test_one_login_with_more_connections_than_there_are_places_keeps_nobod
     """By what a server has unless it is told otherwise."""
     async with PulseServer(FPS, users=USERS) as server:
         for _ in range(MANY):
-            await proven(by_hand, server.port, "c0")
-        await first_pulses(server.port, "c1", Login("c1", USERS["c1"]))
+            await logged_in(by_hand, server.port, "c0")
+        await first_pulses(server.port, "c1", Credentials("c1", USERS["c1"]))
         assert len(server.clients()) < 20
 
 
 async def test_who_follows_under_a_login_stays_when_it_comes_again_to_ask(by_hand: Connect) -> None:
     limits = ServerLimits(login_places=2, catch_up=PATIENCE)
     async with PulseServer(FPS, users=USERS, limits=limits) as server:
-        follows, proof = await proven(by_hand, server.port, "c0", hello=True)
-        crowd = [(await proven(by_hand, server.port, "c0"))[0] for _ in range(5)]
+        follows = await logged_in(by_hand, server.port, "c0", hello=True)
+        crowd = [await logged_in(by_hand, server.port, "c0") for _ in range(5)]
         for it in crowd[:3]:
             assert b"ERROR full " in await it.ended(), "the oldest make room"
         assert named(server) == ["c0", None, None]
-        follows.say(proof.sealed(b"PING 1\n"))
-        while not isinstance(parse_server_line(proof.opened((await follows.line()).rstrip())), Pong):
+        follows.say(b"PING 1\n")
+        while not isinstance(await follows.message(), Pong):
             pass
-        others = await clients_of(HERE, server.port, PATIENCE, Login("c0", USERS["c0"]))
+        others = await query_clients(HERE, server.port, PATIENCE, credentials=Credentials("c0", USERS["c0"]))
         assert others[0].name == "c0"
 
 
 async def test_a_second_of_a_login_that_follows_takes_the_place_of_the_first(by_hand: Connect) -> None:
     async with PulseServer(FPS, users=USERS) as server:
-        older, _ = await proven(by_hand, server.port, "c0", hello=True)
-        await proven(by_hand, server.port, "c0", hello=True)
-        assert b"ERROR replaced another c0 has come" in await older.ended()
+        older = await logged_in(by_hand, server.port, "c0", hello=True)
+        await logged_in(by_hand, server.port, "c0", hello=True)
+        assert b"ERROR replaced another c0 has connected" in await older.ended()
         assert named(server).count("c0") == 1
 
 
@@ -96,9 +95,9 @@ async def test_a_place_is_kept_for_every_user_however_many_others_there_are(by_h
     limits = ServerLimits(clients=2, login_places=1, catch_up=PATIENCE)
     async with PulseServer(FPS, users=USERS, limits=limits) as server:
         for user in USERS:
-            await proven(by_hand, server.port, user, hello=True)
+            await logged_in(by_hand, server.port, user, hello=True)
         for user in USERS:
-            await proven(by_hand, server.port, user)
+            await logged_in(by_hand, server.port, user)
         assert sorted(it for it in named(server) if it) == sorted(USERS)
 
 
@@ -150,18 +149,17 @@ async def test_a_crowd_takes_no_place_of_another_address(by_hand: Connect, elsew
         await alone.beat()
 
 
-async def test_strangers_in_masses_take_no_place_at_the_door_of_another_address(
+async def test_very_many_pending_logins_evict_none_of_another_address(
     by_hand: Connect, elsewhere: str
 ) -> None:
-    limits = ServerLimits(strangers=3, prove_within=1000.0)
+    limits = ServerLimits(pending_logins=3, login_within=1000.0)
     async with PulseServer(FPS, users=USERS, limits=limits) as server:
         slow = await by_hand(server.port, source=elsewhere)
-        challenge = await slow.message()
+        assert isinstance(await slow.message(), LoginRequest)
         for _ in range(10):
-            assert isinstance(await (await by_hand(server.port)).message(), Challenge)
-        proof = Proof(Login("c0", USERS["c0"]))
-        slow.say(proof.proven(challenge))
-        assert isinstance(parse_server_line(proof.opened((await slow.line()).rstrip())), Greeting)
+            assert isinstance(await (await by_hand(server.port)).message(), LoginRequest)
+        slow.say(encode(LoginMessage("c0", USERS["c0"])))
+        assert isinstance(await slow.message(), Greeting)
 
 
 class Somebody:
@@ -171,11 +169,11 @@ class Somebody:
         self.origin = origin
 
 
-def test_who_makes_room_is_the_oldest_of_those_who_have_most() -> None:
+def test_the_oldest_of_the_busiest_origin_is_evicted() -> None:
     there = [Somebody(it) for it in "abbcbaa"]
-    assert who_makes_room(there) is there[0]
-    assert who_makes_room(there[:-1]) is there[1]
-    assert who_makes_room(there[3:4]) is there[3]
+    assert select_evicted(there) is there[0]
+    assert select_evicted(there[:-1]) is there[1]
+    assert select_evicted(there[3:4]) is there[3]
 
 
 async def test_two_of_one_name_that_replace_each_other_are_few_lines_of_the_log(
@@ -184,12 +182,12 @@ async def test_two_of_one_name_that_replace_each_other_are_few_lines_of_the_log(
     caplog.set_level(logging.INFO, "camsync")
     async with PulseServer(FPS, users=USERS) as server:
         for _ in range(30):
-            await proven(by_hand, server.port, "c0", hello=True)
+            await logged_in(by_hand, server.port, "c0", hello=True)
         while named(server).count("c0") != 1 or len(named(server)) != 1:  # noqa: ASYNC110
             await asyncio.sleep(0.01)
     assert len(caplog.messages) == 2
-    assert caplog.messages[0] == "c0 is here"
-    assert caplog.messages[1].startswith("another c0 is here, from 127.0.0.1:")
+    assert caplog.messages[0] == "c0 connected"
+    assert caplog.messages[1].startswith("another c0 connected from 127.0.0.1:")
 
 
 async def test_every_expected_name_that_comes_is_a_line_of_the_log(
@@ -201,7 +199,7 @@ async def test_every_expected_name_that_comes_is_a_line_of_the_log(
         for name in names:
             (await by_hand(server.port)).say(f"HELLO 1 {name}\n".encode())
         await server.wait_begun()
-    assert sorted(caplog.messages) == sorted(f"{name} is here" for name in names)
+    assert sorted(caplog.messages) == sorted(f"{name} connected" for name in names)
 
 
 async def test_names_that_nobody_expects_are_few_lines_of_the_log(
@@ -214,4 +212,4 @@ async def test_names_that_nobody_expects_are_few_lines_of_the_log(
             stranger.say(f"HELLO 1 x{number}\nPING 1\n".encode())
             while not isinstance(await stranger.message(), Pong):
                 pass
-    assert sum(it.endswith(" is here") for it in caplog.messages) == 8
+    assert sum(it.endswith(" connected") for it in caplog.messages) == 8

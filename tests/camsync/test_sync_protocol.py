@@ -10,19 +10,19 @@ from hypothesis import strategies as st
 
 from camsync.lines import LineBuffer, OverlongLineError, RateLimit
 from camsync.messages import (
-    Beat,
     ClientLine,
-    Clients,
+    ClientList,
+    ClientsRequest,
+    CountedPulse,
+    ErrorMessage,
     Greeting,
     Hello,
-    Known,
-    Listener,
+    ListedClient,
     Ping,
     Pong,
-    Refusal,
+    PulseMessage,
     ServerLine,
-    Wait,
-    Who,
+    WaitMessage,
 )
 from camsync.protocol import MAX_LINE, ProtocolError, encode, is_name, parse_client_line, parse_server_line
 
@@ -33,20 +33,20 @@ times = st.integers(-(10**15), 10**15).map(lambda micro: micro / 1e6)
 spans = st.integers(0, 10**12).map(lambda micro: micro / 1e6)
 rates = st.floats(0.01, 10_000).map(lambda fps: float(f"{fps:.12f}"))
 client_lines = st.one_of(
-    st.builds(Hello, names, st.none() | st.builds(Known, numbers, spans)),
+    st.builds(Hello, names, st.none() | st.builds(CountedPulse, numbers, spans)),
     st.builds(Ping, times),
-    st.just(Who()),
+    st.just(ClientsRequest()),
 )
 server_lines = st.one_of(
     st.builds(Greeting, st.just(1), rates, times, st.none() | numbers),
-    st.builds(Wait, st.lists(names, min_size=1, max_size=5).map(tuple)),
-    st.builds(Beat, numbers, times),
+    st.builds(WaitMessage, st.lists(names, min_size=1, max_size=5).map(tuple)),
+    st.builds(PulseMessage, numbers, times),
     st.builds(Pong, times, times),
     st.builds(
-        Clients,
-        st.lists(st.builds(Listener, st.none() | names, st.integers(0, 10**6)), max_size=5).map(tuple),
+        ClientList,
+        st.lists(st.builds(ListedClient, st.none() | names, st.integers(0, 10**6)), max_size=5).map(tuple),
     ),
-    st.builds(Refusal, st.just("malformed"), st.just("two words")),
+    st.builds(ErrorMessage, st.just("malformed"), st.just("two words")),
 )
 
 
@@ -89,9 +89,9 @@ def test_the_answer_to_any_bytes_is_one_readable_line(line: bytes) -> None:
     try:
         parse_client_line(line)
     except ProtocolError as error:
-        answer = encode(Refusal(error.code, str(error)))
+        answer = encode(ErrorMessage(error.code, str(error)))
         assert answer.decode("ascii").rstrip("\n").isprintable()
-        assert isinstance(parse_server_line(answer[:-1]), Refusal)
+        assert isinstance(parse_server_line(answer[:-1]), ErrorMessage)
 
 
 @pytest.mark.parametrize(

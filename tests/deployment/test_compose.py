@@ -126,7 +126,7 @@ def test_each_service_has_its_own_secrets_alone() -> None:
         for name, service in services.items()
     }
     assert used["bestview"] == ["bus", "router_key"]
-    assert used["sync"] == ["pulses"]
+    assert used["sync"] == ["pulses", "sync_key"]
     for camera in load_config(ROOT / "configs" / "demo.yaml").camera_ids:
         assert used[camera] == [f"{camera}_bus", f"{camera}_pulses", f"{camera}_token"]
     assert sorted(secrets) == sorted(source for sources in used.values() for source in sources)
@@ -143,6 +143,8 @@ def test_the_secure_site_trusts_nobody_by_where_they_are(monkeypatch: pytest.Mon
         assert not config.access.open_to_all
         assert not config.access.trusted_network
         assert config.sync.users == Path("/run/web/pulses" if name == "bestview" else SECRETS + "pulses")
+        assert config.sync.tls.authority == Path("/run/public/authority.pem")
+        assert (config.sync.tls.key is not None) == (name == "sync")
         assert config.zenoh.connect.startswith("tls/")
         assert config.zenoh.listen.startswith("tls/")
         assert config.zenoh.users == Path(SECRETS + "bus")

@@ -103,7 +103,7 @@ async def test_who_waits_for_others_ends_when_told(tmp_path: Path) -> None:
     config, content = site(tmp_path, SCENE, SCENE)
     async with asyncio.timeout(PATIENCE):
         sync, bestview = await asyncio.gather(
-            start("sync", config, until="bestview is here"), start("bestview", config, until="pulse server")
+            start("sync", config, until="bestview connected"), start("bestview", config, until="pulse server")
         )
         async with aiohttp.ClientSession(f"http://127.0.0.1:{content['http']['port']}") as session:
             readers = [

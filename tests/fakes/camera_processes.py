@@ -8,7 +8,7 @@ from pathlib import Path
 from camsync import PulseServer, ServerLimits
 from fakes.timeouts import PATIENCE
 from server.camera.process import CameraProcess
-from server.config.pulse_passwords import pulse_users
+from server.config.pulse_access import pulse_users
 from server.config.site_config import Config
 from server.messaging.messages import pulse_client
 from server.service.service import BestViewService

@@ -14,7 +14,7 @@ from camsync import (
     PulseClient,
 )
 from camsync.clock import Clock, steady_unix_clock
-from camsync.messages import Beat, ServerLine
+from camsync.messages import PulseMessage, ServerLine
 from camsync.protocol import parse_server_line
 from fakes.timeouts import PATIENCE
 
@@ -38,17 +38,17 @@ class ByHand:
         assert line.endswith(b"\n"), f"the server hung up after {line!r}"
         return parse_server_line(line.removesuffix(b"\n"))
 
-    async def beat(self) -> Beat:
+    async def beat(self) -> PulseMessage:
         while True:
             message = await self.message()
-            if isinstance(message, Beat):
+            if isinstance(message, PulseMessage):
                 return message
 
     async def other(self) -> ServerLine | None:
         """Give the next message that is no pulse."""
         while True:
             message = await self.message()
-            if not isinstance(message, Beat):
+            if not isinstance(message, PulseMessage):
                 return message
 
     async def ended(self) -> bytes:

@@ -14,9 +14,9 @@ from benchmarks.fuzz.__main__ import PARTS, side_by_side, targets_of
 from benchmarks.fuzz.http_strangers import SECRETS, Strangers
 from benchmarks.fuzz.run import Attempt, Crash, Plan, Runner, numbered
 from benchmarks.fuzz.target import Scripts, Target, UnclearError, refused
-from camsync import door, proof
 from server.http.access import access_control
 from server.http.access.grants import Need
+from server.service.calibration import floor_plan
 
 SECONDS = 0.25
 INPUTS = 1000
@@ -204,10 +204,10 @@ def test_a_refusal_that_nobody_can_read_is_none(text: str) -> None:
 @pytest.mark.parametrize("target", ALL, ids=[it.name for it in ALL])
 def test_it_leaves_everything_else_as_it_was(target: type[Target]) -> None:
     """Two at once, and the first ended first: what they foresee or hide must not outlive them."""
-    before = dict(os.environ), dict(vars(door)), dict(vars(proof))
+    before = dict(os.environ), dict(vars(floor_plan))
     one, other = target(), target()
     for it in (one, other):
         it.hand_over(numbered(it, 1, 0))
     one.close()
     other.close()
-    assert (dict(os.environ), dict(vars(door)), dict(vars(proof))) == before
+    assert (dict(os.environ), dict(vars(floor_plan))) == before

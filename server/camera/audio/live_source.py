@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from av.audio.stream import AudioStream
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.camera.audio.frames import Frame, Packet, Way
 from server.camera.audio.selection import way_for
 from server.config.sections import SoundSettings
@@ -50,16 +50,16 @@ class LiveSound:
         self._frames: deque[Frame] = deque(maxlen=round(_WAITING_S * form.rate / form.samples))
         self._way: Way | None = None
         self._last = -1
-        self._silent = Spell(calm=0.0)
+        self._silent = LogThrottle(quiet_s=0.0)
 
     def opened(self, stream: AudioStream | None) -> None:
         """Begin with a connection."""
         self._way = None
         if stream is None:
-            if (more := self._silent.happened()) is not None:
+            if (more := self._silent.record()) is not None:
                 log.warning("there is no sound in what the camera sends%s; the site is silent", more)
         else:
-            if self._silent.over():
+            if self._silent.end():
                 log.info("there is sound again in what the camera sends")
             self._way = way_for(stream, self._form, self._kbps)
 

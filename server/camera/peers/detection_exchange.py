@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.camera.peers.cross_view_scorer import Heard, Witness
 from server.camera.peers.detection_buffer import Earshot
 from server.config.site_config import Config
@@ -46,9 +46,9 @@ class Exchange:
         self._opening: asyncio.Task[Bus] | None = None
         self._bus: Bus | None = None
         self._told = False
-        self._waits = Spell(calm=0.0)
-        self._late: dict[str, Spell] = defaultdict(Spell)
-        self._bad: dict[str, Spell] = defaultdict(Spell)
+        self._waits = LogThrottle(quiet_s=0.0)
+        self._late: dict[str, LogThrottle] = defaultdict(LogThrottle)
+        self._bad: dict[str, LogThrottle] = defaultdict(LogThrottle)
         self.bad_messages = 0
         """Messages of the others that were none."""
 
@@ -83,10 +83,10 @@ class Exchange:
                 bus = await asyncio.shield(self._opening)
                 break
             except UserError as problem:
-                if (more := self._waits.happened(str(problem))) is not None:
+                if (more := self._waits.record(str(problem))) is not None:
                     log.info("camera %s: cannot hear the others yet: %s%s", self._camera, problem, more)
                 await asyncio.sleep(_AGAIN_S)
-        if self._waits.over():
+        if self._waits.end():
             log.info("camera %s: hears the others", self._camera)
         for other in self._others:
             self._listen(bus, other)
@@ -120,13 +120,13 @@ class Exchange:
         return heard
 
     def _tell_late(self, camera: str, pulse: int) -> None:
-        more = self._late[camera].happened()
+        more = self._late[camera].record()
         if more is not None:
             told = "camera %s: what %s found in frame %d came too late%s"
             log.info(told, self._camera, camera, pulse, more)
 
     def _tell_in_time(self, camera: str) -> None:
-        if self._late[camera].over():
+        if self._late[camera].end():
             log.info("camera %s: what %s finds comes in time again", self._camera, camera)
 
     async def end(self, word: FrameDetections | None) -> None:
@@ -170,13 +170,13 @@ class Exchange:
                 raise msgspec.ValidationError("it is another camera's")
         except DECODE_ERRORS as problem:
             self.bad_messages += 1
-            if (more := self._bad[other].happened(str(problem))) is not None:
+            if (more := self._bad[other].record(str(problem))) is not None:
                 told = "camera %s: a message on %s is none: %s%s"
                 log.warning(told, self._camera, message.key, problem, more)
             return None
-        if ended := self._bad[other].over():
+        if ended := self._bad[other].end():
             told = "camera %s: what %s says is understood again; %d messages were not"
-            log.info(told, self._camera, other, ended.times)
+            log.info(told, self._camera, other, ended.count)
         return word
 
     def _alive(self, key: str, there: bool) -> None:

@@ -14,7 +14,7 @@ from av.audio.stream import AudioStream
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.camera.audio import LiveSound
 from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, no_answer, open_video
@@ -58,7 +58,7 @@ class Stream:
         self._newest_at = 0.0
         self._silence = _Silence()
         self._closing = threading.Event()
-        self._away = Spell(calm=0.0)
+        self._away = LogThrottle(quiet_s=0.0)
         self._thread = threading.Thread(target=self._run, args=(opened,), name="source", daemon=True)
         self._thread.start()
         self._sized.wait(_FIRST_S)
@@ -136,11 +136,11 @@ class Stream:
 
     def _lost(self, why: str, *, mistake: bool = False) -> None:
         """Say that the camera is away; one that comes and goes, or stays away, is not told of each time."""
-        if (more := self._away.happened(why)) is not None:
+        if (more := self._away.record(why)) is not None:
             log.warning("%s%s; it is tried again", why, more, exc_info=mistake)
 
     def _back(self) -> None:
-        if ended := self._away.over():
+        if ended := self._away.end():
             log.info("%s: pictures come again, after %.0f s", redact_address(self._url), ended.seconds)
 
     def _read_alive(self, opened: Opened) -> bool:

@@ -7,11 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
+from camsync.protocol import is_password
 from server.cli.doctor.certificates import authority_finding, certificate_finding, router_finding
 from server.cli.doctor.findings import Finding, bad, ok, report_failure, warning
 from server.cli.doctor.reachability import host_and_port
 from server.config.password_file import read_users
-from server.config.pulse_passwords import SETTING, SHORTEST, pulse_clients
+from server.config.pulse_access import SETTING, pulse_clients
+from server.config.sections import ProcessTlsSettings
 from server.config.site_config import Config
 from server.config.tokens_file import read_tokens
 from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers
@@ -34,7 +36,9 @@ def _checks(config: Config) -> Iterator[tuple[str, Callable[[], list[Finding]]]]
     yield "access.tokens", lambda: _tokens(config)
     yield "ground", lambda: [_ground(config)]
     yield "http.tls", lambda: _pair("http.tls", config.http.tls.certificate, config.http.tls.key)
-    yield "zenoh.tls", lambda: _bus(config)
+    yield "sync.tls", lambda: _process_tls("sync.tls", config.sync.tls, config.sync.host)
+    there = host_and_port(config.zenoh.connect)
+    yield "zenoh.tls", lambda: _process_tls("zenoh.tls", config.zenoh.tls, there and there[0])
     if config.sync.users is not None:
         yield SETTING, partial(_users, SETTING, config.sync.users, pulse_clients(config))
     if config.zenoh.users is not None:
@@ -50,14 +54,13 @@ def _pair(check: str, certificate: Path | None, key: Path | None) -> list[Findin
     return [certificate_finding(check, certificate, key), *_private(f"{check}.key", key)]
 
 
-def _bus(config: Config) -> list[Finding]:
-    tls, there = config.zenoh.tls, host_and_port(config.zenoh.connect)
-    found = _pair("zenoh.tls", tls.certificate, tls.key)
+def _process_tls(check: str, tls: ProcessTlsSettings, host: str | None) -> list[Finding]:
+    found = _pair(check, tls.certificate, tls.key)
     if tls.authority is None:
         return found
-    found.append(authority_finding("zenoh.tls", tls.authority))
-    if tls.certificate is not None and tls.key is not None and there is not None:
-        refused = router_finding("zenoh.tls", tls.certificate, tls.key, tls.authority, there[0])
+    found.append(authority_finding(check, tls.authority))
+    if tls.certificate is not None and tls.key is not None and host is not None:
+        refused = router_finding(check, tls.certificate, tls.key, tls.authority, host)
         found += [] if refused is None else [refused]
     return found
 
@@ -100,13 +103,13 @@ def _users(check: str, path: Path, names: Sequence[str]) -> list[Finding]:
     except UserError as error:
         return [bad(check, str(error).removeprefix(f"{check}: "), _LINES)]
     missing = [it for it in names if it not in users]
-    short = [name for name, password in users.items() if len(password) < SHORTEST]
     found = [ok(check, f"{path}: {len(users)} users")]
     if missing:
         do = "a line for each, where the server runs; a camera's machine needs its own alone"
         found = [warning(check, f"{path} has no line for {', '.join(missing)}", do)]
-    if short and check == SETTING:
-        text = f"{path}: less than {SHORTEST} characters are the passwords of {', '.join(short)}"
+    wrong = [name for name, password in users.items() if check == SETTING and not is_password(password)]
+    if wrong:
+        text = f"{path}: the passwords of {', '.join(wrong)} have spaces, or more than 128 characters"
         found = [bad(check, text, "`openssl rand -hex 32` makes one")]
     return found + _private(check, path)
 

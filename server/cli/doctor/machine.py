@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import ssl
 import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from camsync.messages import Challenge, Greeting
+from camsync.messages import Greeting, LoginRequest
 from camsync.protocol import ProtocolError, parse_server_line
 from server.cli.doctor.camera_probe import CameraProbe
 from server.cli.doctor.findings import Finding, ok, warning
+from server.config.pulse_access import pulse_client_tls
 from server.config.site_config import Config
 from server.system.clock_sync import is_clock_synchronized
 from server.system.descriptors import connection_limit
@@ -29,7 +31,7 @@ _PROCESS_MB = 250
 async def clock_findings(config: Config) -> list[Finding]:
     """Say whether somebody keeps this machine's clock, and how far it is from the pulse server's."""
     found = [_kept(config)]
-    offset = await _offset(config.sync.host, config.sync.port)
+    offset = await _offset(config.sync.host, config.sync.port, pulse_client_tls(config))
     if offset is None:
         found.append(ok("pulse server", "is not running: its clock cannot be compared"))
     elif abs(offset) > _FAR_S:
@@ -108,15 +110,15 @@ def _kept(config: Config) -> Finding:
     return warning("clock", text, do)
 
 
-async def _offset(host: str, port: int) -> float | None:
-    """Give the pulse server's clock minus ours by its greeting; None: it does not greet."""
+async def _offset(host: str, port: int, tls: ssl.SSLContext | None) -> float | None:
+    """Return the pulse server's clock minus ours, in seconds, by its first line; None where none comes."""
     try:
         async with asyncio.timeout(_ANSWER_S):
             asked = time.time()
-            reader, writer = await asyncio.open_connection(host, port)
+            reader, writer = await asyncio.open_connection(host, port, ssl=tls)
             line = await reader.readline()
             writer.close()
             said = parse_server_line(line.rstrip(b"\r\n"))
     except (OSError, TimeoutError, ProtocolError, ValueError):
         return None
-    return said.now - (asked + time.time()) / 2 if isinstance(said, Greeting | Challenge) else None
+    return said.now - (asked + time.time()) / 2 if isinstance(said, Greeting | LoginRequest) else None

@@ -6,9 +6,9 @@ import errno
 import os
 
 import client
-from camsync import Login, SyncError, clients_of
+from camsync import Credentials, SyncError, query_clients
 from server.cli.doctor.findings import Finding, bad, ok, report_failure
-from server.config.pulse_passwords import pulse_clients, pulse_login
+from server.config.pulse_access import pulse_client_tls, pulse_clients, pulse_credentials
 from server.config.site_config import Config
 from server.supervisor.startup_checks import check_port_free
 from server.system.errors import UserError
@@ -79,11 +79,15 @@ def _taken(host: str, port: int, check: str) -> bool | str | None:
 async def _is_ours(config: Config, check: str) -> bool:
     """Ask whoever has a port whether it is this site."""
     if check == "sync.port":
-        host, login = _reached(config.sync.bind), _login(config)
+        host, credentials = _reached(config.sync.bind), _credentials(config)
         try:
-            clients = {it.name for it in await clients_of(host, config.sync.port, login=login)}
-        except SyncError:
+            tls = pulse_client_tls(config)
+            if tls is not None:
+                tls.check_hostname = False  # the certificate names the host at which other machines connect
+            listed = await query_clients(host, config.sync.port, credentials=credentials, tls=tls)
+        except (SyncError, UserError):
             return False
+        clients = {client.name for client in listed}
         return not clients.isdisjoint(pulse_clients(config))
     scheme = "http" if config.http.tls.key is None else "https"
     host = _reached(config.http.host)
@@ -97,11 +101,11 @@ async def _is_ours(config: Config, check: str) -> bool:
     return site.name == config.site.name and set(site.cameras) == set(config.camera_ids)
 
 
-def _login(config: Config) -> Login | None:
-    """Give what the pulse server knows somebody of this site by: on a camera's machine, that camera."""
+def _credentials(config: Config) -> Credentials | None:
+    """Return credentials of any client of this site: on a camera's machine, those of the camera."""
     for name in reversed(pulse_clients(config)):
         try:
-            return pulse_login(config, name)
+            return pulse_credentials(config, name)
         except UserError:
             continue
     return None

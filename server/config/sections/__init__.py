@@ -6,7 +6,7 @@ from server.config.sections.base import Endpoint, Identifier, PictureSide, Polyg
 from server.config.sections.camera import CameraSettings, TrackSettings
 from server.config.sections.encode import EncodeSettings
 from server.config.sections.output import HttpSettings, RecordSettings, TlsSettings
-from server.config.sections.site import SiteSettings, SyncSettings, ZenohSettings, ZenohTlsSettings
+from server.config.sections.site import ProcessTlsSettings, SiteSettings, SyncSettings, ZenohSettings
 from server.config.sections.view import LIVE_VIEW_SETTINGS, FlagSettings, ShareSettings, ViewSettings
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "PictureSide",
     "Polygon",
     "Port",
+    "ProcessTlsSettings",
     "RecordSettings",
     "Section",
     "ShareSettings",
@@ -31,5 +32,4 @@ __all__ = [
     "TrackSettings",
     "ViewSettings",
     "ZenohSettings",
-    "ZenohTlsSettings",
 ]

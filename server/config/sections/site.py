@@ -21,6 +21,17 @@ class SiteSettings(Section):
     """How much nicer a camera's process is than who starts it, as in nice(1): a busy machine serves first."""
 
 
+class ProcessTlsSettings(Section):
+    """TLS between the processes of a site."""
+
+    authority: Path | None = None
+    """PEM: the authority that has signed the server's certificate; clients trust it alone."""
+    certificate: Path | None = None
+    """PEM: the server's certificate; it names the host at which clients connect."""
+    key: Path | None = None
+    """PEM: its private key."""
+
+
 class SyncSettings(Section):
     """The pulse server."""
 
@@ -30,23 +41,15 @@ class SyncSettings(Section):
     """The address the server listens on."""
     port: Port = 7400
     users: Path | None = None
-    """A file of `name:password`, one a line; none: whoever reaches the server is believed.
+    """A file of `name:password`, one a line; none: no login, whoever reaches the server gets the pulses.
 
-    A camera comes as its id, services as bestview, bestview-1, … The server needs all lines, others theirs.
+    A camera logs in as its id, services as bestview, bestview-1, … The server needs all lines, each client
+    its own. Needs `tls`, but on the loopback interface.
     """
+    tls: ProcessTlsSettings = ProcessTlsSettings()
+    """Encryption of the pulses: `certificate` and `key` on the server, `authority` on its clients."""
     start_timeout_s: NonNegativeFloat = 20.0
     """How long pulse 0 waits for all cameras to be there, so that recordings start at their first frame."""
-
-
-class ZenohTlsSettings(Section):
-    """Encryption of the bus, where its addresses begin with tls/."""
-
-    authority: Path | None = None
-    """PEM: the authority that has signed the router's certificate; whoever connects goes by it."""
-    certificate: Path | None = None
-    """PEM: the router's certificate; it names the host of `zenoh.connect`."""
-    key: Path | None = None
-    """PEM: its private key."""
 
 
 class ZenohSettings(Section):
@@ -63,4 +66,5 @@ class ZenohSettings(Section):
 
     A camera comes as its id, and sends under its own key alone. The router needs all lines, others their own.
     """
-    tls: ZenohTlsSettings = ZenohTlsSettings()
+    tls: ProcessTlsSettings = ProcessTlsSettings()
+    """Encryption of the bus, where its addresses begin with tls/."""

@@ -16,7 +16,7 @@ from typing import Any
 
 from aiohttp import web
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.http.connections.connection_pool import Connection, Places
 from server.http.periodic import again_and_again
 from server.system.accept_errors import AcceptErrors
@@ -108,7 +108,7 @@ class Listener:
     ) -> None:
         self._places, self._tls = places, tls
         self._server, self._settings = server, settings
-        self._failing, self._full = AcceptErrors(), Spell()
+        self._failing, self._full = AcceptErrors(), LogThrottle()
         self._opening: set[asyncio.Task[None]] = set()
 
     @asynccontextmanager
@@ -190,7 +190,7 @@ class Listener:
         self._places.cut_off_overdue()
 
     def _say_full(self) -> None:
-        if (more := self._full.happened()) is not None:
+        if (more := self._full.record()) is not None:
             log.warning(
                 "all connections that are taken (http.connections_max %d, http.connections_per_address %d) "
                 "are busy: operators alone get in%s",

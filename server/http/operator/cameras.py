@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 from aiohttp import web
 
-from camsync import SyncError, clients_of
-from server.config.pulse_passwords import pulse_clients
+from camsync import SyncError, query_clients
+from server.config.pulse_access import pulse_clients
 from server.http.access.grants import OPERATING
 from server.http.api.handlers import answer
 from server.http.api.responses import camera_info
@@ -43,7 +43,9 @@ async def get_pulses(request: web.Request) -> web.Response:
     sync, expected = service.config.sync, pulse_clients(service.config)
     where = f"{sync.host}:{sync.port}"
     try:
-        clients = await clients_of(sync.host, sync.port, login=service.pulse_login)
+        clients = await query_clients(
+            sync.host, sync.port, credentials=service.pulse_credentials, tls=service.pulse_tls
+        )
     except SyncError as error:
         return answer(Pulses(where, str(error), [], []))
     listeners = [PulseListener(it.name, it.name in expected, it.behind) for it in clients]

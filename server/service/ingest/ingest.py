@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from camsync import Spell
 from camsync.lines import RateLimit
+from logthrottle import LogThrottle
 from server.media.stream_format import ParameterMismatchError
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
@@ -116,7 +116,7 @@ class Intake:
         self._now, self._ahead = now, ahead
         self._shelves, self._aligner, self._on_frame = shelves, aligner, on_frame
         self._sound, self._sounding = sound, sounding
-        self._unknown = Spell()
+        self._unknown = LogThrottle()
         self._told = {camera: RateLimit(_TOLD_MOST, _TOLD_RATE, time.monotonic()) for camera in shelves}
         self.states = {camera: CameraState() for camera in shelves}
         self._thumbnails: dict[str, OrderedDict[tuple[int, int], Thumbnail]] = {
@@ -134,7 +134,7 @@ class Intake:
         camera = camera_of_key(key)
         state = self.states.get(camera)
         if state is None:
-            if (more := self._unknown.happened(camera)) is not None:
+            if (more := self._unknown.record(camera)) is not None:
                 log.warning("camera %s is not in the configuration%s; it is ignored", camera, more)
             return
         state.alive = there

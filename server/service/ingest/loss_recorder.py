@@ -6,8 +6,8 @@ import logging
 import time
 from collections.abc import Mapping
 
-from camsync import Spell
 from camsync.clock import Clock
+from logthrottle import LogThrottle
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.ingest import CameraState
@@ -28,13 +28,13 @@ class Lacking:
         clock: Clock = time.monotonic,
     ) -> None:
         self._shelves, self._states, self._stride = shelves, states, stride
-        self._late = {camera: Spell(clock) for camera in shelves}
+        self._late = {camera: LogThrottle(clock) for camera in shelves}
         self.recorder: LiveDecisionWriter | None = None
         self.late_epochs = 0
         """Windows that were decided without a camera that was there."""
         self.lost_pictures = dict.fromkeys(shelves, 0)
         """By camera: pictures of decided GOPs that did not come though it was delivering."""
-        self._holes = Spell(clock)
+        self._holes = LogThrottle(clock)
         self._until: int | None = None
         """The first pulse of which nothing is decided yet."""
 
@@ -42,14 +42,14 @@ class Lacking:
         """Note whose tracks are late, and what cameras say that they did not do or hear."""
         for camera in epoch.late:
             self.late_epochs += 1
-            if (more := self._late[camera].happened()) is not None:
+            if (more := self._late[camera].record()) is not None:
                 told = "camera %s: its tracks for pulses up to %d came too late%s"
                 log.warning(told, camera, epoch.last, more)
         for camera, message in epoch.tracks.items():
             self._states[camera].unheard += len(message.alone)
-            if ended := self._late[camera].over():
+            if ended := self._late[camera].end():
                 told = "camera %s: its tracks come in time again; those of %d windows in %.0f s did not"
-                log.info(told, camera, ended.times, ended.seconds)
+                log.info(told, camera, ended.count, ended.seconds)
         if self.recorder is None:
             return
         for camera in epoch.late:
@@ -71,7 +71,7 @@ class Lacking:
 
     def _hole(self, pulses: range) -> None:
         """Note frames that are past and left out: in one line, there may be millions."""
-        if (more := self._holes.happened()) is not None:
+        if (more := self._holes.record()) is not None:
             told = "pulses %d to %d are not decided: they were long past%s"
             log.warning(told, pulses.start, pulses.stop - 1, more)
         if self.recorder is not None:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import msgspec
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.media.audio.audio_chunk import Heard
 from server.messaging.messages import GopChoices
 from server.service.recording.age_clock import AgeClock, MachineClocks
@@ -67,7 +67,7 @@ class RecordingFolder:
         self._open: SegmentWriter | None = None
         self._end = 0
         self._closed_bytes = 0
-        self._left, self._stuck = Spell(), Spell()
+        self._left, self._stuck = LogThrottle(), LogThrottle()
 
     def open(self) -> None:
         """Take the folder, and what earlier runs left in it.
@@ -178,7 +178,7 @@ class RecordingFolder:
     def _leave(self, why: str) -> None:
         """End a run that cannot be written on. What there still is of it can be seen on, and gets old."""
         run = self.run
-        if run is not None and (more := self._left.happened(why)) is not None:
+        if run is not None and (more := self._left.record(why)) is not None:
             log.warning("recording: cannot go on in %s: %s%s; a new folder is begun", run.folder, why, more)
         with contextlib.suppress(OSError):
             self.abandon()
@@ -268,8 +268,8 @@ class RecordingFolder:
                 failed = error
         if failed is None:
             self._retention.tell(due)
-            self._stuck.over()
-        elif (more := self._stuck.happened(failed.strerror or "")) is not None:
+            self._stuck.end()
+        elif (more := self._stuck.record(failed.strerror or "")) is not None:
             what = f"{failed.filename}: {failed.strerror or failed}{more}"
             log.error("recording: cannot take away what has to go: %s; it is tried again each time", what)
         for run in self.earlier:

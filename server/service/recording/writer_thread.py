@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.service.recording.recording_folder import GopRecord
 
 log = logging.getLogger(__name__)
@@ -44,7 +44,7 @@ class WriterThread:
         self._waiting: deque[GopRecord] = deque()
         self._changed = threading.Condition()
         self._closing = False
-        self._failing = Spell(calm=0.0)
+        self._failing = LogThrottle(quiet_s=0.0)
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
         self.written = 0
         """GOPs."""
@@ -111,7 +111,7 @@ class WriterThread:
             self._write(piece)
         except OSError as error:
             self.trouble = error.strerror or str(error)
-            if (more := self._failing.happened(self.trouble)) is not None:
+            if (more := self._failing.record(self.trouble)) is not None:
                 log.error(  # noqa: TRY400 — says all there is
                     "recording: cannot write: %s%s%s; nothing is recorded until it can be written again, "
                     "which is tried every %.0f s; the streams go on",
@@ -123,7 +123,7 @@ class WriterThread:
             self._give_up()
             return False
         except Exception as error:
-            if (more := self._failing.happened(repr(error))) is not None:
+            if (more := self._failing.record(repr(error))) is not None:
                 log.exception("recording: a mistake in MyView%s; it is tried again", more)
             self.trouble = "a mistake in MyView"
             self._give_up()
@@ -131,7 +131,7 @@ class WriterThread:
         finally:
             self._since = None
         self.trouble = ""
-        if ended := self._failing.over():
+        if ended := self._failing.end():
             log.info("recording: goes on, after %.0f s", ended.seconds)
         self.written += 1
         return True

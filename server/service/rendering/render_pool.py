@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.media.rendering_messages import Canvas
 from server.service.rendering.decided_boxes import NO_OVERLAY, DecidedBoxes, GopOverlay
 from server.service.rendering.rendered_stream import RenderedStream
@@ -84,7 +84,7 @@ class RenderPool:
         self._tasks: set[asyncio.Task[None]] = set()
         """Those of sources that are running, or ending."""
         self._restarts = self._lost = 0
-        self._failing = Spell()
+        self._failing = LogThrottle()
 
     @property
     def sources(self) -> dict[Subject, RenderedStream]:
@@ -199,7 +199,7 @@ class RenderPool:
 
     def _ended(self, subject: Subject, running: _RunningStream) -> None:
         error = None if running.task.cancelled() else running.task.exception()
-        if error is not None and (more := self._failing.happened(repr(error))) is not None:
+        if error is not None and (more := self._failing.record(repr(error))) is not None:
             log.error("drawing %s failed%s", subject, more, exc_info=error)
         self._forget(subject, running)
 

@@ -8,7 +8,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from camsync import Spell
+from logthrottle import LogThrottle
 from server.media.rendering_messages import Canvas, Draw, Jpeg, Still
 from server.service.rendering.decided_boxes import GopOverlay
 from server.service.rendering.mjpeg_streams import MjpegStreams
@@ -106,7 +106,7 @@ class RenderedStream:
         self.restarts = 0
         self._viewer: Subscriber | None = None
         self._lost = 0
-        self._dies = Spell()
+        self._dies = LogThrottle()
         self.pid: int | None = None
         """The process that draws now."""
 
@@ -174,7 +174,7 @@ class RenderedStream:
                 await self._run_process()
             except WorkerDiedError as error:
                 pause = _RETRY_FIRST_S if self._answered else min(2 * pause, _RETRY_MAX_S)
-                if (more := self._dies.happened(str(error))) is not None:
+                if (more := self._dies.record(str(error))) is not None:
                     told = "drawing %s: the process %s%s; starting another"
                     log.warning(told, self._name, error, more)
                 self.restarts += 1

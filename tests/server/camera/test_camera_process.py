@@ -190,7 +190,7 @@ async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
 async def test_a_camera_and_a_service_prove_who_they_are_to_pulses_that_ask(
     tmp_path: Path, running: list[Running]
 ) -> None:
-    (tmp_path / "users").write_text("".join(f"{name}:{name * 32}\n" for name in ("c0", "bestview")))
+    (tmp_path / "users").write_text("".join(f"{name}:{name * 8}\n" for name in ("c0", "bestview")))
     config = site(tmp_path, c0="scene:room?objects=1")
     config = config.model_copy(update={"sync": config.sync.model_copy(update={"users": tmp_path / "users"})})
     it = Running(config)

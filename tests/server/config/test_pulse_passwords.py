@@ -1,4 +1,4 @@
-"""Pulses with passwords: every process of a site proves who it is, and what is wrong is one line."""
+"""Pulses with users: every process of a site logs in, over TLS, and what is wrong is one line."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 import yaml
 
-from camsync import Login, PulseClient, clients_of
+from camsync import Credentials, PulseClient, query_clients
 from fakes.command_line import Run, refusal
 from fakes.timeouts import PATIENCE
 from server.cli.generated_config import free_port
 from server.config.loader import load_config
-from server.config.pulse_passwords import pulse_clients, pulse_login, pulse_users
+from server.config.pulse_access import pulse_client_tls, pulse_clients, pulse_credentials, pulse_users
 from server.config.running_config import ActiveConfig
 from server.config.site_config import Config
 from server.supervisor.sync_process import sync_process
@@ -41,20 +41,20 @@ def site(folder: Path, users: str | None = RIGHT, **changes: Any) -> Path:
 def test_the_server_knows_all_and_a_process_its_own(tmp_path: Path) -> None:
     config = load_config(site(tmp_path))
     assert pulse_users(config) == {"c0": LONG, "bestview": LONG + "!", "auditor": LONG + "?"}
-    assert pulse_login(config, "c0") == Login("c0", LONG)
-    assert LONG not in repr(pulse_login(config, "c0")), "nor does it stand in any log"
+    assert pulse_credentials(config, "c0") == Credentials("c0", LONG)
+    assert LONG not in repr(pulse_credentials(config, "c0")), "nor does it stand in any log"
 
 
 def test_without_a_file_nobody_is_asked(tmp_path: Path) -> None:
     config = load_config(site(tmp_path, sync={"port": 7400}))
-    assert (pulse_users(config), pulse_login(config, "c0")) == (None, None)
+    assert (pulse_users(config), pulse_credentials(config, "c0")) == (None, None)
 
 
 def test_a_process_needs_no_line_but_its_own(tmp_path: Path) -> None:
     config = load_config(site(tmp_path, f"c0:{LONG}\n"))
-    assert pulse_login(config, "c0") == Login("c0", LONG)
+    assert pulse_credentials(config, "c0") == Credentials("c0", LONG)
     with pytest.raises(UserError, match="has no line for 'bestview', as which this process comes"):
-        pulse_login(config, "bestview")
+        pulse_credentials(config, "bestview")
 
 
 def test_every_service_of_a_site_has_its_line(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_every_service_of_a_site_has_its_line(tmp_path: Path) -> None:
         (None, r"sync\.users: cannot read .*sync\.users: No such file"),
         ("c0\n", "line 1 is no name:password"),
         (f"c0:{LONG}\nc0:{LONG}\n", "lines 1 and 2 are for the same name"),
-        (f"c0:{LONG}\nbestview:secret\n", "the password of 'bestview' has less than 32 characters"),
+        (f"c0:{LONG}\nbestview:secret word\n", "the password of 'bestview' must have 1 to 128 printable"),
         (f"c0:{LONG}\n", "has no line for bestview"),
     ],
 )
@@ -92,8 +92,8 @@ async def test_the_process_lets_in_who_knows_a_password(tmp_path: Path) -> None:
         async with asyncio.timeout(PATIENCE):
             await _pulses_come(running.now)
             sync = running.now.sync
-            login = pulse_login(running.now, "auditor")
-            assert await clients_of(sync.host, sync.port, PATIENCE, login) == ()
+            auditor = pulse_credentials(running.now, "auditor")
+            assert await query_clients(sync.host, sync.port, PATIENCE, credentials=auditor) == ()
     finally:
         serving.cancel()
         await asyncio.gather(serving, return_exceptions=True)
@@ -104,7 +104,14 @@ async def _pulses_come(config: Config) -> None:
     sync = config.sync
 
     async def first(name: str) -> None:
-        async with PulseClient(sync.host, sync.port, name, login=pulse_login(config, name)) as client:
+        client = PulseClient(
+            sync.host,
+            sync.port,
+            name,
+            credentials=pulse_credentials(config, name),
+            tls=pulse_client_tls(config),
+        )
+        async with client:
             assert not (await anext(client)).own
 
     await asyncio.gather(*(first(name) for name in pulse_clients(config)))

@@ -103,7 +103,10 @@ def test_a_bus_that_asks_who_comes_may_be_anywhere_if_it_is_encrypted() -> None:
 def test_pulses_that_ask_who_comes_may_be_anywhere() -> None:
     with pytest.raises(UserError, match=r"sync\.bind: .* sync\.users"):
         check_pulses(small_config(sync={"bind": OUTSIDE}))
-    check_pulses(small_config(sync={"bind": OUTSIDE, "users": "sync.users"}))
+    with pytest.raises(UserError, match=r"sync\.bind: .* sync\.tls"):
+        check_pulses(small_config(sync={"bind": OUTSIDE, "users": "sync.users"}))
+    tls = {"certificate": "sync.pem", "key": "sync.key"}
+    check_pulses(small_config(sync={"bind": OUTSIDE, "users": "sync.users", "tls": tls}))
 
 
 def test_the_secure_example_is_open_to_nobody_without_a_token_or_a_password() -> None:
@@ -112,6 +115,7 @@ def test_the_secure_example_is_open_to_nobody_without_a_token_or_a_password() ->
     assert not config.access.open_to_all
     assert not config.access.trusted_network
     assert config.sync.users == CONFIGS / "secret" / "sync.users"
+    assert config.sync.tls.key == CONFIGS / "secret" / "sync.key"
     assert config.access.tokens == CONFIGS / "secret" / "tokens.yaml"
     assert config.http.tls.key == CONFIGS / "secret" / "https.key"
     assert config.zenoh.connect.startswith("tls/")

@@ -12,11 +12,11 @@ import av
 import msgspec
 import pytest
 
-from camsync import Spell
 from fakes.cameras import GOP, small_config
 from fakes.media.videos import write_video
 from fakes.rendering import CANVAS, fragments
 from fakes.site import Hall
+from logthrottle import LogThrottle
 from server.camera.audio import LiveSound, RecordedSound, recorded_source
 from server.camera.peers.detection_exchange import Exchange
 from server.camera.process import CameraProcess
@@ -48,7 +48,7 @@ async def test_words_that_come_too_late_again_and_again_are_told_of_seldom_and_w
     caplog.set_level("INFO")
     clock = [0.0]
     exchange = Exchange(small_config(), "c0", None, 10)
-    exchange._late["c1"] = Spell(lambda: clock[0])
+    exchange._late["c1"] = LogThrottle(lambda: clock[0])
     for pulse in range(3):
         exchange._tell_late("c1", pulse)
         exchange._tell_in_time("c1")
@@ -70,7 +70,7 @@ async def test_a_camera_that_nobody_understands_is_told_of_once_and_not_by_frame
     clock = [0.0]
     exchange = Exchange(small_config(), "c0", None, 10)
     for camera in ("c1", "c2"):
-        exchange._bad[camera] = Spell(lambda: clock[0])
+        exchange._bad[camera] = LogThrottle(lambda: clock[0])
 
     def hear(camera: str, payload: bytes) -> None:
         exchange._read(Message(KEYS.camera(camera, "found"), payload, b""))
@@ -205,7 +205,7 @@ def test_a_folder_that_cannot_be_written_is_told_of_once_however_often_something
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "file").write_text("")
-    spell = Spell()
+    spell = LogThrottle()
     running: Any = SimpleNamespace(path=tmp_path / "site.yaml", now=small_config())
     for _ in range(5):
         _keep(running, tmp_path / "file" / "folder" / "site.yaml", spell)

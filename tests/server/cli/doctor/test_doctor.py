@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from camsync import Login, PulseClient, PulseServer
+from camsync import Credentials, PulseClient, PulseServer
 from fakes.cameras import FPS, HEIGHT, WIDTH, encoded
 from fakes.command_line import Run
 from fakes.doctor import SIZE, config, site
@@ -142,10 +142,10 @@ async def test_a_closed_pulse_server_is_this_site_s_where_it_knows_one_of_its_pa
     users = {"c0": "0" * 32, "bestview": "1" * 32}
     (tmp_path / "users").write_text(f"c0:{users['c0']}\n")  # a camera's machine has its own line alone
     there = config(tmp_path, sync={"port": free(), "users": "users"})
-    login = Login("bestview", users["bestview"])
+    credentials = Credentials("bestview", users["bestview"])
     async with (
         PulseServer(FPS, port=there.sync.port, users=users) as server,
-        PulseClient("127.0.0.1", server.port, "bestview", login=login) as service,
+        PulseClient("127.0.0.1", server.port, "bestview", credentials=credentials) as service,
     ):
         await anext(aiter(service))
         assert "ms off this machine's" in only(await clock_findings(there), "pulse server").text
@@ -293,7 +293,7 @@ def test_a_folder_that_cannot_be_written_is_bad(tmp_path: Path) -> None:
 def test_files_that_others_can_read_or_write_are_told_of(tmp_path: Path) -> None:
     tokens, users = tmp_path / "tokens.yaml", tmp_path / "users"
     tokens.write_text("tokens: []\n")
-    users.write_text("bestview:secret\n")
+    users.write_text("bestview:secret word\n")
     tokens.chmod(0o666)
     users.chmod(0o644)
     changes: Any = {"access": {"tokens": "tokens.yaml"}}

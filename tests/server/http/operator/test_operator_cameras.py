@@ -6,7 +6,7 @@ from contextlib import aclosing
 
 import pytest
 
-from camsync import Login, PulseClient, PulseServer
+from camsync import Credentials, PulseClient, PulseServer
 from fakes.cameras import CAMERAS, status
 from fakes.site import A, B, Hall, opened
 from server.messaging.inbox import Message
@@ -80,13 +80,13 @@ async def test_a_closed_pulse_server_tells_it_to_the_service_whose_password_it_k
     users = {A: "a" * 32, "bestview": "b" * 32}
     async with (
         PulseServer(25.0, users=users) as server,
-        PulseClient("127.0.0.1", server.port, A, login=Login(A, users[A])) as camera,
+        PulseClient("127.0.0.1", server.port, A, credentials=Credentials(A, users[A])) as camera,
         aclosing(opened(sync={"port": server.port})) as halls,
     ):
         await anext(aiter(camera))
         hall = await anext(halls)
-        assert "asks for a password" in (await hall.get_json("/api/operator/pulses"))["error"]
-        hall.service.pulse_login = Login("bestview", users["bestview"])
+        assert "needs a login" in (await hall.get_json("/api/operator/pulses"))["error"]
+        hall.service.pulse_credentials = Credentials("bestview", users["bestview"])
         told = await hall.get_json("/api/operator/pulses")
     assert (told["error"], [it["name"] for it in told["clients"]]) == ("", [A])
     assert told["missing"] == [B, "bestview"]

@@ -10,10 +10,10 @@ from collections.abc import Collection
 
 from camsync.clock import Clock
 from camsync.limits import ServerLimits
-from camsync.log_throttle import Spell
 from camsync.messages import Hello
 from camsync.protocol import LAST_PULSE
 from camsync.pulse_axis import PulseAxis
+from logthrottle import LogThrottle
 
 _log = logging.getLogger(__name__)
 _ROOM = 2
@@ -24,7 +24,7 @@ INEXACT = 2
 """Pulses ahead that are the error of measurement, not another axis."""
 
 
-class Claims:
+class AxisClaims:
     """What the clients of one server claim, the newest word of each.
 
     ``expect`` are those whose word counts; nobody: everybody's does. ``fps`` is in pulses per second.
@@ -37,7 +37,7 @@ class Claims:
         self._epochs: dict[str, float] = {}
         """By name: when pulse 0 was due, by what they have counted."""
         self._here: frozenset[str] = frozenset()
-        self._boasts, self._alone = Spell(clock), Spell(clock)
+        self._boasts, self._alone = LogThrottle(clock), LogThrottle(clock)
 
     def note(self, hello: Hello) -> bool:
         """Take what a client says; return whether it says how far it has counted, and could have."""
@@ -48,7 +48,7 @@ class Claims:
         axis = PulseAxis.through(hello.known.number, now - hello.known.ago, self._fps)
         number = axis.number_at(now)
         if number >= self._most:
-            if (more := self._boasts.happened()) is not None:
+            if (more := self._boasts.record()) is not None:
                 _log.warning("%s claims to have counted to %d%s: not believed", hello.name, number, more)
             return False
         self._epochs[hello.name] = axis.epoch
@@ -71,7 +71,7 @@ class Claims:
             epochs += [following.epoch] * (len(self._here) - len(epochs))
         return PulseAxis(sorted(epochs)[len(epochs) // 2], self._fps)
 
-    def tell_of_others(self, axis: PulseAxis) -> None:
+    def log_minority(self, axis: PulseAxis) -> None:
         """Tell the log of who claims more than the axis that is gone by."""
         now = self._clock()
         number = axis.number_at(now)
@@ -80,6 +80,6 @@ class Claims:
             for name, epoch in self._epochs.items()
             if PulseAxis(epoch, self._fps).number_at(now) > number + INEXACT
         ]
-        if further and (more := self._alone.happened()) is not None:
+        if further and (more := self._alone.record()) is not None:
             told = "%s: said to have counted further than to %d, which too few others say%s"
             _log.warning(told, ", ".join(sorted(further)), number, more)

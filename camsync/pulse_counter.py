@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from camsync.messages import Known
+from camsync.messages import CountedPulse
 from camsync.pulse_axis import PulseAxis
 
 
-class Follower:
+class PulseCounter:
     """Keeps the axis last heard of and the last number counted; numbers go upwards, each at most once.
 
     All times are unix seconds on the client's clock. ``catch_up`` is how many seconds of own pulses are made
@@ -64,11 +64,11 @@ class Follower:
             return 0.0
         return self._axis.due(self._last) - now
 
-    def known(self, now: float) -> Known | None:
+    def known(self, now: float) -> CountedPulse | None:
         """Give what to tell a server that has forgotten the axis; None before the first pulse."""
         if self._axis is None or self._last is None:
             return None
-        return Known(self._last, max(0.0, now - self._axis.due(self._last)))
+        return CountedPulse(self._last, max(0.0, now - self._axis.due(self._last)))
 
     def next_due(self) -> float | None:
         """Give when the next pulse is due; None while there is no axis."""

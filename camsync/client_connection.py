@@ -1,0 +1,281 @@
+"""One client's connection, seen from the server."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+import ssl
+from dataclasses import dataclass
+from typing import Protocol, cast
+
+from camsync.clock import Clock
+from camsync.limits import ServerLimits
+from camsync.lines import LineBuffer, OverlongLineError, RateLimit
+from camsync.login import LoginGate
+from camsync.messages import (
+    ClientList,
+    ClientsRequest,
+    ErrorMessage,
+    Hello,
+    ListedClient,
+    LoginMessage,
+    Ping,
+    Pong,
+)
+from camsync.protocol import MAX_LINE, ProtocolError, encode, parse_client_line
+
+_log = logging.getLogger(__name__)
+_SEND_BUFFER = (
+    4096  # bytes in the kernel: a slow client is noticed within seconds, not after an hour of pulses
+)
+_KEEPALIVE = 5  # seconds of quiet before the kernel asks whether the client is still there
+
+
+@dataclass(frozen=True, slots=True)
+class ClientInfo:
+    """State of one client."""
+
+    name: str | None
+    """The name of its HELLO; None before that."""
+    address: str
+    """``host:port``."""
+    joined: float
+    """When it connected: unix seconds, server clock."""
+    sent: int
+    """Pulses handed to its connection."""
+    dropped: int
+    """Pulses it lost because it did not read."""
+    behind: int
+    """Pulses lost in a row until now: 0 for a client that keeps up."""
+    errors: int
+    """Lines of it that could not be parsed."""
+
+
+class ConnectionOwner(Protocol):
+    """Receiver of a connection's events."""
+
+    def joined(self, client: ClientConnection) -> None:
+        """Add a new connection."""
+
+    def left(self, client: ClientConnection) -> None:
+        """Remove a connection that has ended."""
+
+    def clients(self) -> tuple[ClientInfo, ...]:
+        """Return all clients in the order in which they joined."""
+
+    def hello(self, client: ClientConnection, hello: Hello) -> None:
+        """Take a client's name; raise ProtocolError if it may not have it."""
+
+
+class ClientConnection(asyncio.Protocol):
+    """One client: the server never waits for it; what it may send and what waits for it are bounded.
+
+    Where there is a ``gate``, it joins the others after TLS (with ``tls``) and after its login.
+    """
+
+    def __init__(
+        self,
+        owner: ConnectionOwner,
+        clock: Clock,
+        limits: ServerLimits,
+        gate: LoginGate | None = None,
+        tls: ssl.SSLContext | None = None,
+    ) -> None:
+        self._owner = owner
+        self._gate = gate
+        self._tls = tls
+        self._clock = clock
+        self._limits = limits
+        self._lines = LineBuffer(MAX_LINE)
+        self._joined = clock()
+        self._rate = RateLimit(limits.line_burst, limits.line_rate, self._joined)
+        self._kept_up = self._joined  # when a pulse last went out to it
+        self._transport: asyncio.Transport | None = None
+        self._handshake: asyncio.Task[None] | None = None
+        self._sent = self._dropped = self._behind = self._errors = 0
+        self._joined_owner = False
+        self._early: list[bytes] = []
+        """Lines that came with the end of the TLS handshake."""
+        self.address = self._host = "?"
+        self.name: str | None = None
+        self.user: str | None = None
+        """Who has logged in; None where no login is needed."""
+
+    @property
+    def origin(self) -> str:
+        """The user that has logged in, or else the host."""
+        return self.user or self._host
+
+    def info(self) -> ClientInfo:
+        """Return the state of this client now."""
+        return ClientInfo(
+            self.name, self.address, self._joined, self._sent, self._dropped, self._behind, self._errors
+        )
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Start serving the client (called by asyncio)."""
+        self._transport = cast("asyncio.Transport", transport)
+        self._host, port, *_ = transport.get_extra_info("peername") or ("?", 0)
+        self.address = f"{self._host}:{port}"
+        _tune(transport.get_extra_info("socket"), self._limits.cut_off)
+        if self._gate is None:
+            self._join()
+            return
+        self._gate.admit(self)
+        if self._tls is None:
+            self._request_login(self._gate)
+        else:
+            self._transport.pause_reading()  # what has come already belongs to TLS
+            self._handshake = asyncio.create_task(
+                self._start_tls(self._tls, self._gate), name="TLS of pulses"
+            )
+
+    def data_received(self, data: bytes) -> None:
+        """Answer what the client sends (called by asyncio)."""
+        try:
+            for line in self._lines.feed(data):
+                if self._closing:
+                    return
+                if not self._rate.take(self._clock()):
+                    self.end("flood", "too many lines")
+                    return
+                self._take(line)
+        except OverlongLineError as error:
+            self._errors += 1
+            self.end("overlong", str(error))
+
+    def eof_received(self) -> bool:
+        """Keep sending to a client that has nothing to say, as ``nc`` with its input closed (asyncio).
+
+        One that has said HELLO has gone: else a camera that left would still count as waited for. TLS ends in
+        both directions at once.
+        """
+        return self.name is None and self._tls is None
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the client (called by asyncio)."""
+        _log.debug("client %s (%s) left: %s", self.name, self.address, exc or "closed")
+        self._transport = None
+        if self._handshake is not None:
+            self._handshake.cancel()
+        if self._gate is not None:
+            self._gate.forget(self)
+        self._owner.left(self)
+
+    def send(self, line: bytes) -> bool:
+        """Send a line unless too much waits already; return whether it was sent."""
+        transport = self._transport
+        if transport is None or transport.is_closing():
+            return False
+        if transport.get_write_buffer_size() + len(line) > self._limits.backlog:
+            return False
+        transport.write(line)
+        return True
+
+    def send_pulse(self, line: bytes) -> None:
+        """Send a pulse, or count it as lost; cut the client off when it stays behind."""
+        now = self._clock()
+        if self.send(line):
+            self._sent += 1
+            self._behind = 0
+            self._kept_up = now
+            return
+        if self._closing:
+            return
+        if self._behind == 0:
+            self._kept_up = now
+        self._dropped += 1
+        self._behind += 1
+        if now - self._kept_up > self._limits.cut_off:
+            _log.warning("client %s (%s) does not read its pulses: cut off", self.name, self.address)
+            self.end("slow", "pulses were not read")
+
+    def end(self, code: str, text: str) -> None:
+        """Close the connection with an ERROR line, if the client reads."""
+        transport = self._transport
+        if transport is None or transport.is_closing():
+            return
+        if self._handshake is not None and not self._handshake.done():
+            transport.abort()  # nothing can be said before TLS is ready
+            return
+        if not transport.get_write_buffer_size():
+            transport.write(encode(ErrorMessage(code, text)))
+        if transport.get_write_buffer_size():
+            transport.abort()  # it does not read: a polite close would wait for it
+        else:
+            transport.close()
+
+    @property
+    def _closing(self) -> bool:
+        return self._transport is None or self._transport.is_closing()
+
+    async def _start_tls(self, tls: ssl.SSLContext, gate: LoginGate) -> None:
+        if (plain := self._transport) is None:
+            return
+        try:
+            encrypted = await asyncio.get_running_loop().start_tls(
+                plain, self, tls, server_side=True, ssl_handshake_timeout=self._limits.login_within
+            )
+        except OSError as error:  # ssl.SSLError is one
+            _log.debug("client %s: no TLS: %s", self.address, error)
+            self._transport = None
+            gate.refuse(self, "TLS failed")
+            return
+        if encrypted is not None:
+            self._transport = encrypted
+            asyncio.get_running_loop().call_soon(self._request_login, gate)  # then the handshake is done
+
+    def _request_login(self, gate: LoginGate) -> None:
+        self._handshake = None
+        if not gate.request(self) and not self._closing:
+            self._join()
+        for line in self._early:
+            if not self._closing:
+                self._take(line)
+        self._early.clear()
+
+    def _join(self) -> None:
+        self._joined_owner = True
+        self._owner.joined(self)
+
+    def _take(self, line: bytes) -> None:
+        if self._handshake is not None:
+            self._early.append(line)
+            return
+        if not self._joined_owner:
+            if self._gate is not None and (user := self._gate.check(self, line)) is not None:
+                self.user = user
+                self._join()
+            return
+        try:
+            match parse_client_line(line):
+                case Ping(sent):
+                    self.send(encode(Pong(sent, self._clock())))
+                case ClientsRequest():
+                    self._send_clients()
+                case Hello() as hello:
+                    self._owner.hello(self, hello)
+                case LoginMessage():
+                    self.send(encode(ErrorMessage("malformed", "this connection needs no login")))
+        except ProtocolError as error:
+            self._errors += 1
+            self.send(encode(ErrorMessage(error.code, str(error))))
+
+    def _send_clients(self) -> None:
+        """Send the list of the other clients: a long line, so only to a client that has read everything."""
+        others = [client for client in self._owner.clients() if client.address != self.address]
+        line = encode(ClientList(tuple(ListedClient(client.name, client.behind) for client in others)))
+        if self._transport is not None and not self._transport.get_write_buffer_size():
+            self._transport.write(line)
+
+
+def _tune(connection: socket.socket, cut_off: float) -> None:
+    """Let the kernel hold little for a slow client, and notice one that has vanished without a word."""
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    if hasattr(socket, "TCP_USER_TIMEOUT"):
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, max(1, int(cut_off * 1000)))
+    if hasattr(socket, "TCP_KEEPIDLE"):
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, _KEEPALIVE)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 1)
