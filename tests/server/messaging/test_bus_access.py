@@ -17,7 +17,7 @@ from fakes.programs import needs_openssl
 from fakes.timeouts import PATIENCE
 from server.cli.generated_config import free_port
 from server.config.password_file import password_of, read_users
-from server.config.sections import ZenohSettings, ZenohTlsSettings
+from server.config.sections import ProcessTlsSettings, ZenohSettings
 from server.messaging.bus import Bus
 from server.messaging.bus_access import SETTING, build_access_control
 from server.messaging.inbox import Message
@@ -45,7 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def settings(folder: Path) -> ZenohSettings:
     address = f"tls/127.0.0.1:{free_port()}"
-    tls = ZenohTlsSettings(
+    tls = ProcessTlsSettings(
         authority=folder / "authority.pem", certificate=folder / "router.pem", key=folder / "router.key"
     )
     return ZenohSettings(connect=address, listen=address, users=folder / "zenoh.users", tls=tls)
@@ -135,7 +135,7 @@ async def test_strangers_fail_to_publish_and_to_listen(
         settings.model_copy(update={"users": None}),
         settings.model_copy(update={"users": _users(tmp_path, "c0:guessed\n")}),
         settings.model_copy(update={"connect": settings.connect.replace("tls/", "tcp/")}),
-        settings.model_copy(update={"tls": ZenohTlsSettings()}),
+        settings.model_copy(update={"tls": ProcessTlsSettings()}),
     ]
     heard, overheard = Heard(), Heard()
     with opened(

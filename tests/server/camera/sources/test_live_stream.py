@@ -136,9 +136,9 @@ def test_a_camera_that_is_away_for_long_is_told_of_once_and_when_it_is_back(
     try:
         until(lambda: shown(source) == 0)
         camera.unplug()
-        until(lambda: source._away._times > 30)
+        until(lambda: source._away._count > 30)
         camera.plug_in(port)
-        until(lambda: not source._away._times)
+        until(lambda: not source._away._count)
     finally:
         source.close()
     *away, back = caplog.records
