@@ -23,7 +23,8 @@ from server.config.sections import ZenohSettings
 from server.messaging.bus import Bus
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys, camera_of_key
-from server.supervisor.shutdown import run_process, terminate_with_parent
+from server.supervisor.shutdown import run_process
+from server.system.child_process import terminate_with_parent
 
 SITE = "faults"
 SHARE = 0.3

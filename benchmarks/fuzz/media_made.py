@@ -7,7 +7,6 @@ from typing import Literal
 
 from benchmarks.fuzz.mutate import damaged
 from benchmarks.fuzz.site import FPS, HEIGHT, WIDTH, pictures
-from server.config.sections import SiteSettings
 from server.media.audio.audio_format import SoundFormat
 from server.media.containers.mp4_audio import sound_fragment
 from server.media.stream_format import Agreement
@@ -34,8 +33,8 @@ def stream(codec: Literal["h264", "vp8"], frames: int = 10) -> bytes:
     if agreement is None:
         found = Agreement()
         found.accept(units[0].data)
-        head = found.head(SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), form) or b""
+        head = found.head((WIDTH, HEIGHT), FPS, form) or b""
         sound = sound_fragment(form, [form.silence] * 9, 0)
         return head + sound + b"".join(found.pack(it.data, it.pulse, FPS, key=it.key) for it in units)
-    head = agreement.head(SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS))
+    head = agreement.head((WIDTH, HEIGHT), FPS)
     return head + b"".join(agreement.pack(it.data, it.pulse, FPS, key=it.key) for it in units)

@@ -23,7 +23,7 @@ from server.config.loader import load_config
 from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.messages import CameraTracks, FrameHeader, ThumbnailHeader, ZenohKeys
-from server.supervisor.shutdown import terminate_with_parent
+from server.system.child_process import terminate_with_parent
 
 _THUMBS_EVERY = 5
 """Epochs."""

@@ -23,7 +23,7 @@ from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.messages import FrameHeader, ZenohKeys
-from server.supervisor.shutdown import terminate_with_parent
+from server.system.child_process import terminate_with_parent
 from synthetic import Scene
 
 CAMERAS = 4

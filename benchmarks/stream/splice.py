@@ -33,7 +33,9 @@ class Cut:
 
     def __init__(self, films: Sequence[Sequence[AccessUnit]], config: Config) -> None:
         self._films, self.gop = films, config.encode.gop
-        self.agreement = agreement = agreement_for(config)
+        self.agreement = agreement = agreement_for(
+            config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
+        )
         self._shelves = {
             name: FrameBuffer(config.site.fps, 4 * self.gop, agreement) for name in config.camera_ids
         }

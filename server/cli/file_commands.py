@@ -14,9 +14,6 @@ import typer
 from server.system.atomic_write import atomic_folder
 from server.system.errors import UserError
 
-SEVERAL = {"render": ("--det",), "evaluate": ("--gt", "--tracks", "--videos")}
-"""Options by command that take several values after one flag (`server/cli/repeated_options.py`)."""
-
 OutFolder = Annotated[Path, typer.Option("--out", help="A new folder to write into.")]
 
 
@@ -26,7 +23,11 @@ def render(
     config: Annotated[Path | None, typer.Option("--config", help="Settings, and cameras by name.")] = None,
     det: Annotated[
         list[Path] | None,
-        typer.Option("--det", metavar="FILE…", help="Detections (MOTChallenge) instead, one file per view."),
+        typer.Option(
+            "--det",
+            metavar="FILE",
+            help="Detections (MOTChallenge) instead of a detector; once per view, in order.",
+        ),
     ] = None,
     ground: Annotated[Path | None, typer.Option("--ground", help="Homographies (JSON) per view.")] = None,
 ) -> None:
@@ -110,15 +111,20 @@ def _track_templates(
 def evaluate(
     truth: Annotated[
         list[Path],
-        typer.Option("--gt", metavar="FILE…", help="Ground truth: files, or a folder of one per camera."),
+        typer.Option(
+            "--gt",
+            metavar="PATH",
+            help="Ground truth: a file, once per camera, or a folder of one file per camera.",
+        ),
     ],
     tracks: Annotated[
         list[Path] | None,
-        typer.Option("--tracks", metavar="FILE…", help="Tracks: as many files, or such a folder."),
+        typer.Option("--tracks", metavar="PATH", help="Tracks: as many files, or such a folder."),
     ] = None,
     views: Annotated[Path | None, typer.Option("--views", help="Choices of views: choices.csv.")] = None,
     videos: Annotated[
-        list[Path] | None, typer.Option("--videos", metavar="FILE…", help="The views, for --plots.")
+        list[Path] | None,
+        typer.Option("--videos", metavar="FILE", help="A view's video for --plots; once per camera."),
     ] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of the cameras' pictures.")] = None,
     fps: Annotated[float | None, typer.Option(min=0.01, max=1000.0, help="Frames per second.")] = None,

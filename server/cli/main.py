@@ -15,9 +15,9 @@ import typer
 
 from server.cli import file_commands, operation_commands, site_commands, token_commands, viewer_commands
 from server.cli.calibrate.command import calibrate
-from server.cli.repeated_options import one_value_per_flag
-from server.supervisor.shutdown import SUPERVISED_VARIABLE, terminate_with_parent
+from server.supervisor.shutdown import SUPERVISED_VARIABLE
 from server.system.address_redaction import redact_address
+from server.system.child_process import terminate_with_parent
 from server.system.descriptors import raise_descriptor_limit
 from server.system.errors import UserError
 from server.system.log_setup import say_failure
@@ -100,7 +100,7 @@ def main() -> None:
     if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
         signal.signal(signal.SIGTERM, _end)
     try:
-        app(args=one_value_per_flag(sys.argv[1:], file_commands.SEVERAL))
+        app()
     except KeyboardInterrupt:
         sys.exit(_INTERRUPTED)
     except Exception as error:  # noqa: BLE001 — said, or raised again

@@ -8,15 +8,19 @@ from camsync import Credentials
 from camsync.protocol import is_password
 from server.config.password_file import password_of, read_users
 from server.config.site_config import Config
-from server.messaging.messages import pulse_client
 from server.system.errors import UserError
 
 SETTING = "sync.users"
 
 
+def bestview_client_name(index: int) -> str:
+    """Return the name of a best-view service at the pulse server, which waits for it before pulse 0."""
+    return "bestview" if index == 0 else f"bestview-{index}"
+
+
 def pulse_clients(config: Config) -> tuple[str, ...]:
     """Return the names of all clients of a site's pulse server: its cameras and its best-view services."""
-    return (*config.camera_ids, *map(pulse_client, range(config.view.share.of)))
+    return (*config.camera_ids, *map(bestview_client_name, range(config.view.share.of)))
 
 
 def pulse_users(config: Config) -> dict[str, str] | None:

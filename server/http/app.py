@@ -25,6 +25,7 @@ from server.http.api.handlers import problem
 from server.http.api.query_validation import refuse_what_is_not_there
 from server.http.api.shard_redirect import to_the_right_service
 from server.http.app_keys import EVENTS, METRICS, ON_DISK, PICTURES, READERS, SERVICE
+from server.http.connections.connection_limit import FOR_OPERATORS, connection_limit
 from server.http.connections.connection_pool import Bounds, Places
 from server.http.connections.fair_shares import Shares
 from server.http.connections.listener import Listener
@@ -42,7 +43,7 @@ from server.http.streams.sending import break_off
 from server.http.tls import Certificate
 from server.service.rendering.render_pool import RenderPool
 from server.service.service import BestViewService
-from server.system.descriptors import FOR_OPERATORS, connection_limit, descriptor_limit
+from server.system.descriptors import descriptor_limit
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)

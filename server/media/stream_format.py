@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from server.config.sections import SiteSettings
 from server.media.audio.audio_format import SoundFormat
 from server.media.containers.fmp4 import Sample, fragment, init_segment, rebased, sample_of, ticks
 from server.media.gap_filler import NO_CAMERAS, Bridge, H264Bridge
@@ -64,16 +63,21 @@ class Agreement:
         return fragment([Sample(sample(nal_units(access_unit)), key)], pulse, fps)
 
     def head(
-        self, site: SiteSettings, sound: SoundFormat | None = None, *, pulses: int | None = None
+        self,
+        size: tuple[int, int],
+        fps: float,
+        sound: SoundFormat | None = None,
+        *,
+        pulses: int | None = None,
     ) -> bytes | None:
         """Give what a player needs before the first fragment; None before the first key frame.
 
         ``pulses``: how many there are in a file. Its size does not depend on the number.
         """
-        del pulses  # players add up the fragments
+        del fps, pulses  # players add up the fragments
         if self.parameters is None:
             return None
-        return init_segment(self.parameters, site.width, site.height, sound)
+        return init_segment(self.parameters, *size, sound)
 
     def begun_at(self, origin: int, fragment: bytes, fps: float) -> bytes:
         """Give a fragment as it is in a stream that has this pulse at time 0."""

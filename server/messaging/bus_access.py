@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from server.config.password_file import read_users
+from server.config.pulse_access import bestview_client_name
 from server.config.site_config import Config
-from server.messaging.messages import ZenohKeys, pulse_client
+from server.messaging.messages import ZenohKeys
 
 SETTING = "zenoh.users"
 _SENDS = ["put", "delete", "liveliness_token"]
@@ -54,8 +55,8 @@ def build_access_control(
         _rule("tells cameras", "ingress", ["put", "delete"], [keys.camera("*", it) for it in _TOLD])
         | {"permission": "deny"},
     ]
-    further = [pulse_client(index) for index in range(1, _SERVICES)]
-    listeners = [it for it in users if it not in {*cameras, *further, pulse_client(0)}]
+    further = [bestview_client_name(index) for index in range(1, _SERVICES)]
+    listeners = [it for it in users if it not in {*cameras, *further, bestview_client_name(0)}]
     subjects = [{"id": "services", "usernames": further}]
     policies = [{"rules": ["services"], "subjects": ["services"]}]
     if listeners:

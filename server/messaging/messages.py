@@ -262,11 +262,6 @@ class GopChoices(msgspec.Struct, frozen=True, kw_only=True):
 _CAMERA_PART = 3
 
 
-def pulse_client(index: int) -> str:
-    """Name a best-view service at the pulse server, which waits for it before pulse 0."""
-    return "bestview" if index == 0 else f"bestview-{index}"
-
-
 @dataclass(frozen=True, slots=True)
 class ZenohKeys:
     """The zenoh key expressions of a site."""

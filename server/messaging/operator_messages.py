@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 
 from server.messaging.number_types import Coordinate, Cost, Number, Pulse
+from tracking.types import RiskReason
 
 RISK_EVENTS_MAX = 32
 """Troubles that a camera tells of one window at most; the riskiest ones."""
-
-RiskReason = Literal["alike", "fading", "gap", "exchange"]
-"""Two who look alike are about to cross; somebody fades into the background; the window is not proven; two
-solutions in which two people are exchanged cost nearly the same."""
 
 
 class RiskEvent(msgspec.Struct, frozen=True, kw_only=True):

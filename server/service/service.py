@@ -15,14 +15,14 @@ import msgspec
 
 from camsync import Credentials, PulseClient
 from logthrottle import LogThrottle
-from server.config.pulse_access import pulse_client_tls, pulse_credentials
+from server.config.pulse_access import bestview_client_name, pulse_client_tls, pulse_credentials
 from server.config.sections import ViewSettings
 from server.config.site_config import Config
 from server.media.codec import agreement_for
 from server.messaging.bus import Bus
 from server.messaging.bus_access import access_control_of
 from server.messaging.inbox import Inbox, Message
-from server.messaging.messages import GopChoices, ZenohKeys, pulse_client
+from server.messaging.messages import GopChoices, ZenohKeys
 from server.service.calibration.walk_session import WalkSession
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 from server.service.decision_state import Board
@@ -63,7 +63,9 @@ class BestViewService:
         frames = max(round(config.view.buffer_s * fps), behind + 4 * (config.view.lookahead + grace + stride))
         self.most_lookahead = (frames - behind) // 2 - grace - stride
         """Frames that can be looked ahead while this runs: half as many as what is kept could do for."""
-        self.agreement = agreement_for(config)
+        self.agreement = agreement_for(
+            config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
+        )
         self.shelves = {camera: FrameBuffer(config.site.fps, frames, self.agreement) for camera in cameras}
         far = round(_FAR_S * fps)
         self.aligner = Aligner(cameras, stride, grace, behind, far + grace + behind)
@@ -127,10 +129,10 @@ class BestViewService:
             UserError: its address is in use, or a file of passwords cannot be read.
         """
         index, zenoh = self.config.view.share.index, self.config.zenoh
-        self.pulse_credentials = pulse_credentials(self.config, pulse_client(index))
+        self.pulse_credentials = pulse_credentials(self.config, bestview_client_name(index))
         self.pulse_tls = pulse_client_tls(self.config)
         if index:
-            self._bus = bus = Bus.second(zenoh, pulse_client(index))
+            self._bus = bus = Bus.second(zenoh, bestview_client_name(index))
         else:
             self._bus = bus = Bus.router(zenoh, access_control_of(self.config))
         handlers = {
@@ -270,7 +272,7 @@ class BestViewService:
 
     async def _follow_pulses(self) -> None:
         sync, fps = self.config.sync, self.config.site.fps
-        name = pulse_client(self.config.view.share.index)
+        name = bestview_client_name(self.config.view.share.index)
         async with PulseClient(
             sync.host, sync.port, name, fps_hint=fps, credentials=self.pulse_credentials, tls=self.pulse_tls
         ) as pulses:

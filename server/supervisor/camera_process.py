@@ -17,6 +17,7 @@ from server.supervisor.reload import ReloadPlan
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_checks import check_recording
 from server.supervisor.startup_signal import signal_started
+from server.system.backoff import Backoff
 from server.system.errors import UnavailableError, UserError
 
 log = logging.getLogger(__name__)
@@ -55,7 +56,7 @@ async def _made(running: ActiveConfig, camera_id: str, anew: asyncio.Event, *, b
     To end instead, and be started again, would load all libraries each time. Once the site has begun, as it
     does while a camera is waited for, what is wrong with one camera ends that one alone.
     """
-    away, pause = LogThrottle(quiet_s=0.0), _RETRY_FIRST_S
+    away, backoff = LogThrottle(quiet_s=0.0), Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
     while True:
         anew.clear()
         try:
@@ -73,8 +74,7 @@ async def _made(running: ActiveConfig, camera_id: str, anew: asyncio.Event, *, b
                 log.info("camera %s: it answers, after %.0f s", camera_id, ended.seconds)
             return camera
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(anew.wait(), pause)
-        pause = min(2 * pause, _RETRY_MAX_S)
+            await asyncio.wait_for(anew.wait(), backoff.next())
 
 
 def _opened(config: Config, camera_id: str) -> CameraProcess:

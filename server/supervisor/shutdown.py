@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import ctypes
 import logging
 import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Coroutine, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 from server.system.accept_errors import AcceptErrors
+from server.system.child_process import TERMINATION_SIGNALS
 
 log = logging.getLogger(__name__)
 
-_PR_SET_PDEATHSIG = 1
-_ENDING = (signal.SIGINT, signal.SIGTERM)
 SUPERVISED_VARIABLE = "MYVIEW_SUPERVISED"
 """Set in the environment of a process that a supervisor looks after."""
 EXIT_FINISHED = 4
@@ -49,19 +45,13 @@ async def run_until_signal(
         told()
         task.cancel()
 
-    for number in (*_ENDING, signal.SIGHUP) if hang_up else _ENDING:
+    for number in (*TERMINATION_SIGNALS, signal.SIGHUP) if hang_up else TERMINATION_SIGNALS:
         loop.add_signal_handler(number, end)
     try:
         await task
     except asyncio.CancelledError:
         return False
     return True
-
-
-def terminate_with_parent() -> None:
-    """Ask the kernel to end this process when its supervisor is gone (Linux; elsewhere nothing)."""
-    with contextlib.suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def run_process(
@@ -87,29 +77,3 @@ def _end_after(seconds: float) -> None:
     timer = threading.Timer(seconds, end)
     timer.daemon = True
     timer.start()
-
-
-@contextmanager
-def defer_termination() -> Iterator[None]:
-    """Put off SIGINT and SIGTERM until the block is over; only in the main thread.
-
-    The mask alone would not do: a library's thread may take the signal, and Python then runs the
-    handler here all the same.  It is set too because children inherit it: one that is told to end while
-    it still starts would say so with a traceback.  They call :func:`restore_termination`.
-    """
-    came: list[int] = []
-    before = {number: signal.signal(number, lambda number, _: came.append(number)) for number in _ENDING}
-    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        if came:
-            signal.raise_signal(came[0])
-
-
-def restore_termination() -> None:
-    """In a child that was started within :func:`defer_termination`: let SIGINT and SIGTERM through."""
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)

@@ -7,7 +7,6 @@ import contextlib
 import logging
 import os
 import signal
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,8 +15,9 @@ from logthrottle import LogThrottle
 from server.config.site_config import Config
 from server.supervisor.shutdown import EXIT_FINISHED, SUPERVISED_VARIABLE
 from server.supervisor.startup_signal import STARTED_FD_VARIABLE, open_startup_pipe
+from server.system.backoff import Backoff
+from server.system.child_process import start_command
 from server.system.errors import UserError
-from server.system.niceness import lower_priority
 from server.system.processors import available_processors
 
 log = logging.getLogger(__name__)
@@ -103,7 +103,7 @@ class Supervisor:
                 child.process.send_signal(signal.SIGHUP)
 
     async def _watch(self, child: Child) -> None:
-        pause = _RETRY_FIRST_S
+        backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
         loop = asyncio.get_running_loop()
         for other in child.awaits:
             await other.started.wait()
@@ -119,12 +119,11 @@ class Supervisor:
             if code == UserError.code and child.restarts == 0:
                 raise UserError(f"{child.name} could not start")
             if loop.time() - started > _SETTLED_S:
-                pause = _RETRY_FIRST_S
-            cause = _cause(code)
+                backoff.reset()
+            cause, pause = _cause(code), backoff.next()
             if (more := child.dies.record(cause)) is not None:
                 log.warning("%s %s%s; starting it again in %.1f s", child.name, cause, more, pause)
             await asyncio.sleep(pause)
-            pause = min(2 * pause, _RETRY_MAX_S)
             child.restarts += 1
 
     async def _start(self, child: Child) -> asyncio.subprocess.Process:
@@ -132,18 +131,14 @@ class Supervisor:
         with open_startup_pipe() as pipe:
             try:
                 self._before_start()
-                process = child.process = await asyncio.create_subprocess_exec(
-                    sys.executable,
-                    "-m",
-                    "server.cli.main",
-                    *self._arguments(child),
-                    env={**self._environment, STARTED_FD_VARIABLE: str(pipe.given)},
-                    pass_fds=(pipe.given,),
-                    process_group=0,  # Ctrl-C in a terminal is for the supervisor alone
+                process = child.process = await start_command(
+                    self._arguments(child),
+                    {**self._environment, STARTED_FD_VARIABLE: str(pipe.given)},
+                    inherited=(pipe.given,),
+                    niceness=child.nicer,
                 )
             finally:
                 os.close(pipe.given)
-            lower_priority(process.pid, child.nicer)
             await pipe.ended(_STARTS_WITHIN_S)
         child.started.set()
         return process

@@ -8,9 +8,8 @@ from pathlib import Path
 from camsync import PulseServer, ServerLimits
 from fakes.timeouts import PATIENCE
 from server.camera.process import CameraProcess
-from server.config.pulse_access import pulse_users
+from server.config.pulse_access import bestview_client_name, pulse_users
 from server.config.site_config import Config
-from server.messaging.messages import pulse_client
 from server.service.service import BestViewService
 
 FPS = 50
@@ -23,7 +22,7 @@ class Running:
         self.config = config
         self.service = BestViewService(config, out)
         self._tasks: list[asyncio.Task[None]] = []
-        expect = {*config.camera_ids, pulse_client(0)}
+        expect = {*config.camera_ids, bestview_client_name(0)}
         self.pulses = PulseServer(
             FPS,
             expect=expect,

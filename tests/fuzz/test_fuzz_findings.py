@@ -241,7 +241,7 @@ def test_a_playlist_of_a_time_that_no_calendar_has_is_written_without_it(tmp_pat
 def test_a_recording_of_times_that_no_film_has_is_left_as_it_is(tmp_path: Path) -> None:
     agreement, (unit, *_) = Agreement(), pictures(0, 1)
     agreement.accept(unit.data)
-    head = agreement.head(site().site, SoundFormat(48_000, 2)) or b""
+    head = agreement.head(site().site.size, site().site.fps, SoundFormat(48_000, 2)) or b""
     form = SoundFormat(48_000, 2)
     sound = sound_fragment(form, [form.silence] * 3, 0)
     picture = bytearray(agreement.pack(unit.data, 0, 25.0, key=True))

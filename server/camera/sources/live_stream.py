@@ -20,6 +20,7 @@ from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, no_answer, open_video
 from server.camera.sources.orientation import INTERLACED, Orientation, orientation_of, pixel_aspect_of
 from server.system.address_redaction import ffmpeg_reason, redact_address
+from server.system.backoff import Backoff
 from server.system.errors import UnavailableError, UserError
 
 log = logging.getLogger(__name__)
@@ -88,13 +89,12 @@ class Stream:
         self._thread.join(_LET_GO_S)  # a silent camera holds it up for longer: it ends by itself
 
     def _run(self, opened: Opened | None) -> None:
-        pause = _RETRY_FIRST_S
+        backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
         while not self._closing.is_set():
             if opened is not None and self._read_alive(opened):
-                pause = _RETRY_FIRST_S
-            if self._closing.wait(pause):
+                backoff.reset()
+            if self._closing.wait(backoff.next()):
                 return
-            pause = min(2 * pause, _RETRY_MAX_S)
             try:
                 opened = open_video(self._url, self._options, (OPEN_S, READ_S))
             except UserError as error:

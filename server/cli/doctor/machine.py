@@ -14,8 +14,8 @@ from server.cli.doctor.camera_probe import CameraProbe
 from server.cli.doctor.findings import Finding, ok, warning
 from server.config.pulse_access import pulse_client_tls
 from server.config.site_config import Config
+from server.http.connections.connection_limit import connection_limit
 from server.system.clock_sync import is_clock_synchronized
-from server.system.descriptors import connection_limit
 from server.system.processors import available_processors
 
 _FAR_S = 1.0

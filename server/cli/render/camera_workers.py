@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import logging
-import multiprocessing
 import queue
-import signal
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
@@ -19,7 +17,7 @@ from server.camera.sources import SourceEnded
 from server.cli.render.peer_pipes import PeerLink, PeerPipeFactory, PeerPipes
 from server.config.site_config import Config
 from server.messaging.messages import CameraTracks, FrameDetections
-from server.supervisor.shutdown import defer_termination, restore_termination, terminate_with_parent
+from server.system.child_process import SPAWN, defer_termination, start_function
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -64,18 +62,14 @@ class CameraWorkers:
 
     def start(self) -> None:
         """Start all workers; a signal waits until each is known, so that :meth:`close` ends every one."""
-        context = multiprocessing.get_context("spawn")
         piping = PeerPipeFactory(
             {camera: self._config.witnesses(camera) for camera in self._config.camera_ids}
         )
         with defer_termination():
             for camera in self._config.camera_ids:
-                outbox: Outbox = context.Queue(_AHEAD)
+                outbox: Outbox = SPAWN.Queue(_AHEAD)
                 with piping.of(camera) as pipes:
-                    process = context.Process(
-                        target=_work, args=(self._config, camera, outbox, pipes), name=camera, daemon=True
-                    )
-                    process.start()
+                    process = start_function(camera, _work, self._config, camera, outbox, pipes)
                 self._outboxes[camera], self._processes[camera] = outbox, process
 
     def __iter__(self) -> Iterator[EpochBatch]:
@@ -112,9 +106,6 @@ class CameraWorkers:
 
 
 def _work(config: Config, camera: str, outbox: Outbox, others: PeerPipes) -> None:
-    terminate_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends its workers
-    restore_termination()
     try:
         pipeline = CameraPipeline(config, camera)
         if pipeline.why_encoded:

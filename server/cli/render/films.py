@@ -92,7 +92,7 @@ class FilmWriter:
 
     def _head(self, pulses: int) -> bytes:
         sound = None if self._sound is None else self._sound.format
-        return self._agreement.head(self._site, sound, pulses=pulses) or b""
+        return self._agreement.head(self._site.size, self._site.fps, sound, pulses=pulses) or b""
 
 
 def _begun_at(origin: int, heard: Heard, fps: float) -> bytes:

@@ -32,7 +32,9 @@ class Renderer:
         self._config, self._folder = config, folder
         # What is to be decided, and what the camera that was run first has done since.
         frames = 4 * (config.view.lookahead + config.encode.gop + config.track.window.stride)
-        agreement = agreement_for(config)
+        agreement = agreement_for(
+            config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
+        )
         self._shelves = {camera: FrameBuffer(config.site.fps, frames, agreement) for camera in cameras}
         self._aligner = Aligner(cameras, config.track.window.stride, grace=0)
         for camera in cameras:

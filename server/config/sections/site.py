@@ -20,6 +20,11 @@ class SiteSettings(Section):
     niceness: Annotated[int, Field(ge=0, le=19)] = 10
     """How much nicer a camera's process is than who starts it, as in nice(1): a busy machine serves first."""
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of every camera's picture in the streams, pixels."""
+        return self.width, self.height
+
 
 class ProcessTlsSettings(Section):
     """TLS between the processes of a site."""

@@ -10,7 +10,7 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_va
 from bestview import IdentitySettings, QualitySettings
 from server.config.dataclass_section import validated
 from server.config.sections.base import Section
-from server.messaging.operator_messages import RiskReason
+from tracking.types import RiskReason
 
 LIVE_VIEW_SETTINGS = (
     "lookahead",

@@ -23,7 +23,9 @@ class Form:
 
 def mp4_head(service: BestViewService) -> bytes | None:
     """Give what every MP4 of a site begins with, the same for all; None before the first key frame."""
-    return service.agreement.head(service.config.site, service.config.sound.format)
+    return service.agreement.head(
+        service.config.site.size, service.config.site.fps, service.config.sound.format
+    )
 
 
 def _mp4(piece: Chunk) -> bytes:
@@ -36,5 +38,9 @@ def _ts(piece: Chunk) -> bytes:
 
 MP4 = Form("video/mp4", mp4_head, _mp4)
 TS = Form("video/mp2t", lambda _: b"", _ts)
-WEBM = Form("video/webm", lambda service: service.agreement.head(service.config.site), lambda it: it.data)
+WEBM = Form(
+    "video/webm",
+    lambda service: service.agreement.head(service.config.site.size, service.config.site.fps),
+    lambda it: it.data,
+)
 """Of a site whose codec is VP8, and of no other."""

@@ -6,7 +6,6 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from server.config.sections import SiteSettings
 from server.media.audio.audio_format import SoundFormat
 from server.media.containers.webm import cluster, header, rebased, ticks
 from server.media.gap_filler import NO_CAMERAS, Bridge, Span
@@ -49,11 +48,16 @@ class Vp8Agreement(Agreement):
         return cluster(access_unit, pulse, fps, key=key)
 
     def head(
-        self, site: SiteSettings, sound: SoundFormat | None = None, *, pulses: int | None = None
+        self,
+        size: tuple[int, int],
+        fps: float,
+        sound: SoundFormat | None = None,
+        *,
+        pulses: int | None = None,
     ) -> bytes:
         """Give what a player needs before the first cluster; there is no sound in it."""
         del sound
-        return header(site.width, site.height, site.fps, pulses)
+        return header(*size, fps, pulses)
 
     def begun_at(self, origin: int, fragment: bytes, fps: float) -> bytes:
         """Give a cluster as it is in a stream that has this pulse at time 0."""

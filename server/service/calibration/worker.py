@@ -7,7 +7,7 @@ import logging
 
 import msgspec
 
-from server.system.child_process import start_child
+from server.system.child_process import start_worker
 
 
 class CameraBoxes(msgspec.Struct, frozen=True, array_like=True):
@@ -59,7 +59,7 @@ log = logging.getLogger(__name__)
 async def run_calibration(task: CalibrationTask) -> CalibrationResult:
     """Let a process of its own calibrate from a walk; it is ended where nobody waits for it any more."""
     try:
-        process = await start_child("server.service.calibration")
+        process = await start_worker("server.service.calibration")
     except OSError as error:
         return CalibrationResult(error=f"the calibration cannot be started: {error.strerror}")
     try:

@@ -10,8 +10,8 @@ from typing import Literal
 import msgspec
 
 from server.config.sections import FlagSettings
-from server.messaging.operator_messages import RiskReason
 from server.service.operator_assist.flag_budget import FlagBudget
+from tracking.types import RiskReason
 
 FlagState = Literal["raised", "followed", "answered", "expired"]
 

@@ -17,6 +17,7 @@ from server.service.rendering.worker_process import RenderWorker, WorkerDiedErro
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.broadcaster import Broadcaster, Chunk, Subscriber
 from server.service.streaming.media_chunk import MediaChunk
+from server.system.backoff import Backoff
 
 
 @dataclass(slots=True)
@@ -168,18 +169,19 @@ class RenderedStream:
             self.close()
 
     async def _draw_on(self) -> None:
-        pause = _RETRY_FIRST_S
+        backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
         while True:
             try:
                 await self._run_process()
             except WorkerDiedError as error:
-                pause = _RETRY_FIRST_S if self._answered else min(2 * pause, _RETRY_MAX_S)
+                if self._answered:
+                    backoff.reset()
                 if (more := self._dies.record(str(error))) is not None:
                     told = "drawing %s: the process %s%s; starting another"
                     log.warning(told, self._name, error, more)
                 self.restarts += 1
                 self.film.interrupted()
-                await asyncio.sleep(pause)
+                await asyncio.sleep(backoff.next())
             else:
                 return
 

@@ -9,7 +9,7 @@ from typing import NoReturn, Self
 import msgspec
 
 from server.media.rendering_messages import LENGTH_BYTES, Canvas, Draw, Drawn, framed
-from server.system.child_process import start_child
+from server.system.child_process import start_worker
 
 _ANSWER_S = 5.0
 """An answer that takes longer does not come: the process hangs."""
@@ -37,7 +37,7 @@ class RenderWorker:
             ProcessDiedError: the system does not let it start.
         """
         try:
-            process = await start_child("server.service.rendering.worker")
+            process = await start_worker("server.service.rendering.worker")
         except OSError as error:
             raise WorkerDiedError(f"cannot be started: {error.strerror}") from error
         started = cls(process)

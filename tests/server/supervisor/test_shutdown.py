@@ -15,7 +15,7 @@ import pytest
 
 from fakes.paths import ROOT
 from fakes.timeouts import PATIENCE
-from server.supervisor.shutdown import defer_termination
+from server.system.child_process import defer_termination
 
 
 @pytest.fixture(params=[signal.SIGTERM, signal.SIGINT])
@@ -72,7 +72,7 @@ def test_nothing_came_nothing_happens(handled: tuple[signal.Signals, list[int]])
 
 def test_a_child_inherits_the_mask_and_can_lift_it() -> None:
     code = (
-        "import signal; from server.supervisor.shutdown import end_at_once_again as again\n"
+        "import signal; from server.system.child_process import restore_termination as again\n"
         "def blocked(): return {2, 15} & set(signal.pthread_sigmask(signal.SIG_BLOCK, ()))\n"
         "before = blocked(); again(); print(len(before), len(blocked()))"
     )

@@ -128,7 +128,7 @@ async def test_the_best_view_and_the_pulses_load_before_any_camera(machine: Mach
 async def test_no_more_cameras_load_at_a_time_than_there_are_processors(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(supervisor, "processors", lambda: 2.5)
+    monkeypatch.setattr(supervisor, "available_processors", lambda: 2.5)
     machine.run(cameras=("c0", "c1", "c2", "c3", "c4"))
     await machine.processes(2)
     machine.loads_at_once = False

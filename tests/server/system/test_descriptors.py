@@ -20,12 +20,8 @@ from fakes.system.ports import free
 from fakes.timeouts import PATIENCE
 from server.cli.doctor.findings import Level
 from server.cli.doctor.machine import descriptor_findings
-from server.system.descriptors import (
-    FOR_OPERATORS,
-    connection_limit,
-    descriptor_limit,
-    raise_descriptor_limit,
-)
+from server.http.connections.connection_limit import FOR_OPERATORS, connection_limit
+from server.system.descriptors import descriptor_limit, raise_descriptor_limit
 
 
 @pytest.fixture

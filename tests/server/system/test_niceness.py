@@ -13,7 +13,7 @@ import yaml
 
 from fakes.timeouts import PATIENCE
 from server.cli.generated_config import free_port
-from server.system.child_process import start_child
+from server.system.child_process import start_worker
 from server.system.niceness import lower_priority
 
 NOBODY = 2**22 + 1  # more than a process's number can be (proc(5), pid_max)
@@ -49,7 +49,7 @@ def test_who_is_gone_already_is_no_trouble() -> None:
 
 
 async def test_what_the_service_starts_yields_to_it_and_goes_before_the_cameras() -> None:
-    process = await start_child("server.service.rendering.worker")
+    process = await start_worker("server.service.rendering.worker")
     try:
         assert BEFORE < niceness(process.pid) < BEFORE + 10
     finally:

@@ -330,7 +330,7 @@ def test_a_camera_without_a_place_among_those_that_have_one_is_told_of(tmp_path:
 def test_the_processors_are_those_that_this_process_may_use(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(machine, "processors", lambda: 0.5)
+    monkeypatch.setattr(machine, "available_processors", lambda: 0.5)
     said = only(machine_findings(config(tmp_path), {"c0": CameraProbe(cores=0.2)}), "processor")
     assert (said.level, said.text.endswith("of 0.5 cores")) == (Level.WARNING, True)
 

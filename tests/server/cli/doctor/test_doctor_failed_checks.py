@@ -39,7 +39,7 @@ BROKEN = [(Level.BAD, "/closed/door: Permission denied")]
         ("port_findings", {"http.port", "sync.port", "zenoh.listen"}),
         ("reachability_findings", {"sync.host", "zenoh.connect"}),
         ("clock_findings", {"clock", "pulse server"}),
-        ("probe_all", set[str]()),
+        ("probe_cameras", set[str]()),
         ("camera_findings", {"camera c0"}),
         ("sound_findings", set[str]()),
         ("disk_findings", {"record"}),
@@ -92,7 +92,7 @@ async def test_findings_are_told_as_they_are_found(
         told.append(capsys.readouterr().out)
         return {"c0": CameraProbe("away")}
 
-    monkeypatch.setattr(command, "probe_all", probe_all)
+    monkeypatch.setattr(command, "probe_cameras", probe_all)
     await command._told(site(tmp_path), 1.0, as_json=False)
     (before,) = told
     after = capsys.readouterr().out

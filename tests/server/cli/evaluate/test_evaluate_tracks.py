@@ -5,7 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
@@ -46,6 +46,11 @@ def write(path: Path, text: str) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(gzip.compress(text.encode()) if path.suffix == ".gz" else text.encode())
     return path
+
+
+def each(option: str, paths: Iterable[Path]) -> list[str | Path]:
+    """Repeat an option before each of its values."""
+    return [word for path in paths for word in (option, path)]
 
 
 def rows(printed: str) -> dict[str, list[str]]:
@@ -100,35 +105,43 @@ def test_what_is_not_there_is_named(refused: Printed, tmp_path: Path) -> None:
 def test_several_files_belong_together_by_their_names_in_whatever_order(run: Printed, tmp_path: Path) -> None:
     found = [write(tmp_path / "seen" / f"c{it}.txt", people((it + 1,))) for it in range(3)]
     there = [write(tmp_path / "gt" / f"c{it}.txt.gz", people((it + 1,))) for it in (2, 0, 1)]
-    once = rows(run("--gt", *there, "--tracks", *found))
+    once = rows(run(*each("--gt", there), *each("--tracks", found)))
     assert list(once) == ["camera", "c0", "c1", "c2", "mean,", "joint"]
     assert once["joint"][5] == "100.0"
-    repeated = [word for path in there for word in ("--gt", path)]
-    assert rows(run(*repeated, "--tracks", tmp_path / "seen")) == once
+    assert rows(run(*each("--gt", there), "--tracks", tmp_path / "seen")) == once
+
+
+def test_a_second_value_without_its_option_is_refused(myview: Run, tmp_path: Path) -> None:
+    a, b = (write(tmp_path / f"{name}.txt", people((1,))) for name in "ab")
+    ended = myview("evaluate", "--gt", a, b, "--tracks", a, b)
+    assert ended.code == 2
+    assert "unexpected extra argument" in ended.err
 
 
 def test_files_of_other_names_belong_together_in_their_order(run: Printed, tmp_path: Path) -> None:
     found = [write(tmp_path / f"{name}.txt", people((1,))) for name in ("left", "right")]
     there = [write(tmp_path / name / "gt.txt", people((1,))) for name in ("a", "b")]
-    assert list(rows(run("--gt", *there, "--tracks", *found))) == [
+    assert list(rows(run(*each("--gt", there), *each("--tracks", found)))) == [
         "camera",
         "left",
         "right",
         "mean,",
         "joint",
     ]
-    table = rows(run("--gt", *found, "--tracks", *there))
+    table = rows(run(*each("--gt", found), *each("--tracks", there)))
     assert list(table) == ["camera", "left", "right", "mean,", "joint"]
 
 
 def test_files_that_cannot_be_paired_are_refused(refused: Printed, tmp_path: Path) -> None:
     a, b, c = (write(tmp_path / f"{name}.txt", people((1,))) for name in "abc")
     b2, a2 = (write(tmp_path / "gt" / f"{name}.txt", people((1,))) for name in "ba")
-    assert "1 files of tracks (a.txt) for 2 of ground truth" in refused("--tracks", a, "--gt", b2, c)
-    assert f"--tracks: {b}: there is no ground truth of that name" in refused("--tracks", a, b, "--gt", a2)
-    assert f"--gt: {b2}: there are no tracks of that name" in refused("--tracks", a, "--gt", a2, b2)
-    assert "are both called 'a'" in refused("--tracks", a, a2, "--gt", a2)
-    assert "cannot tell the cameras apart" in refused("--tracks", a, a2, "--gt", b, b2)
+    assert "1 files of tracks (a.txt) for 2 of ground truth" in refused("--tracks", a, *each("--gt", (b2, c)))
+    assert f"--tracks: {b}: there is no ground truth of that name" in refused(
+        *each("--tracks", (a, b)), "--gt", a2
+    )
+    assert f"--gt: {b2}: there are no tracks of that name" in refused("--tracks", a, *each("--gt", (a2, b2)))
+    assert "are both called 'a'" in refused(*each("--tracks", (a, a2)), "--gt", a2)
+    assert "cannot tell the cameras apart" in refused(*each("--tracks", (a, a2)), *each("--gt", (b, b2)))
 
 
 def test_folders_without_common_names_are_refused(refused: Printed, tmp_path: Path) -> None:

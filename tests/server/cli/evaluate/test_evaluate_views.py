@@ -141,10 +141,8 @@ def test_plots_show_the_choice_and_the_frames_around_its_cuts(evaluate: Run, hal
     path = write(
         hall / "choices.csv", [*choices({1: "c0"}, range(1, 9)), *choices({1: "c1"}, range(9, 21))[1:]]
     )
-    videos = (hall / "c0.mp4", hall / "c1.mp4")
-    code, _, err = evaluate(
-        "--gt", hall, "--views", path, "--videos", *videos, *SIZE, "--plots", hall / "plots"
-    )
+    videos = ("--videos", hall / "c0.mp4", "--videos", hall / "c1.mp4")
+    code, _, err = evaluate("--gt", hall, "--views", path, *videos, *SIZE, "--plots", hall / "plots")
     assert (code, err) == (0, "")
     assert {it.name for it in (hall / "plots").iterdir()} == {"choices.png", "person-1.png"}
     assert all(it.stat().st_size > 1000 for it in (hall / "plots").iterdir())
@@ -178,7 +176,10 @@ def test_options_that_make_no_sense_are_refused(evaluate: Run, hall: Path) -> No
         (["--views", hall / "none.csv", *SIZE], "none.csv: cannot be read"),
         (["--views", path, "--size", "big", "--fps", 10], "--size: 'big' is not WIDTHxHEIGHT"),
         (["--views", path, "--size", "9x9"], "the number of frames a second is not known"),
-        (["--views", path, "--videos", "c0.mp4", "x.mp4"], "--videos: give one for each of the cameras"),
+        (
+            ["--views", path, "--videos", "c0.mp4", "--videos", "x.mp4"],
+            "--videos: give one for each of the cameras",
+        ),
     ):
         code, out, err = evaluate("--gt", hall, *arguments)
         assert (code, out) == (BAD_INPUT, ""), why
@@ -221,6 +222,6 @@ def test_views_may_be_folders_of_images(evaluate: Run, hall: Path) -> None:
         (hall / "views" / camera).mkdir(parents=True)
         cv2.imwrite(str(hall / "views" / camera / "1.png"), np.zeros((100, 100, 3), dtype=np.uint8))
     path = write(hall / "choices.csv", choices({1: "c0", 2: "c1"}))
-    videos = ("--videos", hall / "views" / "c0", hall / "views" / "c1")
+    videos = ("--videos", hall / "views" / "c0", "--videos", hall / "views" / "c1")
     same = evaluate("--gt", hall, "--views", path, *SIZE)
     assert evaluate("--gt", hall, "--views", path, *videos, "--fps", 10) == same

@@ -29,7 +29,9 @@ from server.service.streaming.splicer import Splicer
 
 async def spliced(config: Config) -> tuple[bytes, bytes]:
     """Give a stream that changes camera at every GOP, as MP4 and as a transport stream."""
-    agreement = agreement_for(config)
+    agreement = agreement_for(
+        config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
+    )
     shelves = {camera: FrameBuffer(FPS, GOPS * GOP, agreement) for camera in MAKES}
     put(shelves)
     splicer, pieces, viewer = Splicer(shelves, agreement, config), list[Chunk](), None
@@ -39,7 +41,7 @@ async def spliced(config: Config) -> tuple[bytes, bytes]:
     splicer.close()
     assert viewer is not None
     pieces = [piece async for piece in viewer.pieces()]
-    head = agreement.head(config.site)
+    head = agreement.head(config.site.size, config.site.fps)
     assert head is not None
     ts = b"".join(piece.ts for piece in pieces if isinstance(piece, MediaChunk))
     return head + b"".join(piece.data for piece in pieces), ts

@@ -1,0 +1,23 @@
+"""The delays between attempts at what fails: exponential backoff."""
+
+from __future__ import annotations
+
+from tenacity import RetryCallState, Retrying, wait_exponential
+
+
+class Backoff:
+    """Delays that double from ``first_s`` to ``max_s`` seconds, one per failure in a row."""
+
+    def __init__(self, first_s: float, max_s: float) -> None:
+        self._wait = wait_exponential(multiplier=first_s, max=max_s)
+        self._attempts = RetryCallState(Retrying(), None, (), {})
+        self.reset()
+
+    def next(self) -> float:
+        """Return the seconds to wait before the next attempt."""
+        self._attempts.attempt_number += 1
+        return self._wait(self._attempts)
+
+    def reset(self) -> None:
+        """Begin with ``first_s`` again, after an attempt that has succeeded."""
+        self._attempts.attempt_number = 0

@@ -1,0 +1,18 @@
+"""One module starts child processes, so that limits, priorities and signals are looked after in one place."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import server
+
+STARTS = re.compile(
+    r"create_subprocess|subprocess\.(run|Popen|call|check)|\bProcess\(target|os\.fork|get_context"
+)
+
+
+def test_no_other_module_of_the_server_starts_processes() -> None:
+    root = Path(server.__path__[0])
+    starting = [it for it in root.rglob("*.py") if STARTS.search(it.read_text("utf-8"))]
+    assert [str(it.relative_to(root)) for it in starting] == ["system/child_process.py"]
