@@ -27,7 +27,7 @@ class Benchmark:
     """It has the options that all have, and says its own command."""
 
     def command(self, options: argparse.Namespace) -> list[str]:
-        """Give the command that runs it."""
+        """Return the command that runs it."""
         words = ["-m", f"benchmarks.{self.name}", "--out", str(options.out), *self.arguments]
         return [*words, "--data", str(options.data)] if self.shared else words
 

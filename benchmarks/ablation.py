@@ -76,7 +76,7 @@ class Input:
 
 
 def inputs(recordings: list[Recording]) -> list[Input]:
-    """Give every recording's detections alone, and with the pictures where there are any: looks need them."""
+    """Return every recording's detections alone, and with the pictures where there are any: looks need them."""
     alone = [Input(it) for it in recordings]
     return alone + [Input(it, pictures=True) for it in recordings if it.video and it.video.is_file()]
 
@@ -87,7 +87,7 @@ def score(term: Term, given: Input) -> Scores:
 
 
 def cell(name: str, without: Scores, default: Scores | None) -> str:
-    """Give a number, or its difference to the default's."""
+    """Return a number, or its difference to the default's."""
     value = getattr(without, name)
     if default is not None:
         value -= getattr(default, name)
@@ -109,7 +109,7 @@ def tables(report: Report, names: list[str], found: dict[str, list[Scores]]) -> 
 
 
 def _beside(term: str, wide: dict[str, list[Scores]]) -> Sequence[Scores | None]:
-    """Give what a row's scores are compared with: the default's are not."""
+    """Return what a row's scores are compared with: the default's are not."""
     default = wide[DEFAULT.name]
     return [None] * len(default) if term == DEFAULT.name else default
 

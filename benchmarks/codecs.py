@@ -125,7 +125,7 @@ def _config(way: Way, film: Path, site: SiteSettings) -> Config:
 
 
 def middle(costs: Sequence[Cost]) -> Cost:
-    """Give the median of each number."""
+    """Return the median of each number."""
     return Cost(
         statistics.median(it.taken for it in costs),
         statistics.median(it.encoded for it in costs),

@@ -97,7 +97,7 @@ class Stage:
         return BytesChunk(data, start=True)
 
     def told(self, fragments: bytes) -> GopOverlay:
-        """Give the boxes of a GOP."""
+        """Return the boxes of a GOP."""
         first = first_pulse(fragments, self.site.fps)
         return GopOverlay(first, [self._boxes[pulse % _DRAWN] for pulse in range(first, first + self.gop)], 1)
 
@@ -145,7 +145,7 @@ def _last(stage: Stage, chunk: BytesChunk) -> int:
 
 
 def _processor_seconds(pid: int) -> float:
-    """Give a process's processor time, in nanoseconds the kernel counts (Linux)."""
+    """Return a process's processor time, in nanoseconds the kernel counts (Linux)."""
     return int(Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()[0]) / 1e9
 
 

@@ -29,7 +29,7 @@ class Busy:
     """By what a process is; :data:`OTHER` is everything else on the machine."""
 
     def cores_since(self, earlier: Busy) -> dict[str, float]:
-        """Give how many cores were in use since an earlier moment, by what used them."""
+        """Return how many cores were in use since an earlier moment, by what used them."""
         passed = self.at - earlier.at
         return {name: (used - earlier.used.get(name, 0.0)) / passed for name, used in self.used.items()}
 
@@ -57,7 +57,7 @@ def _stat(entry: Path) -> list[str]:
 
 
 def _family(running: Mapping[int, list[str]]) -> set[int]:
-    """Give this process and all that it has started, directly or not."""
+    """Return this process and all that it has started, directly or not."""
     family = {os.getpid()}
     grown = True
     while grown:
@@ -68,7 +68,7 @@ def _family(running: Mapping[int, list[str]]) -> set[int]:
 
 
 def _name(pid: int) -> str:
-    """Say what a process is: a command of `myview`, the browser, or this measurement."""
+    """Return what a process is: a command of `myview`, the browser, or this measurement."""
     if pid == os.getpid():
         return "measuring"
     try:
@@ -84,7 +84,7 @@ def _name(pid: int) -> str:
 
 
 def running_pids(name: str) -> list[int]:
-    """Give the processes below this one that are called so, such as ``camera c1``."""
+    """Return the processes below this one that are called so, such as ``camera c1``."""
     running = {int(entry.name): _stat(entry) for entry in _PROC.iterdir() if entry.name.isdecimal()}
     family = _family({pid: stat for pid, stat in running.items() if stat})
     return [pid for pid in sorted(family) if _name(pid) == name]

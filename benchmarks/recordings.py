@@ -34,7 +34,7 @@ class Recording:
 
 
 def find_recordings(data: Path, names: list[str] | None = None) -> list[Recording]:
-    """Give the sequences that are in the folder of recordings, or those of them that are named.
+    """Return the sequences that are in the folder of recordings, or those of them that are named.
 
     Raises:
         CannotRunError: there are none.
@@ -60,7 +60,7 @@ def find_recordings(data: Path, names: list[str] | None = None) -> list[Recordin
 def track(
     sequence: Recording, settings: TrackSettings | None = None, *, pictures: bool = False
 ) -> list[MotRow]:
-    """Give MyView's tracks: what `myview track --det` writes, by default with its defaults.
+    """Return MyView's tracks: what `myview track --det` writes, by default with its defaults.
 
     With `pictures` people's looks come from the video; without, only boxes and confidences are known.
     """

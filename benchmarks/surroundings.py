@@ -28,7 +28,7 @@ class CannotRunError(Exception):
 
 
 def parser(about: str, name: str) -> argparse.ArgumentParser:
-    """Give a command line with the options that all benchmarks have."""
+    """Return a command line with the options that all benchmarks have."""
     found = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=about.splitlines()[0])
     found.add_argument("--out", type=Path, default=ROOT / "out" / "bench", help="folder for plots and tables")
     found.add_argument(
@@ -41,7 +41,7 @@ def parser(about: str, name: str) -> argparse.ArgumentParser:
 
 
 def command_line() -> str:
-    """Give the command that runs this process's benchmark as it was run."""
+    """Return the command that runs this process's benchmark as it was run."""
     module = Path(sys.argv[0]).resolve().relative_to(ROOT).with_suffix("")
     name = ".".join(module.parts).removesuffix(".__main__")
     words = ["python", "-m", name, *sys.argv[1:]]
@@ -49,7 +49,7 @@ def command_line() -> str:
 
 
 def one_thread_environment() -> dict[str, str]:
-    """Give the environment for child processes."""
+    """Return the environment for child processes."""
     return {**os.environ, **ONE_THREAD}
 
 
@@ -87,6 +87,6 @@ def _git(*words: str) -> str:
 
 
 def finish(problem: CannotRunError, name: str) -> NoReturn:
-    """Say why a benchmark is left out, and end."""
+    """Return why a benchmark is left out, and end."""
     print(f"{name}: left out: {problem}")
     sys.exit(SKIPPED)

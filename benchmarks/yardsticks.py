@@ -80,7 +80,7 @@ def views(data: Path, most: int | None) -> list[View]:
 
 
 def follow(name: str, view: View) -> tuple[list[MotRow], float]:
-    """Give a tracker's tracks, and the milliseconds that it took for each frame."""
+    """Return a tracker's tracks, and the milliseconds that it took for each frame."""
     frames = view.frames
     tracker = tracker_named(
         name, WindowSettings(), CostSettings(), lambda: create_solver(DEFAULT_SOLVER), fps=view.fps

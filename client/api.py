@@ -12,7 +12,7 @@ _DEFAULT = HttpSettings()
 
 
 async def site(url: str, settings: HttpSettings = _DEFAULT) -> Site:
-    """Give what holds for all cameras.
+    """Return what holds for all cameras.
 
     Raises:
         ValueError: ``url`` is no address.
@@ -22,19 +22,19 @@ async def site(url: str, settings: HttpSettings = _DEFAULT) -> Site:
 
 
 async def objects(url: str, settings: HttpSettings = _DEFAULT) -> tuple[SeenObject, ...]:
-    """Give everything that is or was tracked, as the server lists it; errors as ``site``."""
+    """Return everything that is or was tracked, as the server lists it; errors as ``site``."""
     return (await get_json(server_url(url) / "api/objects", Objects, settings)).objects
 
 
 async def cameras(url: str, settings: HttpSettings = _DEFAULT) -> tuple[Camera, ...]:
-    """Give how each camera does; errors as ``site``."""
+    """Return how each camera does; errors as ``site``."""
     return (await get_json(server_url(url) / "api/cameras", Cameras, settings)).cameras
 
 
 async def choice(
     url: str, number: int, settings: HttpSettings = _DEFAULT, *, at: str | None = None
 ) -> Choice:
-    """Give which camera shows object ``number`` and what every camera would cost; errors as ``site``.
+    """Return which camera shows object ``number`` and what every camera would cost; errors as ``site``.
 
     ``at`` is a moment of the last minute, as in ``past``; what was before the first question about an object
     is not kept.
@@ -48,14 +48,14 @@ async def choice(
 
 
 async def spans(url: str, number: int, settings: HttpSettings = _DEFAULT) -> tuple[Span, ...]:
-    """Give what can be seen again of object ``number``; errors as ``choice``."""
+    """Return what can be seen again of object ``number``; errors as ``choice``."""
     return (await get_json(server_url(url) / f"api/objects/{number}/past", Past, settings)).spans
 
 
 async def past(
     url: str, start: str, end: str | None = None, settings: HttpSettings = _DEFAULT
 ) -> AsyncIterator[Gop]:
-    """Give what was said from one moment to another, or up to now; errors as ``site``.
+    """Yield what was said from one moment to another, or up to now; errors as ``site``.
 
     Moments are seconds back (``-60``), pulses (``p1250``) or times (ISO 8601).
 

@@ -15,7 +15,7 @@ _DEFAULT = HttpSettings()
 
 
 async def events(url: str, settings: HttpSettings = _DEFAULT) -> AsyncIterator[Event]:
-    """Give Site, Objects, Cameras, Gop and Flag events, for ever; events of other names are passed over.
+    """Yield Site, Objects, Cameras, Gop and Flag events, for ever; events of other names are passed over.
 
     When the server goes away the client connects again; the server then says anew how things stand, so that
     an event may come twice.

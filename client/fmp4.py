@@ -39,7 +39,7 @@ class BoxReader:
         self._rest = bytearray()
 
     def feed(self, data: bytes) -> Iterator[Mp4Box]:
-        """Give the boxes that ``data`` completes.
+        """Yield the boxes that ``data`` completes.
 
         Raises:
             Mp4Error: a size that no box can have.
@@ -51,7 +51,7 @@ class BoxReader:
 
 
 def timescale(moov: Mp4Box) -> int:
-    """Give the units per second of the first track's media time.
+    """Return the units per second of the first track's media time.
 
     Raises:
         Mp4Error: the box has no track, or one without a rate.
@@ -64,7 +64,7 @@ def timescale(moov: Mp4Box) -> int:
 
 
 def sound_track(moov: Mp4Box) -> int | None:
-    """Give the number of the track of sound; None where there is none."""
+    """Return the number of the track of sound; None where there is none."""
     for trak in BoxReader().feed(moov.content):
         if trak.kind == b"trak" and _handler(trak.content) == b"soun":
             return _field(child(trak.content, b"tkhd"), 12, 20, ">I")
@@ -72,7 +72,7 @@ def sound_track(moov: Mp4Box) -> int | None:
 
 
 def _handler(trak: bytes) -> bytes:
-    """Say what kind of track it is; nothing where it does not say."""
+    """Return what kind of track it is; nothing where it does not say."""
     try:
         return child(trak, b"mdia", b"hdlr")[8:12]
     except Mp4Error:
@@ -80,7 +80,7 @@ def _handler(trak: bytes) -> bytes:
 
 
 def track_of(moof: Mp4Box) -> int:
-    """Give the number of the track that a fragment belongs to.
+    """Return the number of the track that a fragment belongs to.
 
     Raises:
         Mp4Error: the fragment does not say.
@@ -89,7 +89,7 @@ def track_of(moof: Mp4Box) -> int:
 
 
 def decode_time(moof: Mp4Box) -> int:
-    """Give the media time of the fragment's first frame, in units of the timescale.
+    """Return the media time of the fragment's first frame, in units of the timescale.
 
     Raises:
         Mp4Error: the fragment does not say.
@@ -99,7 +99,7 @@ def decode_time(moof: Mp4Box) -> int:
 
 
 def child(content: bytes, *path: bytes) -> bytes:
-    """Give the content of the first box along ``path``.
+    """Return the content of the first box along ``path``.
 
     Raises:
         Mp4Error: there is none.
@@ -152,7 +152,7 @@ def _head(data: bytes | bytearray, at: int) -> _Head | None:
 
 
 def _first_box(data: bytes | bytearray) -> Mp4Box | None:
-    """Give the box that the bytes begin with; None if it is not whole yet."""
+    """Return the box that the bytes begin with; None if it is not whole yet."""
     head = _head(data, 0)
     if head is None or len(data) < head.size:
         return None

@@ -65,12 +65,12 @@ class HttpSettings:
     """What lets in, where the server asks for it."""
 
     def backoff(self, failures: int) -> float:
-        """Give the seconds to wait after so many failures in a row (1 or more)."""
+        """Return the seconds to wait after so many failures in a row (1 or more)."""
         return min(self.backoff_most, self.backoff_first * 2.0 ** min(failures - 1, 30))
 
 
 def server_url(text: str) -> URL:
-    """Give the server's address from what a user types or pastes: the page's link will do.
+    """Return the server's address from what a user types or pastes: the page's link will do.
 
     Raises:
         ValueError: it is no HTTP address.
@@ -220,7 +220,7 @@ class _ErrorBody(msgspec.Struct):
 
 
 def _error_text(body: bytes) -> str | None:
-    """Give the first line of the server's own words."""
+    """Return the first line of the server's own words."""
     try:
         words = decoded(body, _ErrorBody).error
     except ValueError:
@@ -229,7 +229,7 @@ def _error_text(body: bytes) -> str | None:
 
 
 def _why_away(error: aiohttp.ClientError) -> str:
-    """Say in one line why there is no answer: the library's words may be several, and quote what came."""
+    """Return in one line why there is no answer: the library's words may be several, and quote what came."""
     words = error.message if isinstance(error, aiohttp.ClientResponseError) else str(error)
     if isinstance(error, aiohttp.ClientConnectorError) and not isinstance(error, aiohttp.ClientSSLError):
         number, told = error.os_error.errno, error.os_error.strerror

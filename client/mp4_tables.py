@@ -78,7 +78,7 @@ class Film:
 
 
 def moov(film: Film, media_at: int) -> bytes:
-    """Give the box that says it all; ``media_at``: where in the file the media begin."""
+    """Return the box that says it all; ``media_at``: where in the file the media begin."""
     traks = [it.content for it in BoxReader().feed(film.header.content) if it.kind == b"trak"]
     mvhd = child(film.header.content, b"mvhd")
     duration = _movie_time(film.pictures.duration / film.pictures.units)
@@ -90,7 +90,7 @@ def moov(film: Film, media_at: int) -> bytes:
 
 
 def box(kind: str, *parts: bytes) -> bytes:
-    """Give a box."""
+    """Return a box."""
     body = b"".join(parts)
     return struct.pack(">I", _HEADER + len(body)) + kind.encode("ascii") + body
 
@@ -100,7 +100,7 @@ def _movie_time(seconds: float) -> int:
 
 
 def _edits(pictures: Samples, sound: Samples) -> bytes:
-    """Say how the sound goes with the pictures, which begin at 0: what is before them is not heard."""
+    """Return how the sound goes with the pictures, which begin at 0: what is before them is not heard."""
     early = pictures.times[0] / pictures.units - sound.times[0] / sound.units
     lasts = sound.duration / sound.units
     if early >= 0:
@@ -138,7 +138,7 @@ def _trak(trak: bytes, samples: Samples, media_at: int, media_header: bytes, edi
 
 
 def _tables(samples: Samples, media_at: int) -> Iterator[bytes]:
-    """Give the tables of samples."""
+    """Yield the tables of samples."""
     yield _table("stts", _durations(samples))
     if samples.keys:
         yield _table("stss", [(number,) for number in samples.keys])
@@ -149,7 +149,7 @@ def _tables(samples: Samples, media_at: int) -> Iterator[bytes]:
 
 
 def _durations(samples: Samples) -> list[tuple[int, int]]:
-    """Give how long samples last, as runs: how many, how long."""
+    """Return how long samples last, as runs: how many, how long."""
     runs: list[tuple[int, int]] = []
     ends = [*samples.times[1:], samples.times[-1] + samples.last_duration]
     for begin, end in zip(samples.times, ends, strict=True):
@@ -159,7 +159,7 @@ def _durations(samples: Samples) -> list[tuple[int, int]]:
 
 
 def _chunk_lengths(samples: Samples) -> list[tuple[int, int, int]]:
-    """Give how many samples a chunk has, where that changes: chunk from 1 on, how many, of which kind."""
+    """Return how many samples a chunk has, where that changes: chunk from 1 on, how many, of which kind."""
     rows, number = [], 1
     for count, same in groupby(count for _, count in samples.chunks):
         rows.append((number, count, 1))

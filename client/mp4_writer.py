@@ -59,7 +59,7 @@ def write_plain(fragmented: Path, out: Path) -> None:
 
 
 def _scan(file: BinaryIO) -> tuple[Film, list[tuple[int, int]]]:
-    """Give what a file holds, and where in it the media are: offset and length."""
+    """Return what a file holds, and where in it the media are: offset and length."""
     film: Film | None = None
     sound: int | None = None
     samples: Samples | None = None

@@ -98,7 +98,7 @@ async def record(
 
 
 async def _container(url: str, out: Path | None, settings: HttpSettings) -> str:
-    """Say which stream to ask for: the file's name says it, or else the server."""
+    """Return which stream to ask for: the file's name says it, or else the server."""
     if out is not None:
         return "webm" if out.suffix.lower() == ".webm" else "mp4"
     try:

@@ -80,7 +80,7 @@ class Session:
             self.reconnections += 1
 
     def _asking(self, address: URL) -> URL:
-        """Say where to begin and to end: after an interruption, with the frame after the last one."""
+        """Return where to begin and to end: after an interruption, with the frame after the last one."""
         query = {} if self._end is None else {"to": self._end}
         at, site = self._record.media_time, self._commentary.site
         if at is not None and site is not None and self._start is not None:
@@ -136,7 +136,7 @@ class Session:
 
 
 def _taker(record: Recording | WebmRecording) -> Callable[[bytes], Iterator[bool]]:
-    """Give what takes a connection's bytes; it tells of each part whether there is room for more."""
+    """Return what takes a connection's bytes; it tells of each part whether there is room for more."""
     if isinstance(record, WebmRecording):
         elements = ElementReader()
         return lambda data: map(record.take, elements.feed(data))

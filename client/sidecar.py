@@ -77,19 +77,19 @@ def _vtt_head(number: int, site: Site) -> str:
 
 
 def _cue(frame: Frame, first: int, site: Site) -> str:
-    """Give a frame of a metadata track: its pulse as the name, JSON as the text (W3C WebVTT)."""
+    """Return a frame of a metadata track: its pulse as the name, JSON as the text (W3C WebVTT)."""
     times = " --> ".join(_clock((at - first) / site.fps, 3) for at in (frame.pulse, frame.pulse + 1))
     told = {"camera": frame.camera, "boxes": [_rounded(it) for it in frame.boxes]}
     return f"p{frame.pulse}\n{times}\n{msgspec.json.encode(told).decode()}"
 
 
 def _rounded(box: Box) -> Box:
-    """Give a box to a tenth of a pixel: nobody finds people more exactly."""
+    """Return a box to a tenth of a pixel: nobody finds people more exactly."""
     return Box(box.object, *(round(side, 1) for side in (box.left, box.top, box.right, box.bottom)))
 
 
 def _lines(frame: Frame, first: int, number: int, site: Site) -> Iterator[str]:
-    """Give subtitles that are a frame's boxes (Advanced SubStation Alpha, drawn by libass)."""
+    """Yield subtitles that are a frame's boxes (Advanced SubStation Alpha, drawn by libass)."""
     begin, end = (_clock((at - first) / site.fps, 2) for at in (frame.pulse, frame.pulse + 1))
     for box in frame.boxes:
         yield from _drawn(box, begin, end, "Shown" if box.object == number else "Other")
@@ -105,7 +105,7 @@ def _drawn(box: Box, begin: str, end: str, style: str) -> tuple[str, str]:
 
 
 def _clock(seconds: float, decimals: int) -> str:
-    """Give hours, minutes and seconds, to so many decimals."""
+    """Return hours, minutes and seconds, to so many decimals."""
     units = round(seconds * 10**decimals)
     whole, part = divmod(units, 10**decimals)
     minutes, second = divmod(whole, 60)

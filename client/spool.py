@@ -39,7 +39,7 @@ class Spool:
         return Place(offset, len(data))
 
     def get(self, place: Place) -> bytes:
-        """Give back what was kept.
+        """Return back what was kept.
 
         Raises:
             OSError: it cannot be read.

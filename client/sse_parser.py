@@ -32,7 +32,7 @@ class SseParser:
         self._last_id = ""
 
     def feed(self, data: bytes) -> list[SentEvent]:
-        """Give the events that ``data`` completes.
+        """Return the events that ``data`` completes.
 
         Raises:
             EventStreamError: an event is larger than MAX_EVENT.

@@ -62,7 +62,7 @@ class Commentary:
         self._heard.set()
 
     def camera_at(self, media_time: float | None) -> str | None:
-        """Give the camera shown at ``media_time`` (seconds: pulse / fps); None if it is not known."""
+        """Return the camera shown at ``media_time`` (seconds: pulse / fps); None if it is not known."""
         if media_time is None or self.site is None:
             return None
         pulse = round(media_time * self.site.fps)
@@ -89,7 +89,7 @@ class Commentary:
                     await self._heard.wait()
 
     def frames(self, first: int, last: int) -> Iterator[Frame]:
-        """Give what is known of the frames from one pulse to another, both included, in order.
+        """Yield what is known of the frames from one pulse to another, both included, in order.
 
         Raises:
             OSError: what was kept cannot be read.

@@ -40,7 +40,7 @@ class ElementReader:
         self._rest = bytearray()
 
     def feed(self, data: bytes) -> Iterator[Element]:
-        """Give the elements that ``data`` completes.
+        """Yield the elements that ``data`` completes.
 
         Raises:
             WebmError: a name or a size that no element can have.
@@ -52,7 +52,7 @@ class ElementReader:
 
 
 def cluster_time(cluster: Element) -> int:
-    """Give a cluster's time in ticks.
+    """Return a cluster's time in ticks.
 
     Raises:
         WebmError: it does not say.
@@ -64,7 +64,7 @@ def cluster_time(cluster: Element) -> int:
 
 
 def is_key(cluster: Element) -> bool:
-    """Tell whether a cluster begins with a key frame."""
+    """Return whether a cluster begins with a key frame."""
     for element in _inside(cluster):
         if element.name == _SIMPLE_BLOCK:
             content = element.content
@@ -73,7 +73,7 @@ def is_key(cluster: Element) -> bool:
 
 
 def at_time(cluster: Element, ticks: int) -> bytes:
-    """Give the cluster at another time, as many bytes as before.
+    """Return the cluster at another time, as many bytes as before.
 
     Raises:
         WebmError: it has no room for that time: its own is no longer, or there are several.
@@ -90,12 +90,12 @@ def at_time(cluster: Element, ticks: int) -> bytes:
 
 
 def made(name: int, content: bytes) -> bytes:
-    """Give an element."""
+    """Return an element."""
     return _name(name) + _size(len(content)) + content
 
 
 def number(name: int, value: int, length: int = 8) -> bytes:
-    """Give an element that holds a number."""
+    """Return an element that holds a number."""
     return made(name, value.to_bytes(length, "big"))
 
 
@@ -108,7 +108,7 @@ def _size(size: int) -> bytes:
 
 
 def _inside(element: Element) -> Iterator[Element]:
-    """Give the elements inside another."""
+    """Yield the elements inside another."""
     at = element.head
     while (inner := _element(element.data, at)) is not None:
         at += len(inner.data)
@@ -116,7 +116,7 @@ def _inside(element: Element) -> Iterator[Element]:
 
 
 def _element(data: bytes | bytearray, begin: int) -> Element | None:
-    """Give the element that begins there; None if it is not whole yet."""
+    """Return the element that begins there; None if it is not whole yet."""
     name, at = _number(data, begin, marked=True)
     size, end = _number(data, at, marked=False) if at else (0, 0)
     if not end:
@@ -129,7 +129,7 @@ def _element(data: bytes | bytearray, begin: int) -> Element | None:
 
 
 def _number(data: bytes | bytearray, at: int, *, marked: bool) -> tuple[int, int]:
-    """Give a number whose first bits say how long it is, and where it ends; 0 where it is not whole."""
+    """Return a number whose first bits say how long it is, and where it ends; 0 where it is not whole."""
     if at >= len(data):
         return 0, 0
     length = 9 - data[at].bit_length()

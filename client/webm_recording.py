@@ -151,7 +151,7 @@ def _indexed_head(head: list[Element], length: int, keys: list[tuple[int, int]],
 
 
 def _cues(keys: list[tuple[int, int]], clusters_at: int) -> bytes:
-    """Give the index; places count from the beginning of the segment."""
+    """Return the index; places count from the beginning of the segment."""
     points = []
     for time, place in keys:
         places = number(_CUE_TRACK, 1, 1) + number(_CUE_CLUSTER, clusters_at + place)

@@ -87,7 +87,7 @@ def count(pairs: Sequence[tuple[Watched, Watched]], person: Person) -> Cases:
 
 
 def _about(flag: Flag, found: NDArray[np.int64]) -> set[int]:
-    """Give the fish that a flag is about: on whom its tracks were when it was raised, or last before.
+    """Return the fish that a flag is about: on whom its tracks were when it was raised, or last before.
 
     And who was followed, whom the operator took for one of them. Nobody, where the tracks were on no fish.
     `found` is which track each fish was matched with, `(n, T)`.
@@ -100,13 +100,13 @@ def _about(flag: Flag, found: NDArray[np.int64]) -> set[int]:
 
 
 def _kind(flag: Flag, about: set[int], helped: Watched) -> Kind:
-    """Say whether others were in the way of whom a flag was about, from when it was raised to its trouble."""
+    """Return whether others were in the way of whom a flag was about, from when it was raised to its trouble."""
     first, last = sorted((flag.trouble.frame, flag.raised))
     return kind_of(involved(helped.clip.truth, about, first, last, helped.clip.fps))
 
 
 def _outcome(flag: Flag, about: set[int], alone: Watched, helped: Watched) -> Outcome:
-    """Say what a flag was good for: whom it was about failed without help, with it, both, or neither."""
+    """Return what a flag was good for: whom it was about failed without help, with it, both, or neither."""
     fps = helped.clip.fps
     ended = flag.until if flag.ended is None else max(flag.ended, flag.until)
     first, last = min(flag.trouble.frame, flag.raised) - _BEFORE_S * fps, max(ended, flag.raised) + fps
@@ -121,7 +121,7 @@ def _outcome(flag: Flag, about: set[int], alone: Watched, helped: Watched) -> Ou
 
 
 def tells(trouble: RiskEvent, newest: int, failure: Failure, fps: float, person: Person) -> bool:
-    """Say whether a trouble is about a failure, and came early enough for the operator to see it happen."""
+    """Return whether a trouble is about a failure, and came early enough for the operator to see it happen."""
     early = newest - person.delay_s * fps + person.reaction_s * fps <= failure.frame
     return bool(
         early and newest >= failure.before - _BEFORE_S * fps and {*trouble.objects} & {*failure.tracks}
@@ -129,7 +129,7 @@ def tells(trouble: RiskEvent, newest: int, failure: Failure, fps: float, person:
 
 
 def _again(failure: Failure, others: Sequence[Failure], fps: float) -> bool:
-    """Say whether a failure is among those of the other run: the same fish, at about the same time."""
+    """Return whether a failure is among those of the other run: the same fish, at about the same time."""
     return any(
         {*failure.fish} & {*it.fish} and it.before <= failure.frame + fps and it.frame >= failure.before - fps
         for it in others
@@ -137,7 +137,7 @@ def _again(failure: Failure, others: Sequence[Failure], fps: float) -> bool:
 
 
 def _cause(failure: Failure, helped: Watched, found: NDArray[np.int64]) -> Cause:
-    """Say why a failure is left; `found` is which track each fish was matched with, `(n, T)`."""
+    """Return why a failure is left; `found` is which track each fish was matched with, `(n, T)`."""
     fps, mine = helped.clip.fps, {*failure.tracks}
     first, last = failure.before - _BEFORE_S * fps, failure.frame + fps
     flags = [
@@ -159,7 +159,7 @@ def _cause(failure: Failure, helped: Watched, found: NDArray[np.int64]) -> Cause
 
 
 def _right(flag: Flag, found: NDArray[np.int64]) -> bool:
-    """Say whether the fish that was followed is the one that the named track was on before."""
+    """Return whether the fish that was followed is the one that the named track was on before."""
     before = found[flag.fish, : max(flag.looks[0], 1)]
     known = before[before > 0]
     return bool(len(known) and known[-1] == flag.object)

@@ -47,12 +47,12 @@ class FamiliarColours:
         self._shares = ((moving + _NEVER_SEEN) / (moving + still + 2 * _NEVER_SEEN)).astype(np.float32)
 
     def shares(self, image: Image) -> Plane:
-        """Give for every pixel how often its colour was foreground, `(H, W)` in [0, 1]; unknown colours ½."""
+        """Return for every pixel how often its colour was foreground, `(H, W)` in [0, 1]; unknown colours ½."""
         return np.asarray(self._shares[_codes(image)])
 
 
 def _codes(image: Image) -> npt.NDArray[np.int32]:
-    """Give every pixel's bin, `(H, W)`."""
+    """Return every pixel's bin, `(H, W)`."""
     lab = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2LAB), dtype=np.int32)
     chroma = np.clip((lab[..., 1:] - _MIDDLE) // _PER_CHROMA + _CHROMA // 2, 0, _CHROMA - 1)
     codes = (lab[..., 0] // _PER_LIGHT * _CHROMA + chroma[..., 0]) * _CHROMA + chroma[..., 1]

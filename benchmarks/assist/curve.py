@@ -51,7 +51,7 @@ class Point:
 
 
 def curve(watched: Sequence[Watched], person: Person) -> list[Point]:
-    """Give what is foreseen from each of the risks on in clips that nobody helped with."""
+    """Return what is foreseen from each of the risks on in clips that nobody helped with."""
     return [_point(watched, person, FlagSettings(per_minute=_MANY, risk=risk)) for risk in RISKS]
 
 
@@ -72,7 +72,7 @@ def _point(watched: Sequence[Watched], person: Person, settings: FlagSettings) -
 
 
 def _raised(watched: Watched, desk: Desk) -> list[tuple[int, RiskEvent]]:
-    """Give the flags of a clip, each with the newest frame when it was raised."""
+    """Return the flags of a clip, each with the newest frame when it was raised."""
     windows: dict[int, list[RiskEvent]] = {}
     for newest, it in watched.troubles:
         windows.setdefault(newest, []).append(it)
@@ -80,7 +80,7 @@ def _raised(watched: Watched, desk: Desk) -> list[tuple[int, RiskEvent]]:
 
 
 def rows(points: Sequence[Point]) -> list[list[str]]:
-    """Give the points as rows of a table: flags, failures, foreseen, the most that is possible."""
+    """Return the points as rows of a table: flags, failures, foreseen, the most that is possible."""
     return [
         [
             f"{it.risk:.2f}" if it.risk else "all",

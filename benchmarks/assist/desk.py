@@ -27,7 +27,7 @@ class Desk:
         self._raised = {}
 
     def raised(self, newest: int, troubles: Sequence[RiskEvent]) -> list[RiskEvent]:
-        """Give those of a window's troubles for which a flag is raised, the riskiest first."""
+        """Return those of a window's troubles for which a flag is raised, the riskiest first."""
         now = self._last = self._began + newest
         whose = [frozenset(self._began * _MOST + it for it in trouble.objects) for trouble in troubles]
         for who, it in zip(whose, troubles, strict=True):

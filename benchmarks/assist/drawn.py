@@ -66,20 +66,20 @@ class Blobs:
         self._familiar = FamiliarColours((image, self._differing(image, background)) for image in ahead)
 
     def _differing(self, image: Image, background: Image) -> Mask:
-        """Give what differs from the background, `(H, W)`."""
+        """Return what differs from the background, `(H, W)`."""
         # Light that plays on the ground changes all channels alike: what counts is that they change apart.
         change = cv2.subtract(image, background, dtype=cv2.CV_16S)
         mask = np.where(np.ptp(change, axis=2) >= _DIFFERS, np.uint8(255), np.uint8(0))
         return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, self._round), dtype=np.uint8)
 
     def _bodies(self, shares: Plane) -> Mask:
-        """Give what has familiar colours, `(H, W)`: whole bodies with their pale bands, and nothing thin."""
+        """Return what has familiar colours, `(H, W)`: whole bodies with their pale bands, and nothing thin."""
         mask = np.where(shares >= _FAMILIAR, np.uint8(255), np.uint8(0))
         whole = cv2.morphologyEx(cv2.medianBlur(mask, 3), cv2.MORPH_CLOSE, self._wide)
         return np.asarray(cv2.morphologyEx(whole, cv2.MORPH_OPEN, self._round), dtype=np.uint8)
 
     def detect(self, image: Image) -> Detections:
-        """Give what is found in a picture."""
+        """Return what is found in a picture."""
         shares = self._familiar.shares(image)
         mask = self._bodies(shares)
         sums = (
@@ -94,7 +94,7 @@ class Blobs:
 
 
 def _pieces(mask: Mask, least: int) -> tuple[NDArray[np.int32], Floats]:
-    """Give the connected pieces of a mask: each pixel's number, and the boxes `(K, 4)` of the large ones."""
+    """Return the connected pieces of a mask: each pixel's number, and the boxes `(K, 4)` of the large ones."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask)
     large = stats[1:][stats[1:, cv2.CC_STAT_AREA] >= least]
     corner = large[:, [cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP]].astype(np.float64)
@@ -103,7 +103,7 @@ def _pieces(mask: Mask, least: int) -> tuple[NDArray[np.int32], Floats]:
 
 
 def _parts(mask: Mask, labels: NDArray[np.int32], thinner: int) -> Floats:
-    """Give the boxes `(K, 4)` of the large parts that pieces fall into when eroded by so many pixels.
+    """Return the boxes `(K, 4)` of the large parts that pieces fall into when eroded by so many pixels.
 
     To a part belongs what of its piece is nearer to it than to the others: erosion takes tails off.
     """
@@ -130,14 +130,14 @@ def _parts(mask: Mask, labels: NDArray[np.int32], thinner: int) -> Floats:
 
 
 def _inside(table: Floats, boxes: Floats) -> Floats:
-    """Give the sums over boxes `(K, 4)` of whole pixels, from an integral image."""
+    """Return the sums over boxes `(K, 4)` of whole pixels, from an integral image."""
     height, width = table.shape
     left, top, right, bottom = np.clip(boxes, 0, [width - 1, height - 1] * 2).astype(np.int64).T
     return np.asarray(table[bottom, right] - table[top, right] - table[bottom, left] + table[top, left])
 
 
 def drawn(film: Film, seed: int) -> Clip:
-    """Give a clip of the first camera of a scene."""
+    """Return a clip of the first camera of a scene."""
     played = Scene(film.scene, 1, film.objects, seed, *film.size, film.fps)
     count = round(film.seconds * film.fps)
     detector = _detector(film, [played.image(0, place * _EVERY) for place in range(_AHEAD)])

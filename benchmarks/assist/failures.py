@@ -77,7 +77,7 @@ def involved(truth: Truth, fish: Collection[int], first: int, last: int, fps: fl
 
 
 def matches(truth: Truth, tracks: Tracks) -> NDArray[np.int64]:
-    """Give the number of the track that each fish is matched with, `(n, T)`; 0: none.
+    """Return the number of the track that each fish is matched with, `(n, T)`; 0: none.
 
     In each frame the assignment with the largest overlap of those that keep most pairs of the frame before.
     """
@@ -97,7 +97,7 @@ def matches(truth: Truth, tracks: Tracks) -> NDArray[np.int64]:
 
 
 def failures(truth: Truth, tracks: Tracks, fps: float) -> list[Failure]:
-    """Give the failures of a clip, in their order."""
+    """Return the failures of a clip, in their order."""
     found = matches(truth, tracks)
     least, together = round(_LASTS_S * fps), _TOGETHER_S * fps
     changes = sorted(
@@ -120,7 +120,7 @@ def failures(truth: Truth, tracks: Tracks, fps: float) -> list[Failure]:
 
 
 def _changes(numbers: NDArray[np.int64], least: int) -> list[tuple[int, int, int, int]]:
-    """Give (last frame before, first frame after, old, new) of one fish's lasting changes of number."""
+    """Return (last frame before, first frame after, old, new) of one fish's lasting changes of number."""
     runs: list[list[int]] = []
     for t in np.flatnonzero(numbers):
         if runs and runs[-1][0] == numbers[t]:

@@ -25,12 +25,12 @@ class Kind:
     setup: Setup
 
     def clips(self, count: int, first: int) -> Iterator[Clip]:
-        """Give so many clips, of every second seed from `first` on."""
+        """Return so many clips, of every second seed from `first` on."""
         return (self.make(first + 2 * number) for number in range(count))
 
 
 def kinds(objects: int | None = None, seconds: float = 20.0) -> dict[str, Kind]:
-    """Give the kinds by name; `objects`: how many fish or players there are, if not as usual."""
+    """Return the kinds by name; `objects`: how many fish or players there are, if not as usual."""
     fish = Film("fish", objects or 9, seconds)
     court = Film("court", objects or 10, seconds, fps=25.0, size=(640, 360), people=True)
     return {

@@ -33,7 +33,7 @@ _STEPS = 50
 
 
 def fitted(terms: Floats, wrong: Floats) -> Floats:
-    """Give the weights of a logistic regression of `wrong` (N,) on `terms` (N, D), by Newton's method."""
+    """Return the weights of a logistic regression of `wrong` (N,) on `terms` (N, D), by Newton's method."""
     weights = np.zeros(terms.shape[1])
     for _ in range(_STEPS):
         chance = 1.0 / (1.0 + np.exp(-(terms @ weights)))
@@ -44,7 +44,7 @@ def fitted(terms: Floats, wrong: Floats) -> Floats:
 
 
 def examples(watched: Sequence[Watched], reason: RiskReason) -> tuple[Floats, Floats]:
-    """Give the terms `(N, D)` of the troubles of a reason, and 1 where they went wrong `(N,)`."""
+    """Return the terms `(N, D)` of the troubles of a reason, and 1 where they went wrong `(N,)`."""
     rows, wrong, person = [], [], Person()
     for it in watched:
         for newest, trouble in it.troubles:

@@ -29,7 +29,7 @@ _GRID = 12
 
 
 def school(seed: int, fish: int = 9, seconds: float = 20.0) -> Clip:
-    """Give a clip; the same seed gives the same."""
+    """Return a clip; the same seed gives the same."""
     rng = np.random.default_rng(seed)
     places, headings = _swim(fish, round(seconds * FPS), rng)
     boxes = _boxes(places, headings)
@@ -39,7 +39,7 @@ def school(seed: int, fish: int = 9, seconds: float = 20.0) -> Clip:
 
 
 def _swim(fish: int, frames: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Give the middles `(fish, frames, 3)` and unit headings of the same shape."""
+    """Return the middles `(fish, frames, 3)` and unit headings of the same shape."""
     angle = 2 * np.pi * np.arange(fish) / fish
     here = np.stack([2.4 * np.cos(angle), 1.2 * np.sin(angle), np.zeros(fish)], axis=1)
     way = np.tile([0.0, 0.0, -0.3], (fish, 1)) + rng.normal(0.0, 0.2, (fish, 3))
@@ -59,7 +59,7 @@ def _swim(fish: int, frames: int, rng: np.random.Generator) -> tuple[Floats, Flo
 
 
 def _boxes(places: Floats, headings: Floats) -> Floats:
-    """Give the boxes `(fish, frames, 4)` pixels of bodies a length long and a third high."""
+    """Return the boxes `(fish, frames, 4)` pixels of bodies a length long and a third high."""
     scale = _FOCAL / (_AWAY + places[..., 2])
     middle = _MIDDLE + places[..., :2] * scale[..., None]
     across = scale * (0.25 + 0.75 * np.hypot(headings[..., 0], 0.0))
@@ -69,7 +69,7 @@ def _boxes(places: Floats, headings: Floats) -> Floats:
 
 
 def _visible(boxes: Floats, depth: Floats) -> Floats:
-    """Give the share of each box `(n, 4)` that no nearer one covers, on a grid of points."""
+    """Return the share of each box `(n, 4)` that no nearer one covers, on a grid of points."""
     steps = (np.arange(_GRID) + 0.5) / _GRID
     shares = np.ones(len(boxes))
     for n, (left, top, right, bottom) in enumerate(boxes):
@@ -85,7 +85,7 @@ def _visible(boxes: Floats, depth: Floats) -> Floats:
 
 
 def _found(boxes: Floats, shares: Floats, depth: Floats, rng: np.random.Generator) -> Detections:
-    """Give what is found in one frame, in no order that tells who is who."""
+    """Return what is found in one frame, in no order that tells who is who."""
     clear = np.clip(1.0 - 0.18 * (depth + _TANK[2]), 0.0, 1.0)
     found, scores, looks = [], [], []
     for n in rng.permutation(len(boxes)):
@@ -101,7 +101,7 @@ def _found(boxes: Floats, shares: Floats, depth: Floats, rng: np.random.Generato
 
 
 def _look(clear: float, rng: np.random.Generator) -> Floats:
-    """Give the grey histogram `(_BINS,)` of a fish: paler the farther, rippled by the light."""
+    """Return the grey histogram `(_BINS,)` of a fish: paler the farther, rippled by the light."""
     level = 0.75 * _BINS - 20.0 * clear + rng.normal(0.0, 0.7)
     counts = np.histogram(rng.normal(level, 4.0, 1500), bins=_BINS, range=(0, _BINS))[0] + 0.01
     return np.asarray(counts / counts.sum())

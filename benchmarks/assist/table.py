@@ -52,7 +52,7 @@ _LEFT: Sequence[tuple[Kind, int]] = (("2 way", 15), ("3 way", 15), ("alone", 9))
 
 
 def table2(cases: Cases) -> list[Row]:
-    """Give the counts in the thesis's order.
+    """Return the counts in the thesis's order.
 
     It counts cases, of which each has a flag at most; of failures of more than two it does not say how many
     had a flag, and of those alone, not what the operator did. What it has of why there was no flag it has of
@@ -70,12 +70,12 @@ def table2(cases: Cases) -> list[Row]:
 
 
 def head(*, thesis: bool) -> list[str]:
-    """Give the columns of `texts`."""
+    """Return the columns of `texts`."""
     return ["", "count", *(["as 56 clips", "thesis"] if thesis else [])]
 
 
 def texts(cases: Cases, *, thesis: bool) -> list[list[str]]:
-    """Give the rows as words; `thesis`: with its counts, and ours for as many minutes as it has."""
+    """Return the rows as words; `thesis`: with its counts, and ours for as many minutes as it has."""
     scale = _CLIPS_MINUTES / cases.minutes
     return [
         [
@@ -88,7 +88,7 @@ def texts(cases: Cases, *, thesis: bool) -> list[list[str]]:
 
 
 def _split(cases: Cases, parts: Sequence[_Part], outcomes: tuple[Outcome, Outcome]) -> Iterator[Row]:
-    """Give flags of these outcomes by whether others were in the way, and by outcome."""
+    """Yield flags of these outcomes by whether others were in the way, and by outcome."""
     for it in parts:
         yield Row(it.name, _sum(cases, outcomes, it.kinds), it.thesis)
         for outcome, theirs in zip(outcomes, it.theirs, strict=True):

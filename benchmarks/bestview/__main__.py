@@ -64,7 +64,7 @@ WHY = ["", "Visible", "choice", "number", "missed"]
 
 
 def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator[Case]:
-    """Give the scenes one after the other; those that are not there are said."""
+    """Yield the scenes one after the other; those that are not there are said."""
     wanted = options.scene or SCENES
     for name, find in (("terrace", terrace), ("auditorium", auditorium)):
         if name in wanted:
@@ -80,12 +80,12 @@ def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator
 
 
 def as_live(case: Case) -> Case:
-    """Give the scene as cameras would show it: nothing is known of it before its first frame."""
+    """Return the scene as cameras would show it: nothing is known of it before its first frame."""
     return replace(case, content={**case.content, "detect": {"ahead_frames": 0}})
 
 
 def row_of(it: Outcome) -> list[str]:
-    """Give a row of the table: percent, cuts a minute, and the shortest shot in frames."""
+    """Return a row of the table: percent, cuts a minute, and the shortest shot in frames."""
     idf1 = (
         ["", ""] if it.tracks is None else [f"{100 * s.idf1:.1f}" for s in (it.tracks.joint, it.tracks.mean)]
     )
@@ -102,12 +102,12 @@ def row_of(it: Outcome) -> list[str]:
 
 
 def losses_of(name: str, it: Losses) -> list[str]:
-    """Give a row of the other table, percent."""
+    """Return a row of the other table, percent."""
     return [name, *(f"{100 * share:.1f}" for share in (it.visible, it.choice, it.number, it.missed))]
 
 
 def agreements_of(case: Case, way: Way) -> list[str]:
-    """Give a row of the table of who is who, percent."""
+    """Return a row of the table of who is who, percent."""
     met = Met.of(way.rendering.tracks, case.gt, LEAST_IOU)
     fps = float(case.content["site"]["fps"])
     told = (met.at_once(), *(met.later(round(seconds * fps)) for seconds in LATER_S))
@@ -115,7 +115,7 @@ def agreements_of(case: Case, way: Way) -> list[str]:
 
 
 def peers_of(options: argparse.Namespace, report: Report) -> PeerEnvironment | None:
-    """Give the other trackers' environment, or say why there is none."""
+    """Return the other trackers' environment, or say why there is none."""
     if options.no_peers or options.quick:
         return None
     try:
@@ -126,7 +126,7 @@ def peers_of(options: argparse.Namespace, report: Report) -> PeerEnvironment | N
 
 
 def walked_of(case: Case, blind: Watched, folder: Path, report: Report) -> Seen | None:
-    """Give the scene calibrated by its own tracks, or say why it cannot be."""
+    """Return the scene calibrated by its own tracks, or say why it cannot be."""
     try:
         walked = calibrated(case, own_tracks(followed(case.config(ground=False), blind.frames)), folder)
         return Seen(walked, walked.watch())

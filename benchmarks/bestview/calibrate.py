@@ -20,7 +20,7 @@ class CannotCalibrateError(Exception):
 
 
 def calibrated(case: Case, own: Rows, folder: Path) -> Case:
-    """Give the scene with the homographies that its cameras' own tracks give, in place of any it has.
+    """Return the scene with the homographies that its cameras' own tracks give, in place of any it has.
 
     Raises:
         CannotCalibrateError: the command found none.

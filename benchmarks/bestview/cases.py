@@ -46,7 +46,7 @@ class Case:
     apart: bool = False
 
     def config(self, *, ground: bool = True, **changes: Mapping[str, Any]) -> Config:
-        """Give the configuration, with some settings changed, and with or without homographies."""
+        """Return the configuration, with some settings changed, and with or without homographies."""
         content = {**self.content, **changes}
         if not ground:
             content.pop("ground", None)
@@ -59,12 +59,12 @@ class Case:
 
     @property
     def sizes(self) -> dict[str, Size]:
-        """Give the size of each camera's picture, which is the site's."""
+        """Return the size of each camera's picture, which is the site's."""
         site = self.content["site"]
         return dict.fromkeys(self.gt, (site["width"], site["height"]))
 
     def truth(self) -> SceneTruth:
-        """Give how well everybody could be seen."""
+        """Return how well everybody could be seen."""
         return build_truth(self.gt, self.sizes, self.least_shown)
 
     def watch(self, *, ground: bool = True) -> Watched:

@@ -45,7 +45,7 @@ class GivenNumbers:
     def update(
         self, tracks: Sequence[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
-        """Give everybody their number."""
+        """Return everybody their number."""
         del last_frame, pictures
         numbers = {EpisodeKey(*it.key, 0): self._people[it.key.local - 1] for it in tracks}
         return IdentityUpdate(numbers, **_NOTHING_NEW)

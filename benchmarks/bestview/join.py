@@ -35,7 +35,7 @@ class _Walk:
 
 
 def own_tracks(messages: Messages) -> dict[str, list[MotRow]]:
-    """Give each camera's final boxes by its own numbers: what `myview track` finds, without its bridges."""
+    """Return each camera's final boxes by its own numbers: what `myview track` finds, without its bridges."""
     tracks: dict[str, list[MotRow]] = {}
     for camera, said in messages.items():
         rows: list[MotRow] = []
@@ -54,7 +54,7 @@ def own_tracks(messages: Messages) -> dict[str, list[MotRow]]:
 
 
 def not_joined(rows: Rows) -> dict[str, list[MotRow]]:
-    """Give every track of every camera a number of its own."""
+    """Return every track of every camera a number of its own."""
     keys = sorted({_Key(camera, row.id) for camera, found in rows.items() for row in found})
     number = {key: place for place, key in enumerate(keys, start=1)}
     return {
@@ -100,12 +100,12 @@ def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[
 
 
 def boxes_by_truth(rows: Rows, gt: Rows) -> dict[str, list[MotRow]]:
-    """Give each box the number of the person it is at; boxes at nobody go."""
+    """Return each box the number of the person it is at; boxes at nobody go."""
     return {camera: perfect_association(found, gt[camera]) for camera, found in rows.items()}
 
 
 def tracks_by_truth(rows: Rows, gt: Rows, least_iou: float = 0.5) -> dict[str, list[MotRow]]:
-    """Give each track, for all its life, the number of the person it is most often at.
+    """Return each track, for all its life, the number of the person it is most often at.
 
     A track that is never at anybody goes. Where two of a person are there at once, the one that is with them
     for longer stays.
@@ -159,7 +159,7 @@ def _first_of_each(rows: Sequence[MotRow]) -> list[MotRow]:
 
 
 def _walks(rows: Rows, ground: Mapping[str, Floats]) -> tuple[dict[_Key, _Walk], float]:
-    """Give where each track stands, and the height of a person in ground units."""
+    """Return where each track stands, and the height of a person in ground units."""
     tracks: dict[_Key, list[MotRow]] = defaultdict(list)
     for camera, found in rows.items():
         for row in found:
@@ -177,7 +177,7 @@ def _walks(rows: Rows, ground: Mapping[str, Floats]) -> tuple[dict[_Key, _Walk],
 
 
 def _apart(one: _Walk, other: _Walk) -> float:
-    """Give the median distance in the frames that both are in; infinite where these are few."""
+    """Return the median distance in the frames that both are in; infinite where these are few."""
     _, here, there = np.intersect1d(one.frames, other.frames, return_indices=True)
     distances = np.linalg.norm(one.feet[here] - other.feet[there], axis=1)
     distances = distances[~np.isnan(distances)]

@@ -37,7 +37,7 @@ class Setting:
     goes_on_s: float = DEFAULT_GOES_ON_S
 
     def delay_s(self, fps: float) -> float:
-        """Give the longest that the first frame of a GOP waits for its decision, seconds."""
+        """Return the longest that the first frame of a GOP waits for its decision, seconds."""
         return 0.0 if self.lookahead is None else (self.lookahead + STRIDE - 2) / fps
 
 
@@ -51,7 +51,7 @@ class Swept:
 
 
 def settings_of(*, quick: bool) -> Iterator[Setting]:
-    """Give the settings: look-ahead by GOP; at their defaults, the cost of a cut and what goes on."""
+    """Yield the settings: look-ahead by GOP; at their defaults, the cost of a cut and what goes on."""
     gops = QUICK_GOPS if quick else GOPS
     for gop in gops:
         for lookahead in QUICK_LOOKAHEADS if quick else LOOKAHEADS:
@@ -97,7 +97,7 @@ def sweep(case: Case, truth: SceneTruth, *, quick: bool) -> list[Swept]:
 def _known_whole(
     truth: SceneTruth, gop: int, switch_cost: float
 ) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
-    """Give the optimum whose cuts are where a GOP begins."""
+    """Return the optimum whose cuts are where a GOP begins."""
     people, frames = truth.views.cost.shape[:2]
     starts = np.arange(frames) % gop == 0
     return select_views(truth.views.cost, np.full(people, NO_CAMERA), switch_cost, starts).views

@@ -80,7 +80,7 @@ def in_file(config: Config, path: Path) -> Frames:
 
 
 def sure_rows(frames: Frames) -> list[MotRow]:
-    """Give what the detector is sure of."""
+    """Return what the detector is sure of."""
     rows = (row for pulse, found in enumerate(frames.found) for row in rows_of(pulse, found))
     return [row for row in rows if row.confidence >= SURE]
 
@@ -116,5 +116,5 @@ class _Camera:
         self._frames = frames
 
     def told(self, pulse: int) -> Detections | None:
-        """Give what the others are told of a frame."""
+        """Return what the others are told of a frame."""
         return self._frames.found[pulse] if self._frames.looked[pulse] else None

@@ -62,7 +62,7 @@ class Outcome:
 
 
 def visible_rows(case: Case, truth: SceneTruth) -> dict[str, list[MotRow]]:
-    """Give the true boxes of those who are visible: what a camera that misses nothing would find."""
+    """Return the true boxes of those who are visible: what a camera that misses nothing would find."""
     place = {person: index for index, person in enumerate(truth.people)}
     return {
         camera: [
@@ -95,7 +95,7 @@ def ways(
     peers: PeerEnvironment | None,
     walked: Seen | None,
 ) -> Iterator[Way]:
-    """Give them, truth first.
+    """Yield them, truth first.
 
     Args:
         case: the scene.
@@ -159,7 +159,7 @@ def ways(
 
 
 def _mapped(scene: Case, found: Watched) -> Iterator[Rows]:
-    """Give what the occupancy map finds; where there can be none, say why."""
+    """Yield what the occupancy map finds; where there can be none, say why."""
     try:
         yield occupancy_rows(scene, found.boxes)
     except CannotMapError as problem:
@@ -191,7 +191,7 @@ def score_choices(
 
 
 def _peer_tracks(peers: PeerEnvironment, boxes: Rows) -> dict[str, list[MotRow]]:
-    """Give the peer's tracks of every camera's detections.
+    """Return the peer's tracks of every camera's detections.
 
     Raises:
         PeersAwayError: it failed.

@@ -135,7 +135,7 @@ def _of_two(
 
 
 def _people(path: Path, size: tuple[int, int]) -> _Boxes:
-    """Give the whole boxes of a file."""
+    """Return the whole boxes of a file."""
     return {
         (row.frame, row.id): row.box
         for row in read_rows(path)

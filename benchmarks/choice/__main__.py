@@ -25,14 +25,14 @@ _SEEN_BY = (1, 2, 4)
 
 
 def program_row(gop: int, repeats: int) -> list[str]:
-    """Give a row: the program at the size that is promised, without and with a least shot of a second."""
+    """Return a row: the program at the size that is promised, without and with a least shot of a second."""
     free = frame_time(Size(_PEOPLE, _CAMERAS, _AHEAD, gop, 0), repeats)
     kept = frame_time(Size(_PEOPLE, _CAMERAS, _AHEAD, gop, -(-25 // gop)), repeats)
     return [f"{gop}", f"{1e3 * free:.3f}", f"{1e3 * kept:.3f}"]
 
 
 def decision_row(seen_by: int, gop: int, epochs: int, *, all_terms: bool) -> list[str]:
-    """Give a row: what the stages of the whole decision cost."""
+    """Return a row: what the stages of the whole decision cost."""
     spent = decision_times(Crowd(_PEOPLE, _CAMERAS, seen_by), gop, epochs, all_terms=all_terms)
     stages = (
         spent.reading,

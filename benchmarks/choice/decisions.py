@@ -47,7 +47,7 @@ class Crowd:
     seen_by: int
 
     def epochs(self, config: Config, count: int) -> Iterator[Epoch]:
-        """Give what the cameras say: each window anew, as the tracker sends it."""
+        """Yield what the cameras say: each window anew, as the tracker sends it."""
         rng = np.random.default_rng(_SEED)
         window, stride = config.track.window.window, config.track.window.stride
         cameras = [rng.permutation(self.cameras)[: self.seen_by] for _ in range(self.people)]
@@ -104,7 +104,7 @@ class _Given:
     def update(
         self, tracks: Sequence[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
-        """Give everybody their number."""
+        """Return everybody their number."""
         del last_frame, pictures
         numbers = {EpisodeKey(*it.key, 0): int(it.looks[0].histogram[0]) for it in tracks}
         return IdentityUpdate(numbers, born=(), returned=(), gone=(), merged=(), split=())

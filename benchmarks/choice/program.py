@@ -26,7 +26,7 @@ class Size:
 
 
 def frame_time(size: Size, repeats: int) -> float:
-    """Give the seconds a frame: one choice serves all frames of a GOP; the median of some."""
+    """Return the seconds a frame: one choice serves all frames of a GOP; the median of some."""
     rng = np.random.default_rng(_SEED)
     # As the service has them: objects innermost.
     cost = rng.random((size.lookahead, size.cameras, size.objects)).transpose(2, 0, 1)

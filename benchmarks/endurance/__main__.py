@@ -117,7 +117,7 @@ def describe(report: Report, run: Run) -> None:
 
 
 def spans(frames: int) -> Iterator[tuple[int, int]]:
-    """Give the spans of the table: of :data:`SPAN` frames, of a third of all where that is fewer."""
+    """Return the spans of the table: of :data:`SPAN` frames, of a third of all where that is fewer."""
     span = min(SPAN, frames // 3)
     return itertools.pairwise(range(0, frames + 1, span))
 

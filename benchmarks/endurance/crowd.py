@@ -16,7 +16,7 @@ _WALKING = Walking(3.0, 0.15, stay=(150, 500), away=(20, 200))
 
 
 def crowd(most: int, seed: int) -> Iterator[Detections]:
-    """Give what is seen of at most so many people at once, for ever.
+    """Yield what is seen of at most so many people at once, for ever.
 
     Who comes after somebody has left is somebody else, in clothes of their own: objects are born and
     forgotten all the time.

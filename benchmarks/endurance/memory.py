@@ -21,7 +21,7 @@ _RESIDENT = 1
 
 
 def resident_megabytes() -> float:
-    """Give how much memory of this process is resident, megabytes (Linux)."""
+    """Return how much memory of this process is resident, megabytes (Linux)."""
     pages = int(_STATM.read_text(encoding="ascii").split()[_RESIDENT])
     return pages * os.sysconf("SC_PAGE_SIZE") / _MEGABYTE
 
@@ -46,7 +46,7 @@ class Samples:
         self.blocks.append(sys.getallocatedblocks())
 
     def between(self, start: int, stop: int) -> Samples:
-        """Give the samples after `start` frames and up to `stop`."""
+        """Return the samples after `start` frames and up to `stop`."""
         kept = [n for n, frames in enumerate(self.frames) if start < frames <= stop]
         return Samples(
             [self.frames[n] for n in kept],
@@ -56,15 +56,15 @@ class Samples:
         )
 
     def milliseconds_per_frame(self) -> float:
-        """Give the processor time of a frame between the first and the last sample."""
+        """Return the processor time of a frame between the first and the last sample."""
         return 1e3 * (self.seconds[-1] - self.seconds[0]) / (self.frames[-1] - self.frames[0])
 
     def growth(self) -> float:
-        """Give by how many megabytes :data:`SPAN` frames add, by a straight line through the samples."""
+        """Return by how many megabytes :data:`SPAN` frames add, by a straight line through the samples."""
         return self._per_span(self.megabytes)
 
     def block_growth(self) -> float:
-        """Give by how many blocks :data:`SPAN` frames add, likewise."""
+        """Return by how many blocks :data:`SPAN` frames add, likewise."""
         return self._per_span(self.blocks)
 
     def _per_span(self, values: Sequence[float]) -> float:

@@ -48,7 +48,7 @@ def attempt(scene: Scene, setting: Setting, solver: str) -> Outcome:
 
 
 def row(setting: Setting, solver: str, outcomes: list[Outcome]) -> list[str]:
-    """Give a row of the table."""
+    """Return a row of the table."""
     labels = [it.labels for it in outcomes]
     windows = sum(len(it.followed.reports) for it in outcomes)
     integral = sum(it.integral for it in outcomes)

@@ -39,7 +39,7 @@ class Labels:
 
 
 def per_frame(labels: Bools) -> float:
-    """Give how many of the labels of all objects, `(n, T)`, are marked in a frame, as the paper counts."""
+    """Return how many of the labels of all objects, `(n, T)`, are marked in a frame, as the paper counts."""
     return float(labels.sum() / labels.shape[1])
 
 
@@ -59,7 +59,7 @@ def judge(scene: Scene, boxes: Floats) -> Labels:
 
 
 def _whose(truth: Truth, boxes: Floats) -> NDArray[np.int64]:
-    """Give the object that each label's box is on, `(n, T)`; -1: on none. Of equals, the label's own."""
+    """Return the object that each label's box is on, `(n, T)`; -1: on none. Of equals, the label's own."""
     overlaps = np.nan_to_num(iou(boxes[:, None], truth.boxes[None]))
     own = np.arange(len(boxes))
     overlaps[own, own] += 1e-9
@@ -68,7 +68,7 @@ def _whose(truth: Truth, boxes: Floats) -> NDArray[np.int64]:
 
 
 def _found(scene: Scene, k: int, t: int) -> bool:
-    """Say whether the detector found an object."""
+    """Return whether the detector found an object."""
     if np.isnan(scene.truth.boxes[k, t, 0]):
         return False
     seen = scene.seen[k if len(scene.seen) > 1 else 0][t]
@@ -76,7 +76,7 @@ def _found(scene: Scene, k: int, t: int) -> bool:
 
 
 def named(truth: Truth, tracks: dict[int, Floats]) -> Floats:
-    """Give each object the track that follows it longest, `(n, T, 4)`: for objects that had to be found.
+    """Return each object the track that follows it longest, `(n, T, 4)`: for objects that had to be found.
 
     One track for each object and one object for each track; an object left without has no label.
     """

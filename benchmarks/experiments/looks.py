@@ -48,7 +48,7 @@ def wardrobe(kits: tuple[int, ...], rng: np.random.Generator) -> Wardrobe:
 
 
 def _clothes(place: int, kits: int, rng: np.random.Generator) -> Floats:
-    """Give the two grey levels of each half, `(2, 2)`, of a kit: kits differ most in the upper half."""
+    """Return the two grey levels of each half, `(2, 2)`, of a kit: kits differ most in the upper half."""
     level = 6.0 + (BINS - 12.0) * (place + 0.5) / kits
     shirt = level + np.array([0.0, rng.uniform(4, 8)])
     trousers = rng.uniform(4, BINS - 4) + np.array([0.0, rng.uniform(3, 6)])
@@ -56,7 +56,7 @@ def _clothes(place: int, kits: int, rng: np.random.Generator) -> Floats:
 
 
 def _bell(middles: Floats, rng: np.random.Generator) -> Floats:
-    """Give a histogram with a bell around each level."""
+    """Return a histogram with a bell around each level."""
     wide = rng.uniform(1.5, 3.0, (len(middles), 1))
     bells = np.exp(-0.5 * ((np.arange(BINS) - middles[:, None]) / wide) ** 2).sum(axis=0)
     return np.asarray(bells / bells.sum())
@@ -79,7 +79,7 @@ def owners(box: Floats, people: Floats) -> NDArray[np.int64]:
 
 
 def visible(people: Floats) -> Floats:
-    """Give the share of each person, `(n,)`, that nobody nearer covers; 0 of who is away."""
+    """Return the share of each person, `(n,)`, that nobody nearer covers; 0 of who is away."""
     shares = np.zeros(len(people))
     for k, box in enumerate(people):
         if not np.isnan(box).any():
@@ -91,7 +91,7 @@ def visible(people: Floats) -> Floats:
 
 
 def histogram(box: Floats, people: Floats, clothes: Wardrobe, rng: np.random.Generator) -> Floats:
-    """Give the grey histogram of a box, `(BINS,)`, summing to 1: of all that is in it, with noise."""
+    """Return the grey histogram of a box, `(BINS,)`, summing to 1: of all that is in it, with noise."""
     shown = owners(box, people)
     y = np.linspace(box[1], box[3], _DOWN + 2)[1:-1]
     column, row = _tile((box[0] + box[2]) / 2, WIDTH), _tile((box[1] + box[3]) / 2, HEIGHT)

@@ -68,7 +68,7 @@ def play(cast: Cast, seed: int) -> Scene:
 def detect(
     cast: Cast, people: Floats, shares: Floats, clothes: Wardrobe, rng: np.random.Generator
 ) -> Detections:
-    """Give what is found in one frame, in no order that tells who is who.
+    """Return what is found in one frame, in no order that tells who is who.
 
     `people` are boxes `(n, 4)`, NaN who is away; `shares` `(n,)` how much of each is visible.
     """

@@ -122,7 +122,7 @@ def _texture(tall: int, wide: int, spots: int, rng: np.random.Generator) -> Floa
 
 
 def _mask() -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
-    """Give a toy's shape: a head on a body."""
+    """Return a toy's shape: a head on a body."""
     shape = np.zeros((_TALL, _WIDE), dtype=np.uint8)
     cv2.ellipse(shape, (_WIDE // 2, 2 * _TALL // 3), (_WIDE // 2 - 1, _TALL // 3), 0, 0, 360, 1, -1)
     cv2.circle(shape, (_WIDE // 2, _TALL // 4), _TALL // 4 - 1, 1, -1)
@@ -130,7 +130,7 @@ def _mask() -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
 
 
 def _ways(frames: int, rng: np.random.Generator) -> Floats:
-    """Give the toys' middles: to and fro on both sides of each other, at a height that wanders."""
+    """Return the toys' middles: to and fro on both sides of each other, at a height that wanders."""
     t = np.arange(frames)
     along = np.cos(np.pi * t / _MEETING)
     swing = _SWING * along * np.abs(along)  # slow where they meet

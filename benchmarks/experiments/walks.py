@@ -46,7 +46,7 @@ class Walker:
         self._back_in = 0
 
     def step(self) -> Floats:
-        """Give the feet of the next frame, NaN while away."""
+        """Return the feet of the next frame, NaN while away."""
         if self._back_in:
             self._back_in -= 1
             if not self._back_in:
@@ -84,7 +84,7 @@ class Walker:
 
 
 def walks(people: int, frames: int, walking: Walking, rng: np.random.Generator) -> Floats:
-    """Give the feet of each person in each frame, `(people, frames, 2)` pixels; NaN while away.
+    """Return the feet of each person in each frame, `(people, frames, 2)` pixels; NaN while away.
 
     In the first frame everybody is there, side by side.
     """
@@ -98,7 +98,7 @@ def walks(people: int, frames: int, walking: Walking, rng: np.random.Generator) 
 
 
 def people_at(feet: Floats, height: float) -> Floats:
-    """Give the boxes of people whose feet are given, `(..., 4)`; `height`, pixels, is that of the nearest."""
+    """Return the boxes of people whose feet are given, `(..., 4)`; `height`, pixels, is that of the nearest."""
     x, y = feet[..., 0], feet[..., 1]
     tall = height * (0.62 + 0.38 * (y - _FAR_Y) / (_NEAR_Y - _FAR_Y))
     wide = 0.42 * tall

@@ -38,7 +38,7 @@ _KIND = 4
 
 
 def kind_of(key: str) -> str:
-    """Give what a message of a camera is, such as ``tracks``."""
+    """Return what a message of a camera is, such as ``tracks``."""
     return key.split("/")[_KIND]
 
 

@@ -48,7 +48,7 @@ class _Muxer:
             self._stream: VideoStream = self._container.add_stream_from_template(template.streams.video[0])
 
     def pack(self, number: int, shift_s: int) -> bytes:
-        """Give the packets of the picture of a frame."""
+        """Return the packets of the picture of a frame."""
         packet = av.Packet(self._film.pictures[number % FRAMES])
         packet.stream, packet.time_base = self._stream, _TIME_BASE
         packet.pts = packet.dts = round((number / FPS + shift_s) / _TIME_BASE)
@@ -123,7 +123,7 @@ class NetworkCamera:
             number += 1  # none is left out: the next ones are decoded by it
 
     def _sent(self) -> tuple[Film, int, float]:
-        """Give what all that is sent at a stretch has in common."""
+        """Return what all that is sent at a stretch has in common."""
         return self.film, self.shift_s, self.began
 
     def _now(self) -> int:

@@ -88,14 +88,14 @@ class ComposeSite:
         return {it["Config"]["Labels"]["com.docker.compose.service"]: it for it in found}
 
     def state(self, service: str) -> dict[str, Any]:
-        """Give one container's state as the engine knows it: when it started, how it ended."""
+        """Return one container's state as the engine knows it: when it started, how it ended."""
         found: dict[str, Any] = json.loads(
             self.run("docker", "inspect", "--format", "{{json .State}}", self.container(service))
         )
         return found
 
     def container(self, service: str) -> str:
-        """Give the name that compose gives to a service's container."""
+        """Return the name that compose gives to a service's container."""
         return f"{self.project}-{service}-1"
 
     @property
@@ -104,12 +104,12 @@ class ComposeSite:
         return f"{self.project}_site"
 
     def address(self) -> str:
-        """Give where the best view is published, as host:port."""
+        """Return where the best view is published, as host:port."""
         return self.compose("port", "bestview", "8080")
 
 
 def missing() -> str | None:
-    """Say what is missing to run containers here; None: nothing."""
+    """Return what is missing to run containers here; None: nothing."""
     if shutil.which("docker") is None:
         return "needs Docker: there is no `docker` here"
     for words in (["docker", "info"], ["docker", "compose", "version"]):

@@ -65,7 +65,7 @@ async def with_containers(views: Views, folder: Path) -> AsyncIterator[Stand]:
 
 
 def _site(views: Views) -> dict[str, Any]:
-    """Give the configuration, with the films where containers find them."""
+    """Return the configuration, with the films where containers find them."""
     cameras = [
         {**it, **{key: f"{_FILMS}/{Path(it[key]).name}" for key in ("source", "detections")}}
         for it in views.cameras
@@ -79,7 +79,7 @@ def _site(views: Views) -> dict[str, Any]:
 
 
 def _named(stand: Stand, name: str) -> tuple[ComposeSite, str, str]:
-    """Give the site, the service and its container."""
+    """Return the site, the service and its container."""
     site: ComposeSite = stand.control
     service = stand.shown()[0] if name == SHOWN else name
     return site, service, site.container(service)

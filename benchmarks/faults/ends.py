@@ -92,7 +92,7 @@ def _below(stand: Stand) -> list[tuple[str, int]]:
 
 
 async def _left(before: list[tuple[str, int]]) -> list[str]:
-    """Give who is still there: whose supervisor has ended may end a moment after it."""
+    """Return who is still there: whose supervisor has ended may end a moment after it."""
     give_up = time.monotonic() + _MOMENT_S
     while (left := [name for name, pid in before if pid in _running()]) and time.monotonic() < give_up:  # noqa: ASYNC110
         await asyncio.sleep(_POLL_S)

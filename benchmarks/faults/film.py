@@ -63,13 +63,13 @@ class Views:
     """In which frame of a camera a box was found: left, top, right, bottom in thousandths."""
 
     def frame_of(self, camera: str, box: Box) -> int | None:
-        """Say in which frame a box was found; None where it is a mean of several and says nothing."""
+        """Return in which frame a box was found; None where it is a mean of several and says nothing."""
         sides = (round(1000 * side) for side in (box.left, box.top, box.right, box.bottom))
         return self.found.get((camera, *sides))  # type: ignore[arg-type]
 
 
 def stamped(image: NDArray[np.uint8], camera: int, frame: int) -> NDArray[np.uint8]:
-    """Give a picture ``(H, W, 3)`` with its strip: a copy."""
+    """Return a picture ``(H, W, 3)`` with its strip: a copy."""
     value = camera << NUMBER_BITS | frame
     bits = [value >> place & 1 for place in range(BITS)]
     bits += [1 - bit for bit in bits]
@@ -165,14 +165,14 @@ def write_film(pictures: Sequence[NDArray[np.uint8]], path: Path, fps: int = FPS
 
 
 def _places() -> list[int]:
-    """Give the scene's frame that each frame of a film shows."""
+    """Return the scene's frame that each frame of a film shows."""
     there = list(range(_START, _START + _DRAWN))
     both = [*there, *reversed(there)]
     return [both[frame % len(both)] for frame in range(FRAMES)]
 
 
 def _boxes(truth: Any) -> NDArray[np.float64]:
-    """Give the boxes ``(N, 4)`` that are whole and to be seen, left, top, width, height in whole pixels."""
+    """Return the boxes ``(N, 4)`` that are whole and to be seen, left, top, width, height in whole pixels."""
     boxes = np.floor(truth.boxes[truth.visible >= _SHOWS]).reshape(-1, 4)
     inside = (boxes[:, :2] >= 1).all(axis=1) & (boxes[:, 2] < WIDTH - 1) & (boxes[:, 3] < HEIGHT - 1)
     kept = boxes[inside]
@@ -189,7 +189,7 @@ def _write_detections(boxes: Sequence[NDArray[np.float64]], pulses: int, path: P
 
 
 def _sides(boxes: NDArray[Any], frame: int) -> Iterator[tuple[int, int, int, int]]:
-    """Give left, top, right and bottom in thousandths of the boxes ``(N, 4)`` of a frame."""
+    """Yield left, top, right and bottom in thousandths of the boxes ``(N, 4)`` of a frame."""
     for left, top, width, height in (1000 * boxes.astype(int)).tolist():
         x, y = left + frame, top + _TOPS[frame]
         yield x, y, x + width + _WIDTHS[frame], y + height

@@ -41,7 +41,7 @@ class Received:
     """What was shown of each network camera."""
 
     def without(self, since: float, until: float) -> float:
-        """Give the longest time without a fresh picture, seconds, that ends or begins within a span.
+        """Return the longest time without a fresh picture, seconds, that ends or begins within a span.
 
         A GOP comes in one piece, so the rhythm of GOPs is in it.
         """
@@ -89,7 +89,7 @@ def judge(
 
 
 def _of_another_moment(pulse: int, stamp: Stamp, courses: Mapping[str, Course]) -> str:
-    """Say in what way a picture is not the one of its pulse; empty: it is."""
+    """Return in what way a picture is not the one of its pulse; empty: it is."""
     course = courses.get(stamp.camera)
     if course is not None:
         return course.wrong(pulse, stamp.frame)
@@ -97,7 +97,7 @@ def _of_another_moment(pulse: int, stamp: Stamp, courses: Mapping[str, Course]) 
 
 
 def _said(told: Told, number: int) -> Iterator[tuple[int, tuple[str | None, tuple[Box, ...]]]]:
-    """Give for every pulse the camera to be shown and the boxes in its picture.
+    """Yield for every pulse the camera to be shown and the boxes in its picture.
 
     Where none is chosen, since nobody sees the person, a stream stays with the last one.
     """

@@ -20,7 +20,7 @@ MOST_AHEAD = round(_WAY_S * FPS)
 
 
 def behind(pulse: int, frame: int) -> int:
-    """Give by how many frames a picture is older than its pulse: its number is known up to whole films."""
+    """Return by how many frames a picture is older than its pulse: its number is known up to whole films."""
     return (pulse - frame + FRAMES // 2) % FRAMES - FRAMES // 2
 
 
@@ -46,7 +46,7 @@ class Course:
 
 
 def differ(shown: Mapping[int, int], kept: Mapping[int, int]) -> list[str]:
-    """Say which pictures that were shown are others than those that were recorded: frames by pulse."""
+    """Return which pictures that were shown are others than those that were recorded: frames by pulse."""
     return [
         f"pulse {pulse}: frame {frame} was shown, {kept[pulse]} recorded"
         for pulse, frame in shown.items()

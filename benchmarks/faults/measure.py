@@ -54,6 +54,6 @@ async def _group(faults: list[Fault], views: Views, folder: Path, report: Report
 
 
 def _log_of(folder: Path) -> str:
-    """Give the end of what a site's processes said."""
+    """Return the end of what a site's processes said."""
     said = [path.read_text(encoding="utf-8", errors="replace") for path in sorted(folder.glob("*.log"))]
     return "\n".join("".join(said).splitlines()[-_LINES:])

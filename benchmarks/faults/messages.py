@@ -47,7 +47,7 @@ class _Middle:
         )
 
     async def say(self, word: str) -> Mapping[str, int]:
-        """Say how messages pass from now on; give how many have not passed plainly so far, by kind."""
+        """Return how messages pass from now on; give how many have not passed plainly so far, by kind."""
         process = self._process
         if process is None or process.stdin is None or process.stdout is None:
             return {}
@@ -103,7 +103,7 @@ async def _operate(stand: Stand) -> None:
 
 
 def _pointing(gop: Gop, number: int) -> dict[str, Any] | None:
-    """Say where somebody is in the last frame of a GOP; None: they are in no box."""
+    """Return where somebody is in the last frame of a GOP; None: they are in no box."""
     camera = gop.choices.get(number)
     boxes = gop.boxes.get(camera, ()) if camera else ()
     for box in boxes[-1] if boxes else ():

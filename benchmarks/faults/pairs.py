@@ -16,7 +16,7 @@ PROCESSES = (BESTVIEW, SYNC, SHOWN, OTHER, DRAWING)
 
 
 def turns(*left_out: str) -> Iterator[tuple[str, ...]]:
-    """Give each process but some, then any two of them; the other camera fails only beside the shown one."""
+    """Yield each process but some, then any two of them; the other camera fails only beside the shown one."""
     there = [process for process in PROCESSES if process not in left_out]
     for processes in (*combinations(there, 1), *combinations(there, 2)):
         if OTHER not in processes or SHOWN in processes:
@@ -24,12 +24,12 @@ def turns(*left_out: str) -> Iterator[tuple[str, ...]]:
 
 
 def title(processes: Collection[str]) -> str:
-    """Give them a name in the table, such as ``sync+camera``."""
+    """Return them a name in the table, such as ``sync+camera``."""
     return "+".join("camera" if process in (SHOWN, OTHER) else process for process in processes)
 
 
 def names(stand: Stand, processes: Collection[str]) -> list[str]:
-    """Give the names of the processes in a site as it is now."""
+    """Return the names of the processes in a site as it is now."""
     cameras = stand.shown()
     chosen = {SHOWN: cameras[0], OTHER: cameras[1]}
     return [chosen.get(process, process) for process in processes]

@@ -71,7 +71,7 @@ class Stand:
     """What it plays, where that is not what all sites play."""
 
     def pids(self, name: str) -> list[int]:
-        """Give the processes of a name: sync, bestview, drawing, or a camera's id; none where it is down."""
+        """Return the processes of a name: sync, bestview, drawing, or a camera's id; none where it is down."""
         return running_pids(f"camera {name}" if name in CAMERAS else name)
 
     def send(self, number: signal.Signals, *names: str) -> None:
@@ -89,7 +89,7 @@ class Stand:
                 os.kill(pid, number)
 
     def shown(self) -> list[str]:
-        """Give the cameras, first the one that most viewers are shown; of several the first by its name."""
+        """Return the cameras, first the one that most viewers are shown; of several the first by its name."""
         cameras = [self.told.shown(viewer.number) for viewer in self.viewers]
         return sorted(CAMERAS, key=lambda name: (-cameras.count(name), name))
 
@@ -120,7 +120,7 @@ class Stand:
         return now - at < _SEEN_S and any(gop.choices.values())
 
     def people(self, most: int) -> list[int]:
-        """Give the numbers of people who are shown now."""
+        """Return the numbers of people who are shown now."""
         choices = self.told.gops[-1][1].choices
         return sorted(number for number, camera in choices.items() if camera)[:most]
 

@@ -133,16 +133,16 @@ class Told:
             await asyncio.sleep(_AGAIN_S)
 
     def state(self, camera: str) -> str | None:
-        """Give a camera's state as it was told last."""
+        """Return a camera's state as it was told last."""
         known = self.cameras.cameras if self.cameras else ()
         return next((it.state for it in known if it.camera == camera), None)
 
     def shown(self, number: int) -> str | None:
-        """Give the camera that an object is shown by."""
+        """Return the camera that an object is shown by."""
         return self.choice(self.gops[-1][1], number) if self.gops else None
 
     def choice(self, gop: Gop, number: int) -> str | None:
-        """Give the camera of an object in a GOP, by whichever number it has now."""
+        """Return the camera of an object in a GOP, by whichever number it has now."""
         while number not in gop.choices and number in self.merged:
             number = self.merged[number]
         return gop.choices.get(number)

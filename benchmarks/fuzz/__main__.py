@@ -32,7 +32,7 @@ _COLUMNS = ("target", "inputs", "messages", "a second", "refused", "accepted", "
 
 
 def targets_of(part: str) -> tuple[type[Target], ...]:
-    """Give the targets of a part, whose libraries are loaded only now."""
+    """Return the targets of a part, whose libraries are loaded only now."""
     found: tuple[type[Target], ...] = importlib.import_module(f"benchmarks.fuzz.{part}").TARGETS
     return found
 
@@ -69,7 +69,7 @@ def replay(path: Path) -> int:
 
 
 def row(name: str, tally: Tally) -> list[str]:
-    """Give a line of the table."""
+    """Return a line of the table."""
     counts, rate = tally.counts, tally.counts.messages / tally.seconds if tally.seconds else 0.0
     numbers = (counts.inputs, counts.messages, round(rate), counts.refused, counts.accepted, counts.crashes)
     return [name, *map(str, numbers), str(tally.kinds)]

@@ -38,7 +38,7 @@ _TRUE = np.array([[0.012, 0.001, -3.0], [0.0004, 0.03, -2.0], [0.00001, 0.002, 0
 
 
 def _pairs(rng: Random) -> list[dict[str, Any]]:
-    """Give points of a camera that looks down at a floor, and where on it they are."""
+    """Return points of a camera that looks down at a floor, and where on it they are."""
     pairs = []
     for _ in range(rng.choice(_MORE if rng.random() < _SELDOM else _FEW)):
         x, y = rng.uniform(0, 640), rng.uniform(100, 360)
@@ -103,7 +103,7 @@ class Points(_Files):
         self._right = [{f"c{it}": _pairs(rng) for it in range(rng.choice((1, 1, 2)))} for _ in range(400)]
 
     def make(self, rng: Random) -> bytes:
-        """Give a file of points."""
+        """Return a file of points."""
         return _points(rng, rng.choice(self._right))
 
     def feed(self, data: bytes) -> bool:
@@ -125,7 +125,7 @@ class Plans(_Files):
     name = "calibration-plans"
 
     def make(self, rng: Random) -> bytes:
-        """Give a file of points that is nearly right."""
+        """Return a file of points that is nearly right."""
         cameras = {f"c{number}": _pairs(rng) for number in range(rng.choice((1, 2)))}
         content: Any = {"unit": rng.choice(("m", "$x", "", "\n", "\ud800", "$\\frac$")), "cameras": cameras}
         if rng.random() < 0.5:
@@ -163,7 +163,7 @@ class Ground(_Files):
     name = "calibration-ground"
 
     def make(self, rng: Random) -> bytes:
-        """Give a ground.json."""
+        """Return a ground.json."""
         content: Any = {"unit": "m", "homography": {"c0": _TRUE.tolist(), "c1": (_TRUE * 0.5).tolist()}}
         if rng.random() < 0.6:
             return as_json(otherwise(rng, content))

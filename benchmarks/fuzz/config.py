@@ -85,7 +85,7 @@ class Text(_Undisturbed):
         self._path = Path(self._folder.name) / "site.yaml"
 
     def make(self, rng: Random) -> bytes:
-        """Give a file."""
+        """Return a file."""
         return damaged(rng, _PLAIN, WORDS) if rng.random() < 0.99 else _PLAIN
 
     def feed(self, data: bytes) -> bool:
@@ -113,7 +113,7 @@ class Tokens(Target):
         self._path = Path(self._folder.name) / "tokens.yaml"
 
     def make(self, rng: Random) -> bytes:
-        """Give a file."""
+        """Return a file."""
         return damaged(rng, _TOKENS, WORDS) if rng.random() < 0.99 else _TOKENS
 
     def feed(self, data: bytes) -> bool:
@@ -142,7 +142,7 @@ class Values(_Undisturbed):
         self._sections: dict[str, Any] = sections
 
     def make(self, rng: Random) -> bytes:
-        """Give sections, and variables of the environment."""
+        """Return sections, and variables of the environment."""
         names, whole = rng.sample(sorted(self._sections), 2), rng.random() < _WHOLE
         content: Any = {name: self._sections[name] for name in names} | {"cameras": self._cameras}
         if not whole:
@@ -191,7 +191,7 @@ class Tried(Target):
         self._view = self._service.decider.view
 
     def make(self, rng: Random) -> bytes:
-        """Give changes to some settings."""
+        """Return changes to some settings."""
         changes = {
             "switch_cost_s": 0.3,
             "goes_on_s": 0.5,
@@ -216,7 +216,7 @@ class Tried(Target):
 
 
 def _some(rng: Random, section: Any, needed: tuple[str, ...] = ()) -> Any:
-    """Give some of a section's keys, and those that it cannot be without."""
+    """Return some of a section's keys, and those that it cannot be without."""
     if not isinstance(section, dict):
         return section
     names = {*needed, *rng.sample(list(section), min(len(section), rng.randrange(1, 5)))}
@@ -224,7 +224,7 @@ def _some(rng: Random, section: Any, needed: tuple[str, ...] = ()) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Give a section as YAML has it."""
+    """Return a section as YAML has it."""
     return json.loads(TypeAdapter(Any).dump_json(value))
 
 

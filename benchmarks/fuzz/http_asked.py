@@ -33,7 +33,7 @@ _NAMES = {
 
 
 def address(rng: Random, path: str, queries: tuple[str, ...]) -> str:
-    """Give an address by its pattern, and some of what can be asked for."""
+    """Return an address by its pattern, and some of what can be asked for."""
     for name, values in _NAMES.items():
         while "{" + name + "}" in path:
             value = rng.choice(values) if rng.random() < 0.8 else quote(str(odd(rng)), errors="replace")[:300]
@@ -47,7 +47,7 @@ def address(rng: Random, path: str, queries: tuple[str, ...]) -> str:
 
 
 def some_range(rng: Random) -> str:
-    """Give the head that asks for a part."""
+    """Return the head that asks for a part."""
     return f"Range: {rng.choice(('bytes', 'bytes', 'items', ''))}={rng.choice(_RANGES)}"
 
 
@@ -62,7 +62,7 @@ def _value(rng: Random, name: str) -> str:
 
 
 def _moment(rng: Random) -> str:
-    """Give a moment that is known, far away, or none."""
+    """Return a moment that is known, far away, or none."""
     way = rng.random()
     if way < 0.5:
         return quote(rng.choice(_MOMENTS), safe="+")

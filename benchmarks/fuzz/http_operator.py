@@ -42,7 +42,7 @@ class Operator(Asked):
     name = "http-operator"
 
     def make(self, rng: Random) -> bytes:
-        """Give the bytes of a request."""
+        """Return the bytes of a request."""
         method, path, right = rng.choice(_ASKED)
         body = b"" if right is None else as_json(otherwise(rng, right) if rng.random() < 0.85 else right)
         if rng.random() < 0.15:

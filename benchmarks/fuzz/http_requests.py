@@ -46,7 +46,7 @@ class Requests(Asked):
         self._paths = self._served.described
 
     def make(self, rng: Random) -> bytes:
-        """Give the bytes of a request."""
+        """Return the bytes of a request."""
         path, queries = rng.choice(self._paths)
         if path.endswith(_SELDOM) and rng.random() < 0.999:
             path, queries = "/api/objects", ()

@@ -64,7 +64,7 @@ class Served:
 
     @property
     def described(self) -> list[tuple[str, tuple[str, ...]]]:
-        """Give the addresses that the application tells of, each with what can be asked for."""
+        """Return the addresses that the application tells of, each with what can be asked for."""
         found = [("/", ("object",)), ("/operator", ()), ("/api", ()), ("/api/openapi.json", ())]
         for path, item in describe(self.app)["paths"].items():
             for operation in item.values():
@@ -91,7 +91,7 @@ class Served:
         return answer
 
     def is_well(self) -> bool:
-        """Tell whether it still answers others."""
+        """Return whether it still answers others."""
         return self.ask(_HEALTH).startswith(b"HTTP/1.1 200")
 
     def close(self) -> None:
@@ -102,7 +102,7 @@ class Served:
 
 
 def judged(data: bytes, answer: bytes) -> bool:
-    """Say whether a request was granted; an answer is one line of JSON where it was not."""
+    """Return whether a request was granted; an answer is one line of JSON where it was not."""
     assert b"Traceback" not in answer, answer[:2000].decode("utf-8", "replace")
     code = answer[9:12]
     assert code != b"500", answer[:2000].decode("utf-8", "replace")

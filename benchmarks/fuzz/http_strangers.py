@@ -111,7 +111,7 @@ class Strangers(Target):
         )
 
     def make(self, rng: Random) -> bytes:
-        """Give the bytes of a request, and first from which address."""
+        """Return the bytes of a request, and first from which address."""
         path, queries = rng.choice(self._paths)
         asked = address(rng, path, queries)
         lines = ["Host: 127.0.0.1"]
@@ -176,7 +176,7 @@ class Strangers(Target):
 
 
 def _may(who: set[str], one: _Answered) -> bool:
-    """Say whether somebody who knows these secrets may have been given this answer."""
+    """Return whether somebody who knows these secrets may have been given this answer."""
     if one.path in _OPEN or one.method == "OPTIONS" or "night" in who:
         return True
     if "hall" in who:
@@ -189,7 +189,7 @@ def _may(who: set[str], one: _Answered) -> bool:
 
 
 def _nearly(rng: Random, secret: str) -> str:
-    """Give a secret, mostly whole."""
+    """Return a secret, mostly whole."""
     if rng.random() < 0.5:
         return secret
     if rng.random() < 0.2:
@@ -199,7 +199,7 @@ def _nearly(rng: Random, secret: str) -> str:
 
 
 def _windows(seed: int, begin: float) -> frozenset[bytes]:
-    """Give all pieces of a camera's pictures, in each from such a share of it on."""
+    """Return all pieces of a camera's pictures, in each from such a share of it on."""
     found: set[bytes] = set()
     for unit in pictures(seed, EPOCHS * STRIDE):
         begins = range(round(begin * len(unit.data)), len(unit.data) - _WINDOW)

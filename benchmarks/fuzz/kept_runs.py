@@ -91,7 +91,7 @@ class Runs(Scripts):
             (self._run / name).write_bytes(data)
 
     def make(self, rng: Random) -> bytes:
-        """Give files that are not as they were."""
+        """Return files that are not as they were."""
         files: _Files = []
         for kind in rng.sample(sorted(self._kinds), rng.choice((1, 1, 1, 2))):
             name = rng.choice(self._kinds[kind])

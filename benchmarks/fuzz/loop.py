@@ -30,7 +30,7 @@ class _Impatient(selectors.DefaultSelector):
         """That have not ended: they are waited for a while, since they may have nothing to do."""
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        """Give what is ready now; where nothing is, the time until something is due has passed.
+        """Return what is ready now; where nothing is, the time until something is due has passed.
 
         What is sent on this machine is there when it was sent.
         """
@@ -53,7 +53,7 @@ class HurryingLoop(asyncio.SelectorEventLoop):
         super().__init__(self._impatient)
 
     def time(self) -> float:
-        """Give the time, seconds from anywhere, with what was skipped."""
+        """Return the time, seconds from anywhere, with what was skipped."""
         return super().time() + self._impatient.skipped
 
     def pass_by(self, seconds: float) -> None:

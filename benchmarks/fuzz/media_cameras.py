@@ -46,7 +46,7 @@ class OwnPackets(Target):
         self._right = ((avcc, lengths), (units[0].data[:40], units[1].data), (b"", units[0].data))
 
     def make(self, rng: Random) -> bytes:
-        """Give what stands beside a stream, and a packet of it."""
+        """Return what stands beside a stream, and a packet of it."""
         beside, packet = rng.choice(self._right)
         beside = wrong(rng, beside) if rng.random() < 0.6 else beside
         packet = wrong(rng, packet) if rng.random() < 0.6 else packet
@@ -84,7 +84,7 @@ class Files(Target):
         self._file = self._path.read_bytes()
 
     def make(self, rng: Random) -> bytes:
-        """Give a file."""
+        """Return a file."""
         return wrong(rng, self._file)
 
     def feed(self, data: bytes) -> bool:

@@ -32,7 +32,7 @@ class _Film(Target):
         self._path = Path(self._folder.name)
 
     def make(self, rng: Random) -> bytes:
-        """Give a stream."""
+        """Return a stream."""
         return wrong(rng, self._stream)
 
     def feed(self, data: bytes) -> bool:
@@ -107,7 +107,7 @@ class Events(Target):
     _SENT = b'event: gop\nid: 7\ndata: {"first": 5, "frames": 5}\n\n: hello\r\ndata: a\rdata: b\n\n'
 
     def make(self, rng: Random) -> bytes:
-        """Give a stream of events."""
+        """Return a stream of events."""
         return damaged(rng, self._SENT)
 
     def feed(self, data: bytes) -> bool:

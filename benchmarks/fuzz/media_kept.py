@@ -31,7 +31,7 @@ class Drawing(Target):
         self._fragments = stream("h264", _DRAWN)
 
     def make(self, rng: Random) -> bytes:
-        """Give fragments."""
+        """Return fragments."""
         return wrong(rng, self._fragments)
 
     def feed(self, data: bytes) -> bool:
@@ -70,7 +70,7 @@ class Kept(Target):
         self._form = SoundFormat(48_000, 2)
 
     def make(self, rng: Random) -> bytes:
-        """Give a playlist, or a file of pictures and sound."""
+        """Return a playlist, or a file of pictures and sound."""
         return wrong(rng, rng.choice((self._LIST, self._stream)))
 
     def feed(self, data: bytes) -> bool:

@@ -68,7 +68,7 @@ class Live(Scripts):
         self._sent = [_sent(form, codec) for form, codec in _FORMS.items()]
 
     def make(self, rng: Random) -> bytes:
-        """Give what is to be done with it, and what is sent."""
+        """Return what is to be done with it, and what is sent."""
         return rng.choice((b"D", b"P")) + wrong(rng, rng.choice(self._sent))
 
     def feed(self, data: bytes) -> bool:
@@ -102,7 +102,7 @@ class Live(Scripts):
 
 
 def _sent(form: str, codec: str) -> bytes:
-    """Give some GOPs as a camera sends them, with sound where the form has any."""
+    """Return some GOPs as a camera sends them, with sound where the form has any."""
     sent = io.BytesIO()
     with av.open(sent, "w", format=form) as out:
         stream = out.add_stream(codec, rate=FPS)

@@ -22,12 +22,12 @@ WORDS = (
 
 
 def wrong(rng: Random, data: bytes) -> bytes:
-    """Give the bytes with damage that media stumbles over."""
+    """Return the bytes with damage that media stumbles over."""
     return damaged(rng, data, WORDS)
 
 
 def stream(codec: Literal["h264", "vp8"], frames: int = 10) -> bytes:
-    """Give a stream of some GOPs as a viewer is sent it."""
+    """Return a stream of some GOPs as a viewer is sent it."""
     agreement = Vp8Agreement(WIDTH, HEIGHT) if codec == "vp8" else None
     form, units = SoundFormat(48_000, 2), pictures(0, frames, codec)
     if agreement is None:

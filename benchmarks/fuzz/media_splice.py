@@ -53,7 +53,7 @@ class _Splice(Scripts):
         return site(codec=self.codec, encode=encode)
 
     def make(self, rng: Random) -> bytes:
-        """Give two cameras' frames in the order of their pulses."""
+        """Return two cameras' frames in the order of their pulses."""
         share = rng.choice((0.05, 0.1, 0.3))
         whole = rng.random() < _WHOLE
         gops = _EPOCHS if whole else rng.choice((2, 2, 3))

@@ -51,7 +51,7 @@ class _Files(Target):
         self._right = [_rows(rng, self.least_id) for _ in range(200)]
 
     def file(self, rng: Random) -> bytes:
-        """Give a file that is nearly right."""
+        """Return a file that is nearly right."""
         data = rng.choice(self._right)
         return damaged(rng, data, WORDS) if rng.random() < 0.9 else data
 
@@ -72,7 +72,7 @@ class Text(_Files):
     name = "mot-text"
 
     def make(self, rng: Random) -> bytes:
-        """Give a file."""
+        """Return a file."""
         data = self.file(rng)
         if rng.random() < 0.05:
             data = gzip.compress(data, 1)
@@ -107,7 +107,7 @@ class Detections(_Files):
         self._picture = np.zeros((48, 64, 3), dtype=np.uint8)
 
     def make(self, rng: Random) -> bytes:
-        """Give a file."""
+        """Return a file."""
         return self.file(rng)
 
     def feed(self, data: bytes) -> bool:
@@ -130,7 +130,7 @@ class Walks(_Files):
     least_id = 1
 
     def make(self, rng: Random) -> bytes:
-        """Give a file of tracks."""
+        """Return a file of tracks."""
         return self.file(rng)
 
     def feed(self, data: bytes) -> bool:

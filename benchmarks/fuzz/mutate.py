@@ -71,19 +71,19 @@ _ODD: tuple[Callable[[Random], Any], ...] = (
 
 
 def damaged(rng: Random, data: bytes, words: Sequence[bytes] = WORDS) -> bytes:
-    """Give the bytes with one to four pieces of damage: flipped, cut, doubled, moved, said otherwise."""
+    """Return the bytes with one to four pieces of damage: flipped, cut, doubled, moved, said otherwise."""
     for _ in range(rng.choice((1, 1, 1, 2, 2, 3, 4))):
         data = rng.choice(_DAMAGES)(rng, data, words)
     return data[:_MOST_BYTES]
 
 
 def odd(rng: Random) -> Any:
-    """Give a value that is seldom what is expected."""
+    """Return a value that is seldom what is expected."""
     return rng.choice(_ODD)(rng)
 
 
 def nested(depth: int) -> Any:
-    """Give lists in lists."""
+    """Return lists in lists."""
     value: Any = []
     for _ in range(depth):
         value = [value]
@@ -91,7 +91,7 @@ def nested(depth: int) -> Any:
 
 
 def otherwise(rng: Random, value: Any) -> Any:
-    """Give a copy of a value with something in it changed: odd, gone, doubled or of another kind."""
+    """Return a copy of a value with something in it changed: odd, gone, doubled or of another kind."""
     if isinstance(value, dict) and value and rng.random() < _DESCEND:
         key = rng.choice(list(value))
         return {**value, key: otherwise(rng, value[key])}
@@ -133,7 +133,7 @@ def _changes(value: Any) -> Sequence[Callable[[Random], Any]]:
 
 
 def odd_key(rng: Random) -> str:
-    """Give a key that nobody waits for."""
+    """Return a key that nobody waits for."""
     return rng.choice(("", "x", "0", "camera", "\ud800", "a" * 300, "id"))
 
 
@@ -143,7 +143,7 @@ def _without(rng: Random, value: dict[str, Any]) -> dict[str, Any]:
 
 
 def as_json(value: Any) -> bytes:
-    """Give a value as JSON, numbers that JSON does not know as Python writes them."""
+    """Return a value as JSON, numbers that JSON does not know as Python writes them."""
     return json.dumps(value).encode()
 
 

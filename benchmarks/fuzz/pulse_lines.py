@@ -58,7 +58,7 @@ WORDS = (
 
 
 def some_line(rng: Random, lines: tuple[bytes, ...]) -> bytes:
-    """Give a line of these; most are damaged."""
+    """Return a line of these; most are damaged."""
     line = rng.choice(lines)
     return line if rng.random() < 0.3 else damaged(rng, line, WORDS)
 
@@ -69,7 +69,7 @@ class Lines(Target):
     name = "pulse-lines"
 
     def make(self, rng: Random) -> bytes:
-        """Give a line without its end."""
+        """Return a line without its end."""
         line = some_line(rng, CLIENT_LINES + SERVER_LINES)
         return line.rstrip(b"\n") if rng.random() < 0.9 else rng.randbytes(rng.randrange(60))
 

@@ -40,7 +40,7 @@ class ServerSessions(Scripts):
         self._loop = asyncio.new_event_loop()
 
     def make(self, rng: Random) -> bytes:
-        """Give who says what."""
+        """Return who says what."""
         return _scripted(rng, CLIENT_LINES, 3)
 
     def feed(self, data: bytes) -> bool:
@@ -93,7 +93,7 @@ class ClientSessions(Scripts):
         self._loop = asyncio.new_event_loop()
 
     def make(self, rng: Random) -> bytes:
-        """Give what the server says, mostly after a greeting that is right."""
+        """Return what the server says, mostly after a greeting that is right."""
         if rng.random() < 0.8:
             first: Script = [(0, rng.choice(SERVER_LINES[:2]))]
             return msgspec.msgpack.encode([*first, *_script.decode(_scripted(rng, SERVER_LINES, 1))])

@@ -34,7 +34,7 @@ class Sockets(Scripts):
         self._fed = 0
 
     def make(self, rng: Random) -> bytes:
-        """Give what a connection says, to the server or to a client."""
+        """Return what a connection says, to the server or to a client."""
         lines = rng.choice((CLIENT_LINES, SERVER_LINES))
         said = b"".join(some_line(rng, lines) for _ in range(rng.randrange(1, 6)))
         return (b"C" if lines is CLIENT_LINES else b"S") + said

@@ -95,7 +95,7 @@ class Attempt:
             signal.signal(signal.SIGPROF, before)
 
     def feed(self, data: bytes) -> bool | Crash:
-        """Give whether an input was taken; a crash where there was one."""
+        """Return whether an input was taken; a crash where there was one."""
         self._log.last = None
         signal.setitimer(signal.ITIMER_PROF, self._hang_s)
         try:
@@ -118,7 +118,7 @@ class Attempt:
 
 
 def _most_mb() -> int:
-    """Give the most megabytes that the process has had."""
+    """Return the most megabytes that the process has had."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
 
 
@@ -157,7 +157,7 @@ class Plan:
     """The number of the first input."""
 
     def done(self, counts: Counts) -> bool:
-        """Tell whether these are as many as there were to be."""
+        """Return whether these are as many as there were to be."""
         return any(
             most is not None and so_far >= most
             for so_far, most in ((counts.inputs, self.inputs), (counts.messages, self.messages))
@@ -165,7 +165,7 @@ class Plan:
 
 
 def numbered(target: Target, seed: int, index: int) -> bytes:
-    """Give the input of this number: the same in every run."""
+    """Return the input of this number: the same in every run."""
     return target.make(Random(seed << 48 | index))
 
 

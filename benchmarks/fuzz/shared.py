@@ -37,11 +37,11 @@ class Shared:
 
     @property
     def counts(self) -> Counts:
-        """Give what was kept last."""
+        """Return what was kept last."""
         return Counts(*_HEAD.unpack_from(self._memory)[:-1])
 
     @property
     def data(self) -> bytes:
-        """Give the input that was kept last."""
+        """Return the input that was kept last."""
         size = _HEAD.unpack_from(self._memory)[-1]
         return self._memory[_HEAD.size : _HEAD.size + size]

@@ -43,7 +43,7 @@ Word = Callable[[Random, str, int], CameraTracks]
 
 
 def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
-    """Give a site of two cameras that look at one floor; every epoch is a GOP."""
+    """Return a site of two cameras that look at one floor; every epoch is a GOP."""
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
         "encode": {"gop": GOP, "codec": codec},
@@ -77,7 +77,7 @@ def pictures(seed: int, frames: int, codec: Literal["h264", "vp8"] = "h264") -> 
 
 
 def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
-    """Give a frame as it comes from the bus."""
+    """Return a frame as it comes from the bus."""
     head = FrameHeader(
         pulse=unit.pulse,
         key=unit.key,
@@ -91,7 +91,7 @@ def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
 
 
 def word(rng: Random, camera: str, epoch: int) -> CameraTracks:
-    """Give a camera's word on an epoch, in which up to three people walk."""
+    """Return a camera's word on an epoch, in which up to three people walk."""
     first = epoch * STRIDE
     return CameraTracks(
         camera=camera,
@@ -141,18 +141,18 @@ def one_each(rng: Random, camera: str, epoch: int) -> CameraTracks:
 
 
 def tracks(message: CameraTracks) -> Message:
-    """Give a word as it comes from the bus."""
+    """Return a word as it comes from the bus."""
     return Message(KEYS.camera(message.camera, "tracks"), msgspec.json.encode(message), b"")
 
 
 def thumbnail(camera: str, pulse: int) -> Message:
-    """Give a small picture as it comes from the bus."""
+    """Return a small picture as it comes from the bus."""
     head = ThumbnailHeader(track=1, boot=1, pulse=pulse)
     return Message(KEYS.camera(camera, "thumbs/1"), b"\xff\xd8jpeg", msgspec.json.encode(head))
 
 
 def status(camera: str, pulse: int) -> Message:
-    """Give a status as it comes from the bus."""
+    """Return a status as it comes from the bus."""
     told = CameraStatus(
         camera=camera,
         boot=1,
@@ -169,7 +169,7 @@ def status(camera: str, pulse: int) -> Message:
 
 
 def sound(epoch: int) -> Message:
-    """Give the sound of an epoch as it comes from the bus."""
+    """Return the sound of an epoch as it comes from the bus."""
     head = AudioHeader(first=epoch * 9, sizes=[_SOUND_BYTES] * 9)
     return Message(KEYS.sound, bytes(_SOUND_BYTES * 9), msgspec.json.encode(head))
 

@@ -34,7 +34,7 @@ class Target(ABC):
 
     @abstractmethod
     def make(self, rng: Random) -> bytes:
-        """Give an input: most are nearly right, some are right, some are anything."""
+        """Return an input: most are nearly right, some are right, some are anything."""
 
     @abstractmethod
     def feed(self, data: bytes) -> bool:
@@ -62,7 +62,7 @@ class Scripts(Target):
 
 
 def refused(error: BaseException | str) -> bool:
-    """Say that an input was refused, having seen that a person can read why.
+    """Return that an input was refused, having seen that a person can read why.
 
     Raises:
         UnclearError: it is no line, or none that can be read.

@@ -66,7 +66,7 @@ class Messages(Target):
         self._form = SoundFormat(48_000, 2)
 
     def make(self, rng: Random) -> bytes:
-        """Give a message."""
+        """Return a message."""
         pulse = rng.randrange(10)
         right = rng.choice(
             (
@@ -109,7 +109,7 @@ class Words(Scripts):
         self._exchange = Exchange(site(), "c0", None, 50)
 
     def make(self, rng: Random) -> bytes:
-        """Give some words of the other camera."""
+        """Return some words of the other camera."""
         script: Script = []
         for pulse in range(3):
             boxes = [(1.0, 2.0, 9.0, 30.0, 0.9)] * rng.randrange(3)
@@ -141,7 +141,7 @@ class Places(Scripts):
     name = "zenoh-pointing"
 
     def make(self, rng: Random) -> bytes:
-        """Give some words of the best view."""
+        """Return some words of the best view."""
         script: Script = []
         for pulse in range(3):
             place = OperatorPoint(pulse=pulse, track=1, x=9.0, y=9.0, reach=rng.random() + 0.1)
@@ -173,7 +173,7 @@ class Sessions(Scripts):
         self._loop = asyncio.new_event_loop()
 
     def make(self, rng: Random) -> bytes:
-        """Give some hundred messages, of which some are wrong."""
+        """Return some hundred messages, of which some are wrong."""
         script: Script = []
         share = rng.choice((0.0, 0.02, 0.02, 0.1, 0.5))
         only_one = rng.random() < 0.5

@@ -31,7 +31,7 @@ class Memories(Scripts):
         self._config = site()
 
     def make(self, rng: Random) -> bytes:
-        """Give some memories, and by what the people of the site walk."""
+        """Return some memories, and by what the people of the site walk."""
         script = []
         for _ in range(_SAID):
             camera = rng.choice(CAMERAS)

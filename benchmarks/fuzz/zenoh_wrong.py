@@ -11,7 +11,7 @@ from server.messaging.inbox import Message
 
 
 def wrong(rng: Random, message: Message) -> Message:
-    """Give a message with something in it wrong: a value, a byte, its key."""
+    """Return a message with something in it wrong: a value, a byte, its key."""
     key, payload, head = message.key, message.payload, message.attachment
     way = rng.random()
     if way < 0.55:

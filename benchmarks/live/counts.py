@@ -24,7 +24,7 @@ class Counts:
     late: int
 
     def since(self, earlier: Counts) -> Counts:
-        """Give what was counted since an earlier moment."""
+        """Return what was counted since an earlier moment."""
         cameras = {
             camera: {
                 what: number - earlier.cameras.get(camera, {}).get(what, 0) for what, number in it.items()

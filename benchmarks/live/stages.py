@@ -52,7 +52,7 @@ class StageTimes:
     process: float
 
     def milliseconds_since(self, earlier: StageTimes) -> dict[str, float]:
-        """Give the processor milliseconds per frame of each stage and of the rest since an earlier moment."""
+        """Return the processor milliseconds per frame of each stage and of the rest since an earlier moment."""
         frames = max(self.frames - earlier.frames, 1)
         found = {name: 1e3 * (self.seconds[name] - earlier.seconds[name]) / frames for name in STAGES}
         whole = 1e3 * (self.process - earlier.process) / frames
@@ -60,7 +60,7 @@ class StageTimes:
 
 
 def hooked_environment(folder: Path) -> dict[str, str]:
-    """Give what the environment of `myview up` needs so that its cameras time themselves into a folder."""
+    """Return what the environment of `myview up` needs so that its cameras time themselves into a folder."""
     path = [str(_HOOK), str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     return {"PYTHONPATH": os.pathsep.join(filter(None, path)), FOLDER_VARIABLE: str(folder)}
 

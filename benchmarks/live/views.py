@@ -44,7 +44,7 @@ class Live:
 
 
 def live_views(name: str, data: Path, folder: Path) -> Live:
-    """Give the cameras of that name; the scene is recorded into the folder first.
+    """Return the cameras of that name; the scene is recorded into the folder first.
 
     Raises:
         CannotRunError: the recordings are not there.
@@ -57,7 +57,7 @@ def live_views(name: str, data: Path, folder: Path) -> Live:
 
 
 def usual_views(data: Path) -> str:
-    """Give the recordings' name where they are there, the scene's otherwise."""
+    """Return the recordings' name where they are there, the scene's otherwise."""
     try:
         for scene in _SCENES:
             find_views(data, scene)

@@ -67,7 +67,7 @@ class Asked:
         return min((at + took for at, took in self.waits if took is not None), default=np.inf)
 
     def wait(self, percent: float) -> float:
-        """Give a percentile of the seconds that an answer took, once the first one had come."""
+        """Return a percentile of the seconds that an answer took, once the first one had come."""
         took = [self.seconds - at if it is None else it for at, it in self.waits if at >= self.first]
         return float(np.percentile(took, percent)) if took else np.inf
 
@@ -81,7 +81,7 @@ class Asked:
 
 
 def lag_below(share: float, lags: Sequence[tuple[float, float]]) -> float:
-    """Give the bound in seconds that so large a share of the lags does not pass."""
+    """Return the bound in seconds that so large a share of the lags does not pass."""
     return next((bound for bound, count in lags if count >= share * lags[-1][1]), np.nan)
 
 
@@ -150,7 +150,7 @@ def _value(line: str) -> float:
 
 
 def memory(supervisor: int) -> tuple[float, float]:
-    """Give megabytes of a site's camera processes, in the median, and of its best-view service."""
+    """Return megabytes of a site's camera processes, in the median, and of its best-view service."""
     cameras, service = [], np.nan
     for folder in Path("/proc").iterdir():
         with contextlib.suppress(OSError, ValueError, IndexError):
@@ -186,7 +186,7 @@ def write_site(folder: Path, films: Path, cameras: int) -> tuple[Path, int]:
 
 
 def row(cameras: int, niceness: int, asked: Asked) -> list[str]:
-    """Give a row of the table."""
+    """Return a row of the table."""
     own = [(float(bound), count) for bound, count in asked.own.histogram.buckets]
     seconds = [asked.first, *(asked.wait(it) for it in (50, 95, 100))]
     bounds = [lag_below(0.95, asked.lags), lag_below(1.0, asked.lags), lag_below(0.95, own)]

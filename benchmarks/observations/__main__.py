@@ -60,7 +60,7 @@ class Row:
 
 
 def rows_of(observer: Observer, seen: dict[str, Seen], peers: PeerEnvironment | None) -> Iterator[Row]:
-    """Give the rows of one observer: its hypotheses, those it is sure of, and everybody's tracks of them.
+    """Yield the rows of one observer: its hypotheses, those it is sure of, and everybody's tracks of them.
 
     Raises:
         PeersAwayError: a peer failed.
@@ -82,7 +82,7 @@ def rows_of(observer: Observer, seen: dict[str, Seen], peers: PeerEnvironment | 
 def peer_tracks(
     peers: PeerEnvironment, peer: Peer, boxes: dict[str, list[MotRow]]
 ) -> dict[str, list[MotRow]]:
-    """Give a peer's tracks of the boxes of every view."""
+    """Return a peer's tracks of the boxes of every view."""
     tracks = {}
     with tempfile.TemporaryDirectory() as folder:
         for name, rows in boxes.items():
@@ -111,7 +111,7 @@ def measure_scene(
 
 
 def _cells(row: Row, truths: dict[str, list[MotRow]], seen: list[Seen]) -> list[str]:
-    """Give the cells of a row; of hypotheses the time to find them, of tracks that to make them as well."""
+    """Return the cells of a row; of hypotheses the time to find them, of tracks that to make them as well."""
     scored: list[ViewScores] = [
         (scores_of_tracks if row.tracks else scores_of_boxes)(truth, row.boxes[name])
         for name, truth in truths.items()

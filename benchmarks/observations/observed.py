@@ -38,20 +38,20 @@ class View:
         return (WATERMARK,) if self.watermark else ()
 
     def images(self, most: int | None = None) -> Iterator[Image]:
-        """Give the frames, at most so many."""
+        """Yield the frames, at most so many."""
         with av.open(str(self.video)) as film:
             for frame in islice(film.decode(video=0), most):
                 yield np.asarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8)
 
     def people(self, frames: int | None) -> list[MotRow]:
-        """Give the ground truth of the first frames."""
+        """Return the ground truth of the first frames."""
         if self.truth is None:
             return []
         return [row for row in read_rows(self.truth) if frames is None or row.frame <= frames]
 
 
 def views_of(data: Path, scene: str) -> list[View]:
-    """Give the views of a scene.
+    """Return the views of a scene.
 
     Raises:
         CannotRunError: there is none.
@@ -92,7 +92,7 @@ def scores_of_tracks(truth: list[MotRow], tracks: list[MotRow]) -> ViewScores:
 
 
 def oracle(truths: dict[str, list[MotRow]], boxes: dict[str, list[MotRow]]) -> float:
-    """Give the joint IDF1 over all cameras of boxes that are given the true identity."""
+    """Return the joint IDF1 over all cameras of boxes that are given the true identity."""
     cameras = {
         name: Recording(truth, perfect_association(boxes[name], truth)) for name, truth in truths.items()
     }

@@ -38,7 +38,7 @@ class BlobDetector:
         self._visible: Image | None = None
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
-        """Give a box for every component that is large enough."""
+        """Return a box for every component that is large enough."""
         rows, columns = image.shape[:2]
         if self._visible is None:
             self._visible = visible_mask(rows, columns, self._view.ignore)
@@ -113,7 +113,7 @@ def watch(observer: Observer, view: View, frames: int | None) -> Seen:
 
 
 def rows_of(number: int, found: Detections) -> list[MotRow]:
-    """Give a frame's detections as rows of a file."""
+    """Return a frame's detections as rows of a file."""
     return [
         MotRow(number + 1, -1, left, top, right - left, bottom - top, score)
         for (left, top, right, bottom), score in zip(found.boxes.tolist(), found.scores.tolist(), strict=True)
@@ -121,7 +121,7 @@ def rows_of(number: int, found: Detections) -> list[MotRow]:
 
 
 def final_rows(result: WindowResult | None) -> Iterable[MotRow]:
-    """Give the rows of the frames that are final now."""
+    """Yield the rows of the frames that are final now."""
     if result is None:
         return
     for track in result.tracks:

@@ -58,7 +58,7 @@ class Walker:
         return self.first + len(self.places)
 
     def look(self, begin: int, end: int) -> _Look:
-        """Give what it looks like over some frames."""
+        """Return what it looks like over some frames."""
         span = slice(max(begin - self.first, 0), max(end - self.first, 0))
         pixels = self.pixels[span].astype(np.float64)
         return _Look((self.looks[span] * pixels[..., None]).sum(axis=0), pixels.sum(axis=0))
@@ -75,7 +75,7 @@ class _Look:
         return _Look(self.rows + other.rows, self.pixels + other.pixels)
 
     def apart(self, other: _Look, least: float) -> float:
-        """Give the mean Bhattacharyya distance over the cameras that know both; NaN: none does."""
+        """Return the mean Bhattacharyya distance over the cameras that know both; NaN: none does."""
         known = (self.pixels >= least) & (other.pixels >= least)
         if not known.any():
             return float("nan")
@@ -95,7 +95,7 @@ class _Meeting:
 
 
 def numbers_of(walkers: Sequence[Walker], person: float, settings: ColourSettings) -> list[Ints]:
-    """Give every path's number (F,) in each of its frames.
+    """Return every path's number (F,) in each of its frames.
 
     Args:
         walkers: the paths.
@@ -134,7 +134,7 @@ def numbers_of(walkers: Sequence[Walker], person: float, settings: ColourSetting
 
 
 def _meetings(walkers: Sequence[Walker], near: float) -> list[_Meeting]:
-    """Give the meetings in order: frames in which paths are near each other, overlapping ones as one."""
+    """Return the meetings in order: frames in which paths are near each other, overlapping ones as one."""
     found: list[_Meeting] = []
     for one, first in enumerate(walkers):
         for other, second in enumerate(walkers[:one]):

@@ -57,7 +57,7 @@ class View:
     weight: Floats
 
     def boxes(self, ground: Floats, aspect: float) -> Floats:
-        """Give the boxes (..., 4) in pixels of people at places (..., 2), NaN where nobody can be seen."""
+        """Return the boxes (..., 4) in pixels of people at places (..., 2), NaN where nobody can be seen."""
         foot = from_ground(self.homography, ground)
         x, y = foot[..., 0], foot[..., 1]
         tall = self.line.at(y)
@@ -66,7 +66,7 @@ class View:
         return np.stack([x - half, y - tall, x + half, y], axis=-1)
 
     def cells(self, boxes: Floats) -> Ints:
-        """Give the cells (..., 4) that boxes cover, inside the picture; none where there is no box."""
+        """Return the cells (..., 4) that boxes cover, inside the picture; none where there is no box."""
         rows, columns = self.weight.shape
         scale = np.array([columns / self.size[0], rows / self.size[1]] * 2)
         limits = np.array([columns, rows, columns, rows], dtype=np.float64)
@@ -74,7 +74,7 @@ class View:
         return np.asarray(np.rint(known), dtype=np.int64)
 
     def seen(self, boxes: Floats) -> Floats:
-        """Give the share of each box (K, 4) that is in the picture and counts, (K,)."""
+        """Return the share of each box (K, 4) that is in the picture and counts, (K,)."""
         sums = cv2.integral(self.weight, sdepth=cv2.CV_64F)
         left, top, right, bottom = self.cells(boxes).T
         inside = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
@@ -83,7 +83,7 @@ class View:
         return np.asarray(np.nan_to_num(inside / area, nan=0.0))
 
     def ground(self) -> Floats:
-        """Give points (K, 2) all over the ground that it shows people on."""
+        """Return points (K, 2) all over the ground that it shows people on."""
         width, height = self.size
         x, y = np.meshgrid(np.linspace(0, width, _ASKED), np.linspace(0, height * (1 + _BEYOND), _ASKED))
         tall = self.line.at(y)
@@ -92,7 +92,7 @@ class View:
         return np.asarray(there[np.isfinite(there).all(axis=1)])
 
     def person(self) -> float:
-        """Give how long a person's height is in units of the ground: the median over the picture."""
+        """Return how long a person's height is in units of the ground: the median over the picture."""
         width, height = self.size
         x, y = np.meshgrid(np.linspace(0.2, 0.8, 7) * width, np.linspace(0.2, 1.0, 17) * height)
         tall = self.line.at(y)
@@ -144,7 +144,7 @@ def lay_out(views: Sequence[View], settings: FloorSettings) -> Floor:
 def _mesh(
     views: Sequence[View], shown: Floats, step: float, settings: FloorSettings
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Give the places (R, C, 2) of a grid around what is shown, and which of them are."""
+    """Return the places (R, C, 2) of a grid around what is shown, and which of them are."""
     (left, top), (right, bottom) = shown.min(axis=0), shown.max(axis=0)
     x, y = np.meshgrid(np.arange(left, right + step, step), np.arange(top, bottom + step, step))
     mesh = np.stack([x, y], axis=-1)

@@ -22,7 +22,7 @@ _LEAST_PAIRS = 20
 def levelled(
     boxes: Rows, ground: Mapping[str, Floats], heights: Mapping[str, int], person: float
 ) -> dict[str, Floats]:
-    """Give the homographies, each with its ground shifted, the shifts adding up to nothing.
+    """Return the homographies, each with its ground shifted, the shifts adding up to nothing.
 
     The feet of two cameras that are each other's nearest in a frame are taken for one person's. The median of
     their distances, pair of cameras by pair of cameras, is what the shifts explain, by least squares.
@@ -59,7 +59,7 @@ def levelled(
 
 
 def _standing(rows: list[MotRow], homography: Floats, height: int) -> dict[int, Floats]:
-    """Give the feet (K, 2) on the ground that are seen in each frame."""
+    """Return the feet (K, 2) on the ground that are seen in each frame."""
     if not rows:
         return {}
     boxes = np.array([row.box for row in rows])
@@ -71,7 +71,7 @@ def _standing(rows: list[MotRow], homography: Floats, height: int) -> dict[int, 
 
 
 def _pairs(one: Mapping[int, Floats], other: Mapping[int, Floats], shift: Floats, gate: float) -> Floats:
-    """Give the differences (P, 2) of feet that are each other's nearest, and near, after a shift."""
+    """Return the differences (P, 2) of feet that are each other's nearest, and near, after a shift."""
     found = [np.empty((0, 2))]
     for frame in sorted(one.keys() & other.keys()):
         apart = one[frame][:, None] - other[frame][None]

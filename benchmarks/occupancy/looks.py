@@ -62,7 +62,7 @@ def _slices(box: Floats, shape: tuple[int, ...]) -> tuple[slice, slice]:
 
 
 def _alone(foreground: NDArray[np.uint8], shape: tuple[int, ...], boxes: Floats) -> NDArray[np.uint8]:
-    """Give the foreground in the picture (H, W), 255 or 0, where no more than one box is."""
+    """Return the foreground in the picture (H, W), 255 or 0, where no more than one box is."""
     size = (shape[1], shape[0])
     whole = cv2.resize(foreground, size, interpolation=cv2.INTER_NEAREST)
     covered = np.zeros(shape, dtype=np.uint8)

@@ -70,7 +70,7 @@ class OccupancyMap:
         self._rectangles = rectangles
 
     def occupied(self, sights: Sequence[Sight]) -> Floats:
-        """Give the probabilities (L,), the fixed point of the paper's mean field (its equation 15).
+        """Return the probabilities (L,), the fixed point of the paper's mean field (its equation 15).
 
         With A_c the picture of all rectangles where somebody is, expected under q, and B_c the foreground,
         `q_i = 1 / (1 + exp(log((1 - prior) / prior) + sum_c Psi(B_c, E[A_c | X_i = 1]) -
@@ -114,7 +114,7 @@ class _Camera:
         self._found = float(self._missed.sum())
 
     def farther(self, q: Floats) -> Floats:
-        """Give `sigma (Psi(B, E[A | X_i = 1]) - Psi(B, E[A | X_i = 0]))` for every place, (L,)."""
+        """Return `sigma (Psi(B, E[A | X_i = 1]) - Psi(B, E[A | X_i = 0]))` for every place, (L,)."""
         q = q[self._seen]
         # 1 - E[A], the probability that nobody covers a cell, and how much of B it leaves unexplained.
         nobody = self._nobody(q)
@@ -131,7 +131,7 @@ class _Camera:
         return result
 
     def _nobody(self, q: Floats) -> Plane:
-        """Give the product of `1 - q_k` over the rectangles on each cell, by sums of logarithms."""
+        """Return the product of `1 - q_k` over the rectangles on each cell, by sums of logarithms."""
         value = np.log1p(-q)
         height, width = self._shape
         weights = np.concatenate([value, -value, -value, value])
@@ -141,7 +141,7 @@ class _Camera:
         return np.asarray(np.exp(np.minimum(sums[1:, 1:], 0.0)))
 
     def _inside(self, plane: Plane) -> Floats:
-        """Give the plane's sum in each rectangle that is seen."""
+        """Return the plane's sum in each rectangle that is seen."""
         sums = cv2.integral(plane, sdepth=cv2.CV_64F).ravel()
         one, two, three, four = self._corners
         return np.asarray(sums[one] - sums[two] - sums[three] + sums[four])

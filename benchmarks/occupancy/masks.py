@@ -91,7 +91,7 @@ class _Heard:
         return self._search(mask, shadow, grid)
 
     def last(self) -> tuple[Mask | None, Mask | None]:
-        """Give the frame's foreground and shadow, once."""
+        """Return the frame's foreground and shadow, once."""
         last, self._last = self._last, (None, None)
         return last
 

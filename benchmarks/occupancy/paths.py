@@ -47,7 +47,7 @@ class Path:
 
 
 def shortest_paths(lattice: Lattice) -> list[Path]:
-    """Give the paths of least total cost, by their first frame and place."""
+    """Return the paths of least total cost, by their first frame and place."""
     flow = _Flow(lattice)
     while flow.augment():
         pass
@@ -86,7 +86,7 @@ class _Flow:
         return True
 
     def paths(self) -> list[Path]:
-        """Give the paths that are in use."""
+        """Return the paths that are in use."""
         found = []
         for first, place in zip(*np.nonzero(self._used & (self._before == _END)), strict=True):
             frame, here, places = int(first), int(place), []

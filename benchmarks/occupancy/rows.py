@@ -58,7 +58,7 @@ class Settings:
 
 
 def occupancy_rows(case: Case, boxes: Rows, settings: Settings | None = None) -> dict[str, list[MotRow]]:
-    """Give everybody's boxes in every camera by their number.
+    """Return everybody's boxes in every camera by their number.
 
     Args:
         case: a scene with pictures and homographies.
@@ -83,7 +83,7 @@ def occupancy_rows(case: Case, boxes: Rows, settings: Settings | None = None) ->
 
 
 def views_of(masks: Mapping[str, Masks], ground: Mapping[str, Floats], boxes: Rows) -> dict[str, View]:
-    """Give the cameras, their homographies shifted until their feet agree."""
+    """Return the cameras, their homographies shifted until their feet agree."""
     views = {camera: View(ground[camera], it.size, it.line, it.weight) for camera, it in masks.items()}
     person = float(np.median([view.person() for view in views.values()]))
     level = levelled(boxes, ground, {camera: it.size[1] for camera, it in views.items()}, person)
@@ -91,7 +91,7 @@ def views_of(masks: Mapping[str, Masks], ground: Mapping[str, Floats], boxes: Ro
 
 
 def occupancy(floor: Floor, masks: Sequence[Masks], settings: OccupancySettings) -> Floats:
-    """Give the probabilities (T, L) that somebody stands at each place in each frame."""
+    """Return the probabilities (T, L) that somebody stands at each place in each frame."""
     mapping = OccupancyMap(floor.rectangles, settings)
     frames = max(len(it.foreground) for it in masks)
     q = np.empty((frames, len(floor.places)))
@@ -101,7 +101,7 @@ def occupancy(floor: Floor, masks: Sequence[Masks], settings: OccupancySettings)
 
 
 def lattice_of(floor: Floor, q: Floats, settings: PathSettings) -> Lattice:
-    """Give the paper's network: being at a place costs `-log(q / (1 - q))`."""
+    """Return the paper's network: being at a place costs `-log(q / (1 - q))`."""
     sure = np.clip(q, settings.doubt, 1.0 - settings.doubt)
     gates = np.where(floor.gates, settings.gate_cost, settings.inside_cost)
     return Lattice(_whole(-np.log(sure / (1.0 - sure))), floor.moves, _whole(gates))
@@ -114,7 +114,7 @@ def walkers_of(
     walks: Sequence[Walk],
     aspect: float,
 ) -> list[Walker]:
-    """Give what everybody looks like in all cameras, along their walks."""
+    """Return what everybody looks like in all cameras, along their walks."""
     firsts = [walk.first for walk in walks]
     seen = []
     for camera, view in views.items():
@@ -132,7 +132,7 @@ def walkers_of(
 
 
 def _sight(masks: Masks, frame: int) -> Sight:
-    """Give a frame's foreground; shadows tell nothing, and neither does a frame that is not there."""
+    """Return a frame's foreground; shadows tell nothing, and neither does a frame that is not there."""
     one = masks.foreground[frame] if frame < len(masks.foreground) else None
     other = masks.shadow[frame] if frame < len(masks.shadow) else None
     if one is None or other is None:

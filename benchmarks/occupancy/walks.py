@@ -41,7 +41,7 @@ class Walk:
 
 
 def walk_of(floor: Floor, q: Floats, path: Path, reach: int) -> Walk:
-    """Give a walk: the mean of places and those around them by how likely they are, `reach` frames around."""
+    """Return a walk: the mean of places and those around them by how likely they are, `reach` frames around."""
     frames = path.first + np.arange(len(path.places))
     around = floor.moves[path.places]
     there = around < len(floor.places)
@@ -53,7 +53,7 @@ def walk_of(floor: Floor, q: Floats, path: Path, reach: int) -> Walk:
 
 
 def smoothed(places: Floats, reach: int) -> Floats:
-    """Give the mean of the places (F, 2) so many frames around each, fewer towards the ends."""
+    """Return the mean of the places (F, 2) so many frames around each, fewer towards the ends."""
     sums = np.concatenate([np.zeros((1, 2)), np.cumsum(places, axis=0)])
     here = np.arange(len(places))
     near = np.minimum(reach, np.minimum(here, len(places) - 1 - here))
@@ -63,7 +63,7 @@ def smoothed(places: Floats, reach: int) -> Floats:
 def rows_of_walks(
     view: View, walks: Sequence[Walk], numbers: Sequence[Ints], settings: WalkSettings
 ) -> list[MotRow]:
-    """Give everybody's boxes in a camera by their number in each frame, cut at the borders of its picture."""
+    """Return everybody's boxes in a camera by their number in each frame, cut at the borders of its picture."""
     width, height = view.size
     rows = []
     for walk, number in zip(walks, numbers, strict=True):

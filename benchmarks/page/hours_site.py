@@ -41,7 +41,7 @@ class Clock:
     begun: float
 
     def now(self) -> float:
-        """Give the site's time of day, unix seconds."""
+        """Return the site's time of day, unix seconds."""
         return self.begun + (time.time() - self.begun) * self.speed
 
     async def until(self, moment: float) -> None:
@@ -60,7 +60,7 @@ class FastSite:
         self._head = init_segment(self._agreement.parameters, _WIDTH, _HEIGHT)
 
     def app(self) -> web.Application:
-        """Give what answers the page."""
+        """Return what answers the page."""
         app = web.Application()
         app.router.add_get("/", _file)
         app.router.add_get("/page/{name}", _file)
@@ -167,7 +167,7 @@ def _camera(number: int, pulse: int) -> int:
 
 
 def _there(first: int) -> list[int]:
-    """Say who is in view: a new number every few minutes, and nobody is known for more than an hour."""
+    """Return who is in view: a new number every few minutes, and nobody is known for more than an hour."""
     newest = first // (_FPS * 600)
     return list(range(newest, newest + _PEOPLE))
 

@@ -51,7 +51,7 @@ Table = dict[str, dict[str, Scores]]
 
 
 def environment(folder: Path, report: Report) -> PeerEnvironment | None:
-    """Give the peers' environment, or say why there is none."""
+    """Return the peers' environment, or say why there is none."""
     try:
         return peer_environment(folder)
     except PeersAwayError as problem:
@@ -62,7 +62,7 @@ def environment(folder: Path, report: Report) -> PeerEnvironment | None:
 def tracks_of(
     sequence: Recording, peers: PeerEnvironment | None, report: Report, *, pictures: bool
 ) -> Iterator[tuple[str, list[MotRow]]]:
-    """Give everybody's tracks of a sequence, MyView's first and perfect association's last."""
+    """Yield everybody's tracks of a sequence, MyView's first and perfect association's last."""
     yield OURS, track(sequence)
     if pictures and sequence.video is not None and sequence.video.is_file():
         yield PICTURES, track(sequence, pictures=True)
@@ -82,7 +82,7 @@ def _peers_tracks(
 
 
 def difference(peers: PeerEnvironment, sequence: Recording, tracks: list[MotRow], scores: Scores) -> float:
-    """Give by how much the peers' own evaluation, which follows TrackEval, differs from ours at most."""
+    """Return by how much the peers' own evaluation, which follows TrackEval, differs from ours at most."""
     theirs = peers.score(read_rows(sequence.truth), tracks)
     return max(abs(float(getattr(scores, name)) - value) for name, value in theirs.items())
 

@@ -51,7 +51,7 @@ class PeerEnvironment:
     python: Path
 
     def track(self, peer: Peer, detections: Path) -> list[MotRow]:
-        """Give a peer's tracks.
+        """Return a peer's tracks.
 
         Raises:
             PeersAwayError: it failed.
@@ -62,7 +62,7 @@ class PeerEnvironment:
             return read_rows(out)
 
     def score(self, truth: list[MotRow], tracks: list[MotRow]) -> dict[str, float]:
-        """Give HOTA, MOTA, IDF1 and switches by the peers' own evaluation.
+        """Return HOTA, MOTA, IDF1 and switches by the peers' own evaluation.
 
         Raises:
             PeersAwayError: it failed.
@@ -91,14 +91,14 @@ class PeerEnvironment:
 
 
 def default_folder() -> Path:
-    """Give where the environment is kept: the user's cache, by what is installed in it."""
+    """Return where the environment is kept: the user's cache, by what is installed in it."""
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     wanted = hashlib.sha256(" ".join([sys.version, *PACKAGES]).encode()).hexdigest()[:12]
     return cache / "myview" / f"peers-{wanted}"
 
 
 def peer_environment(folder: Path) -> PeerEnvironment:
-    """Give the environment in the folder; it is made, which takes a network and a minute, if it is not there.
+    """Return the environment in the folder; it is made, which takes a network and a minute, if it is not there.
 
     Raises:
         PeersAwayError: it cannot be made.
@@ -128,7 +128,7 @@ def peer_environment(folder: Path) -> PeerEnvironment:
 
 
 def _last_line(error: Exception) -> str:
-    """Give what a command said last, or what became of it."""
+    """Return what a command said last, or what became of it."""
     said = error.stderr if isinstance(error, subprocess.CalledProcessError) else ""
     lines = [text for text in (said or str(error)).splitlines() if text.strip()]
     return lines[-1].strip() if lines else type(error).__name__

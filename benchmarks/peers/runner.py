@@ -29,7 +29,7 @@ Rows = np.ndarray[tuple[int, int], np.dtype[np.float64]]
 
 
 def read(path: Path) -> Rows:
-    """Give rows `frame, id, left, top, right, bottom, confidence`."""
+    """Return rows `frame, id, left, top, right, bottom, confidence`."""
     data = path.read_bytes()
     text = (gzip.decompress(data) if path.suffix == ".gz" else data).decode("ascii")
     rows = np.array([[float(it) for it in line.split(",")[:7]] for line in text.splitlines() if line.strip()])
@@ -38,13 +38,13 @@ def read(path: Path) -> Rows:
 
 
 def line(frame: int, number: int, box: np.ndarray[Any, np.dtype[np.float64]]) -> str:
-    """Give a row of a result."""
+    """Return a row of a result."""
     left, top, right, bottom = (float(side) for side in box)
     return f"{frame},{number},{left:.2f},{top:.2f},{right - left:.2f},{bottom - top:.2f},1,-1,-1,-1\n"
 
 
 def online(kind: str) -> Callable[[Rows], Iterator[str]]:
-    """Give a tracker of Roboflow's `trackers`, with its own defaults."""
+    """Yield a tracker of Roboflow's `trackers`, with its own defaults."""
     import supervision  # noqa: PLC0415 — not in this process when motile runs
     import trackers  # noqa: PLC0415
 
@@ -62,7 +62,7 @@ def online(kind: str) -> Callable[[Rows], Iterator[str]]:
 
 
 def windows(rows: Rows) -> Iterator[str]:
-    """Give the tracks of motile, window by window.
+    """Yield the tracks of motile, window by window.
 
     It leaves the costs to its user. Here a box costs 0.5 less its confidence, a track 1, and joining two
     boxes of neighbouring frames 0.5 less their overlap.
@@ -114,7 +114,7 @@ def linked(rows: Rows, frames: list[np.ndarray[Any, np.dtype[np.intp]]]) -> list
 
 
 def iou(first: np.ndarray[Any, Any], second: np.ndarray[Any, Any]) -> float:
-    """Give the intersection over the union of two boxes."""
+    """Return the intersection over the union of two boxes."""
     sides = np.minimum(first[2:], second[2:]) - np.maximum(first[:2], second[:2])
     if sides.min() <= 0.0:
         return 0.0
@@ -123,7 +123,7 @@ def iou(first: np.ndarray[Any, Any], second: np.ndarray[Any, Any]) -> float:
 
 
 def own_scores(truth: Path, tracks: Path) -> dict[str, float]:
-    """Give the scores by the peers' own evaluation, which follows TrackEval."""
+    """Return the scores by the peers' own evaluation, which follows TrackEval."""
     from trackers.eval import evaluate_mot_sequence  # noqa: PLC0415 — only where it is needed
 
     found = evaluate_mot_sequence(truth, tracks, ["CLEAR", "HOTA", "Identity"])

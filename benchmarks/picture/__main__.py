@@ -142,7 +142,7 @@ async def _best_picture(page: Page) -> bytes:
 
 
 async def _score(page: Page) -> float:
-    """Say how good the page looks; 0 when the chosen person is not being shown."""
+    """Return how good the page looks; 0 when the chosen person is not being shown."""
     if not await page.evaluate(_PLAYS):
         return 0.0
     number = await page.evaluate("myview.object")
@@ -150,7 +150,7 @@ async def _score(page: Page) -> float:
 
 
 def small_png(png: bytes) -> bytes:
-    """Give the picture with as many colours as fit into the size that a README's picture may have."""
+    """Return the picture with as many colours as fit into the size that a README's picture may have."""
     image = Image.open(io.BytesIO(png)).convert("RGB")
     smaller = png
     for colours in _COLOURS:

@@ -89,7 +89,7 @@ DELAY = Rule("delay, ms", 0.10, 50.0, 0.1)
 
 
 def resident_of(pid: int) -> float:
-    """Give how much memory of a process is resident, megabytes (Linux).
+    """Return how much memory of a process is resident, megabytes (Linux).
 
     Raises:
         OSError: there is no such process.
@@ -99,7 +99,7 @@ def resident_of(pid: int) -> float:
 
 
 def descriptors_of(pid: int) -> int:
-    """Give how many files and sockets a process has open.
+    """Return how many files and sockets a process has open.
 
     Raises:
         OSError: there is no such process.
@@ -108,7 +108,7 @@ def descriptors_of(pid: int) -> int:
 
 
 def threads_of(pid: int) -> int:
-    """Give how many threads a process has.
+    """Return how many threads a process has.
 
     Raises:
         OSError: there is no such process.

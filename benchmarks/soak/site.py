@@ -38,15 +38,15 @@ class Tempo:
         return NOMINAL * self.speed
 
     def seconds(self, of_the_site: float) -> float:
-        """Give seconds of the world for seconds of the site."""
+        """Return seconds of the world for seconds of the site."""
         return of_the_site / self.speed
 
     def hours(self, pulse: int) -> float:
-        """Give the site's time at a pulse."""
+        """Return the site's time at a pulse."""
         return pulse / NOMINAL / 3600.0
 
     def pulse(self, hours: float) -> int:
-        """Give the pulse at a time of the site."""
+        """Return the pulse at a time of the site."""
         return round(hours * 3600.0 * NOMINAL)
 
 
@@ -73,7 +73,7 @@ class Filmed:
         return self.folder / "ground.json"
 
     def settings(self, recorded: Path, keep_hours: float) -> dict[str, dict[str, Any]]:
-        """Give what else is set: what is kept is counted in the site's time, patience in the world's.
+        """Return what else is set: what is kept is counted in the site's time, patience in the world's.
 
         ``keep_hours`` is how long the recording is kept.
         """

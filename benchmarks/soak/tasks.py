@@ -37,7 +37,7 @@ class Held:
 
 
 def hooked_environment(folder: Path) -> dict[str, str]:
-    """Give what the environment of `myview up` needs so that its processes note into a folder."""
+    """Return what the environment of `myview up` needs so that its processes note into a folder."""
     path = [str(_HOOK), str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     return {"PYTHONPATH": os.pathsep.join(filter(None, path)), FOLDER_VARIABLE: str(folder)}
 

@@ -41,7 +41,7 @@ class Shown:
 
 
 def shown_by(moof: bytes, fps: float) -> Shown | None:
-    """Say what a fragment shows, by the box before its pictures; None: it is sound, or another box."""
+    """Return what a fragment shows, by the box before its pictures; None: it is sound, or another box."""
     time, run = moof.find(_TFDT), moof.find(_TRUN)
     if not moof.startswith(b"moof") or min(time, run) < 0:
         return None
@@ -132,7 +132,7 @@ class Visitors:
                     return
 
     async def _stream(self, path: str) -> AsyncIterator[tuple[Shown, float]]:
-        """Give what is shown, and how many milliseconds after its pulse was due it came."""
+        """Yield what is shown, and how many milliseconds after its pulse was due it came."""
         async with self._session.get(path) as answer:
             answer.raise_for_status()
             while True:

@@ -30,12 +30,12 @@ LIVE = (Size(8, 16, 15), Size(10, 40, 15), Size(20, 40, 15))
 
 
 def named(case: Case) -> list[str]:
-    """Give the cells that say which case it is."""
+    """Return the cells that say which case it is."""
     return [case.name, f"{case.size.objects}", f"{case.size.places}", f"{case.layout:g}"]
 
 
 def ratios(case: Case, seeds: int) -> list[str]:
-    """Give a row: full and gated programs of all arcs against `columns`."""
+    """Return a row: full and gated programs of all arcs against `columns`."""
     cells = named(case)
     for gate in (None, GATE):
         found = against_arcs(case, seeds, gate)
@@ -44,7 +44,7 @@ def ratios(case: Case, seeds: int) -> list[str]:
 
 
 def exact(case: Case, seeds: int) -> list[str]:
-    """Give a row: what the integer optimum takes, and how far the rounded answer is from it."""
+    """Return a row: what the integer optimum takes, and how far the rounded answer is from it."""
     found = [
         (timed("exact", network), timed("columns", network).solution.report)
         for network in map(case.network, range(seeds))
@@ -63,7 +63,7 @@ def exact(case: Case, seeds: int) -> list[str]:
 
 
 def live_row(size: Size, steps: int, *, told: bool) -> list[str]:
-    """Give a row: windows at stride 1, the building of the network from boxes and histograms included."""
+    """Return a row: windows at stride 1, the building of the network from boxes and histograms included."""
     found = live(size, steps, told=told)
     middle, late = np.percentile(1e3 * found.seconds, [50, 95])
     return [

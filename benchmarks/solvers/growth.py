@@ -44,7 +44,7 @@ class Growth:
 
 
 def paper_growth(size: Size) -> float:
-    """Give n² k m (2 log k + 2 log n + log m), the average complexity that II.D states."""
+    """Return n² k m (2 log k + 2 log n + log m), the average complexity that II.D states."""
     n, k, m = size.objects, size.places, size.frames
     return float(n**2 * k * m * (2 * np.log(k) + 2 * np.log(n) + np.log(m)))
 

@@ -70,7 +70,7 @@ def timed(solver: str, network: Network) -> Timed:
 
 
 def seconds(solver: str, network: Network, repeats: int = 1) -> float:
-    """Give the median time of some solves."""
+    """Return the median time of some solves."""
     return float(np.median([timed(solver, network).seconds for _ in range(repeats)]))
 
 

@@ -50,7 +50,7 @@ class Walkers:
         self._speed = self._rng.normal(0.0, 3.0, (size.objects, 2))
 
     def templates(self) -> list[Template]:
-        """Give everybody where they are now."""
+        """Return everybody where they are now."""
         return [
             Template(n, self.looks[n], np.concatenate([self.corners[n], self.corners[n] + PERSON]))
             for n in range(self._size.objects)
@@ -84,14 +84,14 @@ class Walkers:
 
 
 def walking_window(size: Size, settings: CostSettings, seed: int) -> Network:
-    """Give one window of people who walk."""
+    """Return one window of people who walk."""
     people = Walkers(size, seed)
     templates = people.templates()
     return build_network(templates, [people.step() for _ in range(size.frames)], settings)
 
 
 def moving_windows(size: Size, steps: int, seed: int) -> Iterator[tuple[list[Template], list[Detections]]]:
-    """Give the windows that a tracker with a stride of one frame solves one after the other."""
+    """Yield the windows that a tracker with a stride of one frame solves one after the other."""
     people = Walkers(size, seed)
     past = [people.templates()]
     frames: list[Detections] = []

@@ -124,13 +124,13 @@ def step_up(
 
 
 def _given(heard: Heard, sent: dict[int, Given]) -> list[float]:
-    """Give the milliseconds that giving out took, of the GOPs that have come."""
+    """Return the milliseconds that giving out took, of the GOPs that have come."""
     gops = {round(tick * SITE.fps / TIMESCALE) // ENCODE.gop * ENCODE.gop for tick in heard.ticks}
     return [1e3 * (it.ended - it.began) for first, it in sent.items() if first in gops]
 
 
 def send_delays(heard: Heard, sent: dict[int, float]) -> NDArray[np.float64]:
-    """Give the milliseconds from when each GOP was sent to when its end was read."""
+    """Return the milliseconds from when each GOP was sent to when its end was read."""
     gop = ENCODE.gop
     last = (round(tick * SITE.fps / TIMESCALE) for tick in heard.ticks)
     return np.array(
@@ -164,7 +164,7 @@ def _first_picture(port: int, number: int) -> float:
 
 
 def end_of_first_fragment(data: bytes) -> int:
-    """Give where the first media data end; 0: they are not whole yet."""
+    """Return where the first media data end; 0: they are not whole yet."""
     at = 0
     while at + 8 <= len(data):
         size, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]

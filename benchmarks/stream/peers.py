@@ -139,7 +139,7 @@ def _fetch(port: int, folder: str, seconds: float) -> tuple[int, int]:
 
 
 def _newest(playlist: bytes) -> str:
-    """Give the newest whole segment: what is listed of the growing one comes behind it, in tags."""
+    """Return the newest whole segment: what is listed of the growing one comes behind it, in tags."""
     return next(line for line in reversed(playlist.decode().splitlines()) if not line.startswith("#"))
 
 

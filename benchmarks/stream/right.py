@@ -96,7 +96,7 @@ async def judge(frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings
 async def _watch(
     made: Sequence[Sequence[AccessUnit]], chosen: Sequence[int], encode: EncodeSettings
 ) -> tuple[list[Chunk], Cut]:
-    """Give what one viewer of one object is sent, from the first GOP to the last."""
+    """Return what one viewer of one object is sent, from the first GOP to the last."""
     names = [f"c{number}" for number in range(_CAMERAS)]
     cameras = [CameraSettings(id=name, source="rtsp://nowhere/") for name in names]
     cut = Cut(made, Config(site=_SITE, encode=encode, cameras=cameras))

@@ -41,7 +41,7 @@ class Given:
 
 
 def read(path: Path) -> dict[int, Given]:
-    """Give when each GOP was sent, by its first pulse."""
+    """Return when each GOP was sent, by its first pulse."""
     lines = (line.split() for line in path.read_text(encoding="ascii").split("\n")[:-1])
     return {int(first): Given(float(began), float(ended)) for first, began, ended in lines}
 

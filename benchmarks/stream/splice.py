@@ -56,7 +56,7 @@ class Cut:
 
 
 def cif_config() -> Config:
-    """Give the site of the films."""
+    """Return the site of the films."""
     cameras = [CameraSettings(id=name, source="rtsp://nowhere/") for name in _NAMES]
     return Config(site=SITE, encode=ENCODE, cameras=cameras)
 

@@ -126,7 +126,7 @@ def _served(served: Served) -> str:
 
 
 def summary(found: Found) -> list[list[str]]:
-    """Give the rows of the table of all that was measured."""
+    """Return the rows of the table of all that was measured."""
     rows = []
     if found.spliced and found.encoded:
         last = found.spliced[-1]

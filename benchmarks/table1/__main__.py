@@ -45,7 +45,7 @@ _QUICK = 150
 
 
 def recorded(data: Path) -> Iterator[View]:
-    """Give the recordings that there are."""
+    """Yield the recordings that there are."""
     for scene, name, rate in _RECORDED:
         video, truth = data / scene / f"{name}.mp4", data / scene / "gt" / f"{name}.txt"
         if video.is_file() and truth.is_file():
@@ -67,7 +67,7 @@ def _searched(name: str, video: Path, truth: Path, fps: float) -> View:
 
 
 def _shortened(view: View, frames: int) -> View:
-    """Give the last frames of a view."""
+    """Return the last frames of a view."""
     last = view.frames[-frames:]
     return View(view.name, last, [row for row in view.truth if row.frame > last[0].number], view.fps)
 

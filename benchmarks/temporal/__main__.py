@@ -67,13 +67,13 @@ class Tally:
 
 
 def clips(minutes: float) -> list[Clip]:
-    """Give sixteen sequences, so that many clothes meet: four of two people, six of three, six of four."""
+    """Return sixteen sequences, so that many clothes meet: four of two people, six of three, six of four."""
     people = (2,) * 4 + (3,) * 6 + (4,) * 6
     return [Clip(count, minutes / len(people), seed) for seed, count in enumerate(people)]
 
 
 def follow(seen: Played, settings: TemporalSettings, tally: Tally | None = None) -> list[dict[int, int]]:
-    """Give the blobs by number that a window decides on, stage by stage; count its edges into `tally`."""
+    """Return the blobs by number that a window decides on, stage by stage; count its edges into `tally`."""
     window = TemporalWindow(settings, SIZE, seen.metre, STAGE_S)
     first = dict(enumerate(seen.blobs[0].tolist(), start=1))
     window.begin(seen.stages[0], list(first.items()))
@@ -159,13 +159,13 @@ def print_errors(report: Report, tallies: dict[int, Tally], how: str) -> None:
 
 
 def _shares(tallies: Sequence[Tally]) -> str:
-    """Give the errors in hundredths of the people in merges."""
+    """Return the errors in hundredths of the people in merges."""
     chances = max(sum(it.chances for it in tallies), 1)
     return " ".join(f"{100 * sum(it.errors[stages] for it in tallies) / chances:.0f}" for stages in STAGES)
 
 
 def _of(theirs: Sequence[tuple[int, ...]]) -> str:
-    """Give their errors in hundredths of what they call merges."""
+    """Return their errors in hundredths of what they call merges."""
     merges, *errors = (sum(column) for column in zip(*theirs, strict=True))
     return " ".join(f"{100 * it / merges:.0f}" for it in errors)
 

@@ -48,7 +48,7 @@ def events(found: Sequence[Merged], blobs: NDArray[np.int64]) -> int:
 def mistaken(
     found: Sequence[Merged], blobs: NDArray[np.int64], told: Sequence[Mapping[int, int]]
 ) -> list[bool]:
-    """Say who of those merged is somebody else afterwards; `told` are the blobs by number of each stage.
+    """Return who of those merged is somebody else afterwards; `told` are the blobs by number of each stage.
 
     Somebody's number is the one that is in their blob in most of the stages in which they are alone, before
     and after. Who had none before cannot lose it.

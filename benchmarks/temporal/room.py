@@ -98,7 +98,7 @@ class _Eye:
 
 
 def faded(image: Image, colour: float) -> Image:
-    """Give a picture with a share of its colour, as bright as it was."""
+    """Return a picture with a share of its colour, as bright as it was."""
     if colour == 1.0:
         return image
     grey = cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
@@ -111,7 +111,7 @@ def _scene(clip: Clip, people: int, stage_s: float) -> Scene:
 
 
 def _blob_of(box: Floats, found: tuple[Blob, ...]) -> int:
-    """Give the blob that fills most of the middle of somebody's box."""
+    """Return the blob that fills most of the middle of somebody's box."""
     middle, half = (box[:2] + box[2:]) / 2.0, (box[2:] - box[:2]) / 4.0
     core = np.rint(np.concatenate([middle - half, middle + half])).astype(int)
     filled = [_filled(blob, core) for blob in found]

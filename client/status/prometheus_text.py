@@ -29,15 +29,15 @@ class Metrics:
             raise ContractError(f"/metrics is not understood: {error}") from error
 
     def get(self, name: str, **labels: str) -> float | None:
-        """Give one value; None: it is not there."""
+        """Return one value; None: it is not there."""
         return self._values.get((name, frozenset(labels.items())))
 
     def count(self, name: str, **labels: str) -> int:
-        """Give a whole number; 0 where it is not there."""
+        """Return a whole number; 0 where it is not there."""
         return int(self.get(name, **labels) or 0)
 
     def by(self, name: str, label: str) -> dict[str, int]:
-        """Give whole numbers by the value of a label."""
+        """Return whole numbers by the value of a label."""
         return {
             dict(labels)[label]: int(value)
             for (known, labels), value in self._values.items()
@@ -45,12 +45,12 @@ class Metrics:
         }
 
     def mean(self, name: str, **labels: str) -> float | None:
-        """Give the mean of a histogram; None: nothing was counted."""
+        """Return the mean of a histogram; None: nothing was counted."""
         count = self.get(f"{name}_count", **labels)
         return (self.get(f"{name}_sum", **labels) or 0.0) / count if count else None
 
     def share(self, part: str, whole: str, **labels: str) -> float | None:
-        """Give the quotient of two counters; None: there is nothing of the whole."""
+        """Return the quotient of two counters; None: there is nothing of the whole."""
         of = self.get(whole, **labels)
         return (self.get(part, **labels) or 0.0) / of if of else None
 

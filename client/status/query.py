@@ -29,7 +29,7 @@ _WORDS_MOST = 64_000
 
 
 async def status(url: str, settings: HttpSettings = _DEFAULT) -> SiteNow:
-    """Say how a site is.
+    """Return how a site is.
 
     Raises:
         ValueError: ``url`` is no address.
@@ -111,7 +111,7 @@ async def _people(
 
 
 async def _since(url: str, person: SeenObject, fps: float, settings: HttpSettings) -> float | None:
-    """Give the seconds for which a person's camera shows them already."""
+    """Return the seconds for which a person's camera shows them already."""
     try:
         told = await choice(url, person.object, settings)
     except NotFoundError:

@@ -11,7 +11,7 @@ from tracking.detectors import BackgroundDetector
 
 
 def ready_detector(config: Config, camera: CameraSettings, source: Source, fit: Letterbox) -> Observer:
-    """Give a camera's detector, ready for the first frame where the source is a recording.
+    """Return a camera's detector, ready for the first frame where the source is a recording.
 
     A live camera's learns as it goes.
 

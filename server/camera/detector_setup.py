@@ -38,7 +38,7 @@ class Observer(Detector, Protocol):
 
     @property
     def bins(self) -> int:
-        """Give that length: what a frame without a picture has to fit."""
+        """Return that length: what a frame without a picture has to fit."""
         ...
 
     @property
@@ -48,7 +48,7 @@ class Observer(Detector, Protocol):
 
 
 def make_detector(config: Config, camera: CameraSettings, fit: Letterbox) -> Observer:
-    """Give the detector of a camera; its boxes are in the site's picture.
+    """Return the detector of a camera; its boxes are in the site's picture.
 
     Raises:
         UserError: the detection file or the network cannot be read, or the network cannot be run.
@@ -72,7 +72,7 @@ _LEAST_SLOPE, _MOST_SLOPE = 0.03, 1.5
 
 
 def _floor(config: Config, camera: CameraSettings, fit: Letterbox) -> Floor | None:
-    """Give what the ground says about people's heights in the site's picture; None: nothing."""
+    """Return what the ground says about people's heights in the site's picture; None: nothing."""
     per_metre = UNITS_PER_METER.get(camera.ground_unit or "")
     if camera.ground is None:
         return None
@@ -95,7 +95,7 @@ def _floor(config: Config, camera: CameraSettings, fit: Letterbox) -> Floor | No
 
 
 def _of_kind(settings: DetectSettings, floor: Floor | None) -> Observer:
-    """Give the detector that the settings name."""
+    """Return the detector that the settings name."""
     looks = Looks(settings.looks, settings.bins)
     match settings.kind:
         case "hog":
@@ -143,7 +143,7 @@ class FittedDetections:
         return self._looks.bins
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:
-        """Give the detections of a frame, with the appearance that the site's picture shows."""
+        """Return the detections of a frame, with the appearance that the site's picture shows."""
         own = self._file.detect(_NO_PICTURE, None if frame is None else self._counted(frame))
         boxes = self._fit.boxes_to_site(own.boxes)
         return Detections(boxes, own.scores, self._looks.rows(image, boxes))

@@ -46,7 +46,7 @@ class Pointed:
             self._waiting.extend(Pointing(it.pulse, it.track, it.x, it.y, it.reach) for it in said.points)
 
     def take(self) -> list[Pointing]:
-        """Give what has come since this was last asked, in its order."""
+        """Return what has come since this was last asked, in its order."""
         taken = list(self._waiting)
         self._waiting.clear()
         self.taken += len(taken)

@@ -121,7 +121,7 @@ class CameraPipeline:
         self._patience = round(_WAITS_S * site.fps) + config.encode.gop
 
     def take(self, pulse: int) -> Image | None:
-        """Give the site-sized picture of a pulse, None where the source has none yet.
+        """Return the site-sized picture of a pulse, None where the source has none yet.
 
         Raises:
             SourceEnded: the recording is over.
@@ -199,7 +199,7 @@ class CameraPipeline:
         return self._measured(self._reporter.regular(result), searched.image)
 
     def last_word(self, end: int) -> FrameDetections | None:
-        """Give what the other cameras are told when the recording has no frame ``end``."""
+        """Return what the other cameras are told when the recording has no frame ``end``."""
         return None if self.witness is None else self.witness.word(end, None, ended=True)
 
     def finish(self, end: int) -> CameraTracks:
@@ -211,7 +211,7 @@ class CameraPipeline:
         return self._measured(self._reporter.closing(self._tracker.flush(), last), None)
 
     def _measured(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
-        """Say how sharp everybody is, where that counts."""
+        """Return how sharp everybody is, where that counts."""
         return tracks if self._sharpness is None else self._sharpness.measured(tracks, image)
 
     def close(self) -> None:

@@ -30,7 +30,7 @@ class Sharpness:
         self._known: dict[int, float] = {}
 
     def measured(self, message: CameraTracks, image: Image | None) -> CameraTracks:
-        """Give the message with the sharpness of its tracks; ``image`` is the window's last frame, if any."""
+        """Return the message with the sharpness of its tracks; ``image`` is the window's last frame, if any."""
         for track in message.tracks:
             box = track.boxes[-1] if track.boxes else None
             value = None if image is None or box is None else sharpness(image, box)
@@ -44,7 +44,7 @@ class Sharpness:
 
 
 def sharpness(image: Image, box: Box) -> float | None:
-    """Say how much detail there is inside a box, 0 to 1: ``d / (d + 1/4)``; None where it is too small.
+    """Return how much detail there is inside a box, 0 to 1: ``d / (d + 1/4)``; None where it is too small.
 
     *d* is the variance of the Laplacian of the person, 32 by 64 pixels and grey, over that of the grey
     itself: a blur takes detail and leaves contrast.

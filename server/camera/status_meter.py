@@ -43,7 +43,7 @@ class Meter:
         self._shed += 1
 
     def status(self, camera: str, boot: int, state: CameraState, waiting: int, load: Load) -> CameraStatus:
-        """Give the camera's status; ``waiting`` frames are to be searched, ``load`` is what is left out."""
+        """Return the camera's status; ``waiting`` frames are to be searched, ``load`` is what is left out."""
         sync = self._client.status() if self._client is not None else None
         since = time.monotonic() - _SPAN_S
         return CameraStatus(

@@ -16,7 +16,7 @@ _QUALITY = 82
 
 
 def thumbnails(image: Image, tracks: CameraTracks) -> dict[int, bytes]:
-    """Give a JPEG of everybody who is visible in the window's last frame, which ``image`` is, by track."""
+    """Return a JPEG of everybody who is visible in the window's last frame, which ``image`` is, by track."""
     pictures = {}
     for track in tracks.tracks:
         box = track.boxes[-1] if track.boxes else None

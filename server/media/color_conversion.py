@@ -24,7 +24,7 @@ _THREADS = 1
 
 
 def bgr(picture: VideoFrame) -> NDArray[np.uint8]:
-    """Give a decoded picture as ``(height, width, 3)`` BGR.
+    """Return a decoded picture as ``(height, width, 3)`` BGR.
 
     One that names colours which FFmpeg cannot convert (ITU-T H.273, 8.3: half of the numbers there are) is
     shown by BT.601: whoever names them mostly did not mean to.
@@ -39,6 +39,6 @@ def bgr(picture: VideoFrame) -> NDArray[np.uint8]:
 
 
 def yuv(image: NDArray[np.uint8]) -> VideoFrame:
-    """Give a picture, ``(height, width, 3)`` BGR, as it is encoded: colour at half the size."""
+    """Return a picture, ``(height, width, 3)`` BGR, as it is encoded: colour at half the size."""
     picture = VideoFrame.from_ndarray(image, format="bgr24")
     return _kept.to_yuv.reformat(picture, format="yuv420p", threads=_THREADS)

@@ -24,7 +24,7 @@ class Bridge(Protocol):
     """Makes such pictures; how depends on the codec."""
 
     def can_follow(self, picture: Picture) -> bool:
-        """Tell whether what this picture says of itself can be read, as all the other methods do."""
+        """Return whether what this picture says of itself can be read, as all the other methods do."""
 
     def after(self, newest: Picture, spans: Sequence[Span]) -> list[Picture]:
         """Repeat the newest picture; only a key picture can follow."""
@@ -33,7 +33,7 @@ class Bridge(Protocol):
         """Repeat what is before a picture that was not taken, so that this one can be decoded after it."""
 
     def is_lost_between(self, newest: Picture, picture: Picture, missing: int) -> bool:
-        """Tell whether of the missing ones something was encoded that the picture is decoded by.
+        """Return whether of the missing ones something was encoded that the picture is decoded by.
 
         Both are of one GOP of one run of a camera.
         """
@@ -49,7 +49,7 @@ class H264Bridge:
     """As of :class:`Picture`."""
 
     def can_follow(self, picture: Picture) -> bool:
-        """Tell whether it has a number."""
+        """Return whether it has a number."""
         try:
             self.how.frame_num(picture.sample)
         except ValueError:
@@ -65,7 +65,7 @@ class H264Bridge:
         return made
 
     def before(self, picture: Picture, span: Span) -> list[Picture]:
-        """Give one picture with the number of the next, so it is no reference, and only one."""
+        """Return one picture with the number of the next, so it is no reference, and only one."""
         return [self._made(self.how.repeat(self.how.frame_num(picture.sample), reference=False), span)]
 
     def is_lost_between(self, newest: Picture, picture: Picture, missing: int) -> bool:

@@ -33,7 +33,7 @@ class Letterbox:
         return self._site
 
     def image(self, own: Image) -> Image:
-        """Give the site-sized picture of a camera's own one."""
+        """Return the site-sized picture of a camera's own one."""
         if self._exact and own.shape[1::-1] == self._site:
             return own
         shrinking = self.scale < 1

@@ -86,7 +86,7 @@ class Drawn(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def belongs(pulse: int, rate: float, fps: float) -> bool:
-    """Tell whether a frame belongs to a series of ``rate`` pictures a second out of ``fps``.
+    """Return whether a frame belongs to a series of ``rate`` pictures a second out of ``fps``.
 
     It depends on the pulse alone, so that series share pictures, and a slower one is part of a faster one
     whose rate is a multiple.
@@ -95,6 +95,6 @@ def belongs(pulse: int, rate: float, fps: float) -> bool:
 
 
 def framed(message: msgspec.Struct) -> bytes:
-    """Give a message as it goes through a pipe."""
+    """Return a message as it goes through a pipe."""
     body = msgspec.msgpack.encode(message)
     return len(body).to_bytes(LENGTH_BYTES, "big") + body

@@ -59,7 +59,7 @@ class Agreement:
         return None
 
     def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
-        """Give a frame as a fragment, which fits into any stream of the site."""
+        """Return a frame as a fragment, which fits into any stream of the site."""
         return fragment([Sample(sample(nal_units(access_unit)), key)], pulse, fps)
 
     def head(
@@ -70,7 +70,7 @@ class Agreement:
         *,
         pulses: int | None = None,
     ) -> bytes | None:
-        """Give what a player needs before the first fragment; None before the first key frame.
+        """Return what a player needs before the first fragment; None before the first key frame.
 
         ``pulses``: how many there are in a file. Its size does not depend on the number.
         """
@@ -80,16 +80,16 @@ class Agreement:
         return init_segment(self.parameters, *size, sound)
 
     def begun_at(self, origin: int, fragment: bytes, fps: float) -> bytes:
-        """Give a fragment as it is in a stream that has this pulse at time 0."""
+        """Return a fragment as it is in a stream that has this pulse at time 0."""
         return rebased(fragment, -ticks(origin, fps))
 
     def told_by(self, key: bytes) -> ParameterSets | None:
-        """Give the parameter sets of the pictures from a key fragment on, where they may be its own."""
+        """Return the parameter sets of the pictures from a key fragment on, where they may be its own."""
         del key
         return None
 
     def bridge(self, newest: Picture, fps: float) -> Bridge | None:
-        """Give what bridges holes after a picture; None where it is not known how."""
+        """Return what bridges holes after a picture; None where it is not known how."""
         del newest
         return None if self.parameters is None else bridge_by(self.parameters, fps)
 
@@ -147,7 +147,7 @@ class OwnParameters(Agreement):
         return parameter_sets(units_of(sample_of(key)))
 
     def bridge(self, newest: Picture, fps: float) -> Bridge | None:
-        """Give what bridges holes after a picture, by that picture's own parameter sets."""
+        """Return what bridges holes after a picture, by that picture's own parameter sets."""
         if newest.parameters is None:
             return None
         bridge = bridge_by(newest.parameters, fps)
@@ -160,7 +160,7 @@ class OwnParameters(Agreement):
 
 
 def bridge_by(parameters: ParameterSets, fps: float) -> H264Bridge | None:
-    """Give what bridges holes in a stream of these parameter sets; None where it is not known how."""
+    """Return what bridges holes in a stream of these parameter sets; None where it is not known how."""
     try:
         return H264Bridge(continuing(parameters), fps)
     except UnfitError:

@@ -28,7 +28,7 @@ def scores(hota: float, idf1: float, switches: int) -> Scores:
 
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
-    """Give a folder of recordings with one in it: two people walk past each other, far apart."""
+    """Return a folder of recordings with one in it: two people walk past each other, far apart."""
     people = [
         MotRow(frame, number, left, 100.0 * number, 40.0, 90.0)
         for frame in range(1, FRAMES + 1)

@@ -15,7 +15,7 @@ _BLOBS = np.array([[0, 1, 2], [0, 1, 2], [0, 0, 1], [0, 0, 1], [0, 1, 2], [0, 1,
 
 
 def _told(*swapped: int) -> list[dict[int, int]]:
-    """Give numbers as people have them, but with two exchanged in some stages."""
+    """Return numbers as people have them, but with two exchanged in some stages."""
     order = [[1, 0, 2] if stage in swapped else [0, 1, 2] for stage in range(len(_BLOBS))]
     return [dict(enumerate(row[own].tolist(), 1)) for row, own in zip(_BLOBS, order, strict=True)]
 

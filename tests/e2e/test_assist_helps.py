@@ -26,7 +26,7 @@ ALIKE = "alike"
 
 
 def left_to_right(gop: Gop) -> list[int]:
-    """Give who is shown by the camera of the two; empty where they change within the GOP."""
+    """Return who is shown by the camera of the two; empty where they change within the GOP."""
     rows = {tuple(it.object for it in sorted(row, key=lambda it: it.left)) for row in gop.boxes[ALIKE]}
     return list(rows.pop()) if len(rows) == 1 else []
 

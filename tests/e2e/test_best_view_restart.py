@@ -32,7 +32,7 @@ pytestmark = [
 
 
 def whose(gops: Sequence[Gop], words: Sequence[CameraTracks]) -> dict[Followed, set[int]]:
-    """Give the numbers under which each track's boxes were shown."""
+    """Return the numbers under which each track's boxes were shown."""
     numbers = {
         (camera, gop.first + at, (box.left, box.top, box.right, box.bottom)): box.object
         for gop in gops
@@ -98,7 +98,7 @@ async def killed(site: RunningSite, words: list[CameraTracks]) -> None:
     told = whose(site.gops[:count], words)
 
     def again() -> dict[Followed, set[int]]:
-        """Give the tracks that went on over the time without a service, as they are told now."""
+        """Return the tracks that went on over the time without a service, as they are told now."""
         on = {track for word in words if word.last > died for track in tracks_of(word)}
         now = whose(site.gops[count:], words)
         return {track: now[track] for track in told.keys() & now.keys() & on}
@@ -117,7 +117,7 @@ async def killed(site: RunningSite, words: list[CameraTracks]) -> None:
 
 
 def seen_now(gop: Gop) -> set[int]:
-    """Give who has a box in the last frame."""
+    """Return who has a box in the last frame."""
     return {box.object for frames in gop.boxes.values() for box in frames[-1]}
 
 
@@ -126,7 +126,7 @@ def tracks_of(word: CameraTracks) -> list[Followed]:
 
 
 async def asked(session: aiohttp.ClientSession, url: str, number: int) -> int | None:
-    """Give the status of an answer about somebody's best view; None: there was none."""
+    """Return the status of an answer about somebody's best view; None: there was none."""
     try:
         async with session.get(f"{url}objects/{number}/best.mp4") as answer:
             return answer.status

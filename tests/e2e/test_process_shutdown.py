@@ -33,7 +33,7 @@ SCENE = "scene:room?camera=0&cameras=3&objects=4&seed=1"
 
 @contextlib.asynccontextmanager
 async def silent_camera() -> AsyncIterator[tuple[str, asyncio.Event]]:
-    """Give the address of a camera that lets in whoever comes and says nothing, and whether somebody came."""
+    """Yield the address of a camera that lets in whoever comes and says nothing, and whether somebody came."""
     came = asyncio.Event()
 
     async def say_nothing(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -84,7 +84,7 @@ async def end(*processes: Process) -> list[int]:
 
 
 def processes_of(config: Path) -> list[bytes]:
-    """Give the commands that run with a configuration."""
+    """Return the commands that run with a configuration."""
     found = []
     for process in Path("/proc").glob("[0-9]*/cmdline"):
         with contextlib.suppress(OSError):

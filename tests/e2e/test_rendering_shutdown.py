@@ -42,7 +42,7 @@ async def test_drawing_ends_within_two_seconds_of_sigterm(tmp_path: Path) -> Non
 
 
 def processes(module: str, parent: int) -> list[int]:
-    """Give the pids of a process's children that run a module."""
+    """Return the pids of a process's children that run a module."""
     children = Path(f"/proc/{parent}/task").glob("*/children")
     pids = [int(pid) for path in children for pid in path.read_text().split()]
     return [pid for pid in pids if module in Path(f"/proc/{pid}/cmdline").read_text().split("\0")]

@@ -25,7 +25,7 @@ SITE = {"site": {"name": "hall", "width": WIDTH, "height": HEIGHT}}
 
 
 def walk_config(**changes: Any) -> Config:
-    """Give a site of the scene's size."""
+    """Return a site of the scene's size."""
     return small_config(**{**SITE, **changes})
 
 
@@ -42,7 +42,7 @@ def curved(frames: int, wide: float = 0.3) -> Floats:
 
 
 def words(config: Config, places: Floats, epoch: int = 0, boot: int = 1) -> Iterator[Epoch]:
-    """Give what the cameras say of somebody who walks, from an epoch on; whole windows alone."""
+    """Yield what the cameras say of somebody who walks, from an epoch on; whole windows alone."""
     ids = config.camera_ids
     scene = Scene("room", len(ids), 1, width=WIDTH, height=HEIGHT)
     for number in range(epoch, epoch + len(places) // STRIDE):
@@ -79,7 +79,7 @@ def _view(scene: Scene, camera: int) -> Perspective:
 
 
 def _box(scene: Scene, camera: int, place: Floats) -> Box | None:
-    """Give the box of somebody in the camera's picture; None: not all of them is in it."""
+    """Return the box of somebody in the camera's picture; None: not all of them is in it."""
     ends, depth = _view(scene, camera).project(np.array([[*place, 0.0], [*place, TALL]]))
     (x, bottom), (_, top) = ends.tolist()
     half = (bottom - top) / 5

@@ -58,6 +58,6 @@ class Running:
 
 
 def in_folder(folder: Path) -> dict[str, bytes]:
-    """Give what tracks and choices were written."""
+    """Return what tracks and choices were written."""
     files = [*folder.rglob("*.txt"), *folder.rglob("*.csv")]
     return {str(file.relative_to(folder)): file.read_bytes() for file in files}

@@ -41,7 +41,7 @@ NO_REASON = cast("Why", None)
 
 
 def small_config(cameras: Sequence[str | dict[str, Any]] = CAMERAS, **changes: Any) -> Config:
-    """Give a site in which every epoch is a GOP, and whoever is seen once is somebody."""
+    """Return a site in which every epoch is a GOP, and whoever is seen once is somebody."""
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
         "encode": {"gop": GOP},
@@ -75,12 +75,12 @@ def encoded(
 
 
 def look(person: int) -> list[float]:
-    """Give a histogram by which a person can be told from others."""
+    """Return a histogram by which a person can be told from others."""
     return [1.0 if place == person % 8 else 0.0 for place in range(8)]
 
 
 def word(camera: str, epoch: int, boxes: Mapping[int, Box | None], **changes: Any) -> CameraTracks:
-    """Give a camera's word on an epoch: where each track is, all epoch long."""
+    """Return a camera's word on an epoch: where each track is, all epoch long."""
     last = end_of_epoch(epoch, STRIDE)
     message = CameraTracks(
         camera=camera,
@@ -109,29 +109,29 @@ def word(camera: str, epoch: int, boxes: Mapping[int, Box | None], **changes: An
 
 
 def epoch_of(number: int, *words: CameraTracks) -> Epoch:
-    """Give an epoch as the aligner would."""
+    """Return an epoch as the aligner would."""
     return Epoch(number, end_of_epoch(number, STRIDE), {message.camera: message for message in words})
 
 
 def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
-    """Give a frame as it comes from the bus."""
+    """Return a frame as it comes from the bus."""
     head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=boot, due=0.0, taken=0.0, encoded=0.0)
     return Message(ZenohKeys("hall").camera(camera, "video"), unit.data, msgspec.json.encode(head))
 
 
 def tracks(message: CameraTracks) -> Message:
-    """Give a word as it comes from the bus."""
+    """Return a word as it comes from the bus."""
     return Message(ZenohKeys("hall").camera(message.camera, "tracks"), msgspec.json.encode(message), b"")
 
 
 def thumbnail(camera: str, track: int, jpeg: bytes, pulse: int = 0, boot: int = 1) -> Message:
-    """Give a small picture as it comes from the bus."""
+    """Return a small picture as it comes from the bus."""
     head = ThumbnailHeader(track=track, boot=boot, pulse=pulse)
     return Message(ZenohKeys("hall").camera(camera, f"thumbs/{track}"), jpeg, msgspec.json.encode(head))
 
 
 def status(camera: str, **changes: Any) -> Message:
-    """Give a status as it comes from the bus."""
+    """Return a status as it comes from the bus."""
     told = CameraStatus(
         camera=camera,
         boot=1,
@@ -159,7 +159,7 @@ class TrackNumbers:
     def update(
         self, tracks: Sequence[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
-        """Give everybody their number."""
+        """Return everybody their number."""
         del last_frame, pictures
         return IdentityUpdate({EpisodeKey(*it.key, 0): it.local for it in tracks}, (), (), (), (), ())
 

@@ -23,7 +23,7 @@ class Ended(NamedTuple):
 
 
 def refusal(ended: Ended) -> str:
-    """Give the one line that says what is wrong with the input."""
+    """Return the one line that says what is wrong with the input."""
     assert (ended.code, ended.out) == (BAD_INPUT, ""), ended.err
     (line,) = ended.err.splitlines()
     assert line.startswith("myview: ")
@@ -35,7 +35,7 @@ Run = Callable[..., Ended]
 
 @pytest.fixture
 def myview(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Run]:
-    """Give a function that runs `myview` with some arguments."""
+    """Yield a function that runs `myview` with some arguments."""
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
 
     def command(*arguments: object) -> Ended:

@@ -25,7 +25,7 @@ EPOCHS = 8
 
 
 def behind() -> FedService:
-    """Give a service that has heard all cameras, and decided nothing."""
+    """Return a service that has heard all cameras, and decided nothing."""
     service = FedService(small_config())
     service.come(*CAMERAS)
     for epoch in range(EPOCHS):

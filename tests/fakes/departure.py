@@ -57,7 +57,7 @@ def go_on(hall: Hall, epochs: range) -> list[GopChoices]:
 
 
 def expected(told: list[GopChoices], codec: Codec = "h264", *, holds: bool = True) -> dict[int, Picture]:
-    """Say what who may see object 1 alone is to see, by pulse, of decisions from the first one on.
+    """Return what who may see object 1 alone is to see, by pulse, of decisions from the first one on.
 
     ``holds``: before it is grey, the last picture stands.
     """
@@ -108,7 +108,7 @@ def equal(shown: dict[int, Picture], right: dict[int, Picture]) -> None:
 
 
 def chosen(told: list[GopChoices], codec: Codec = "h264") -> dict[int, Picture]:
-    """Say what everybody else sees."""
+    """Return what everybody else sees."""
     cameras = {pulse: it.choices[1] for it in told for pulse in range(it.first, it.first + it.frames)}
     return {pulse: own(camera, codec)[pulse] for pulse, camera in cameras.items()}
 

@@ -48,7 +48,7 @@ def units(camera: int, frames: int) -> tuple[AccessUnit, ...]:
 
 
 def boxes(camera: int, first: int, frames: int) -> dict[int, list[Box | None]]:
-    """Say where everybody is, by person and frame."""
+    """Return where everybody is, by person and frame."""
     found: dict[int, list[Box | None]] = {}
     for place in range(frames):
         truth = room().truth(START + first + place)[camera]
@@ -113,7 +113,7 @@ async def drawn_room(**changes: object) -> AsyncIterator[Drawn]:
 
 
 def decoded(camera: int, frames: int) -> Iterator[Image]:
-    """Give a camera's pictures as a viewer sees them."""
+    """Yield a camera's pictures as a viewer sees them."""
     decoder = av.VideoCodecContext.create("h264", "r")
     for unit in units(camera, MOST)[:frames]:
         for picture in decoder.decode(av.Packet(unit.data)):

@@ -50,7 +50,7 @@ def shown(gop: int) -> tuple[str, int]:
 
 
 def expected() -> list[NDArray[np.uint8]]:
-    """Give what is to be seen: where a GOP does not come, the last picture before it."""
+    """Return what is to be seen: where a GOP does not come, the last picture before it."""
     own, seen = {camera: alone(camera) for camera in MAKES}, []
     for gop in range(GOPS):
         camera, real = shown(gop)

@@ -40,6 +40,6 @@ _PIECE = 4
 
 
 def tells(text: str, password: str, without: str) -> bool:
-    """Tell whether four characters of a password are in a text, that are not there without it."""
+    """Return whether four characters of a password are in a text, that are not there without it."""
     pieces = {password[at : at + _PIECE] for at in range(len(password) - _PIECE + 1)}
     return any(it in text and it not in without for it in pieces)

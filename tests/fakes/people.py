@@ -29,7 +29,7 @@ class Dictated:
 
 
 def boxes(it: People, camera: str, pulse: int) -> dict[int, Box]:
-    """Give everybody's box in one frame by number."""
+    """Return everybody's box in one frame by number."""
     [rows] = it.boxes(camera, pulse, 1)
     numbers = [number for number, *_ in rows]
     assert numbers == sorted(set(numbers))

@@ -45,7 +45,7 @@ class ByHand:
                 return message
 
     async def other(self) -> ServerLine | None:
-        """Give the next message that is no pulse."""
+        """Return the next message that is no pulse."""
         while True:
             message = await self.message()
             if not isinstance(message, PulseMessage):

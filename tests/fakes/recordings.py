@@ -65,7 +65,7 @@ class ClocksByHand:
 
 @cache
 def filled() -> tuple[dict[str, FrameBuffer], bytes]:
-    """Give a shelf per camera with all its frames, and what every file begins with."""
+    """Return a shelf per camera with all its frames, and what every file begins with."""
     agreement = Agreement()
     shelves = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
@@ -102,7 +102,7 @@ def head(began: float = PULSE0, numbers_since: float | None = None) -> SessionIn
 def piece(
     gop: int, choices: Mapping[int, str], cameras: tuple[str, ...] = CAMERAS, frames: int = GOP
 ) -> GopRecord:
-    """Give a GOP as it was decided; ``frames``: as many of it have come."""
+    """Return a GOP as it was decided; ``frames``: as many of it have come."""
     first = gop * GOP
     delivered = {}
     for camera in cameras:

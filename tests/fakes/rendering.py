@@ -19,7 +19,7 @@ CANVAS = Canvas(
 
 
 def fragments(first: int, count: int, seed: int = 0) -> bytes:
-    """Give frames of a camera as the service passes them on."""
+    """Return frames of a camera as the service passes them on."""
     units = encoded(seed)[first : first + count]
     return b"".join(
         fragment([Sample(sample(nal_units(unit.data)), unit.key)], unit.pulse, FPS) for unit in units
@@ -28,7 +28,7 @@ def fragments(first: int, count: int, seed: int = 0) -> bytes:
 
 @cache
 def shown(seed: int) -> list[Image]:
-    """Give a camera's frames as any decoder shows them."""
+    """Return a camera's frames as any decoder shows them."""
     decoder = av.VideoCodecContext.create("h264", "r")
     pictures = [picture for unit in encoded(seed) for picture in decoder.decode(av.Packet(unit.data))]
     return [np.asarray(picture.to_ndarray(format="bgr24"), np.uint8) for picture in pictures]

@@ -60,6 +60,6 @@ async def hall() -> AsyncIterator[Hall]:
 
 @pytest.fixture
 async def busy(hall: Hall) -> Hall:
-    """Give a hall with people in it."""
+    """Return a hall with people in it."""
     see(hall)
     return hall

@@ -27,12 +27,12 @@ def token_of(name: str) -> str:
 
 
 def bearer(name: str) -> dict[str, str]:
-    """Give the head that a token is sent in."""
+    """Return the head that a token is sent in."""
     return {"Authorization": f"Bearer {token_of(name)}"}
 
 
 def line_of(name: str, **what: Any) -> dict[str, Any]:
-    """Give a line of the file."""
+    """Return a line of the file."""
     return {"name": name, "sha256": token_digest(token_of(name)), **(what or EVERYBODY[name])}
 
 

@@ -58,7 +58,7 @@ def described() -> Iterator[Site]:
 
 
 def endless(operation: Any) -> bool:
-    """Tell whether an answer has no end."""
+    """Return whether an answer has no end."""
     content = operation.definition.raw["responses"]["200"].get("content", {})
     return any(kind.startswith(ENDLESS) for kind in content)
 

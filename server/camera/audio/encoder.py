@@ -46,7 +46,7 @@ class Encoding:
         """Samples that are to be left out of what comes."""
 
     def take(self, packet: Packet, at: Fraction) -> list[Frame]:
-        """Give the frames that have become whole."""
+        """Return the frames that have become whole."""
         if packet.pts is None or packet.time_base is None:
             return []
         shift = at - packet.pts * packet.time_base
@@ -106,7 +106,7 @@ class Encoding:
         return AudioResampler(format="fltp", layout=self._layout, rate=self._rate)
 
     def _laid_out(self, samples: NDArray[np.float32]) -> tuple[NDArray[np.float32], str]:
-        """Give samples ``(channels, samples)`` as the encoder likes them, with its name for that."""
+        """Return samples ``(channels, samples)`` as the encoder likes them, with its name for that."""
         if self._format == "fltp":
             return samples, "fltp"
         return np.ascontiguousarray(samples.T).reshape(1, -1), "flt"

@@ -25,7 +25,7 @@ class Way(Protocol):
     """How a source's packets become the site's frames."""
 
     def take(self, packet: Packet, at: Fraction) -> list[Frame]:
-        """Give what becomes whole by a packet that sounds ``at`` seconds after pulse 0; numbers grow."""
+        """Return what becomes whole by a packet that sounds ``at`` seconds after pulse 0; numbers grow."""
         ...
 
 

@@ -85,7 +85,7 @@ class LiveSound:
                 self._frames.append(frame)
 
     def at(self, pulse: int) -> list[Frame]:
-        """Give what has come since the pulse before, now that the newest picture is shown at this one."""
+        """Return what has come since the pulse before, now that the newest picture is shown at this one."""
         with self._lock:
             self._asked = pulse / self._fps
             if self._newest is not None:

@@ -18,7 +18,7 @@ _PRESENT = 0x80
 
 
 def fits(stream: AudioStream, form: SoundFormat) -> bool:
-    """Tell whether a decoder that was told the site's format decodes these packets."""
+    """Return whether a decoder that was told the site's format decodes these packets."""
     context = stream.codec_context
     if context.name in {"opus", "libopus"} and form.coding == "opus":
         return (context.sample_rate, context.layout.nb_channels) == (OPUS_RATE, form.channels)
@@ -37,7 +37,7 @@ class Passing:
         self._next: int | None = None
 
     def take(self, packet: Packet, at: Fraction) -> list[Frame]:
-        """Give the packet as a frame; nothing where its place is taken, or it is not as long as a frame."""
+        """Return the packet as a frame; nothing where its place is taken, or it is not as long as a frame."""
         data = bytes(packet)
         if self._form.coding == "opus" and samples_in(data) != self._form.samples:
             return []

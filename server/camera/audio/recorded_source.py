@@ -60,14 +60,14 @@ class RecordedSound:
         """That it cannot be read to its end."""
 
     def at(self, pulse: int) -> list[Frame]:
-        """Give what is to be sent at a pulse: it is recorded, so it can be sent a moment early.
+        """Return what is to be sent at a pulse: it is recorded, so it can be sent a moment early.
 
         The pictures of other cameras, shown at once, then find it there.
         """
         return self.until(pulse + max(1, round(_AHEAD_S * self._fps)))
 
     def until(self, pulse: int) -> list[Frame]:
-        """Give the frames that follow, up to what sounds when ``pulse`` is due; pulses must grow.
+        """Return the frames that follow, up to what sounds when ``pulse`` is due; pulses must grow.
 
         The first call begins a second before that.
         """
@@ -83,7 +83,7 @@ class RecordedSound:
         return frames
 
     def _from(self, moment: Fraction) -> Iterator[tuple[Fraction, Packet]]:
-        """Give the packets from a moment on with when they sound, seconds after pulse 0."""
+        """Yield the packets from a moment on with when they sound, seconds after pulse 0."""
         begin, lasts = self._begin, self._lasts
         if lasts is not None:
             begin += max(0, (moment - begin) // lasts) * lasts
@@ -100,7 +100,7 @@ class RecordedSound:
             begin += lasts
 
     def _once(self) -> Iterator[tuple[Fraction, Packet]]:
-        """Give the packets of one pass with when they sound after the first picture."""
+        """Yield the packets of one pass with when they sound after the first picture."""
         container, stream = _open(self._path)
         try:
             for time, packet in _in_order(container.demux(stream)):
@@ -148,7 +148,7 @@ def _lasts(container: InputContainer, video: VideoStream, fps: Fraction) -> Frac
 
 
 def _in_order(packets: Iterable[Packet]) -> Iterator[tuple[Fraction, Packet]]:
-    """Give packets with their times in seconds, without single ones far ahead of what follows: damage."""
+    """Yield packets with their times in seconds, without single ones far ahead of what follows: damage."""
     reached: Fraction | None = None
     ahead: tuple[Fraction, Packet] | None = None
     for packet in packets:
@@ -167,7 +167,7 @@ def _in_order(packets: Iterable[Packet]) -> Iterator[tuple[Fraction, Packet]]:
 
 
 def _pictures(container: InputContainer) -> VideoStream | None:
-    """Give the stream of its pictures, if it has one: that of a record's cover is none."""
+    """Return the stream of its pictures, if it has one: that of a record's cover is none."""
     streams = container.streams.video
     return next((it for it in streams if not it.disposition & Disposition.attached_pic), None)
 

@@ -28,7 +28,7 @@ class _ByItsFirst:
         self._way: Way | None = None
 
     def take(self, packet: Packet, at: Fraction) -> list[Frame]:
-        """Give what becomes whole by a packet."""
+        """Return what becomes whole by a packet."""
         if self._way is None:
             passes = samples_in(bytes(packet)) == self._form.samples
             self._way = Passing(self._form) if passes else Encoding(self._form, self._kbps)

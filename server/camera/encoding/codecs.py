@@ -22,7 +22,7 @@ _BITS_TO_SPARE = 1_000_000_000
 
 
 def x264(site: SiteSettings | Canvas, settings: EncodeSettings | Canvas) -> VideoCodecContext:
-    """Give an encoder of H.264."""
+    """Return an encoder of H.264."""
     context = _opened_by("libx264", site)
     context.max_b_frames = 0
     context.options = {
@@ -37,7 +37,7 @@ def x264(site: SiteSettings | Canvas, settings: EncodeSettings | Canvas) -> Vide
 
 
 def libvpx(site: SiteSettings, settings: EncodeSettings) -> VideoCodecContext:
-    """Give an encoder of VP8."""
+    """Return an encoder of VP8."""
     context = _opened_by("libvpx", site)
     context.bit_rate = _BITS_TO_SPARE
     context.options = {
@@ -67,7 +67,7 @@ def _opened_by(name: str, site: SiteSettings | Canvas) -> VideoCodecContext:
 
 
 def _cap(site: SiteSettings | Canvas, settings: EncodeSettings | Canvas) -> str:
-    """Give x264 a leaky bucket (H.264, annex C) that lets no more than the cap through in any second.
+    """Return x264 a leaky bucket (H.264, annex C) that lets no more than the cap through in any second.
 
     A bucket that fills at a rate and holds so many seconds of it lets both through at once. It holds a GOP,
     so that a key picture may take much of what the others leave.

@@ -45,7 +45,7 @@ class Stepping:
         return merge_results([it for it in results if it is not None])
 
     def _release(self, after: tuple[int, Detections] | None) -> WindowResult | None:
-        """Give the tracker what waits; ``after`` is the next searched frame."""
+        """Return the tracker what waits; ``after`` is the next searched frame."""
         held, self._held = self._held, []
         results = [self._tracker.push(it, self._guessed(it, after)) for it in held]
         return merge_results([it for it in results if it is not None])

@@ -36,11 +36,11 @@ class Load:
         return self._ladder.rung.words
 
     def searches(self, pulse: int) -> bool:
-        """Tell whether a frame is searched."""
+        """Return whether a frame is searched."""
         return self._ladder.rung.searches(pulse, self._stride)
 
     def takes(self, pulse: int) -> bool:
-        """Tell whether a frame is taken at all."""
+        """Return whether a frame is taken at all."""
         return self._ladder.rung.takes(pulse, self._stride, self._gop)
 
     def measured(self, lag: float, now: float) -> None:

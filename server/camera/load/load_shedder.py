@@ -31,11 +31,11 @@ class Rung:
     taken: int = 1
 
     def searches(self, pulse: int, stride: int) -> bool:
-        """Tell whether a frame is searched. The last one of every window is."""
+        """Return whether a frame is searched. The last one of every window is."""
         return -(pulse + 1) % stride % self.searched == 0
 
     def takes(self, pulse: int, stride: int, gop: int) -> bool:
-        """Tell whether a frame is taken. The first one of every GOP is, and the last one of every window."""
+        """Return whether a frame is taken. The first one of every GOP is, and the last one of every window."""
         return pulse % gop % self.taken == 0 or (pulse + 1) % stride == 0
 
     @property
@@ -52,7 +52,7 @@ _ORDINALS = {2: "2nd", 3: "3rd"}
 
 
 def rungs(stride: int, *, live: bool) -> tuple[Rung, ...]:
-    """Give the ladder from the ground up, for windows that end every ``stride`` frames.
+    """Return the ladder from the ground up, for windows that end every ``stride`` frames.
 
     Frames of a recording are always taken: whoever watches it again would miss them.
     """

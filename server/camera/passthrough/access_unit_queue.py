@@ -36,7 +36,7 @@ class Waiting:
             self._whole = False
 
     def take(self, pulse: int) -> Unit | None:
-        """Give what goes with a pulse; pulses must grow. None: nothing can."""
+        """Return what goes with a pulse; pulses must grow. None: nothing can."""
         begins = self._last is None or pulse // self._gop != self._last // self._gop
         skipped = self._last is not None and pulse != self._last + 1
         self._last = pulse

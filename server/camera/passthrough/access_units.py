@@ -23,7 +23,7 @@ class Packing:
     """Parameter sets that may stand there alone."""
 
     def annex_b(self, packet: bytes) -> bytes:
-        """Give the same NAL units behind start codes, in a key picture with the parameter sets before them.
+        """Return the same NAL units behind start codes, in a key picture with the parameter sets before them.
 
         Raises:
             ValueError: the lengths do not fit.
@@ -62,7 +62,7 @@ def packing_of(extradata: bytes | None) -> Packing:
 
 
 def is_key(annex_b: bytes) -> bool:
-    """Tell whether an access unit is one that nothing before it is needed for."""
+    """Return whether an access unit is one that nothing before it is needed for."""
     return any(nal_type(unit) == NAL_IDR for unit in nal_units(annex_b))
 
 

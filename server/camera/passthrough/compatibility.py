@@ -34,7 +34,7 @@ class Wanted:
 
 
 def wanted_by(config: Config) -> Wanted:
-    """Say what a site wants."""
+    """Return what a site wants."""
     site = config.site
     parameters = None
     encoding = any(camera.h264 != "pass" for camera in config.cameras)

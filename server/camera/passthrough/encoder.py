@@ -36,7 +36,7 @@ class Passing:
         self._source = source
 
     def encode(self, pulse: int, image: Image) -> AccessUnit:
-        """Give the access unit of a pulse, whose picture was the last one taken."""
+        """Return the access unit of a pulse, whose picture was the last one taken."""
         unit = self._source.taken
         if unit is None or unit.image is not image:
             raise RuntimeError("a picture was taken meanwhile")

@@ -45,7 +45,7 @@ class OwnRecording:
         self._begin()
 
     def take(self, pulse: int) -> Image | None:
-        """Give frame ``pulse - offset``; None before the recording begins."""
+        """Return frame ``pulse - offset``; None before the recording begins."""
         index = pulse - self._offset
         if index < 0:
             return None
@@ -105,7 +105,7 @@ def at_once(opened: Opened) -> None:
 
 
 def packets(opened: Opened) -> Iterator[av.Packet[VideoStream]]:
-    """Give the packets that hold access units."""
+    """Yield the packets that hold access units."""
     at_once(opened)
     for packet in opened.container.demux(opened.stream):
         if packet.size:

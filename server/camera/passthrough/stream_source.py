@@ -48,7 +48,7 @@ class OwnStream(Stream):
         super().__init__(url, options, listener)
 
     def take(self, pulse: int) -> Image | None:
-        """Give the picture of the access unit that goes with a pulse; None where none can."""
+        """Return the picture of the access unit that goes with a pulse; None where none can."""
         with self._waiting_lock:
             self.taken = taken = self._waiting.take(pulse)
         if taken is None:

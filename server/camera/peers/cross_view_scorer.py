@@ -40,7 +40,7 @@ class Witness:
         """The others' sizes of picture, and where they look from; None: at none of this camera's ground."""
 
     def word(self, pulse: int, detections: Detections | None, *, ended: bool = False) -> FrameDetections:
-        """Say what was found in a frame; None: nobody was looked for."""
+        """Return what was found in a frame; None: nobody was looked for."""
         boxes = None
         if detections is not None:
             # The surest, in the detector's order.
@@ -54,11 +54,11 @@ class Witness:
         )
 
     def looks_here(self, word: FrameDetections) -> bool:
-        """Tell whether the camera whose word this is looks at ground that this one sees."""
+        """Return whether the camera whose word this is looks at ground that this one sees."""
         return self._vantage_of(word) is not None
 
     def scored(self, detections: Detections, words: Sequence[FrameDetections]) -> Detections:
-        """Give the detections with the scores that they have by what the others found in the same frame."""
+        """Return the detections with the scores that they have by what the others found in the same frame."""
         others = [
             (vantage, _findings(word.boxes))
             for word in words
@@ -89,7 +89,7 @@ def _vantage(config: Config, camera_id: str, size: tuple[int, int]) -> CameraGeo
 
 
 def _findings(rows: Sequence[tuple[float, ...]]) -> CameraDetections:
-    """Give boxes and scores as arrays, without boxes that have no size."""
+    """Return boxes and scores as arrays, without boxes that have no size."""
     table = np.array(rows, dtype=np.float64).reshape(-1, 5)
     table = table[(table[:, 0] < table[:, 2]) & (table[:, 1] < table[:, 3])]
     return CameraDetections(table[:, :4], table[:, 4])

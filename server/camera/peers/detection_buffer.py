@@ -76,7 +76,7 @@ class Earshot:
                 del other.words[old]
 
     def misses(self, pulse: int) -> bool:
-        """Tell whether somebody's word on this frame is worth waiting for."""
+        """Return whether somebody's word on this frame is worth waiting for."""
         return any(_missed(other, pulse) for other in self._others.values())
 
     def give_up(self, pulse: int) -> list[str]:
@@ -87,14 +87,14 @@ class Earshot:
         return late
 
     def heard(self, pulse: int) -> Heard:
-        """Give what was said of a frame, in the order of the configuration."""
+        """Return what was said of a frame, in the order of the configuration."""
         words = [other.words[pulse] for other in self._others.values() if pulse in other.words]
         alone = any(_expected(other, pulse) and pulse not in other.words for other in self._others.values())
         return Heard(tuple(words), alone)
 
 
 def _expected(other: _Other, pulse: int) -> bool:
-    """Tell whether a camera has something to say of a frame."""
+    """Return whether a camera has something to say of a frame."""
     return other.near is not False and not (other.ended and pulse >= other.newest)
 
 

@@ -25,7 +25,7 @@ class Source(Protocol):
     """A recording waits for nobody: its picture of a pulse is the same whenever it is asked for."""
 
     def take(self, pulse: int) -> Image | None:
-        """Give the picture of a pulse; pulses must grow. None: there is none (yet).
+        """Return the picture of a pulse; pulses must grow. None: there is none (yet).
 
         Raises:
             SourceEnded: the recording is over.
@@ -33,7 +33,7 @@ class Source(Protocol):
         ...
 
     def ahead(self, places: Sequence[int]) -> Iterator[Image]:
-        """Give the pictures at some places of a recording, counted from its beginning, by rising place.
+        """Return the pictures at some places of a recording, counted from its beginning, by rising place.
 
         What is played stays where it is. Fewer where the recording is shorter; none of what is no recording.
         """

@@ -56,7 +56,7 @@ class _Line(Protocol):
         ...
 
     def rest(self) -> Iterator[TimedPicture]:
-        """Give what never came at the end."""
+        """Return what never came at the end."""
         ...
 
 

@@ -66,7 +66,7 @@ class Stream:
         self._sized.set()
 
     def take(self, pulse: int) -> Image | None:
-        """Give the newest picture; None while the camera is away.
+        """Return the newest picture; None while the camera is away.
 
         Raises:
             UnavailableError: the size of its pictures has changed; the caller has to open it again, because
@@ -80,7 +80,7 @@ class Stream:
         return None if picture is None else self._oriented(picture).image(picture)
 
     def ahead(self, places: Sequence[int]) -> Iterator[Image]:  # noqa: ARG002 — Source
-        """Give nothing: what a camera will show nobody knows."""
+        """Return nothing: what a camera will show nobody knows."""
         return iter(())
 
     def close(self) -> None:
@@ -153,7 +153,7 @@ class Stream:
             return False
 
     def _listened_to(self, opened: Opened) -> tuple[AudioStream, ...]:
-        """Give what else is to be read than the pictures."""
+        """Return what else is to be read than the pictures."""
         if self._listener is None:
             return ()
         streams = opened.container.streams.audio[:1]
@@ -212,7 +212,7 @@ class _Silence:
         self._until, self._left = 0.0, 0
 
     def was_before(self, packet: av.Packet[VideoStream], now: float) -> bool:
-        """Tell whether a packet was sent before a silence that has just ended, as far as its time says."""
+        """Return whether a packet was sent before a silence that has just ended, as far as its time says."""
         if packet.pts is None or packet.time_base is None:
             return False
         at, last = self._at, self._time

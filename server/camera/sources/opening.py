@@ -86,12 +86,12 @@ def open_video(
 
 
 def no_answer(error: Exception, seconds: float) -> str | None:
-    """Say that a source has kept silent for so long, where it was given up for that."""
+    """Return that a source has kept silent for so long, where it was given up for that."""
     return f"no answer within {seconds:g} s" if isinstance(error, av.error.ExitError) else None
 
 
 def _reason(source: str, error: Exception) -> str:
-    """Say why; of a host that nobody knows FFmpeg says no more than that it was an input/output error."""
+    """Return why; of a host that nobody knows FFmpeg says no more than that it was an input/output error."""
     if isinstance(error, OSError) and error.errno == errno.EIO and "://" in source:
         try:
             socket.getaddrinfo(urlsplit(source).hostname, None)

@@ -18,12 +18,12 @@ _END = "111"
 
 
 def audio_specific_config(rate: int, channels: int) -> bytes:
-    """Give AudioSpecificConfig (1.6.2.1): all that a decoder has to be told."""
+    """Return AudioSpecificConfig (1.6.2.1): all that a decoder has to be told."""
     return (_LOW_COMPLEXITY << 11 | RATES.index(rate) << 7 | channels << 3).to_bytes(2, "big")
 
 
 def silent_frame(channels: int) -> bytes:
-    """Give a frame in which there is nothing to hear."""
+    """Return a frame in which there is nothing to hear."""
     gain = "00000000"
     if channels == 1:
         bits = "000" + "0000" + gain + _ICS_INFO + _QUIET
@@ -35,7 +35,7 @@ def silent_frame(channels: int) -> bytes:
 
 
 def adts(rate: int, channels: int, size: int) -> bytes:
-    """Give what comes before a frame of ``size`` bytes in a transport stream (1.A.2)."""
+    """Return what comes before a frame of ``size`` bytes in a transport stream (1.A.2)."""
     whole = size + 7
     return bytes(
         (

@@ -52,14 +52,14 @@ class SoundFormat:
         return silent_frame(self.channels) if self.coding == "aac" else _OPUS_SILENCE[self.channels - 1]
 
     def frame_at(self, pulse: int, fps: float) -> int:
-        """Give the number of the frame that sounds when a pulse is due."""
+        """Return the number of the frame that sounds when a pulse is due."""
         return round(pulse * self.rate / fps) // self.samples
 
     def pulses(self, begin: int, end: int, fps: float) -> tuple[int, int]:
-        """Give the first pulse, and the one after the last, among which are all that some frames sound at."""
+        """Return the first pulse, and the one after the last, among which are all that some frames sound at."""
         first = begin * self.samples * fps / self.rate
         return max(0, int(first) - 1), int((end + 1) * self.samples * fps / self.rate) + 2
 
     def adts(self, size: int) -> bytes:
-        """Give what comes before a frame of AAC of ``size`` bytes in a transport stream."""
+        """Return what comes before a frame of AAC of ``size`` bytes in a transport stream."""
         return adts(self.rate, self.channels, size)

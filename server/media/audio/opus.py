@@ -14,7 +14,7 @@ _MANY = 3
 
 
 def samples_in(packet: bytes) -> int:
-    """Give how many samples at 48 kHz a packet holds; 0 where it does not say."""
+    """Return how many samples at 48 kHz a packet holds; 0 where it does not say."""
     if not packet:
         return 0
     config, code = packet[0] >> 3, packet[0] & 3

@@ -38,14 +38,14 @@ class Sample:
 
 
 def ticks(pulse: int, fps: float) -> int:
-    """Give the presentation time of a pulse: the media time of a frame is exactly pulse / fps."""
+    """Return the presentation time of a pulse: the media time of a frame is exactly pulse / fps."""
     return round(pulse * TIMESCALE / fps)
 
 
 def init_segment(
     parameters: ParameterSets, width: int, height: int, sound: SoundFormat | None = None
 ) -> bytes:
-    """Give ``ftyp`` and ``moov``: what a player needs before the first fragment, the same for all streams."""
+    """Return ``ftyp`` and ``moov``: what a player needs before the first fragment, the same for all streams."""
     last = _TRACK if sound is None else SOUND_TRACK
     return box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6avc1mp41") + box(
         "moov",
@@ -64,19 +64,19 @@ def init_segment(
 
 
 def fragment(samples: Sequence[Sample], first: int, fps: float) -> bytes:
-    """Give ``moof`` and ``mdat`` of consecutive frames, the first of them shown at pulse ``first``."""
+    """Return ``moof`` and ``mdat`` of consecutive frames, the first of them shown at pulse ``first``."""
     pulses = accumulate((sample.lasts for sample in samples), initial=first)
     return _fragment(samples, first, [ticks(pulse, fps) for pulse in pulses])
 
 
 def still(samples: Sequence[Sample], first: int, until: int, fps: float) -> bytes:
-    """Give a fragment that shows the last of some frames: those before it pass in a tick each."""
+    """Return a fragment that shows the last of some frames: those before it pass in a tick each."""
     begin = ticks(first, fps)
     return _fragment(samples, first, [*(begin + place for place in range(len(samples))), ticks(until, fps)])
 
 
 def _fragment(samples: Sequence[Sample], first: int, edges: Sequence[int]) -> bytes:
-    """Give the fragment of samples, each shown from its edge to the next, in ticks."""
+    """Return the fragment of samples, each shown from its edge to the next, in ticks."""
     entries = b"".join(
         struct.pack(
             ">3I",
@@ -112,6 +112,6 @@ def rebased(frame: bytes, by: int) -> bytes:
 
 
 def sample_of(frame: bytes) -> bytes:
-    """Give the sample of a fragment of :func:`fragment` that has one."""
+    """Return the sample of a fragment of :func:`fragment` that has one."""
     (moof_bytes,) = struct.unpack_from(">I", frame)
     return frame[moof_bytes + 8 :]

@@ -10,24 +10,24 @@ _MATRIX = struct.pack(">9I", 0x10000, 0, 0, 0, 0x10000, 0, 0, 0, 0x40000000)
 
 
 def box(kind: str, *parts: bytes) -> bytes:
-    """Give a box."""
+    """Return a box."""
     body = b"".join(parts)
     return struct.pack(">I", 8 + len(body)) + kind.encode("ascii") + body
 
 
 def full(kind: str, version: int, flags: int, body: bytes) -> bytes:
-    """Give a box that says its version and has flags (4.2)."""
+    """Return a box that says its version and has flags (4.2)."""
     return box(kind, struct.pack(">I", version << 24 | flags), body)
 
 
 def movie_head(last: int) -> bytes:
-    """Give ``mvhd`` of a film whose tracks are numbered up to ``last``."""
+    """Return ``mvhd`` of a film whose tracks are numbered up to ``last``."""
     head = struct.pack(">5I", 0, 0, 1000, 0, 0x10000) + struct.pack(">H", 0x100) + bytes(10)
     return full("mvhd", 0, 0, head + _MATRIX + bytes(24) + struct.pack(">I", last + 1))
 
 
 def track_defaults(track: int) -> bytes:
-    """Give ``trex`` of a track whose fragments say everything themselves."""
+    """Return ``trex`` of a track whose fragments say everything themselves."""
     return full("trex", 0, 0, struct.pack(">5I", track, 1, 0, 0, 0))
 
 
@@ -41,7 +41,7 @@ def track(
     volume: int = 0,
     size: tuple[int, int] = (0, 0),
 ) -> bytes:
-    """Give ``trak`` of a track whose samples are all in fragments.
+    """Return ``trak`` of a track whose samples are all in fragments.
 
     ``head`` is the box of its kind (``vmhd``, ``smhd``), ``entry`` its sample entry; ``size`` is in pixels.
     """
@@ -75,7 +75,7 @@ def track(
 def moof_mdat(
     first: int, track_head: bytes, time: int, flags: int, entries: bytes, samples: Sequence[bytes]
 ) -> bytes:
-    """Give a fragment: ``moof``, and its samples in ``mdat``.
+    """Return a fragment: ``moof``, and its samples in ``mdat``.
 
     ``first`` is the first sample's number, ``time`` its time, and ``track_head`` is ``tfhd``. ``flags`` and
     ``entries`` are those of ``trun``: what is told of each sample, and that.

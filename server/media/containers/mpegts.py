@@ -54,17 +54,17 @@ class Counters:
 
 
 def packets(picture: Picture) -> int:
-    """Give how many packets with content a picture becomes; packing it is not needed for that."""
+    """Return how many packets with content a picture becomes; packing it is not needed for that."""
     return _packets(_PES_HEAD + len(_AUD) + len(picture.sample))
 
 
 def sound_packets(heard: Heard) -> int:
-    """Give how many packets with content some sound becomes; there is none of Opus here."""
+    """Return how many packets with content some sound becomes; there is none of Opus here."""
     return sum(_plain_packets(len(content)) for content in _sound_pes(heard))
 
 
 def pack(pictures: Sequence[Picture], fps: float, counters: Counters, heard: Heard | None = None) -> bytes:
-    """Give consecutive pictures as packets, behind what is to be heard with them, if that is AAC.
+    """Return consecutive pictures as packets, behind what is to be heard with them, if that is AAC.
 
     The tables come before each whole GOP and each key picture.
     """
@@ -102,7 +102,7 @@ def _pack_sound(heard: Heard, counters: Counters) -> Iterator[bytes]:
 
 
 def _sound_pes(heard: Heard) -> list[bytes]:
-    """Give sound as PES packets, each frame behind its ADTS head."""
+    """Return sound as PES packets, each frame behind its ADTS head."""
     form, made = heard.format, list[bytes]()
     for place in range(0, len(heard.frames) if form.coding == "aac" else 0, _FRAMES_AT_ONCE):
         stamp = _stamp(round((heard.first + place) * form.samples * TIMESCALE / form.rate) % _CLOCK)
@@ -123,7 +123,7 @@ def _packets(content: int) -> int:
 
 
 def _pes(picture: Picture, fps: float) -> bytes:
-    """Give a picture as a PES packet (2.4.3.6): it carries its time, and says its length where that fits."""
+    """Return a picture as a PES packet (2.4.3.6): it carries its time, and says its length where that fits."""
     time = ticks(picture.pulse, fps) % _CLOCK
     stamp = _stamp(time)
     content = _AUD + b"".join(_annex_b(picture.sample))
@@ -144,7 +144,7 @@ def _annex_b(sample: bytes) -> Iterator[bytes]:
 
 
 def _reference(time: int, *, key: bool = False) -> bytes:
-    """Give an adaptation field's flags and time reference (2.4.3.4)."""
+    """Return an adaptation field's flags and time reference (2.4.3.4)."""
     base = (time - _DELAY) % _CLOCK
     return struct.pack(">BIH", 0x10 | 0x40 * key, base >> 1, (base & 1) << 15 | 0x7E00)
 
@@ -161,7 +161,7 @@ def _split(pid: int, content: bytes, count: int, counter: int, reference: bytes)
 
 
 def _packet(pid: int, counter: int, payload: bytes, field: bytes = b"", *, begins: bool = False) -> bytes:
-    """Give a packet; ``field`` is an adaptation field without its length, stuffed as far as there is room."""
+    """Return a packet; ``field`` is an adaptation field without its length, stuffed as far as there is room."""
     room = _PAYLOAD - len(payload)
     control = 0x10 * bool(payload)
     if room:
@@ -177,14 +177,14 @@ def _table(pid: int, section: bytes, counter: int) -> bytes:
 
 
 def _section(table: int, number: int, body: bytes) -> bytes:
-    """Give a section of one part (2.4.4.3, 2.4.4.8), version 0, in force."""
+    """Return a section of one part (2.4.4.3, 2.4.4.8), version 0, in force."""
     content = struct.pack(">HBBB", number, 0xC1, 0, 0) + body
     head = struct.pack(">BH", table, 0xB000 | len(content) + 4) + content
     return head + struct.pack(">I", _crc(head))
 
 
 def _crc(data: bytes) -> int:
-    """Give CRC_32 of annex A."""
+    """Return CRC_32 of annex A."""
     crc = 0xFFFFFFFF
     for byte in data:
         crc ^= byte << 24

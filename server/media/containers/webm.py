@@ -25,12 +25,12 @@ _TIME_AT = len(CLUSTER) + 4 + len(_TIMESTAMP) + 1
 
 
 def ticks(pulse: int, fps: float) -> int:
-    """Give the presentation time of a pulse; from it the pulse can be told up to 500 frames a second."""
+    """Return the presentation time of a pulse; from it the pulse can be told up to 500 frames a second."""
     return round(pulse * TICKS / fps)
 
 
 def header(width: int, height: int, fps: float, frames: int | None = None) -> bytes:
-    """Give what a player needs before the first cluster; ``frames`` is how many there will be, if known."""
+    """Return what a player needs before the first cluster; ``frames`` is how many there will be, if known."""
     info = _number(b"\x2a\xd7\xb1", 1_000_000_000 // TICKS) + _text(b"\x4d\x80", "MyView")
     info += _text(b"\x57\x41", "MyView")
     if frames is not None:
@@ -58,7 +58,7 @@ def header(width: int, height: int, fps: float, frames: int | None = None) -> by
 
 
 def cluster(frame: bytes, pulse: int, fps: float, *, key: bool, lasts: int = 1) -> bytes:
-    """Give a frame as a cluster; one that lasts for more than a pulse says so."""
+    """Return a frame as a cluster; one that lasts for more than a pulse says so."""
     time = ticks(pulse, fps)
     head = _TRACK + struct.pack(">h", 0)  # of the track, at the cluster's own time
     if lasts == 1:
@@ -73,7 +73,7 @@ def cluster(frame: bytes, pulse: int, fps: float, *, key: bool, lasts: int = 1) 
 
 
 def pulse_of(frame: bytes, fps: float) -> int:
-    """Give the pulse of a cluster of :func:`cluster`."""
+    """Return the pulse of a cluster of :func:`cluster`."""
     (time,) = struct.unpack_from(">Q", frame, _TIME_AT)
     return round(int(time) * fps / TICKS)
 
@@ -97,5 +97,5 @@ def _text(name: bytes, value: str) -> bytes:
 
 
 def _size(size: int) -> bytes:
-    """Give a size in four bytes, always: so the time of a cluster stands at one place."""
+    """Return a size in four bytes, always: so the time of a cluster stands at one place."""
     return (size | 1 << 28).to_bytes(4, "big")

@@ -65,7 +65,7 @@ def units_of(sample: bytes) -> list[bytes]:
 
 
 def nal_type(unit: bytes) -> int:
-    """Give nal_unit_type (7.3.1)."""
+    """Return nal_unit_type (7.3.1)."""
     return unit[0] & 0x1F
 
 
@@ -79,7 +79,7 @@ def parameter_sets(units: list[bytes]) -> ParameterSets | None:
 
 
 def sample(units: list[bytes]) -> bytes:
-    """Give the units as an MP4 sample: each behind its length (ISO/IEC 14496-15, 5.3.2).
+    """Return the units as an MP4 sample: each behind its length (ISO/IEC 14496-15, 5.3.2).
 
     Parameter sets stay in the sample: they cost some bytes a GOP, and a decoder that joins at a cut is right.
     """

@@ -9,12 +9,12 @@ _TO_ESCAPE = re.compile(b"\x00\x00(?=[\x00-\x03])")
 
 
 def payload_of(unit: bytes) -> bytes:
-    """Give a NAL unit's payload: without its head, and without the bytes that keep start codes out."""
+    """Return a NAL unit's payload: without its head, and without the bytes that keep start codes out."""
     return _ESCAPED.sub(b"\x00\x00", unit[1:])
 
 
 def unit_of(head: int, payload: bytes) -> bytes:
-    """Give the NAL unit of a payload, escaped so that no start code is in it."""
+    """Return the NAL unit of a payload, escaped so that no start code is in it."""
     return bytes([head]) + _TO_ESCAPE.sub(b"\x00\x00\x03", payload)
 
 
@@ -88,6 +88,6 @@ class BitWriter:
             self.u(1, bit)
 
     def done(self) -> bytes:
-        """Give all whole bytes; call :meth:`align` before."""
+        """Return all whole bytes; call :meth:`align` before."""
         bits = self.text
         return bytes(int(bits[at : at + 8], 2) for at in range(0, len(bits), 8))

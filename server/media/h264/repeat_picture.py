@@ -60,7 +60,7 @@ class Continuing:
         return self.width * self.height
 
     def frame_num(self, sample: bytes) -> int:
-        """Give frame_num of a picture, length-prefixed NAL units.
+        """Return frame_num of a picture, length-prefixed NAL units.
 
         Raises:
             ValueError: there is no picture in it.
@@ -77,11 +77,11 @@ class Continuing:
         raise ValueError("a sample without a picture")
 
     def next_num(self, frame_num: int) -> int:
-        """Give the frame_num that follows."""
+        """Return the frame_num that follows."""
         return (frame_num + 1) % (1 << self.frame_num_bits)
 
     def repeat(self, frame_num: int, *, reference: bool) -> bytes:
-        """Give a sample that shows the picture before again; it is number ``frame_num``.
+        """Return a sample that shows the picture before again; it is number ``frame_num``.
 
         One that is no ``reference`` leaves the number to the next picture as well: it can be slipped in
         between two pictures of a camera, but not two of them in a row (8.2.1.3).

@@ -31,7 +31,7 @@ class BoolWriter:
             self.put(value >> place & 1, 128)
 
     def done(self) -> bytes:
-        """Give all bytes, and some more: decoders read ahead, and some take the end of it for damage."""
+        """Return all bytes, and some more: decoders read ahead, and some take the end of it for damage."""
         self.number(_AHEAD, 0)
         bits = self._bits + 8
         spare = -bits % 8

@@ -44,7 +44,7 @@ class Vp8Agreement(Agreement):
             raise ParameterMismatchError("its pictures are not VP8 of the site's size")
 
     def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
-        """Give a frame as a cluster, which fits into any stream of the site."""
+        """Return a frame as a cluster, which fits into any stream of the site."""
         return cluster(access_unit, pulse, fps, key=key)
 
     def head(
@@ -55,16 +55,16 @@ class Vp8Agreement(Agreement):
         *,
         pulses: int | None = None,
     ) -> bytes:
-        """Give what a player needs before the first cluster; there is no sound in it."""
+        """Return what a player needs before the first cluster; there is no sound in it."""
         del sound
         return header(*size, fps, pulses)
 
     def begun_at(self, origin: int, fragment: bytes, fps: float) -> bytes:
-        """Give a cluster as it is in a stream that has this pulse at time 0."""
+        """Return a cluster as it is in a stream that has this pulse at time 0."""
         return rebased(fragment, -ticks(origin, fps))
 
     def bridge(self, newest: Picture, fps: float) -> Bridge:
-        """Give what bridges holes, whatever is before them."""
+        """Return what bridges holes, whatever is before them."""
         del newest
         return Vp8Bridge(repeat(*self._size), fps)
 
@@ -85,17 +85,17 @@ class Vp8Bridge:
     fps: float
 
     def can_follow(self, picture: Picture) -> bool:
-        """Tell that it can: nothing of it is read."""
+        """Return that it can: nothing of it is read."""
         del picture
         return True
 
     def after(self, newest: Picture, spans: Sequence[Span]) -> list[Picture]:
-        """Give a picture for each span."""
+        """Return a picture for each span."""
         del newest
         return [self._made(span) for span in spans]
 
     def before(self, picture: Picture, span: Span) -> list[Picture]:
-        """Give the same: whatever comes next is decoded as if it were not there."""
+        """Return the same: whatever comes next is decoded as if it were not there."""
         del picture
         return [self._made(span)]
 
@@ -110,7 +110,7 @@ class Vp8Bridge:
 
 
 def size_of(frame: bytes) -> tuple[int, int] | None:
-    """Give width and height of a key frame; None where it is none."""
+    """Return width and height of a key frame; None where it is none."""
     if len(frame) < _KEY_HEAD.size or frame[0] & 1:
         return None
     start, width, height = _KEY_HEAD.unpack_from(frame)

@@ -45,7 +45,7 @@ class CameraWindow:
         return self.message.first
 
     def local_tracks(self) -> list[LocalTrack]:
-        """Give what is final of the tracks, where it is anything, boxes in the camera's own picture."""
+        """Return what is final of the tracks, where it is anything, boxes in the camera's own picture."""
         _, height = self.message.size
         known = slice(self.fresh - self.first, max(0, self.message.final_to - self.first + 1))
         hidden = np.isnan(self.boxes[:, known, 0])
@@ -64,7 +64,7 @@ class CameraWindow:
         ]
 
     def seen(self) -> list[tuple[int, int]]:
-        """Give each track's first and last frame with a box; the last is lower: none."""
+        """Return each track's first and last frame with a box; the last is lower: none."""
         there = ~np.isnan(self.boxes[:, :, 0])
         if not there.size:
             return [(self.first, self.first - 1)] * len(self.keys)
@@ -75,7 +75,7 @@ class CameraWindow:
 
 
 def _glimpses(looks: Sequence[messages.AppearanceHistogram], first: int) -> tuple[Glimpse, ...]:
-    """Give the looks in the frames from `first` on."""
+    """Return the looks in the frames from `first` on."""
     return tuple(
         Glimpse(max(it.first, first), it.last, np.array(it.histogram, dtype=np.float64))
         for it in looks
@@ -95,13 +95,13 @@ class Reader:
         """By camera, the last frame that was final."""
 
     def read(self, epoch: Epoch) -> Sequence[CameraWindow]:
-        """Give what all cameras said, in the order of the epoch."""
+        """Return what all cameras said, in the order of the epoch."""
         windows = [self._window(message) for message in epoch.tracks.values()]
         self._final |= {it.message.camera: it.message.final_to for it in windows}
         return windows
 
     def read_late(self, epoch: Epoch) -> Iterator[CameraWindow]:
-        """Give what has mended the past, and came too late for its own epoch, one word after the other.
+        """Yield what has mended the past, and came too late for its own epoch, one word after the other.
 
         Each is read when it is asked for: the one before may have changed what tracks are called.
         """
@@ -122,6 +122,6 @@ class Reader:
         return CameraWindow(message, keys, locals_, fit, boxes.reshape(len(keys), frames, 4), fresh)
 
     def read_again(self, window: CameraWindow) -> CameraWindow:
-        """Give a window by what its tracks are called now."""
+        """Return a window by what its tracks are called now."""
         keys = self.locals.of(window.message)
         return replace(window, keys=keys, locals=np.array([key.local for key in keys], dtype=np.int64))

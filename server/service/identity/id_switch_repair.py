@@ -32,7 +32,7 @@ class Mending:
         parts: Parts,
         asked_from: int,
     ) -> tuple[CameraWindow, list[Split]]:
-        """Give a window by what its tracks are called now, and what has turned out about numbers.
+        """Return a window by what its tracks are called now, and what has turned out about numbers.
 
         ``before`` is what was said of its frames that were final; ``parts``, whose tracks are, is changed:
         of frames before ``asked_from`` it may be forgotten.
@@ -69,7 +69,7 @@ class Mending:
 
 
 def _whose(parts: Sequence[Part], frame: int, asked_from: int) -> int:
-    """Give whose a track was in a frame, 0: nobody's; where that is forgotten, in the first that is not."""
+    """Return whose a track was in a frame, 0: nobody's; where that is forgotten, in the first that is not."""
     if frame < parts[0].first <= asked_from:
         frame = parts[0].first
     number = int(numbers_over([parts], frame, 1)[0, 0])

@@ -67,7 +67,7 @@ def exchanged(mended: CameraWindow, before: Sequence[Stretch[CameraWindow]]) -> 
 def _laid_out(
     keys: Sequence[TrackKey], said: Sequence[Stretch[CameraWindow]], first: int, last: int
 ) -> Floats:
-    """Give where tracks were said to be in the frames from `first` to `last`: (T, F, 4), NaN: nowhere."""
+    """Return where tracks were said to be in the frames from `first` to `last`: (T, F, 4), NaN: nowhere."""
     boxes = np.full((len(keys), last - first + 1, 4), np.nan)
     row = {key: n for n, key in enumerate(keys)}
     for it in said:
@@ -79,7 +79,7 @@ def _laid_out(
 
 
 def _overlap(one: Floats, two: Floats) -> Floats:
-    """Give the overlap (IoU) of boxes (..., 4); 0 where one of them is nowhere."""
+    """Return the overlap (IoU) of boxes (..., 4); 0 where one of them is nowhere."""
     wide = np.minimum(one[..., 2], two[..., 2]) - np.maximum(one[..., 0], two[..., 0])
     high = np.minimum(one[..., 3], two[..., 3]) - np.maximum(one[..., 1], two[..., 1])
     both = np.maximum(wide, 0.0) * np.maximum(high, 0.0)

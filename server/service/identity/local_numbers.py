@@ -31,7 +31,7 @@ class LocalNumbers:
         self._counts: dict[str, int] = {}
 
     def of(self, message: CameraTracks) -> tuple[TrackKey, ...]:
-        """Say what the tracks of a message are called here."""
+        """Return what the tracks of a message are called here."""
         if not message.tracks:
             return ()
         keys = self._keys.setdefault((message.camera, message.boot), {})
@@ -41,11 +41,11 @@ class LocalNumbers:
         return tuple([keys[track.id] for track in message.tracks])
 
     def known(self, camera: str, boot: int, track: int) -> TrackKey | None:
-        """Say what a track that was in some message is called here."""
+        """Return what a track that was in some message is called here."""
         return self._keys.get((camera, boot), {}).get(track)
 
     def origin(self, key: TrackKey) -> Followed:
-        """Say what the camera calls a track that is not forgotten."""
+        """Return what the camera calls a track that is not forgotten."""
         return Followed(key.camera, *self._origin[key])
 
     def exchange(self, one: TrackKey, two: TrackKey) -> None:

@@ -23,15 +23,15 @@ class ByHand:
 
     @property
     def said(self) -> dict[int, int]:
-        """Give whose number each is said to be that is said to be another's."""
+        """Return whose number each is said to be that is said to be another's."""
         return dict(sorted(self._is.items()))
 
     def now(self, number: int) -> int:
-        """Give whose number this is."""
+        """Return whose number this is."""
         return self._is.get(number, number)
 
     def worked_out(self, number: int) -> list[int]:
-        """Give the numbers that are worked out of somebody, in order."""
+        """Return the numbers that are worked out of somebody, in order."""
         return sorted({number, *(raw for raw, said in self._is.items() if said == number)})
 
     def merge(self, kept: int, lost: int, away: Collection[int] = ()) -> None:

@@ -20,7 +20,7 @@ Numbers = Callable[[Sequence[TrackKey], int, int], NDArray[np.int64]]
 def numbered_boxes(
     stretches: Sequence[Stretch[CameraWindow]], numbers: Numbers, first: int, frames: int
 ) -> list[list[NumberedBox]]:
-    """Give the boxes of each of the frames from `first` on, by rising number.
+    """Return the boxes of each of the frames from `first` on, by rising number.
 
     Of two tracks of one person in one frame the first counts. Negative numbers are nobody's.
     """

@@ -145,7 +145,7 @@ class People:
 
     @property
     def merged_by_hand(self) -> dict[int, int]:
-        """Give by number that was said to be another's whose it is."""
+        """Return by number that was said to be another's whose it is."""
         return self._by_hand.said
 
     def merge(self, kept: int, lost: int) -> None:
@@ -179,26 +179,26 @@ class People:
         return new
 
     def number(self, camera: str, local: int, pulse: int) -> int | None:
-        """Give the person's number behind a camera's local one in a frame; None while it is not confirmed."""
+        """Return the person's number behind a camera's local one in a frame; None while it is not confirmed."""
         number = int(self.numbers([TrackKey(camera, local)], pulse, 1)[0, 0])
         return None if number == NOBODY_YET else number
 
     def boxes(self, camera: str, first: int, frames: int) -> list[list[NumberedBox]]:
-        """Give everybody's box in each of a camera's frames from `first` on, in the numbers' order."""
+        """Return everybody's box in each of a camera's frames from `first` on, in the numbers' order."""
         told = self._histories[camera].over(first, first + frames - 1)
         return numbered_boxes(told, self.numbers, first, frames)
 
     def whose(self, camera: str, boot: int, track: int, pulse: int) -> int | None:
-        """Give the person's number behind a tracker's number in a frame."""
+        """Return the person's number behind a tracker's number in a frame."""
         key = self._reader.locals.known(camera, boot, track)
         return None if key is None else self.number(key.camera, key.local, pulse)
 
     def heard_of(self, track: Followed) -> bool:
-        """Tell whether a camera has spoken of this track, lately."""
+        """Return whether a camera has spoken of this track, lately."""
         return self._reader.locals.known(track.camera, track.boot, track.track) is not None
 
     def followed(self, numbers: Collection[int], since: int) -> dict[int, list[Followed]]:
-        """Give the tracks by which these people were followed since a pulse; who was not is left out."""
+        """Return the tracks by which these people were followed since a pulse; who was not is left out."""
         found: dict[int, list[Followed]] = {}
         wanted = set(numbers)
         for key, parts in self._parts.items():
@@ -207,11 +207,11 @@ class People:
         return dict(sorted(found.items()))
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
-        """Give the persons' numbers behind T tracks, frame by frame, (T, frames); -1: nobody yet."""
+        """Return the persons' numbers behind T tracks, frame by frame, (T, frames); -1: nobody yet."""
         return numbers_over([self._parts.get(key, UNKNOWN) for key in keys], first, frames)
 
     def take_corrections(self) -> tuple[Merge | Split, ...]:
-        """Give what has turned out about numbers since this was last asked, in order."""
+        """Return what has turned out about numbers since this was last asked, in order."""
         taken, self._corrections = tuple(self._corrections), []
         return taken
 
@@ -228,7 +228,7 @@ class People:
             history.forget_before(pulse)
 
     def _pictures(self, windows: Sequence[CameraWindow], first: int, last: int) -> dict[str, tuple[int, int]]:
-        """Give the pictures of the cameras that could have seen anybody in the frames that are final now."""
+        """Return the pictures of the cameras that could have seen anybody in the frames that are final now."""
         return {
             it.message.camera: it.message.size
             for it in windows

@@ -32,11 +32,11 @@ class Roll:
         return sorted(self.first_seen)
 
     def whose(self, number: int) -> int:
-        """Give whose number this is: what it turned out to be, or itself."""
+        """Return whose number this is: what it turned out to be, or itself."""
         return self.merged.get(number, number)
 
     def also(self, number: int) -> list[int]:
-        """Give the other numbers that somebody once had, in order."""
+        """Return the other numbers that somebody once had, in order."""
         return sorted(old for old, new in self.merged.items() if new == number)
 
     def note(self, parts: Sequence[Part], first: int, last: int) -> None:

@@ -39,11 +39,11 @@ class ToldTracks:
             self._oldest = self._said.popleft()[1] + 1
 
     def remembers(self, pulse: int) -> bool:
-        """Say whether a frame is one of those that are remembered."""
+        """Return whether a frame is one of those that are remembered."""
         return self._oldest is not None and self._oldest <= pulse
 
     def of(self, camera: str, numbers: Collection[int], pulse: int) -> Followed | None:
-        """Give the track that showed somebody in a frame, or else last before it; None: none did.
+        """Return the track that showed somebody in a frame, or else last before it; None: none did.
 
         ``numbers`` are all that the person has had.
         """

@@ -8,12 +8,12 @@ from server.config.sections import ShareSettings
 
 
 def index_of(number: int, share: ShareSettings) -> int:
-    """Say which service answers for a number: the same in all of them, and nobody has to ask."""
+    """Return which service answers for a number: the same in all of them, and nobody has to ask."""
     return number % share.of
 
 
 def served(numbers: Iterable[int], merged: Mapping[int, int], share: ShareSettings) -> list[int]:
-    """Give those of people's numbers whom this service decides for, in the given order.
+    """Return those of people's numbers whom this service decides for, in the given order.
 
     It does for its own numbers, and for whoever turned out to be one of its own: who watches an old number
     stays there.
@@ -25,5 +25,5 @@ def served(numbers: Iterable[int], merged: Mapping[int, int], share: ShareSettin
 
 
 def server_of(number: int, share: ShareSettings) -> str | None:
-    """Give the address of the service that answers for a number; None: the configuration does not say."""
+    """Return the address of the service that answers for a number; None: the configuration does not say."""
     return share.servers[index_of(number, share)].rstrip("/") + "/" if share.servers else None

@@ -121,7 +121,7 @@ class Returning:
         self._awaited = [it for it in self._awaited if not self._give_back(it, people, pulse)]
 
     def _give_back(self, awaited: _Awaited, people: People, pulse: int) -> bool:
-        """Tell whether somebody is here again, with all that is to be said of them said."""
+        """Return whether somebody is here again, with all that is to be said of them said."""
         found = [self._number(it, people, pulse) for it in awaited.tracks]
         numbers = sorted({it for it in found if it is not None})
         if not numbers:
@@ -136,7 +136,7 @@ class Returning:
         return not awaited.by_hand or None not in found
 
     def _number(self, track: Followed, people: People, pulse: int) -> int | None:
-        """Give whose a track was when it was first heard of again; None: nobody knows."""
+        """Return whose a track was when it was first heard of again; None: nobody knows."""
         if people.heard_of(track):
             self._found.setdefault(track, pulse)
         first = self._found.get(track)
@@ -144,7 +144,7 @@ class Returning:
 
 
 def first_free(said: IdentitySnapshot) -> int:
-    """Give the first number that nobody has or had; what a camera says may contradict itself."""
+    """Return the first number that nobody has or had; what a camera says may contradict itself."""
     return max([said.next, *(number + 1 for it in said.people for number in (it.number, *it.also))])
 
 

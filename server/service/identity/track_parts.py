@@ -51,7 +51,7 @@ def with_settled(before: Sequence[Part], parts: list[Part], asked_from: int) -> 
 
 
 def numbers_over(known: Sequence[Sequence[Part]], first: int, frames: int) -> NDArray[np.int64]:
-    """Give the persons' numbers behind T tracks, by their parts, frame by frame: (T, frames)."""
+    """Return the persons' numbers behind T tracks, by their parts, frame by frame: (T, frames)."""
     newest = np.fromiter((parts[-1].number for parts in known), dtype=np.int64, count=len(known))
     since = np.fromiter((parts[-1].first for parts in known), dtype=np.int64, count=len(known))
     if (since <= first).all():

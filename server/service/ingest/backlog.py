@@ -24,7 +24,7 @@ class KeepingUp:
         self._by = 0
 
     def is_lost(self, behind: int) -> bool:
-        """Tell whether what waits should be left out; ``behind`` is by how many pulses decisions are late."""
+        """Return whether what waits should be left out; ``behind`` is by how many pulses decisions are late."""
         now = self._clock()
         if behind <= self._reach:
             self._since = None

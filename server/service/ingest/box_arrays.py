@@ -18,7 +18,7 @@ _PACKED = np.dtype([("array", "u1"), ("sides", [("type", "u1"), ("value", ">f8")
 
 
 def boxes_array(tracks: Iterable[list[Box | None]]) -> NDArray[np.float64]:
-    """Give the boxes of all tracks one after the other, (B, 4), NaN where hidden.
+    """Return the boxes of all tracks one after the other, (B, 4), NaN where hidden.
 
     NumPy reads numbers out of tuples one at a time. MessagePack writes all of them into one stretch of bytes,
     which is an array already: three times as fast.

@@ -100,7 +100,7 @@ class Aligner:
         place.trusted = True
 
     def behind(self, now: int) -> int:
-        """Give the pulses between the end of the next epoch that somebody has spoken of and pulse ``now``."""
+        """Return the pulses between the end of the next epoch that somebody has spoken of and pulse ``now``."""
         first = min(self._words(), default=None)
         return 0 if first is None else max(0, now - end_of_epoch(first, self.stride))
 
@@ -170,7 +170,7 @@ class Aligner:
         self._shown.clear()
 
     def _caught_up(self, now: int, number: int) -> int:
-        """Give the epoch to go on with: where ``number`` is long past, one of the present."""
+        """Return the epoch to go on with: where ``number`` is long past, one of the present."""
         if end_of_epoch(number, self.stride) > now or self._is_near(number, now) or number in self._words():
             return number
         to = min((it for it in self._words() if self._is_near(it, now)), default=now // self.stride)
@@ -187,7 +187,7 @@ class Aligner:
         return [epoch for place in self._places.values() for epoch in place.waiting]
 
     def _is_near(self, epoch: int, now: int) -> bool:
-        """Tell whether an epoch is of about now; all are while nobody knows what is now."""
+        """Return whether an epoch is of about now; all are while nobody knows what is now."""
         return self._far is None or now < 0 or abs(end_of_epoch(epoch, self.stride) - now) <= self._far
 
     def _drop(self, which: Callable[[int], bool]) -> None:
@@ -204,7 +204,7 @@ class Aligner:
         self._places[message.camera].ended |= message.ended
 
     def _patience(self, end: int) -> int:
-        """Give the last pulse at which an epoch with this end is waited for."""
+        """Return the last pulse at which an epoch with this end is waited for."""
         if self._heard is not None:
             return max(end, self._heard) + self._grace
         expected = any(place.there and not place.ended for place in self._places.values())
@@ -219,7 +219,7 @@ class Aligner:
         ]
 
     def _awaited(self, place: _Place, end: int) -> bool:
-        """Tell whether this camera's word on the epoch is still to come."""
+        """Return whether this camera's word on the epoch is still to come."""
         if place.waiting or place.ended or not place.there or not place.trusted:
             return False  # a word on a later epoch: on this one there will be none
         return place.first is None or place.first <= end

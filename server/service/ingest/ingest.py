@@ -258,7 +258,7 @@ class Intake:
                 del theirs[key]
 
     def _is_far_ahead(self, state: CameraState, pulse: int) -> bool:
-        """Tell whether a pulse is one that nobody can have counted to, and count that."""
+        """Return whether a pulse is one that nobody can have counted to, and count that."""
         newest = self._now()
         if newest < 0 or pulse <= newest + self._ahead:
             return False

@@ -12,7 +12,7 @@ _WINDOW_MAX = 100_000
 
 
 def makes_sense(message: CameraTracks, stride: int) -> bool:
-    """Tell whether the frames, the tracks and the sizes in a message fit together."""
+    """Return whether the frames, the tracks and the sizes in a message fit together."""
     frames, end = message.last - message.first + 1, end_of_epoch(message.epoch, stride)
     ids = [track.id for track in message.tracks]
     looks = [look for track in message.tracks for look in track.looks]
@@ -30,5 +30,5 @@ def makes_sense(message: CameraTracks, stride: int) -> bool:
 
 
 def _is_short(pulses: Sequence[int], end: int) -> bool:
-    """Tell whether these can be frames of an epoch that ends with a pulse; later ones would be kept."""
+    """Return whether these can be frames of an epoch that ends with a pulse; later ones would be kept."""
     return len(pulses) <= _WINDOW_MAX and max(pulses, default=-1) <= end

@@ -32,7 +32,7 @@ class History(Generic[Window]):
         self._stretches = [*before, Stretch(window, first, last), *after]
 
     def over(self, first: int, last: int) -> list[Stretch[Window]]:
-        """Give what is known of the frames from `first` to `last`, in order; frames may be missing."""
+        """Return what is known of the frames from `first` to `last`, in order; frames may be missing."""
         return [
             Stretch(it.window, max(it.first, first), min(it.last, last))
             for it in self._stretches

@@ -30,6 +30,6 @@ class Histogram:
 
     @property
     def buckets(self) -> list[tuple[str, float]]:
-        """Give for every bound, the last of which is infinite, how many values are up to it."""
+        """Return for every bound, the last of which is infinite, how many values are up to it."""
         bounds = [*map(str, self.bounds), "+Inf"]
         return list(zip(bounds, accumulate(self._counts), strict=True))

@@ -31,7 +31,7 @@ class Totals:
 
     @property
     def stages(self) -> dict[str, Histogram]:
-        """Give the stages by name, in the order of a frame's way."""
+        """Return the stages by name, in the order of a frame's way."""
         return {name: getattr(self, name) for name in ("take", "encode", "search", "solve", "track")}
 
     def frame(self, head: FrameHeader) -> None:

@@ -31,7 +31,7 @@ class Shots:
     held: Ints = field(default_factory=_nobody)
 
     def of(self, numbers: Ints) -> Shots:
-        """Give the shots of these people, (K,) rising; who is new has none."""
+        """Return the shots of these people, (K,) rising; who is new has none."""
         cameras, held = (
             np.full(len(numbers), NO_CAMERA, dtype=np.int64),
             np.ones(len(numbers), dtype=np.int64),
@@ -41,6 +41,6 @@ class Shots:
         return Shots(numbers, cameras, held)
 
     def then(self, views: Ints) -> Shots:
-        """Give the shots after one more GOP that these cameras (K,) show; -1 is a hole, which is no cut."""
+        """Return the shots after one more GOP that these cameras (K,) show; -1 is a hole, which is no cut."""
         cameras = np.where(views == NO_CAMERA, self.cameras, views)
         return Shots(self.numbers, cameras, np.where(cameras == self.cameras, self.held + 1, 1))

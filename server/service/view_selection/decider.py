@@ -58,7 +58,7 @@ class GopDecision:
 
 
 def homographies(config: Config) -> dict[str, Floats | None]:
-    """Give every camera's homography from its own picture to the ground, None where there is none."""
+    """Return every camera's homography from its own picture to the ground, None where there is none."""
     return {
         camera.id: None if camera.ground is None else np.array(camera.ground, dtype=np.float64)
         for camera in config.cameras
@@ -178,7 +178,7 @@ class Decider:
         )
 
     def _weight(self, lookahead: int) -> Floats:
-        """Give for how many frames each frame of the look-ahead stands: what is seen last goes on a while."""
+        """Return for how many frames each frame of the look-ahead stands: what is seen last goes on a while."""
         weight, last = np.ones(lookahead), max(1, lookahead // _LAST)
         weight[-last:] += self._goes_on / last
         return weight

@@ -101,7 +101,7 @@ class Why:
         )
 
     def _view(self, views: Ints, unfound: Ints, mean: float) -> ViewReason:
-        """Tell what one camera had to say of a person: where it finds them, and where it does not."""
+        """Return what one camera had to say of a person: where it finds them, and where it does not."""
         outlook = self.part.outlook
         terms = [outlook.terms(int(view)) for view in views]
         return ViewReason(

@@ -85,15 +85,15 @@ class Outlook:
         """The views, and those that are taken to be there though somebody was missed, or is not found."""
 
     def lately(self, pulse: int) -> Lately:
-        """Tell how everybody was seen before a pulse, for the next outlook."""
+        """Return how everybody was seen before a pulse, for the next outlook."""
         return Lately.after(self.numbers, self.before, self.views, self.first, pulse)
 
     def terms(self, view: int) -> Floats:
-        """Give what the quality of a view is made of, (terms,)."""
+        """Return what the quality of a view is made of, (terms,)."""
         return self._line.terms(int(self._places[view]))
 
     def part(self, first: int, frames: int, of: Mask) -> Part:
-        """Give the outlook on some of its frames, for the people of the mask (K,)."""
+        """Return the outlook on some of its frames, for the people of the mask (K,)."""
         return Part(self, first - self.first, frames, np.flatnonzero(of))
 
 
@@ -119,12 +119,12 @@ class Part:
         return self.outlook.numbers[self.people]
 
     def gops(self, starts: Mask, weight: Floats, *, blind: bool) -> GopCosts:
-        """Give what the GOPs cost that begin where the mask (N,) says, each frame by its weight (N,)."""
+        """Return what the GOPs cost that begin where the mask (N,) says, each frame by its weight (N,)."""
         gops = self.outlook.taken.gops(self.first, starts, weight, mark_empty=blind)
         return gops if len(self.people) == len(self.outlook.numbers) else gops.for_people(self.people)
 
     def views(self, number: int) -> Ints:
-        """Give one person's views, (R,) indices into the outlook's.
+        """Return one person's views, (R,) indices into the outlook's.
 
         Raises:
             KeyError: this part is not about that person.
@@ -132,7 +132,7 @@ class Part:
         return self._rows(self.outlook.views, number)
 
     def unfound(self, number: int) -> Ints:
-        """Give one person's views in which they are not found, (V,) indices into the outlook's.
+        """Return one person's views in which they are not found, (V,) indices into the outlook's.
 
         Raises:
             KeyError: this part is not about that person.
@@ -140,7 +140,7 @@ class Part:
         return self._rows(self.outlook.unfound, number)
 
     def cost(self, number: int) -> Floats:
-        """Give one person's c(n, b), (N, C); infinite where a camera cannot be shown.
+        """Return one person's c(n, b), (N, C); infinite where a camera cannot be shown.
 
         Raises:
             KeyError: this part is not about that person.
@@ -159,7 +159,7 @@ class Part:
 
 
 def _first_of_each(values: Ints, count: int) -> Mask:
-    """Tell which values, all below `count`, are there for the first time: of two tracks one counts."""
+    """Return which values, all below `count`, are there for the first time: of two tracks one counts."""
     places = np.arange(len(values))
     owner = np.empty(count, dtype=np.intp)
     owner[values[::-1]] = places[::-1]  # written last, the first one stays

@@ -31,7 +31,7 @@ class Lately:
     last: LastDetections = field(default_factory=_nothing)
 
     def of(self, numbers: Ints, cameras: int, pulse: int) -> LastDetections:
-        """Give what was seen of these people, (K,) rising, before a pulse; who is new has not been seen."""
+        """Return what was seen of these people, (K,) rising, before a pulse; who is new has not been seen."""
         ago, worth = np.full((cameras, len(numbers)), np.inf), np.zeros((cameras, len(numbers)))
         _, old, new = np.intersect1d(self.numbers, numbers, assume_unique=True, return_indices=True)
         if old.size:
@@ -41,5 +41,5 @@ class Lately:
 
     @staticmethod
     def after(numbers: Ints, last: LastDetections, views: VisibleViews, first: int, pulse: int) -> Lately:
-        """Give the same before a later pulse, by the views from `first` on."""
+        """Return the same before a later pulse, by the views from `first` on."""
         return Lately(pulse, numbers, last.advanced_to(views, pulse - first))

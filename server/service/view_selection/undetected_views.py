@@ -49,13 +49,13 @@ class Unfound:
 
     @classmethod
     def nobody(cls) -> Unfound:
-        """Give no views."""
+        """Return no views."""
         none = np.zeros(0, dtype=np.int64)
         tested = Tested(none, none, np.zeros((0, 2)), np.zeros(0, dtype=np.bool_))
         return cls(none, none, none, np.zeros(0), tested)
 
     def of(self, people: Ints, count: int, shown: Mask, found: Ints, factor: float) -> Unfound:
-        """Give the views of some of the people, in frames that can be shown.
+        """Return the views of some of the people, in frames that can be shown.
 
         Args:
             people: by index of everybody here, their index among those asked for; -1: they are not.

@@ -66,7 +66,7 @@ class Sight:
                 history.put(seen, said.first, said.last)
 
     def over(self, camera: str, first: int, last: int) -> list[Stretch[SeenWindow]]:
-        """Give what was last said of a camera's frames from `first` to `last`."""
+        """Return what was last said of a camera's frames from `first` to `last`."""
         return self._histories[camera].over(first, last)
 
     def forget_before(self, pulse: int) -> None:
@@ -105,17 +105,17 @@ class Sight:
         )
 
     def looks(self, cameras: Sequence[str]) -> CameraLayout:
-        """Give what view quality asks of cameras that have spoken."""
+        """Return what view quality asks of cameras that have spoken."""
         pictures = np.array([self._picture(camera) for camera in cameras]).reshape(-1, 4)
         return CameraLayout(self._size, pictures, [self._ground(camera) for camera in cameras], self._fps)
 
     def _picture(self, camera: str) -> tuple[float, float, float, float]:
-        """Say where a camera's own picture lies in the site's: in its middle."""
+        """Return where a camera's own picture lies in the site's: in its middle."""
         left, top = (float(side) for side in self.fits[camera].to_site(np.zeros(2)))
         return left, top, self._size[0] - left, self._size[1] - top
 
     def _ground(self, camera: str) -> Floats | None:
-        """Give the homography from the site's picture; none of a camera that nobody can walk towards."""
+        """Return the homography from the site's picture; none of a camera that nobody can walk towards."""
         own = self._homographies[camera]
         if own is None or camera in self._overhead:
             return None
@@ -125,7 +125,7 @@ class Sight:
 
 
 def _side_by_side(windows: Sequence[CameraWindow], start: int) -> Floats:
-    """Give the boxes of all tracks over the frames of all windows from `start` on: (T, N, 4)."""
+    """Return the boxes of all tracks over the frames of all windows from `start` on: (T, N, 4)."""
     frames = max(window.first + window.boxes.shape[1] for window in windows) - start
     if all(window.boxes.shape[1] == frames for window in windows):
         return np.concatenate([window.boxes for window in windows])

@@ -47,7 +47,7 @@ class Line:
         self._begins = np.cumsum(np.concatenate([[0], lengths * self._tracks]))
 
     def persons(self, people: People, everybody: Ints, frames: int) -> Ints:
-        """Give who is at each place, (L,): indices into everybody's numbers (K,), rising; -1: nobody of them.
+        """Return who is at each place, (L,): indices into everybody's numbers (K,), rising; -1: nobody of them.
 
         A track is in several windows; its numbers in all the frames are asked for once.
         """
@@ -69,7 +69,7 @@ class Line:
         )
 
     def boxes(self, places: Ints) -> Floats:
-        """Give the boxes at places in line, (P,) rising: (P, 4) pixels of the site's picture."""
+        """Return the boxes at places in line, (P,) rising: (P, 4) pixels of the site's picture."""
         boxes = np.empty((len(places), 4))
         ends = np.searchsorted(places, self._begins)
         for stretch, begin, start, end in zip(
@@ -81,7 +81,7 @@ class Line:
         return boxes
 
     def terms(self, place: int) -> Floats:
-        """Give what the quality at a place in line is made of, (terms,)."""
+        """Return what the quality at a place in line is made of, (terms,)."""
         number = int(np.searchsorted(self._begins, place, side="right")) - 1
         stretch = self._stretches[number]
         seen = stretch.window
@@ -94,7 +94,7 @@ def _joined(parts: Sequence[Ints]) -> Ints:
 
 
 def _quality(stretch: Stretch[SeenWindow]) -> Floats:
-    """Give the quality of a stretch's views in line."""
+    """Return the quality of a stretch's views in line."""
     seen, first = stretch.window, stretch.window.window.first
     return seen.quality[stretch.first - first : stretch.last - first + 1].reshape(-1)
 

@@ -28,7 +28,7 @@ def points(site: FakeSite) -> list[dict[str, float]]:
 
 
 async def middle(visit: Visit, person: int) -> tuple[float, float, float, float]:
-    """Give the middle of a person's box: on the page, and in the picture."""
+    """Return the middle of a person's box: on the page, and in the picture."""
     await visit.until(f"myview.boxes.some(([it]) => it === {person})")
     left, top, right, bottom = await visit.get(f"myview.boxes.find(([it]) => it === {person}).slice(1)")
     x, y = (left + right) / 2, (top + bottom) / 2

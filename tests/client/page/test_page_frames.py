@@ -34,7 +34,7 @@ BUSY = "setInterval(() => { const t = performance.now() + 25; while (performance
 
 
 def middle(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64] | None:
-    """Give the middle (x, y) of what is set, or None: of its extent, but for stray pixels."""
+    """Return the middle (x, y) of what is set, or None: of its extent, but for stray pixels."""
     rows, columns = np.nonzero(mask)
     if len(rows) < 50:
         return None
@@ -43,7 +43,7 @@ def middle(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64] | None:
 
 
 def off_by(screen: npt.NDArray[np.int16]) -> float | None:
-    """Give the distance in picture pixels of the green box from the bright square, None without a box."""
+    """Return the distance in picture pixels of the green box from the bright square, None without a box."""
     green = np.abs(screen - ACCENT).max(axis=2) < 30
     left, top = np.nonzero(green.any(axis=0))[0], np.nonzero(green.any(axis=1))[0]
     white = middle(screen.min(axis=2) > 235)

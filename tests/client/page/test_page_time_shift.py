@@ -20,7 +20,7 @@ LIVE = "myview.delays.at(-1).delayMs < 2000"
 
 
 async def first_after(visit: Visit, stopped: int) -> int:
-    """Give the first pulse that is shown after one at which the picture stood."""
+    """Return the first pulse that is shown after one at which the picture stood."""
     await visit.until(f"!video.paused && myview.pulse > {stopped}")
     return int(await visit.get(f"myview.delays.find((it) => it.pulse > {stopped}).pulse"))
 

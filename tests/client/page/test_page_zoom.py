@@ -23,7 +23,7 @@ BROWN = 50
 
 
 async def bright_share(visit: Visit) -> float:
-    """Give the share of the stage that the chosen person's square takes: the most of some moments.
+    """Return the share of the stage that the chosen person's square takes: the most of some moments.
 
     It moves faster than anybody walks, and so leaves the part that is shown now and then.
     """

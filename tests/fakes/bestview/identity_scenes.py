@@ -22,7 +22,7 @@ FOCAL, EYE = 400.0, 3.0
 
 
 def camera_from(side: str) -> NDArray[np.float64]:
-    """Give the ground -> image homography of a level camera 10 m off the middle, looking at it; metres."""
+    """Return the ground -> image homography of a level camera 10 m off the middle, looking at it; metres."""
     level = np.array([[FOCAL, 320.0, 0.0], [0.0, 240.0, FOCAL * EYE], [0.0, 1.0, 0.0]])
     turned = {
         "south": [[1, 0, 0], [0, 1, 10], [0, 0, 1]],
@@ -69,7 +69,7 @@ class Stay:
 
 
 def coat(which: float) -> NDArray[np.float64]:
-    """Give a histogram with a hump of its own."""
+    """Return a histogram with a hump of its own."""
     hump = np.exp(-(((np.arange(64) - 8.0 * which) / 4.0) ** 2))
     return np.asarray(hump / hump.sum())
 

@@ -83,7 +83,7 @@ def _some_sound(number: int, rate: int, layout: str) -> av.AudioFrame:
 
 @cache
 def flashing(recording: Path) -> tuple[AccessUnit, ...]:
-    """Give the recording's pictures as a camera of the hall sends them."""
+    """Return the recording's pictures as a camera of the hall sends them."""
     encoder = Encoder(SiteSettings(width=64, height=48, fps=FPS), EncodeSettings(gop=GOP))
     with av.open(str(recording)) as container:
         pictures = [it.to_ndarray(format="bgr24") for it in container.decode(video=0)]
@@ -100,7 +100,7 @@ def sends(service: FedService, recording: Path, silent: range = range(0)) -> lis
 
 
 def messages(frames: list[Frame]) -> list[Message]:
-    """Give frames of sound as they come from the bus."""
+    """Return frames of sound as they come from the bus."""
     return [
         Message(
             ZenohKeys("hall").sound,
@@ -112,13 +112,13 @@ def messages(frames: list[Frame]) -> list[Message]:
 
 
 def packets(stream: bytes) -> list[bytes]:
-    """Give the frames of sound in an MP4."""
+    """Return the frames of sound in an MP4."""
     with av.open(io.BytesIO(stream)) as container:
         return [bytes(packet) for packet in container.demux(audio=0) if packet.size]
 
 
 def heard(stream: bytes, kind: str | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give what is heard of a stream: times of all samples (seconds), and the samples, in one channel."""
+    """Return what is heard of a stream: times of all samples (seconds), and the samples, in one channel."""
     with av.open(io.BytesIO(stream), format=kind) as container:
         frames = list(container.decode(audio=0))
     times = [float(it.time or 0) + np.arange(it.samples) / it.sample_rate for it in frames]
@@ -126,19 +126,19 @@ def heard(stream: bytes, kind: str | None = None) -> tuple[NDArray[np.float64], 
 
 
 def beeps(stream: bytes, kind: str | None = None) -> list[float]:
-    """Give when beeps begin in a stream, seconds."""
+    """Return when beeps begin in a stream, seconds."""
     times, samples = heard(stream, kind)
     return _begins(times[np.abs(samples) > 0.1])
 
 
 def flashes(stream: bytes, kind: str | None = None) -> list[float]:
-    """Give when flashes begin in a stream, seconds."""
+    """Return when flashes begin in a stream, seconds."""
     with av.open(io.BytesIO(stream), format=kind) as container:
         bright = [it.time for it in container.decode(video=0) if it.to_ndarray(format="gray").mean() > 128]
     return _begins(np.array(bright, dtype=np.float64))
 
 
 def _begins(times: NDArray[np.float64]) -> list[float]:
-    """Give the first of each group of times that are close to each other."""
+    """Return the first of each group of times that are close to each other."""
     earlier = [-1.0, *times]
     return [float(time) for before, time in pairwise(earlier) if time - before > 0.2]

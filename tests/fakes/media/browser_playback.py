@@ -46,7 +46,7 @@ PLAY = (
 async def seen_in_chromium(
     port: int, splicer: Splicer, gops: int, show: Callable[[int], None], script: str, *arguments: Any
 ) -> dict[str, Any]:
-    """Give what a script says of a stream that it reads; all GOPs but the first follow once it watches."""
+    """Return what a script says of a stream that it reads; all GOPs but the first follow once it watches."""
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{port}/healthz")

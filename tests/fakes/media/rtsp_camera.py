@@ -108,7 +108,7 @@ def _described(key: AccessUnit) -> bytes:
 
 
 def _payloads(unit: AccessUnit) -> Iterator[tuple[bytes, bool]]:
-    """Give what goes into packets, and whether it ends the picture."""
+    """Yield what goes into packets, and whether it ends the picture."""
     units = list(nal_units(unit.data))
     for place, nal in enumerate(units):
         ends = place == len(units) - 1

@@ -86,5 +86,5 @@ def damage(path: Path, packets: list[int]) -> Path:
 
 
 def frame_in(picture: np.ndarray[tuple[int, ...], np.dtype[np.uint8]]) -> int:
-    """Tell which frame a picture is."""
+    """Return which frame a picture is."""
     return round(float(picture.mean()) / STEP)

@@ -11,7 +11,7 @@ SERIOUS = ("serious", "critical")
 
 
 async def faults(visit: Visit) -> list[Any]:
-    """Give what axe-core finds serious: rule, help, and the elements."""
+    """Return what axe-core finds serious: rule, help, and the elements."""
     await visit.page.add_script_tag(path=AXE)
     found = await visit.get("axe.run()")
     return [

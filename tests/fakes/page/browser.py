@@ -39,11 +39,11 @@ class Visit:
         )
 
     async def get(self, expression: str) -> Any:
-        """Give the value of a JavaScript expression."""
+        """Return the value of a JavaScript expression."""
         return await self.page.evaluate(expression)
 
     async def screenshot(self) -> npt.NDArray[np.int16]:
-        """Give what is on the stage now, shape (height, width, 3), red, green, blue."""
+        """Return what is on the stage now, shape (height, width, 3), red, green, blue."""
         image = await self.page.locator("#stage").screenshot()
         with av.open(io.BytesIO(image), "r") as container:
             return next(container.decode(video=0)).to_ndarray(format="rgb24").astype(np.int16)
@@ -80,6 +80,6 @@ async def seconds_of_playing(visit: Visit, seconds: float) -> None:
 
 
 async def camera_on_the_stage(visit: Visit) -> str:
-    """Give the camera whose tint the picture has."""
+    """Return the camera whose tint the picture has."""
     ground = np.median((await visit.screenshot()).reshape(-1, 3), axis=0)
     return CAMERAS[int(np.abs(np.array(GROUNDS) - ground).sum(axis=1).argmin())]

@@ -93,14 +93,14 @@ class FakeSite:
 
     @property
     def edge(self) -> int:
-        """Give the newest pulse that is decided and served."""
+        """Return the newest pulse that is decided and served."""
         return int((time.time() + self.ahead - self.pulse0) * FPS) - LOOKAHEAD
 
     def camera(self, person: int, pulse: int) -> int:
         return (pulse // HOLD) % len(CAMERAS) if person == 1 else 2
 
     def shown(self, person: int, pulse: int, held: str | None, preferred: str | None) -> int:
-        """Give the camera of a pulse in a stream that may be held to one, or prefer one."""
+        """Return the camera of a pulse in a stream that may be held to one, or prefer one."""
         if held is not None:
             return CAMERAS.index(held)
         if preferred is not None:
@@ -147,7 +147,7 @@ class FakeSite:
         }
 
     def gop(self, first: int) -> dict[str, Any]:
-        """Give the `gop` event of the frames [first, first + GOP)."""
+        """Return the `gop` event of the frames [first, first + GOP)."""
         choices = {str(k): CAMERAS[self.camera(k, first)] for k in self.people}
         cuts = []
         old, new = self.camera(1, first - 1), self.camera(1, first)
@@ -173,7 +173,7 @@ class FakeSite:
         ]
 
     def choice(self, person: int, first: int) -> dict[str, Any]:
-        """Give why a person is shown as they are in the GOP [first, first + GOP)."""
+        """Return why a person is shown as they are in the GOP [first, first + GOP)."""
         shown = self.camera(person, first)
         costs = {camera: 0.0 if n == shown else 0.25 * (n + 1) for n, camera in enumerate(CAMERAS)}
         return {
@@ -198,7 +198,7 @@ class FakeSite:
         }
 
     def past(self, person: int, since: int = 0) -> dict[str, Any]:
-        """Give what can be seen again of a person, by camera; from `since` on, which begins a view."""
+        """Return what can be seen again of a person, by camera; from `since` on, which begins a view."""
         first = (self.edge - self.recorded * FPS) // HOLD * HOLD
         views = [
             {"camera": CAMERAS[self.camera(person, pulse)], "first": pulse, "frames": HOLD}
@@ -217,13 +217,13 @@ class FakeSite:
             pulse += 1
 
     def boundary(self) -> int:
-        """Give the first pulse of the newest whole GOP (in bursts) or of the present one."""
+        """Return the first pulse of the newest whole GOP (in bursts) or of the present one."""
         edge = self.edge - (GOP - 1 if self.bursts else 0)
         return edge - edge % GOP
 
 
 def thumbnail(person: int) -> bytes:
-    """Give a JPEG of the person's square."""
+    """Return a JPEG of the person's square."""
     left, top = (square if person == 1 else second)(0, 10)
     crop = picture(0, 10)[top - 10 : top + SQUARE + 10, left - 6 : left + SQUARE + 6]
     file = io.BytesIO()
@@ -294,7 +294,7 @@ class SiteServer:
         return web.json_response(self.site.site())
 
     async def _session(self, _: web.Request) -> web.Response:
-        """Say that anybody may watch, and who looks at the page maybe operate."""
+        """Return that anybody may watch, and who looks at the page maybe operate."""
         role = "operate" if self.site.operates else "watch"
         return web.json_response(
             {"by_token": False, "name": None, "role": role, "object": None, "camera": None}

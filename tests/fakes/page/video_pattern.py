@@ -38,7 +38,7 @@ class Pattern:
     fragments: tuple[bytes, ...]
 
     def fragment(self, pulse: int) -> bytes:
-        """Give the frame of a pulse with its place on the time axis: tfdt = pulse * 90000 / fps."""
+        """Return the frame of a pulse with its place on the time axis: tfdt = pulse * 90000 / fps."""
         data = self.fragments[pulse % PERIOD]
         at = data.index(b"tfdt") + 4
         time = struct.pack(">Q", pulse * TIMESCALE // FPS)
@@ -48,13 +48,13 @@ class Pattern:
 
 
 def square(camera: int, pulse: int) -> tuple[int, int]:
-    """Give the corner (left, top) of person 1's bright square: another one in every frame and camera."""
+    """Return the corner (left, top) of person 1's bright square: another one in every frame and camera."""
     step = (pulse + 37 * camera) % PERIOD
     return 4 + 14 * (step % COLUMNS), 20 + 40 * (step // COLUMNS)
 
 
 def second(camera: int, pulse: int) -> tuple[int, int]:
-    """Give the corner (left, top) of person 2's square, which walks the other way."""
+    """Return the corner (left, top) of person 2's square, which walks the other way."""
     left, top = square(camera, pulse)
     return WIDTH - SQUARE - left, HEIGHT - SQUARE - top
 

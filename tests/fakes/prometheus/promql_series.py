@@ -49,7 +49,7 @@ def selectors(expression: str) -> list[promql.VectorSelector]:
 
 
 def given(expression: str, printed: Printed) -> set[Series]:
-    """Give the series of an expression.
+    """Return the series of an expression.
 
     Raises:
         ValueError: it is no PromQL, or makes no sense for these metrics.

@@ -64,6 +64,6 @@ async def opened(site: RunningSite) -> AsyncIterator[Page]:
 
 
 def every_gop_once(site: RunningSite) -> bool:
-    """Tell whether all that was decided was told, each GOP once."""
+    """Return whether all that was decided was told, each GOP once."""
     firsts = [gop.first for gop in site.gops]
     return firsts == list(range(firsts[0], firsts[0] + GOP * len(firsts), GOP))

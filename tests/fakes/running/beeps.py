@@ -30,7 +30,7 @@ def write_beeps(path: Path) -> Path:
 
 
 def heard(path: Path) -> tuple[NDArray[np.float64], list[float]]:
-    """Give the times of all samples of a stream, and of them when beeps begin (media time, seconds)."""
+    """Return the times of all samples of a stream, and of them when beeps begin (media time, seconds)."""
     data = path.read_bytes()
     with av.open(io.BytesIO(data[: data.rfind(b"moof") - 4])) as container:
         frames = list(container.decode(audio=0))

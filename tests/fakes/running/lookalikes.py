@@ -44,7 +44,7 @@ def camera(name: str, folder: Path) -> dict[str, Any]:
 
 
 def _sides(pulse: int) -> tuple[int, int]:
-    """Give the left sides of their boxes."""
+    """Return the left sides of their boxes."""
     off = min(_STEP * abs(pulse - MET), _FAR)
     return (_SIZE[1] - _WIDE) // 2 - off, (_SIZE[1] - _WIDE) // 2 + off
 

@@ -74,7 +74,7 @@ class RunningSite:
         return self.gops[-1].first + self.gops[-1].frames - 1 if self.gops else -1
 
     def children(self) -> dict[str, int]:
-        """Give the pid of every process of the site by what it does: sync, bestview, c0 …"""
+        """Return the pid of every process of the site by what it does: sync, bestview, c0 …"""
         found = {}
         for folder in Path("/proc").iterdir():
             with contextlib.suppress(OSError, ValueError):
@@ -86,7 +86,7 @@ class RunningSite:
         return found
 
     def state(self, camera: str) -> str | None:
-        """Give a camera's state as the events said it last."""
+        """Return a camera's state as the events said it last."""
         return self.states[camera][-1] if self.states[camera] else None
 
     async def until(self, condition: Callable[[], bool], what: str) -> None:

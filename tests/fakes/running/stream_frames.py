@@ -29,7 +29,7 @@ async def record(session: aiohttp.ClientSession, url: str, until_pulse: int, out
 
 
 def newest_pulse(data: bytearray) -> int:
-    """Give the pulse of the newest fragment that has begun, by its tfdt; -1 before the first."""
+    """Return the pulse of the newest fragment that has begun, by its tfdt; -1 before the first."""
     at = data.rfind(b"tfdt")
     if at < 0 or len(data) < at + 16:
         return -1
@@ -47,7 +47,7 @@ def pictures(path: Path) -> dict[int, NDArray[np.uint8]]:
 
 
 def shown_from_to(path: Path) -> list[tuple[float, float]]:
-    """Give when each picture of a stream begins and ends, in pulses."""
+    """Return when each picture of a stream begins and ends, in pulses."""
     data = path.read_bytes()
     with av.open(io.BytesIO(data[: data.rfind(b"moof") - 4])) as container:
         found = [

@@ -6,7 +6,7 @@ import socket
 
 
 def free() -> int:
-    """Give one that the system has chosen, and has let go of again."""
+    """Return one that the system has chosen, and has let go of again."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -14,7 +14,7 @@ _NOBODY = 65534
 
 @contextlib.contextmanager
 def nobodys_folder() -> Iterator[Path]:
-    """Give a folder, and be its owner and not root meanwhile."""
+    """Yield a folder, and be its owner and not root meanwhile."""
     folder = Path(tempfile.mkdtemp(prefix="myview-nobody-"))
     root = os.geteuid() == 0
     try:

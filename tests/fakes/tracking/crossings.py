@@ -34,7 +34,7 @@ class Crossing:
     seed: int = 0
 
     def left(self, person: int, frame: int) -> float:
-        """Give where somebody's box begins, in pixels."""
+        """Return where somebody's box begins, in pixels."""
         return 20.0 + 2.5 * frame if person == 0 else 160.0 - 2.5 * frame
 
     def where(self, person: int, frame: int) -> Floats:

@@ -28,7 +28,7 @@ class Figure:
     colour: tuple[int, int, int] = (40, 60, 190)
 
     def box(self, frame: int) -> npt.NDArray[np.float64]:
-        """Give left, top, right, bottom."""
+        """Return left, top, right, bottom."""
         tall = 0.7 * self.foot - 40.0
         left = self.left + self.speed * frame
         return np.array([left, self.foot - tall, left + 0.36 * tall, self.foot])

@@ -90,7 +90,7 @@ def network_of(case: Case) -> Network:
 
 
 def best_by_trying(network: Network) -> float:
-    """Give the cost of the optimum by trying all states of all objects."""
+    """Return the cost of the optimum by trying all states of all objects."""
     states = range(network.places + 1)
     best = np.inf
     for flat in product(states, repeat=network.objects * network.frames):

@@ -63,7 +63,7 @@ def follow(stream: Sequence[Detections], tracked: OnlineTracker, start: int = 0)
 
 
 def final_boxes(results: Sequence[WindowResult]) -> dict[int, dict[int, np.ndarray]]:
-    """Give the final box by frame and id."""
+    """Return the final box by frame and id."""
     found: dict[int, dict[int, np.ndarray]] = {}
     for result in results:
         for track in result.tracks:

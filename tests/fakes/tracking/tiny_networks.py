@@ -57,12 +57,12 @@ def _scores(table: Table) -> npt.NDArray[np.bool_]:
 
 
 def yolov5(rows: Sequence[Sequence[float]], boxes: int = 20) -> Table:
-    """Give `(1, boxes, 5 + C)`, rows first, the others nothing."""
+    """Return `(1, boxes, 5 + C)`, rows first, the others nothing."""
     table = np.zeros((1, boxes, len(rows[0])), dtype=np.float32)
     table[0, : len(rows)] = rows
     return table
 
 
 def yolov8(rows: Sequence[Sequence[float]], boxes: int = 20) -> Table:
-    """Give `(1, 4 + C, boxes)`."""
+    """Return `(1, 4 + C, boxes)`."""
     return np.ascontiguousarray(yolov5(rows, boxes).transpose(0, 2, 1))

@@ -31,7 +31,7 @@ FRAMES = 60
 
 
 def site(folder: Path, **cameras: str) -> Config:
-    """Give a small and fast site of recordings, on ports of its own."""
+    """Return a small and fast site of recordings, on ports of its own."""
     bus = f"tcp/127.0.0.1:{free_port()}"
     content = {
         "site": {"name": "hall", "fps": FPS, "width": 128, "height": 72},

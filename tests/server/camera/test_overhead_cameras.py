@@ -38,7 +38,7 @@ def _config(kind: str, **camera: object) -> Config:
 
 
 def _recall(kind: str) -> float:
-    """Give the share of people whom the detector surely finds in the room from above."""
+    """Return the share of people whom the detector surely finds in the room from above."""
     config, scene = _config(kind), Scene("overhead", 1, 2, 4, *SIZE, 2.0)
     detector = make_detector(config, config.cameras[0], Letterbox(SIZE, SIZE))
     assert isinstance(detector, BackgroundDetector)
@@ -74,7 +74,7 @@ def seen_by_two() -> NDArray[np.float64]:
 
 
 def _agreement(boxes: NDArray[np.float64], overhead: tuple[str, ...]) -> float:
-    """Give the share of the time in which people have one number in both cameras, by where they are."""
+    """Return the share of the time in which people have one number in both cameras, by where they are."""
     scene = Scene("overhead", 2, 3, 2, *SIZE, 25.0)
     registry = IdentityRegistry(
         IdentitySettings(), {"c0": scene.homography(0), "c1": scene.homography(1) @ _TURNED}, overhead

@@ -16,7 +16,7 @@ BOX: Box = (20.0, 10.0, 84.0, 138.0)
 
 
 def picture(blur: float = 0.0, contrast: float = 1.0) -> NDArray[np.uint8]:
-    """Give a picture full of stripes and spots."""
+    """Return a picture full of stripes and spots."""
     rng = np.random.default_rng(4)
     coarse = cv2.resize(rng.uniform(60, 200, (12, 8)), (120, 160), interpolation=cv2.INTER_NEAREST)
     grey = 128 + contrast * (coarse + rng.normal(0, 10, (160, 120)) - 128)

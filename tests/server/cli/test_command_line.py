@@ -28,7 +28,7 @@ from synthetic import Scene, scene_names
 
 @pytest.fixture
 def run(myview: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
-    """Give a function that runs `myview` in an empty folder."""
+    """Return a function that runs `myview` in an empty folder."""
     monkeypatch.chdir(tmp_path)
     return myview
 
@@ -53,7 +53,7 @@ def site(folder: Path, **changes: Any) -> Path:
 
 @pytest.fixture
 def taken() -> Iterator[int]:
-    """Give a port that somebody listens on."""
+    """Yield a port that somebody listens on."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         yield int(server.getsockname()[1])
 

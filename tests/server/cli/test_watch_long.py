@@ -54,7 +54,7 @@ def test_the_files_are_these_to_the_byte(tmp_path: Path) -> None:
 
 
 def peak(film: Path, frames: int) -> int:
-    """Give the bytes that writing takes at most."""
+    """Return the bytes that writing takes at most."""
     everything: Iterator[Frame] = (Frame(pulse, "c0", (BOX,) * 5) for pulse in range(frames))
     tracemalloc.start()
     try:
@@ -78,7 +78,7 @@ def told(gop: int) -> Gop:
 
 
 def held(folder: Path, gops: int) -> int:
-    """Give the bytes of memory that stay when so much has been said."""
+    """Return the bytes of memory that stay when so much has been said."""
     spool = Spool(folder)
     commentary = Commentary(1, keep=spool)
     commentary.take(told(0))

@@ -43,7 +43,7 @@ def is_section(value: Any) -> bool:
 
 
 def compare(shown: Any, real: Any, place: str) -> list[str]:
-    """Say how a section of the reference differs from the code's defaults."""
+    """Return how a section of the reference differs from the code's defaults."""
     wrong = [f"{place}{key}: is not a setting" for key in shown if key not in keys_of(real)]
     for key in keys_of(real):
         value = getattr(real, key)

@@ -45,7 +45,7 @@ async def test_a_turn_that_fails_is_told_once_and_the_next_is_taken(caplog: pyte
 
 
 async def runs_on(task: asyncio.Task[None], failing: Failing) -> bool:
-    """Tell whether what failed is done again."""
+    """Return whether what failed is done again."""
     await asyncio.wait([task, asyncio.create_task(failing.done.wait())], return_when="FIRST_COMPLETED")
     ended = task.done()
     task.cancel()

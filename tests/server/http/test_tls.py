@@ -37,7 +37,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[TlsSettings, TlsSett
 
 @pytest.fixture
 def tls(made: tuple[TlsSettings, TlsSettings], tmp_path: Path) -> TlsSettings:
-    """Give the first certificate, in files that the test may change."""
+    """Return the first certificate, in files that the test may change."""
     return copied(made[0], TlsSettings(certificate=tmp_path / "c.pem", key=tmp_path / "k.pem"))
 
 
@@ -100,7 +100,7 @@ async def test_watching_trusts_what_the_usual_variable_names_and_sends_its_token
 
 
 async def is_proven(port: int, trusted: TlsSettings) -> bool:
-    """Tell whether a new connection is proven by a certificate."""
+    """Return whether a new connection is proven by a certificate."""
     try:
         _, writer = await asyncio.open_connection("127.0.0.1", port, ssl=trusting(trusted))
     except ssl.SSLCertVerificationError:

@@ -14,7 +14,7 @@ SIZES = ((64, 48), (34, 18), (640, 360))
 
 
 def decoded(seed: int, kind: str = "yuv420p") -> VideoFrame:
-    """Give a picture of one of some sizes as a decoder does."""
+    """Return a picture of one of some sizes as a decoder does."""
     width, height = SIZES[seed % len(SIZES)]
     rows = np.random.default_rng(seed).integers(0, 255, (height * 3 // 2, width), dtype=np.uint8)
     return VideoFrame.from_ndarray(rows, format="yuv420p").reformat(format=kind)

@@ -176,7 +176,7 @@ def until_true(condition: Callable[[], bool]) -> None:
 
 
 def waits_for_a_file(pid: int) -> bool:
-    """Tell whether a thread of a process is held up in the system call that opens a file."""
+    """Return whether a thread of a process is held up in the system call that opens a file."""
     opening = {"2", "257", "56"}  # open and openat, as Linux counts them on x86 and ARM
     try:
         calls = [it.read_text(encoding="ascii") for it in Path(f"/proc/{pid}/task").glob("*/syscall")]

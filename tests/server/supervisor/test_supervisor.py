@@ -70,7 +70,7 @@ class Machine:
         return process
 
     async def processes(self, count: int) -> dict[str, Process]:
-        """Give the next processes by what they are."""
+        """Return the next processes by what they are."""
         found = [await self.started.get() for _ in range(count)]
         return {
             process.arguments[-1 if process.arguments[0] == "camera" else 0]: process for process in found

@@ -38,7 +38,7 @@ KEYS = ZenohKeys("hall")
 
 
 def found(camera: str, pulse: int) -> bytes:
-    """Give what a camera says of a frame."""
+    """Return what a camera says of a frame."""
     return msgspec.json.encode(FrameDetections(camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[]))
 
 

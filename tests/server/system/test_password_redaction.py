@@ -55,7 +55,7 @@ def built(**changes: Any) -> Config:
 
 
 def written(config: Config) -> str:
-    """Give all that an operator is shown of a configuration."""
+    """Return all that an operator is shown of a configuration."""
     return "\n".join(f"{it.key}: {it.value} {it.default}" for it in settings_of(config))
 
 
@@ -91,7 +91,7 @@ def test_an_operator_is_shown_no_secret_of_other_settings(password: str) -> None
 
 
 def misplaced(address: str, secret: str) -> list[dict[str, Any]]:
-    """Give configurations in which an address or a secret is where it does not belong."""
+    """Return configurations in which an address or a secret is where it does not belong."""
     camera = door("door.mp4")
     return [
         {"cameras": [{**camera, address: None}]},

@@ -37,14 +37,14 @@ def umask(mask: int) -> Iterator[None]:
 
 @contextlib.contextmanager
 def folder_of(who: str, tmp_path: Path) -> Iterator[Path]:
-    """Give a folder that is open to all, of the user that the tests run as or of another than root."""
+    """Yield a folder that is open to all, of the user that the tests run as or of another than root."""
     with contextlib.nullcontext(tmp_path) if who == "whoever" else nobodys_folder() as folder:
         folder.chmod(0o755)
         yield folder
 
 
 def modes(folder: Path) -> dict[bool, set[int]]:
-    """Give the modes of all folders (True) and files (False) below one."""
+    """Return the modes of all folders (True) and files (False) below one."""
     found: dict[bool, set[int]] = {True: set(), False: set()}
     for it in folder.rglob("*"):
         found[it.is_dir()].add(stat.S_IMODE(it.stat().st_mode))

@@ -84,7 +84,7 @@ def test_a_camera_is_heard_beside_its_pictures(camera: str) -> None:
 
 
 def moments(frames: list[Frame], form: SoundFormat = FORM) -> list[float]:
-    """Give when beeps begin, seconds after pulse 0."""
+    """Return when beeps begin, seconds after pulse 0."""
     found = {frame.number: frame.data for frame in frames}
     data = [found.get(number, form.silence) for number in range(max(found) + 1)]
     return beeps(sound_init_segment(form) + sound_fragment(form, data, 0))

@@ -50,7 +50,7 @@ FORM = SoundFormat(48_000, 2, "opus")
 
 
 def as_mp4(frames: list[Frame]) -> bytes:
-    """Give frames 0 to the last one as a stream, silent where there is none."""
+    """Return frames 0 to the last one as a stream, silent where there is none."""
     found = {frame.number: frame.data for frame in frames}
     data = [found.get(number, FORM.silence) for number in range(max(found) + 1)]
     return sound_init_segment(FORM) + sound_fragment(FORM, data, 0)

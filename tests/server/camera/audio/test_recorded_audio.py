@@ -37,7 +37,7 @@ def all_until(sound: RecordedSound, pulse: int, first: int = 0) -> list[Frame]:
 
 
 def as_adts(frames: list[Frame], form: SoundFormat) -> bytes:
-    """Give frames 0 to the last one as a stream, silent where there is none."""
+    """Return frames 0 to the last one as a stream, silent where there is none."""
     found = {frame.number: frame.data for frame in frames}
     data = [found.get(number, form.silence) for number in range(max(found) + 1)]
     return b"".join(form.adts(len(frame)) + frame for frame in data)

@@ -34,7 +34,7 @@ def encoded(settings: EncodeSettings) -> list[AccessUnit]:
 
 
 def most_kbps(units: list[AccessUnit]) -> float:
-    """Give the kilobits of the fullest second, wherever it begins."""
+    """Return the kilobits of the fullest second, wherever it begins."""
     kilobits = np.array([len(unit.data) * 8 / 1000 for unit in units])
     return float(np.convolve(kilobits, np.ones(SECOND), "valid").max())
 

@@ -19,7 +19,7 @@ BACKLOG_S = 2.0
 
 
 def simulated(seconds: float, carried: Callable[[float], float], *, live: bool = True) -> list[int]:
-    """Give the level at each frame of a camera that needs all of a machine; `carried` is what it is given.
+    """Return the level at each frame of a camera that needs all of a machine; `carried` is what it is given.
 
     Searching a frame takes three quarters of a frame's time, all else the rest.
     """

@@ -77,7 +77,7 @@ def written(folder: Path, form: str, seed: int = 0) -> Path:
 
 
 def passed(pipeline: CameraPipeline, pulses: range) -> list[AccessUnit]:
-    """Give what a camera's process sends."""
+    """Return what a camera's process sends."""
     sent = []
     for pulse in pulses:
         image = pipeline.take(pulse)

@@ -51,7 +51,7 @@ def config_of(
     ahead: bool = True,
     **offsets: int,
 ) -> Config:
-    """Give a site of that room's views on ports of its own, some of them with an offset."""
+    """Return a site of that room's views on ports of its own, some of them with an offset."""
     bus = f"tcp/127.0.0.1:{free_port()}"
     cameras = [
         {"id": f"c{n}", "source": f"c{n}.mp4", "offset": offsets.get(f"c{n}", 0)} for n in range(views)

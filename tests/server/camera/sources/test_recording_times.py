@@ -26,7 +26,7 @@ __all__ = ["myview"]
 
 
 def shown(path: Path, fps: float | None = None) -> list[int]:
-    """Tell which picture of a recording each pulse shows."""
+    """Return which picture of a recording each pulse shows."""
     recording, frames = Recording(str(path), 0, "stop", fps), list[int]()
     with suppress(SourceEnded):
         while (image := recording.take(len(frames))) is not None:

@@ -18,7 +18,7 @@ TO_IMAGE = np.array([[90.0, 30.0, 120.0], [-6.0, 20.0, 330.0], [-0.01, 0.12, 1.0
 
 @pytest.fixture
 def run(myview: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
-    """Give a function that runs `myview calibrate` in an empty folder."""
+    """Return a function that runs `myview calibrate` in an empty folder."""
     monkeypatch.chdir(tmp_path)
     return lambda *arguments: myview("calibrate", *arguments)
 

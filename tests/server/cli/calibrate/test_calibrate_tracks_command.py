@@ -19,7 +19,7 @@ OFFSET = 6
 
 @pytest.fixture
 def run(myview: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
-    """Give a function that runs `myview calibrate` in an empty folder."""
+    """Return a function that runs `myview calibrate` in an empty folder."""
     monkeypatch.chdir(tmp_path)
     return lambda *arguments: myview("calibrate", *arguments)
 

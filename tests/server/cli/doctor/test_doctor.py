@@ -93,7 +93,7 @@ def test_a_wrong_configuration_is_all_that_is_said(myview: Run, tmp_path: Path) 
 
 @pytest.fixture
 def taken() -> Iterator[int]:
-    """Give a port that somebody listens on who never answers."""
+    """Yield a port that somebody listens on who never answers."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         yield int(server.getsockname()[1])
 

@@ -18,7 +18,7 @@ Printed = Callable[..., str]
 
 @pytest.fixture
 def run(myview: Run) -> Printed:
-    """Give a function that runs `myview evaluate` and gives what it prints."""
+    """Return a function that runs `myview evaluate` and gives what it prints."""
 
     def command(*arguments: object) -> str:
         ended = myview("evaluate", *arguments)
@@ -30,7 +30,7 @@ def run(myview: Run) -> Printed:
 
 @pytest.fixture
 def refused(myview: Run) -> Printed:
-    """Give a function that runs `myview evaluate` and gives the one line that says what is wrong."""
+    """Return a function that runs `myview evaluate` and gives the one line that says what is wrong."""
     return lambda *arguments: refusal(myview("evaluate", *arguments))
 
 
@@ -54,7 +54,7 @@ def each(option: str, paths: Iterable[Path]) -> list[str | Path]:
 
 
 def rows(printed: str) -> dict[str, list[str]]:
-    """Give the table's rows by what stands first in them."""
+    """Return the table's rows by what stands first in them."""
     return {line.split()[0]: line.split() for line in printed.splitlines() if line.strip()}
 
 

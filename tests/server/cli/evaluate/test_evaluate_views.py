@@ -20,7 +20,7 @@ BIG, SMALL = "10,10,50,50", "10,10,20,20"
 
 @pytest.fixture
 def evaluate(myview: Run) -> Run:
-    """Give a function that runs `myview evaluate`."""
+    """Return a function that runs `myview evaluate`."""
     return lambda *arguments: myview("evaluate", *arguments)
 
 
@@ -31,7 +31,7 @@ def write(path: Path, lines: list[str]) -> Path:
 
 
 def boxes(places: Mapping[int, str], frames: range = range(1, FRAMES + 1), end: str = "1,1,1") -> list[str]:
-    """Give MOTChallenge rows: everybody at one place all the time."""
+    """Return MOTChallenge rows: everybody at one place all the time."""
     return [f"{frame},{number},{place},{end}" for frame in frames for number, place in places.items()]
 
 
@@ -51,7 +51,7 @@ def hall(tmp_path: Path) -> Path:
 
 
 def judged(printed: str) -> dict[str, list[str]]:
-    """Give the table's rows by what stands first in them."""
+    """Return the table's rows by what stands first in them."""
     return {line.split()[0]: line.split() for line in printed.splitlines()}
 
 

@@ -78,7 +78,7 @@ async def still(room: Drawn, query: str, who: str) -> Image:
 
 
 def has_box(image: Image, plain: Image, box: list[float]) -> bool:
-    """Tell whether a picture differs from the plain one along most of a box's left and right edges."""
+    """Return whether a picture differs from the plain one along most of a box's left and right edges."""
     left, top, right, bottom = (round(edge) for edge in box)
     changed = np.abs(image.astype(np.int16) - plain).max(axis=2) > 30
     sides = [changed[max(0, top) : bottom, max(0, x - 1) : x + 2].any(axis=1) for x in (left, right - 1)]

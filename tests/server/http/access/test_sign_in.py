@@ -52,7 +52,7 @@ async def site(tmp_path: Path) -> AsyncIterator[Hall]:
 async def asked(
     hall: Hall, path: str = SESSION, method: str = "GET", json: object = None, **headers: str
 ) -> tuple[int, str]:
-    """Give the status and the error; heads are given with _ for -."""
+    """Return the status and the error; heads are given with _ for -."""
     heads = {name.replace("_", "-"): value for name, value in headers.items()}
     async with hall.session.request(method, path, headers=heads, json=json) as answer:
         assert "Access-Control-Allow-Origin" not in answer.headers
@@ -184,7 +184,7 @@ async def test_players_name_the_token_in_the_address(site: Hall) -> None:
 
 
 async def sign_in(hall: Hall, name: str) -> str:
-    """Give the cookie, as a browser sends it."""
+    """Return the cookie, as a browser sends it."""
     async with hall.session.post(SESSION, headers=MINE, json={"token": token_of(name)}) as answer:
         assert answer.status == 200
         [cookie] = answer.cookies.values()

@@ -28,7 +28,7 @@ def tag(text: str, name: str) -> str:
 
 
 def entries(text: str) -> list[tuple[float, str, datetime]]:
-    """Give each segment's seconds, address and time of day; whatever breaks a rule of RFC 8216 fails."""
+    """Return each segment's seconds, address and time of day; whatever breaks a rule of RFC 8216 fails."""
     assert text.startswith("#EXTM3U\n"), "4.3.1.1"
     assert text.endswith("\n")
     assert "\r" not in text

@@ -36,13 +36,13 @@ async def hall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator
 
 
 def dated(playlist: str) -> dict[int, datetime]:
-    """Give the segments before which the time of day stands."""
+    """Return the segments before which the time of day stands."""
     found = re.findall(r"^#EXT-X-PROGRAM-DATE-TIME:(.*)\n#EXTINF.*\n(\d+)\.m4s$", playlist, re.MULTILINE)
     return {int(number): datetime.fromisoformat(when) for when, number in found}
 
 
 def entries(playlist: str) -> dict[int, str]:
-    """Give what is told of each segment."""
+    """Return what is told of each segment."""
     found = re.findall(r"((?:#EXT-X-P.*\n)?#EXTINF.*\n)(\d+)\.m4s$", playlist, re.MULTILINE)
     return {int(number): told for told, number in found}
 

@@ -218,7 +218,7 @@ def decoded(data: bytes) -> dict[int, NDArray[np.uint8]]:
 
 
 def at(shown: dict[int, NDArray[np.uint8]], pulse: int) -> NDArray[np.uint8]:
-    """Give the picture that is seen at a pulse: it may stand for longer."""
+    """Return the picture that is seen at a pulse: it may stand for longer."""
     return shown[max(it for it in shown if it <= pulse)]
 
 

@@ -25,7 +25,7 @@ from server.service.streaming.broadcaster import BytesChunk, Subscriber
 
 
 async def samples(hall: Hall) -> dict[tuple[str, ...], float]:
-    """Give all samples of /metrics, by their name and the values of their labels, the bound last."""
+    """Return all samples of /metrics, by their name and the values of their labels, the bound last."""
     async with hall.session.get("/metrics") as answer:
         text = await answer.text()
     found = {}

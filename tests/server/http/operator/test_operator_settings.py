@@ -30,7 +30,7 @@ async def put(hall: Hall, json: Any) -> tuple[int, Any]:
 
 
 def decided(config: Config, tuned: ViewSettings | None = None, after: int = 0) -> list[Any]:
-    """Give what is decided of two people who are now large in one camera, now in the other."""
+    """Return what is decided of two people who are now large in one camera, now in the other."""
     decider = Decider(config, dict.fromkeys(CAMERAS), lambda *_: True)
     decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     decisions = []

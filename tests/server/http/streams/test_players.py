@@ -119,7 +119,7 @@ def check_pictures(hall: Hall, path: str, output: bytes) -> None:
 
 
 def end_of(hall: Hall, path: str) -> int:
-    """Give the first pulse that a stream does not show."""
+    """Return the first pulse that a stream does not show."""
     return EPOCHS * STRIDE if "cameras" in path else hall.service.decider._next_gop or 0
 
 

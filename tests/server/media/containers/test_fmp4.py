@@ -21,7 +21,7 @@ GOP = 4
 
 
 def picture(seed: int) -> NDArray[np.uint8]:
-    """Give a smooth picture that is different for every seed."""
+    """Return a smooth picture that is different for every seed."""
     rng = np.random.default_rng(seed)
     coarse = rng.integers(0, 255, (6, 8, 3), dtype=np.uint8)
     return np.repeat(np.repeat(coarse, 8, axis=0), 8, axis=1)

@@ -79,7 +79,7 @@ def test_the_time_reference_comes_often_and_before_its_picture(pulse: int, fps: 
 
 
 def spliced(cameras: list[int]) -> tuple[bytes, list[tuple[int, int]]]:
-    """Give a stream of GOPs of these cameras, and which camera and pulse each picture is."""
+    """Return a stream of GOPs of these cameras, and which camera and pulse each picture is."""
     agreement, data, frames = Agreement(), b"", []
     shelves = [FrameBuffer(FPS, 40, agreement) for _ in CAMERAS]
     for seed, shelf in enumerate(shelves):

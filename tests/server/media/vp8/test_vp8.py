@@ -95,7 +95,7 @@ def shelved(units: tuple[AccessUnit, ...], boot: int = 1) -> list[Picture]:
 
 
 def read(data: bytes) -> list[tuple[float, Pixels]]:
-    """Give the pulses and pictures of a WebM."""
+    """Return the pulses and pictures of a WebM."""
     with av.open(io.BytesIO(data), format="matroska") as container:
         return [(frame.time * FPS, frame.to_ndarray(format="yuv420p")) for frame in container.decode(video=0)]
 

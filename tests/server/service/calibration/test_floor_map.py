@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 def camera(tilt: float, height: float, focal: float = 200.0) -> Floats:
-    """Give the homography of a camera so high above the floor that looks down by `tilt` radians."""
+    """Return the homography of a camera so high above the floor that looks down by `tilt` radians."""
     # A place (X, Y) of the floor in the camera's axes: right, down, forward.
     sin, cos = np.sin(tilt), np.cos(tilt)
     place = np.array([[1.0, 0.0, 0.0], [0.0, -sin, height * cos], [0.0, cos, height * sin]])
@@ -58,7 +58,7 @@ EDGES = ([0.0, 240.0], [320.0, 240.0], [0.0, 0.0], [320.0, 0.0])
 
 
 def inside(polygon: Floats, point: Floats) -> bool:
-    """Tell whether a polygon holds a point: a ray crosses its edges an odd number of times."""
+    """Return whether a polygon holds a point: a ray crosses its edges an odd number of times."""
     odd = False
     for one, two in zip(polygon, np.roll(polygon, 1, axis=0), strict=True):
         if (one[1] > point[1]) != (two[1] > point[1]):

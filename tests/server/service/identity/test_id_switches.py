@@ -19,7 +19,7 @@ PLACE = np.array([0.0, 0.0, 10.0, 30.0])
 
 
 def window(boxes: NDArray[np.float64], first: int) -> CameraWindow:
-    """Give a camera's word on some frames, of the boxes (T, F, 4)."""
+    """Return a camera's word on some frames, of the boxes (T, F, 4)."""
     tracks = range(1, len(boxes) + 1)
     last = first + boxes.shape[1] - 1
     message = word("c0", 0, dict.fromkeys(tracks, (1.0, 1.0, 2.0, 2.0)), first=first, last=last)

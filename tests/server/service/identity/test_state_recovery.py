@@ -62,7 +62,7 @@ class Site:
             self.service.decide()
 
     def whose(self, camera: str, track: int, epoch: int, boot: int = 1) -> int:
-        """Give who is behind a track."""
+        """Return who is behind a track."""
         number = self.service.decider.people.whose(camera, boot, track, end_of_epoch(epoch, STRIDE))
         assert number is not None
         return number

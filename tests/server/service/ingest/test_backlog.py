@@ -12,7 +12,7 @@ REACH = 100  # pulses
 
 
 def lost(behind: Sequence[int], every_s: float = 1.0) -> list[bool]:
-    """Give what is said to so many pulses behind, second by second."""
+    """Return what is said to so many pulses behind, second by second."""
     times = iter(it * every_s for it in range(len(behind)))
     keeping_up = KeepingUp(REACH, lambda: next(times))
     return [keeping_up.is_lost(it) for it in behind]

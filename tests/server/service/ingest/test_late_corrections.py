@@ -19,7 +19,7 @@ MENDED = STRIDE
 
 
 def mended(epoch: int) -> CameraTracks:
-    """Give a camera's word that the two were in each other's place since then."""
+    """Return a camera's word that the two were in each other's place since then."""
     last = end_of_epoch(epoch, STRIDE)
     said = word("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, mended_from=MENDED)
     frames = last - MENDED + 1

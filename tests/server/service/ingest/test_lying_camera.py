@@ -55,7 +55,7 @@ Lie = Callable[[int], Sequence[Message]]
 
 
 def frames(epoch: int, /, **changes: Any) -> list[Message]:
-    """Give an epoch's frames of the liar; their heads say something else."""
+    """Return an epoch's frames of the liar; their heads say something else."""
     sent = [video(LIAR, unit) for unit in encoded(0)[epoch * STRIDE : (epoch + 1) * STRIDE]]
     return [
         Message(it.key, it.payload, json.dumps(msgspec.json.decode(it.attachment) | changes).encode())
@@ -64,7 +64,7 @@ def frames(epoch: int, /, **changes: Any) -> list[Message]:
 
 
 def said(epoch: int, /, **changes: Any) -> list[Message]:
-    """Give its word on an epoch, as it is not."""
+    """Return its word on an epoch, as it is not."""
     right = msgspec.to_builtins(word(LIAR, epoch, {1: SMALL}))
     return [Message(KEYS.camera(LIAR, "tracks"), json.dumps(right | changes).encode(), b"")]
 

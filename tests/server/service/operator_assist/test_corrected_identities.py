@@ -57,7 +57,7 @@ class Camera:
 
 
 def at(people: People, pulse: int) -> dict[int, float]:
-    """Give where everybody is shown, by number: the left side."""
+    """Return where everybody is shown, by number: the left side."""
     [rows] = people.boxes("c0", pulse, 1)
     return {number: left for number, left, *_ in rows}
 
@@ -99,7 +99,7 @@ def played(
 
 
 def sides(told: dict[int, dict[int, float]], pulse: int) -> list[int]:
-    """Give who is shown left and right."""
+    """Return who is shown left and right."""
     return sorted(told[pulse], key=told[pulse].__getitem__)
 
 

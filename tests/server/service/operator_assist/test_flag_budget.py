@@ -15,7 +15,7 @@ SAME, OTHER, LATE = frozenset({1, 2}), frozenset({3, 4}), frozenset({5, 6})
 
 
 def raised(per_minute: int, told: list[tuple[int, int, float]]) -> list[int]:
-    """Give when flags are raised for troubles of (pulse, who, risk)."""
+    """Return when flags are raised for troubles of (pulse, who, risk)."""
     budget, found = FlagBudget(FlagSettings(per_minute=per_minute, risk=0.0), FPS), []
     for now, who, risk in told:
         people = frozenset({2 * who, 2 * who + 1})

@@ -54,13 +54,13 @@ def on_disk(folder: Path) -> list[int]:
 
 
 def files_in(run: RecordingSession) -> set[int]:
-    """Give the files that the playlists in memory refer to."""
+    """Return the files that the playlists in memory refer to."""
     tapes = [it.tape for it in (*run.cameras.values(), *run.objects.values())]
     return {stretch.file for tape in tapes for stretch in tape.all}
 
 
 def files_told(run: RecordingSession) -> set[int]:
-    """Give the files that the playlists on the disk refer to."""
+    """Return the files that the playlists on the disk refer to."""
     told: set[int] = set()
     for path in run.folder.rglob("*.m3u8"):
         told |= {int(line[-16:-4]) for line in path.read_text().splitlines() if line[:1] not in ("#", "")}

@@ -46,7 +46,7 @@ class Site:
         return reel
 
     def decoded(self, segments: list[HlsSegment]) -> list[tuple[float, float, NDArray[np.uint8]]]:
-        """Give when each picture is shown and until when, in pulses, and the picture."""
+        """Return when each picture is shown and until when, in pulses, and the picture."""
         assert self.agreement.parameters is not None
         head = init_segment(self.agreement.parameters, WIDTH, HEIGHT)
         with av.open(io.BytesIO(head + b"".join(it.data for it in segments))) as container:

@@ -44,7 +44,7 @@ class Site:
         self.gops += 1
 
     async def cameras(self, viewer: Subscriber) -> str:
-        """Give the cameras that were shown, a letter for each GOP."""
+        """Return the cameras that were shown, a letter for each GOP."""
         viewer.close()
         async with asyncio.timeout(PATIENCE):
             sent = [data async for data in viewer]

@@ -16,7 +16,7 @@ UNSEEN = 2 * GOP
 def decision(
     gop: int, seen: dict[int, list[int]], merged: dict[int, int] | None = None, camera: str = A
 ) -> GopDecision:
-    """Give a GOP in which people are seen at some of its places."""
+    """Return a GOP in which people are seen at some of its places."""
     boxes = [[(number, *BOX) for number, places in seen.items() if place in places] for place in range(GOP)]
     return GopDecision(gop * GOP, GOP, (), {camera: boxes}, merged or {}, (), NO_REASON)
 

@@ -32,19 +32,19 @@ class Drifting(People):
     """People whose numbers change at a frame, differently in each camera and track."""
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
-        """Give numbers that depend on the frame."""
+        """Return numbers that depend on the frame."""
         return np.array([[self.one(key, n) for n in range(first, first + frames)] for key in keys]).reshape(
             len(keys), frames
         )
 
     @staticmethod
     def one(key: TrackKey, pulse: int) -> int:
-        """Give one track's number in one frame; two tracks may share it, and -1 is nobody."""
+        """Return one track's number in one frame; two tracks may share it, and -1 is nobody."""
         return (key.local + CAMERAS.index(key.camera) + pulse // 7) % 4 or -1
 
 
 def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]) -> CameraTracks:
-    """Give a window of three epochs, the first ones of a recording shorter."""
+    """Return a window of three epochs, the first ones of a recording shorter."""
     told = word(camera, epoch, dict.fromkeys(boxes))
     first = max(0, told.last - WINDOW + 1)
     tracks = [
@@ -60,7 +60,7 @@ def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]
 
 
 def slowly(story: Sequence[Epoch], sight: Sight, people: Drifting) -> dict[tuple[int, str, int], float]:
-    """Give the quality of every view by pulse, camera and number, one box after the other."""
+    """Return the quality of every view by pulse, camera and number, one box after the other."""
     found: dict[tuple[int, str, int], float] = {}
     newest: dict[tuple[int, str], CameraTracks] = {}
     for epoch in story:

@@ -28,7 +28,7 @@ Told = Mapping[str, Mapping[int, Box | None]]
 
 
 def at(x: float, y: float, camera: str = A) -> Box:
-    """Give the box of somebody whose feet are at a place of A's picture."""
+    """Return the box of somebody whose feet are at a place of A's picture."""
     scale = 1.0 if camera == A else 2.0
     return scale * (x - 2.0), scale * (y - 10.0), scale * (x + 2.0), scale * y
 
