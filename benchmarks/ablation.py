@@ -76,7 +76,7 @@ class Input:
 
 
 def inputs(recordings: list[Recording]) -> list[Input]:
-    """Return every recording's detections alone, and with the pictures where there are any: looks need them."""
+    """Return every recording's detections, with and without the pictures that appearance needs."""
     alone = [Input(it) for it in recordings]
     return alone + [Input(it, pictures=True) for it in recordings if it.video and it.video.is_file()]
 

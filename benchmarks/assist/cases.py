@@ -100,7 +100,7 @@ def _about(flag: Flag, found: NDArray[np.int64]) -> set[int]:
 
 
 def _kind(flag: Flag, about: set[int], helped: Watched) -> Kind:
-    """Return whether others were in the way of whom a flag was about, from when it was raised to its trouble."""
+    """Return whether others occluded a flagged person between the flag and its risk event."""
     first, last = sorted((flag.trouble.frame, flag.raised))
     return kind_of(involved(helped.clip.truth, about, first, last, helped.clip.fps))
 
@@ -121,7 +121,7 @@ def _outcome(flag: Flag, about: set[int], alone: Watched, helped: Watched) -> Ou
 
 
 def tells(trouble: RiskEvent, newest: int, failure: Failure, fps: float, person: Person) -> bool:
-    """Return whether a trouble is about a failure, and came early enough for the operator to see it happen."""
+    """Return whether a risk event is about a failure, and early enough for the operator to see it."""
     early = newest - person.delay_s * fps + person.reaction_s * fps <= failure.frame
     return bool(
         early and newest >= failure.before - _BEFORE_S * fps and {*trouble.objects} & {*failure.tracks}

@@ -47,7 +47,7 @@ class FamiliarColours:
         self._shares = ((moving + _NEVER_SEEN) / (moving + still + 2 * _NEVER_SEEN)).astype(np.float32)
 
     def shares(self, image: Image) -> Plane:
-        """Return for every pixel how often its colour was foreground, `(H, W)` in [0, 1]; unknown colours ½."""
+        """Return how often each pixel's colour was foreground, `(H, W)` in [0, 1]; unknown colours ½."""
         return np.asarray(self._shares[_codes(image)])
 
 

@@ -73,7 +73,7 @@ class Blobs:
         return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, self._round), dtype=np.uint8)
 
     def _bodies(self, shares: Plane) -> Mask:
-        """Return what has familiar colours, `(H, W)`: whole bodies with their pale bands, and nothing thin."""
+        """Return a mask of familiar colours, `(H, W)`: whole bodies with their pale bands, nothing thin."""
         mask = np.where(shares >= _FAMILIAR, np.uint8(255), np.uint8(0))
         whole = cv2.morphologyEx(cv2.medianBlur(mask, 3), cv2.MORPH_CLOSE, self._wide)
         return np.asarray(cv2.morphologyEx(whole, cv2.MORPH_OPEN, self._round), dtype=np.uint8)
@@ -94,7 +94,7 @@ class Blobs:
 
 
 def _pieces(mask: Mask, least: int) -> tuple[NDArray[np.int32], Floats]:
-    """Return the connected pieces of a mask: each pixel's number, and the boxes `(K, 4)` of the large ones."""
+    """Return connected pieces of a mask: each pixel's number, and the boxes `(K, 4)` of the large ones."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask)
     large = stats[1:][stats[1:, cv2.CC_STAT_AREA] >= least]
     corner = large[:, [cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP]].astype(np.float64)

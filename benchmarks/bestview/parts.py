@@ -17,7 +17,7 @@ from tracking.motchallenge import MotRow
 
 
 def own_parts(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
-    """Return each camera's final boxes, with a number for each part of each track, as the service cuts them."""
+    """Return each camera's final boxes, numbered by part of track as the service cuts them."""
     settings = config.view.identity
     episodes, reader = Episodes(settings), Reader((config.site.width, config.site.height))
     ground, error = homographies(config), FootError(settings.foot_sideways, settings.foot_upwards)

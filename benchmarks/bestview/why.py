@@ -60,7 +60,7 @@ def losses(case: Case, truth: SceneTruth, way: Way) -> Losses:
 def _met(
     truth: SceneTruth, tracks: Mapping[str, list[MotRow]], person_of: Mapping[int, int]
 ) -> tuple[Mask, Mask]:
-    """Return (K, N) whether people's own number was at them where they are visible, and whether another was."""
+    """Return (K, N) whether visible people had their own number, and whether they had another."""
     own: Mask = np.zeros(truth.views.evaluated.shape, dtype=bool)
     others = own.copy()
     frames = own.shape[1]

@@ -98,7 +98,7 @@ def walks(people: int, frames: int, walking: Walking, rng: np.random.Generator) 
 
 
 def people_at(feet: Floats, height: float) -> Floats:
-    """Return the boxes of people whose feet are given, `(..., 4)`; `height`, pixels, is that of the nearest."""
+    """Return boxes of people whose feet are given, `(..., 4)`; `height`, pixels, is that of the nearest."""
     x, y = feet[..., 0], feet[..., 1]
     tall = height * (0.62 + 0.38 * (y - _FAR_Y) / (_NEAR_Y - _FAR_Y))
     wide = 0.42 * tall

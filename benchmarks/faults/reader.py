@@ -90,7 +90,7 @@ def _numbers(table: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
 
 
 def _table(views: Views, camera: str) -> NDArray[np.float32]:
-    """Return what is in each frame of a camera's film `(frames, most people, 6)`; rows of zeros are nobody."""
+    """Return the people in each frame of a film, `(frames, most people, 6)`; zeros: no person."""
     frames: list[list[tuple[float, ...]]] = [[] for _ in range(FRAMES)]
     for (of, *sides), frame in views.found.items():
         if of == camera:

@@ -71,7 +71,7 @@ class Stand:
     """What it plays, where that is not what all sites play."""
 
     def pids(self, name: str) -> list[int]:
-        """Return the processes of a name: sync, bestview, drawing, or a camera's id; none where it is down."""
+        """Return processes of a name: sync, bestview, drawing, or a camera's id; none where it is down."""
         return running_pids(f"camera {name}" if name in CAMERAS else name)
 
     def send(self, number: signal.Signals, *names: str) -> None:

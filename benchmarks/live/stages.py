@@ -52,7 +52,7 @@ class StageTimes:
     process: float
 
     def milliseconds_since(self, earlier: StageTimes) -> dict[str, float]:
-        """Return the processor milliseconds per frame of each stage and of the rest since an earlier moment."""
+        """Return processor milliseconds per frame of each stage and of the rest since an earlier moment."""
         frames = max(self.frames - earlier.frames, 1)
         found = {name: 1e3 * (self.seconds[name] - earlier.seconds[name]) / frames for name in STAGES}
         whole = 1e3 * (self.process - earlier.process) / frames

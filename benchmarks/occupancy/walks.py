@@ -41,7 +41,7 @@ class Walk:
 
 
 def walk_of(floor: Floor, q: Floats, path: Path, reach: int) -> Walk:
-    """Return a walk: the mean of places and those around them by how likely they are, `reach` frames around."""
+    """Return a walk: places averaged over `reach` frames around, weighted by likelihood."""
     frames = path.first + np.arange(len(path.places))
     around = floor.moves[path.places]
     there = around < len(floor.places)
@@ -63,7 +63,7 @@ def smoothed(places: Floats, reach: int) -> Floats:
 def rows_of_walks(
     view: View, walks: Sequence[Walk], numbers: Sequence[Ints], settings: WalkSettings
 ) -> list[MotRow]:
-    """Return everybody's boxes in a camera by their number in each frame, cut at the borders of its picture."""
+    """Return all boxes of a camera by person and frame, cut at the borders of the picture."""
     width, height = view.size
     rows = []
     for walk, number in zip(walks, numbers, strict=True):

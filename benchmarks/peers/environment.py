@@ -98,7 +98,7 @@ def default_folder() -> Path:
 
 
 def peer_environment(folder: Path) -> PeerEnvironment:
-    """Return the environment in the folder; it is made, which takes a network and a minute, if it is not there.
+    """Return environment in the folder; it is made, which takes a network and a minute, if it is not there.
 
     Raises:
         PeersAwayError: it cannot be made.

@@ -10,7 +10,7 @@ from tracking import WindowResult, WindowTrack, merge_results
 
 
 def mended(result: WindowResult, anew: WindowResult) -> WindowResult:
-    """Return what is to be told where a window's result has just been solved anew, by what somebody points at.
+    """Return what to publish where a correction has had a window solved again.
 
     It begins with the first frame that was told as final and has changed, or where nothing has with the first
     frame that was not final; ``revised_from`` says which.

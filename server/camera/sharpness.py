@@ -30,7 +30,7 @@ class Sharpness:
         self._known: dict[int, float] = {}
 
     def measured(self, message: CameraTracks, image: Image | None) -> CameraTracks:
-        """Return the message with the sharpness of its tracks; ``image`` is the window's last frame, if any."""
+        """Return message with the sharpness of its tracks; ``image`` is the window's last frame, if any."""
         for track in message.tracks:
             box = track.boxes[-1] if track.boxes else None
             value = None if image is None or box is None else sharpness(image, box)

@@ -28,7 +28,7 @@ def ready_tracker(
     *,
     ready: bool = True,
 ) -> Tracker:
-    """Return the tracker of that name; what has to learn the room has done so where the source is a recording.
+    """Return tracker of that name; what has to learn the room has done so where the source is a recording.
 
     It looks at the source's pictures as ``fit`` makes them, or at these themselves; not ``ready``: at none
     ahead.

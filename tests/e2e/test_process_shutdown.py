@@ -33,7 +33,7 @@ SCENE = "scene:room?camera=0&cameras=3&objects=4&seed=1"
 
 @contextlib.asynccontextmanager
 async def silent_camera() -> AsyncIterator[tuple[str, asyncio.Event]]:
-    """Yield the address of a camera that lets in whoever comes and says nothing, and whether somebody came."""
+    """Yield address of a camera that lets in whoever comes and says nothing, and whether somebody came."""
     came = asyncio.Event()
 
     async def say_nothing(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -35,7 +35,7 @@ class Rung:
         return -(pulse + 1) % stride % self.searched == 0
 
     def takes(self, pulse: int, stride: int, gop: int) -> bool:
-        """Return whether a frame is taken. The first one of every GOP is, and the last one of every window."""
+        """Return whether a frame is searched: always the first of a GOP, and the last of a window."""
         return pulse % gop % self.taken == 0 or (pulse + 1) % stride == 0
 
     @property

@@ -56,7 +56,7 @@ class SoundFormat:
         return round(pulse * self.rate / fps) // self.samples
 
     def pulses(self, begin: int, end: int, fps: float) -> tuple[int, int]:
-        """Return the first pulse, and the one after the last, among which are all that some frames sound at."""
+        """Return first pulse, and the one after the last, among which are all that some frames sound at."""
         first = begin * self.samples * fps / self.rate
         return max(0, int(first) - 1), int((end + 1) * self.samples * fps / self.rate) + 2
 

@@ -123,7 +123,7 @@ def _packets(content: int) -> int:
 
 
 def _pes(picture: Picture, fps: float) -> bytes:
-    """Return a picture as a PES packet (2.4.3.6): it carries its time, and says its length where that fits."""
+    """Return a picture as a PES packet (2.4.3.6) with its time, and with its length where that fits."""
     time = ticks(picture.pulse, fps) % _CLOCK
     stamp = _stamp(time)
     content = _AUD + b"".join(_annex_b(picture.sample))
@@ -161,7 +161,7 @@ def _split(pid: int, content: bytes, count: int, counter: int, reference: bytes)
 
 
 def _packet(pid: int, counter: int, payload: bytes, field: bytes = b"", *, begins: bool = False) -> bytes:
-    """Return a packet; ``field`` is an adaptation field without its length, stuffed as far as there is room."""
+    """Return a packet; ``field`` is an adaptation field without its length, stuffed to fill the packet."""
     room = _PAYLOAD - len(payload)
     control = 0x10 * bool(payload)
     if room:

@@ -51,7 +51,7 @@ _HALF, _QUARTER = 0x200, 0x100
 
 @lru_cache(maxsize=4)
 def skipped_slice(macroblocks: int) -> str:
-    """Return so many skipped macroblocks, the slice's end and rbsp_stop_one_bit, as bits from a whole byte on.
+    """Encode ``count`` skipped macroblocks, the end of the slice and rbsp_stop_one_bit, byte-aligned.
 
     They are the same in every picture of a size; coding them takes milliseconds.
     """

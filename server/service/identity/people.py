@@ -179,7 +179,7 @@ class People:
         return new
 
     def number(self, camera: str, local: int, pulse: int) -> int | None:
-        """Return the person's number behind a camera's local one in a frame; None while it is not confirmed."""
+        """Return person's number behind a camera's local one in a frame; None while it is not confirmed."""
         number = int(self.numbers([TrackKey(camera, local)], pulse, 1)[0, 0])
         return None if number == NOBODY_YET else number
 
@@ -228,7 +228,7 @@ class People:
             history.forget_before(pulse)
 
     def _pictures(self, windows: Sequence[CameraWindow], first: int, last: int) -> dict[str, tuple[int, int]]:
-        """Return the pictures of the cameras that could have seen anybody in the frames that are final now."""
+        """Return pictures of the cameras that could have seen anybody in the frames that are final now."""
         return {
             it.message.camera: it.message.size
             for it in windows

@@ -112,7 +112,7 @@ class Remembering:
         return any(now < came + PATIENCE_S for camera, came in self._came.items() if camera in self._there)
 
     def awaits(self, number: int) -> bool:
-        """Return whether somebody of this number may be found again, or is and only nothing is decided yet."""
+        """Return whether a person of this number may be re-identified, or is so in a decision to come."""
         if self._began_at is None or self._people.roll.whose(number) in self._people.roll.first_seen:
             return True
         comes = self._heard < set(self._cameras) and self._clock() < self._began_at + _COMES_S

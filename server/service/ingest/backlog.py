@@ -24,7 +24,7 @@ class KeepingUp:
         self._by = 0
 
     def is_lost(self, behind: int) -> bool:
-        """Return whether what waits should be left out; ``behind`` is by how many pulses decisions are late."""
+        """Return whether to skip what waits; ``behind`` is by how many pulses decisions are late."""
         now = self._clock()
         if behind <= self._reach:
             self._since = None

@@ -100,7 +100,7 @@ class Aligner:
         place.trusted = True
 
     def behind(self, now: int) -> int:
-        """Return the pulses between the end of the next epoch that somebody has spoken of and pulse ``now``."""
+        """Return pulses between the end of the next epoch that somebody has spoken of and pulse ``now``."""
         first = min(self._words(), default=None)
         return 0 if first is None else max(0, now - end_of_epoch(first, self.stride))
 

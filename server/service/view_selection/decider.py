@@ -178,7 +178,7 @@ class Decider:
         )
 
     def _weight(self, lookahead: int) -> Floats:
-        """Return for how many frames each frame of the look-ahead stands: what is seen last goes on a while."""
+        """Return how many frames each frame of the look-ahead stands for: the last one counts for longer."""
         weight, last = np.ones(lookahead), max(1, lookahead // _LAST)
         weight[-last:] += self._goes_on / last
         return weight

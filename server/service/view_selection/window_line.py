@@ -47,7 +47,7 @@ class Line:
         self._begins = np.cumsum(np.concatenate([[0], lengths * self._tracks]))
 
     def persons(self, people: People, everybody: Ints, frames: int) -> Ints:
-        """Return who is at each place, (L,): indices into everybody's numbers (K,), rising; -1: nobody of them.
+        """Return the person at each place, (L,): indices into the sorted numbers (K,); -1: none of them.
 
         A track is in several windows; its numbers in all the frames are asked for once.
         """

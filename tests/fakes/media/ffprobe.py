@@ -9,7 +9,7 @@ from fakes.timeouts import PATIENCE
 
 
 def probed(path: Path | str, entries: str) -> list[list[str]]:
-    """Return these entries of each stream of a file whose frames are all decoded; a warning fails the test."""
+    """Return these ffprobe entries of each stream, all frames decoded; a warning fails the test."""
     done = subprocess.run(
         ["ffprobe", "-v", "warning", "-count_frames", "-show_entries", f"stream={entries}",
          "-of", "csv=p=0", str(path)],
