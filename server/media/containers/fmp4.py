@@ -45,7 +45,7 @@ def ticks(pulse: int, fps: float) -> int:
 def init_segment(
     parameters: ParameterSets, width: int, height: int, sound: SoundFormat | None = None
 ) -> bytes:
-    """Return ``ftyp`` and ``moov``, which a player needs before the first fragment; all streams share them."""
+    """Return ``ftyp`` and ``moov``, which players need before the first fragment; all streams share it."""
     last = _TRACK if sound is None else SOUND_TRACK
     return box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6avc1mp41") + box(
         "moov",
