@@ -25,7 +25,8 @@ from server.media.rendering_messages import Canvas
 from server.service.rendering.decided_boxes import GopOverlay, first_pulse
 from server.service.rendering.mjpeg_streams import MjpegVariant
 from server.service.rendering.rendered_stream import RenderedStream
-from server.service.streaming.broadcaster import Broadcaster, BytesChunk, Subscriber
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.subscriber_queue import BytesChunk, Subscriber
 from synthetic import Scene
 
 _MS = 1e3
@@ -94,7 +95,7 @@ class Stage:
             unit = self._encoder.encode(pulse, self._images[pulse % _DRAWN])
             data += fragment([Sample(sample(nal_units(unit.data)), unit.key)], pulse, self.site.fps)
         self._pulse += self.gop
-        return BytesChunk(data, start=True)
+        return BytesChunk(data, random_access=True)
 
     def told(self, fragments: bytes) -> GopOverlay:
         """Return the boxes of a GOP."""
@@ -108,7 +109,7 @@ async def measure(stage: Stage, wish: Wish, gops: int) -> Cost:
     source = RenderedStream("the room", stream, stage.told, stage.canvas, live=True, queue_gops=8)
     source.use()
     source.film.wanted = wish.films
-    viewers = [source.film.channel.join() for _ in range(wish.films)]
+    viewers = [source.film.channel.subscribe() for _ in range(wish.films)]
     viewers += [source.series.join(series) for series in wish.series]
     readers = [asyncio.create_task(_read(viewer)) for viewer in viewers]
     chunks = [stage.next_gop() for _ in range(gops + 1)]

@@ -109,7 +109,7 @@ class Runs(Scripts):
             self.messages += 1
             (self._run / name).write_bytes(content)
         service = self._service
-        past = Recorder(self._config, service.shelves, service.agreement, 10, service.sound)
+        past = Recorder(self._config, service.frame_buffers, service.agreement, 10, service.sound)
         past.pulse0 = _PULSE0
         store = past.store
         assert store is not None

@@ -112,9 +112,9 @@ class _Splice(Scripts):
                 self._decided[0], first=gop * STRIDE, choices=choices, merged={}, corrections=()
             )
             service.past.put(service.board.put(decision), None)
-            service.splicer.decision(decision)
+            service.splicer.publish_decision(decision)
             if gop == 0:
-                viewers += [it.join() for it in service.splicer.objects.values()]
+                viewers += [it.subscribe() for it in service.splicer.persons.values()]
             before = now
         for viewer in viewers:
             drink(viewer)
@@ -133,7 +133,7 @@ class _Splice(Scripts):
 
 
 def _channels(service: Fed) -> list[Any]:
-    return [*service.splicer.cameras.values(), *service.splicer.decided.values()]
+    return [*service.splicer.cameras.values(), *service.splicer.decided_cameras.values()]
 
 
 class Splice(_Splice):

@@ -83,10 +83,10 @@ class Messages(Target):
     def feed(self, data: bytes) -> bool:
         """Take it in, and the epoch out that it may have made."""
         agreement = Agreement()
-        shelves = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
+        frame_buffers = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
         aligner = Aligner(CAMERAS, STRIDE, grace=5)
-        shelf = AudioBuffer(self._form, FPS, 10.0)
-        intake = Intake(shelves, aligner, lambda *_: None, shelf, sounding=CAMERAS[0])
+        frame_buffer = AudioBuffer(self._form, FPS, 10.0)
+        intake = Intake(frame_buffers, aligner, lambda *_: None, frame_buffer, sounding=CAMERAS[0])
         handlers = (intake.video, intake.tracks, intake.status, intake.thumbnail)
         for key, payload, head in _script.decode(data):
             message = Message(key, payload, head)
@@ -207,7 +207,10 @@ class Sessions(Scripts):
     async def _session(self, script: Script) -> bool:
         service = Fed(self._config)
         service.agreement.accept(self._pictures[0][0].data)
-        viewers = [it.join() for it in (*service.splicer.cameras.values(), *service.splicer.decided.values())]
+        viewers = [
+            it.subscribe()
+            for it in (*service.splicer.cameras.values(), *service.splicer.decided_cameras.values())
+        ]
         epoch = 0
         for key, payload, head in script:
             if key:
@@ -244,8 +247,8 @@ def drink(viewer: Any) -> None:
     for piece in list(viewer._queue):
         if isinstance(piece, MediaChunk):
             assert piece.data
-            assert piece.ts
-            assert piece.with_sound
+            assert piece.mpegts
+            assert piece.data_with_audio
     viewer._queue.clear()
 
 

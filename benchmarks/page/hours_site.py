@@ -72,12 +72,15 @@ class FastSite:
 
     def _loop(self, seed: int) -> list[bytes]:
         site, rng = SiteSettings(width=_WIDTH, height=_HEIGHT, fps=_FPS), np.random.default_rng(seed)
-        encoder, shelf = Encoder(site, EncodeSettings(gop=_GOP)), FrameBuffer(_FPS, _LOOP, self._agreement)
+        encoder, frame_buffer = (
+            Encoder(site, EncodeSettings(gop=_GOP)),
+            FrameBuffer(_FPS, _LOOP, self._agreement),
+        )
         small = rng.integers(0, 255, (_LOOP, _HEIGHT // 16, _WIDTH // 16, 3), dtype=np.uint8)
         for pulse, picture in enumerate(small.repeat(16, axis=1).repeat(16, axis=2)):
             unit = encoder.encode(pulse, picture)
-            shelf.put(pulse, 1, unit.data, key=unit.key)
-        return [it.fragment for pulse in range(_LOOP) if (it := shelf.get(pulse)) is not None]
+            frame_buffer.put(pulse, 1, unit.data, key=unit.key)
+        return [it.fragment for pulse in range(_LOOP) if (it := frame_buffer.get(pulse)) is not None]
 
     @property
     def _edge(self) -> int:

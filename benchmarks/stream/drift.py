@@ -17,8 +17,8 @@ from server.media.containers.fmp4 import ticks
 from server.messaging.inbox import Message
 from server.messaging.messages import FrameHeader, GopChoices, ZenohKeys
 from server.service.service import BestViewService
-from server.service.streaming.broadcaster import Chunk
 from server.service.streaming.media_chunk import MediaChunk
+from server.service.streaming.subscriber_queue import Chunk
 
 _PER_CAMERA = 2
 """People in a camera's view, on average: few, so that an hour passes in minutes."""
@@ -86,7 +86,7 @@ async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> Drift:
     service = BestViewService(Config(site=SITE, encode=ENCODE, cameras=cameras))
     source, decided = Source(service, films, hall), list[GopChoices]()
     service.on_decision.append(decided.append)
-    viewer = service.splicer.decided[hall.ids[0]].join().pieces()
+    viewer = service.splicer.decided_cameras[hall.ids[0]].subscribe().chunks()
     delays: list[int] = []
     off, costs, part, began = 0, list[float](), pulses // _PARTS, time.process_time()
     for number in range(pulses):
@@ -108,7 +108,11 @@ def times(piece: Chunk) -> tuple[int, int]:
     """Read when a piece is shown, 1/90000 s: as MP4 says it, and as the transport stream does."""
     assert isinstance(piece, MediaChunk)  # noqa: S101 — streams are made of nothing else
     at = piece.data.index(b"tfdt") + len(b"tfdt") + 4
-    stamp = piece.ts.index(_VIDEO) + _PTS_AT
-    first, middle, last = piece.ts[stamp], piece.ts[stamp + 1 : stamp + 3], piece.ts[stamp + 3 : stamp + 5]
+    stamp = piece.mpegts.index(_VIDEO) + _PTS_AT
+    first, middle, last = (
+        piece.mpegts[stamp],
+        piece.mpegts[stamp + 1 : stamp + 3],
+        piece.mpegts[stamp + 3 : stamp + 5],
+    )
     high, low = int.from_bytes(middle, "big") >> 1, int.from_bytes(last, "big") >> 1
     return int.from_bytes(piece.data[at : at + 8], "big"), (first >> 1 & 7) << 30 | high << 15 | low

@@ -15,8 +15,8 @@ from benchmarks.stream.splice import Cut
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import CameraSettings, EncodeSettings, SiteSettings
 from server.config.site_config import Config
-from server.service.streaming.broadcaster import Chunk
 from server.service.streaming.media_chunk import MediaChunk
+from server.service.streaming.subscriber_queue import Chunk
 
 _SITE = SiteSettings(name="right", width=64, height=48, fps=25)
 _ENCODE = EncodeSettings()
@@ -80,7 +80,7 @@ async def judge(frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings
     assert head is not None  # noqa: S101 — key pictures have come
     contained = head + b"".join(piece.data for piece in pieces)
     has_ts = cut.agreement.container == "mp4"
-    ts = b"".join(piece.ts for piece in pieces if isinstance(piece, MediaChunk)) if has_ts else b""
+    ts = b"".join(piece.mpegts for piece in pieces if isinstance(piece, MediaChunk)) if has_ts else b""
     expected = [
         own[camera][gop * encode.gop + n] for gop, camera in enumerate(chosen) for n in range(encode.gop)
     ]
@@ -104,9 +104,9 @@ async def _watch(
     viewer = None
     for gop, camera in enumerate(chosen):
         cut.shelve(gop)
-        cut.splicer.decision(cut.decide(gop, [camera]))
+        cut.splicer.publish_decision(cut.decide(gop, [camera]))
         if viewer is None:
-            viewer = cut.splicer.objects[1].join().pieces()
+            viewer = cut.splicer.persons[1].subscribe().chunks()
         pieces.append(await anext(viewer))
     return pieces, cut
 

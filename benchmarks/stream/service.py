@@ -20,7 +20,7 @@ from server.service.view_selection.decider import GopDecision
 
 def note(path: Path) -> None:
     """Write a line for each GOP: its first pulse, when it was given out, when all sockets had been tried."""
-    original = Splicer.decision
+    original = Splicer.publish_decision
     notes = path.open("a", encoding="ascii", buffering=1)
 
     @functools.wraps(original)
@@ -29,7 +29,7 @@ def note(path: Path) -> None:
         original(self, decision)
         notes.write(f"{decision.first} {began} {time.monotonic()}\n")
 
-    Splicer.decision = run  # type: ignore[method-assign]
+    Splicer.publish_decision = run  # type: ignore[method-assign]
 
 
 @dataclass(frozen=True, slots=True)

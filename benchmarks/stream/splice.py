@@ -17,9 +17,9 @@ from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.codec import agreement_for
-from server.service.streaming.broadcaster import Chunk
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
+from server.service.streaming.subscriber_queue import Chunk
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 from server.service.view_selection.explanation import Why
 
@@ -43,10 +43,10 @@ class Cut:
 
     def shelve(self, gop: int) -> None:
         """Put a GOP of every camera on the shelves; films go round."""
-        for shelf, film in zip(self._shelves.values(), self._films, strict=True):
+        for frame_buffer, film in zip(self._shelves.values(), self._films, strict=True):
             for pulse in range(gop * self.gop, (gop + 1) * self.gop):
                 unit = film[pulse % len(film)]
-                shelf.put(pulse, 1, unit.data, key=unit.key)
+                frame_buffer.put(pulse, 1, unit.data, key=unit.key)
 
     def decide(self, gop: int, cameras: Sequence[int]) -> GopDecision:
         """Show each object, by place, a camera."""
@@ -87,7 +87,7 @@ async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int)
         began = time.process_time()
         cut.shelve(gop)
         between = time.process_time()
-        cut.splicer.decision(decision)
+        cut.splicer.publish_decision(decision)
         sizes = [len((await anext(viewer)).data) for viewer in viewers]
         end = time.process_time()
         if gop:  # the first one makes the streams
@@ -95,7 +95,7 @@ async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int)
             shelved.append(_US * (between - began) / (CAMERAS * cut.gop))
             decided.append(_US * (end - between) / (objects * cut.gop))
         else:
-            viewers = [it.join().pieces() for it in cut.splicer.objects.values()]
+            viewers = [it.subscribe().chunks() for it in cut.splicer.persons.values()]
             for viewer in viewers:
                 await anext(viewer)
     return Splice(objects, statistics.median(shelved), statistics.median(decided))

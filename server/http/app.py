@@ -114,7 +114,7 @@ def make_app(
     app[ON_DISK], app[_MISTAKES] = on_disk, LogThrottle()
     app[openapi.DESCRIBED] = openapi.Described(app)
     app[WATCHING], app[LISTENING] = Shares(), Shares()
-    app[READERS] = Readers(service.splicer.plan.target_s, app[WATCHING])
+    app[READERS] = Readers(service.splicer.layout.target_s, app[WATCHING])
     what = f"{service.config.site.name}_{service.config.view.share.index}"
     app[ACCESS] = Access(
         service.config.access.tokens,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aiohttp import web
 
-from server.service.streaming.broadcaster import Subscriber
+from server.service.streaming.subscriber_queue import Subscriber
 
 
 class Sent:
@@ -28,17 +28,17 @@ class Sent:
     def leave(self, viewer: Subscriber) -> None:
         """Keep what a viewer has lost."""
         self._viewers.discard(viewer)
-        self._lost += viewer.lost
+        self._lost += viewer.lost_gops
 
     @property
     def lost(self) -> int:
         """How many GOPs viewers have lost because they fell behind."""
-        return self._lost + sum(viewer.lost for viewer in self._viewers)
+        return self._lost + sum(viewer.lost_gops for viewer in self._viewers)
 
     @property
     def longest(self) -> int:
         """How many pieces wait for the viewer who is furthest behind."""
-        return max((viewer.waiting for viewer in self._viewers), default=0)
+        return max((viewer.queued for viewer in self._viewers), default=0)
 
     async def count(self, request: web.Request, response: web.StreamResponse) -> None:
         """Count an answer that has a body of its own; streams count themselves."""

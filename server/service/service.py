@@ -66,7 +66,9 @@ class BestViewService:
         self.agreement = agreement_for(
             config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
         )
-        self.shelves = {camera: FrameBuffer(config.site.fps, frames, self.agreement) for camera in cameras}
+        self.frame_buffers = {
+            camera: FrameBuffer(config.site.fps, frames, self.agreement) for camera in cameras
+        }
         far = round(_FAR_S * fps)
         self.aligner = Aligner(cameras, stride, grace, behind, far + grace + behind)
         form = config.sound.format
@@ -75,18 +77,18 @@ class BestViewService:
         self.left_out = 0
         """Epochs that were not decided, since there was more to decide than could be."""
         self._leaving_out = LogThrottle()
-        self.splicer = Splicer(self.shelves, self.agreement, config, self.sound)
+        self.splicer = Splicer(self.frame_buffers, self.agreement, config, self.sound)
         self.intake = Intake(
-            self.shelves,
+            self.frame_buffers,
             self.aligner,
-            self.splicer.frame,
+            self.splicer.publish_frame,
             self.sound,
             sounding=config.sounding,
             now=lambda: self.pulse,
             ahead=far,
         )
         self.decider = Decider(
-            config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
+            config, homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
         )
         self.board = Board(config.site.fps)
         self.assist = OperatorAssist(config, self.decider.people, partial(self._tell_camera, "pointing"))
@@ -98,7 +100,7 @@ class BestViewService:
             tells=config.view.share.index == 0,
         )
         self.walking = WalkSession(config)
-        self.past = Recorder(config, self.shelves, self.agreement, frames, self.sound)
+        self.past = Recorder(config, self.frame_buffers, self.agreement, frames, self.sound)
         self.pulse = -1
         self._decided_to = -1
         """The last pulse of the last epoch; a frame that is said to be of a later one shows nobody."""
@@ -107,7 +109,7 @@ class BestViewService:
         self._pulsed_at: float | None = None
         self._clock: Callable[[], float] = time.time
         """The pulses', which does not step when the system's is set."""
-        self.lacking = Lacking(self.shelves, self.intake.states, stride)
+        self.lacking = Lacking(self.frame_buffers, self.intake.states, stride)
         self.stages = Stages()
         self.inboxes: list[Inbox[Message]] = []
         """Where the bus's messages wait for the event loop."""
@@ -179,7 +181,7 @@ class BestViewService:
 
     def what_is_left(self) -> list[GopDecision]:
         """Decide what is left when every recording is over."""
-        newest = max(shelf.newest for shelf in self.shelves.values())
+        newest = max(frame_buffer.newest for frame_buffer in self.frame_buffers.values())
         return self.decider.finish(min(newest, self._decided_to))
 
     def _go_without_pulses(self) -> None:
@@ -333,7 +335,7 @@ class BestViewService:
         self.past.put(choices, self.pulse0, self.remembering.numbers_since)
         for tell in self.on_decision:
             tell(choices)
-        self.splicer.decision(decision)
+        self.splicer.publish_decision(decision)
         self.splicer.forget(self.decider.people.known, decision.merged)
         if self._bus is not None:
             key = self._keys.bestview("choices", self.config.view.share.index)

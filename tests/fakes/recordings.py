@@ -67,12 +67,12 @@ class ClocksByHand:
 def filled() -> tuple[dict[str, FrameBuffer], bytes]:
     """Return a shelf per camera with all its frames, and what every file begins with."""
     agreement = Agreement()
-    shelves = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
+    frame_buffers = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, FRAMES):
-            shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+            frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
     assert agreement.parameters is not None
-    return shelves, init_segment(agreement.parameters, WIDTH, HEIGHT)
+    return frame_buffers, init_segment(agreement.parameters, WIDTH, HEIGHT)
 
 
 @cache

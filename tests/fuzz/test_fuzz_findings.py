@@ -173,8 +173,8 @@ async def test_an_access_unit_without_a_picture_is_counted_and_dropped(damaged: 
     service.handle(Message(right.key, damaged, right.attachment))
     service.handle(video("c0", units[2]))
     assert service.intake.states["c0"].bad_messages == 1
-    assert not service.shelves["c0"].has(1)
-    assert service.shelves["c0"].has(2)
+    assert not service.frame_buffers["c0"].has(1)
+    assert service.frame_buffers["c0"].has(2)
 
 
 def test_parameter_sets_of_pictures_beyond_every_level_are_unfit() -> None:

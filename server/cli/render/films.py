@@ -40,13 +40,13 @@ class FilmWriter:
     def __init__(
         self,
         folder: Path,
-        shelves: Mapping[str, FrameBuffer],
+        frame_buffers: Mapping[str, FrameBuffer],
         agreement: Agreement,
         site: SiteSettings,
         sound: AudioBuffer | None = None,
     ) -> None:
         folder.mkdir()
-        self._folder, self._shelves, self._agreement, self._site = folder, shelves, agreement, site
+        self._folder, self._shelves, self._agreement, self._site = folder, frame_buffers, agreement, site
         self._sound = sound
         self._films: dict[int, _Film] = {}
 
@@ -85,8 +85,8 @@ class FilmWriter:
         return _Film(file, showing, decision.first, file.tell(), decision.first)
 
     def _write(self, film: _Film, footage: MediaChunk) -> None:
-        if footage.heard is not None:
-            film.file.write(_begun_at(film.origin, footage.heard, self._site.fps))
+        if footage.audio is not None:
+            film.file.write(_begun_at(film.origin, footage.audio, self._site.fps))
         for picture in footage.pictures:
             film.file.write(self._agreement.begun_at(film.origin, picture.fragment, self._site.fps))
 

@@ -44,8 +44,8 @@ class Renderer:
         )
         self._recorder = DecisionWriter(folder, cameras, self._decider.people.fits)
         self._soundtrack = Soundtrack(config)
-        shelf = self._soundtrack.shelf
-        self._films = FilmWriter(folder / "best", self._shelves, agreement, config.site, shelf)
+        frame_buffer = self._soundtrack.frame_buffer
+        self._films = FilmWriter(folder / "best", self._shelves, agreement, config.site, frame_buffer)
         self._sizes: dict[str, Size] = {}
         self.ended: dict[str, int] = {}
         """The last pulse of each camera whose recording is over."""

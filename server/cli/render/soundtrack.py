@@ -25,17 +25,17 @@ class Soundtrack:
         self._sound = opened if isinstance(opened, RecordedSound) else None
         self._fps = config.site.fps
         self._begun = False
-        self.shelf = None
+        self.frame_buffer = None
         if form is not None and self._sound is not None:
-            self.shelf = AudioBuffer(form, self._fps, _KEPT_S)
+            self.frame_buffer = AudioBuffer(form, self._fps, _KEPT_S)
 
     def read(self, first: int, until: int) -> None:
         """Put what sounds at the pulses ``first … until - 1`` on the shelf; pulses must grow."""
-        if self._sound is None or self.shelf is None:
+        if self._sound is None or self.frame_buffer is None:
             return
         frames = [] if self._begun else self._sound.until(first)
         self._begun = True
         frames += self._sound.until(until + round(_AHEAD_S * self._fps))
         for run in runs(frames):
             head = AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])
-            self.shelf.put(head, b"".join(frame.data for frame in run))
+            self.frame_buffer.put(head, b"".join(frame.data for frame in run))

@@ -17,7 +17,8 @@ from server.http.periodic import again_and_again
 from server.messaging.messages import GopChoices
 from server.service.operator_assist.flags import Flag
 from server.service.service import BestViewService
-from server.service.streaming.broadcaster import Broadcaster, BytesChunk, Subscriber
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.subscriber_queue import BytesChunk, Subscriber
 
 log = logging.getLogger(__name__)
 
@@ -66,19 +67,19 @@ class Events:
     def join(self, sees: Scope) -> Subscriber:
         """Let a reader in; what it should know first comes first."""
         line = self._lines.get(sees) or self._new_line(sees)
-        viewer = line.channel.join()
+        viewer = line.channel.subscribe()
         for flag in self._service.assist.flags.open:
             chunk = self._flag(sees, flag)
             if chunk is not None:
                 viewer.put_first(chunk)
         for name, content in self._lists(sees).items():
-            viewer.put_first(BytesChunk(event(name, content), start=True))
+            viewer.put_first(BytesChunk(event(name, content), random_access=True))
         return viewer
 
     def leave(self, sees: Scope, viewer: Subscriber) -> None:
         """Let a reader go."""
         line = self._lines[sees]
-        line.channel.leave(viewer)
+        line.channel.unsubscribe(viewer)
         if not line.channel.viewers:
             del self._lines[sees]
 
@@ -93,7 +94,7 @@ class Events:
             line.channel.close()
 
     def _new_line(self, sees: Scope) -> _Line:
-        line = self._lines[sees] = _Line(Broadcaster(starts_kept=_GOPS_KEPT, queue_starts=_QUEUE))
+        line = self._lines[sees] = _Line(Broadcaster(backlog_gops=_GOPS_KEPT, queue_gops=_QUEUE))
         for choices in self._recent:
             line.channel.publish(self._gop(sees, choices))
         if self._closed:
@@ -112,16 +113,16 @@ class Events:
             data = event(name, content)
             if line.told.get(name) != data:
                 line.told[name] = data
-                line.channel.tell(BytesChunk(data, start=True))
-        for viewer in line.channel.who_lost():
+                line.channel.publish_once(BytesChunk(data, random_access=True))
+        for viewer in line.channel.subscribers_with_new_loss():
             for chunk in self._again(sees, lists):
                 viewer.put(chunk)
-        line.channel.tell(BytesChunk(b": here\n\n", start=False))
+        line.channel.publish_once(BytesChunk(b": here\n\n", random_access=False))
 
     def _again(self, sees: Scope, lists: dict[str, Any]) -> Iterator[BytesChunk]:
         """Give all that holds, to who fell behind: what is told only once may be among what they lost."""
         for name, content in lists.items():
-            yield BytesChunk(event(name, content), start=True)
+            yield BytesChunk(event(name, content), random_access=True)
         flags = self._service.assist.flags
         for flag in [*reversed(flags.ended[:_FLAGS_AGAIN]), *flags.open]:
             chunk = self._flag(sees, flag)
@@ -138,17 +139,17 @@ class Events:
 
     def _gop(self, sees: Scope, choices: GopChoices) -> BytesChunk:
         content = choices_for(choices, sees, self._service.board.resolve)
-        return BytesChunk(event("gop", content, choices.first), start=True)
+        return BytesChunk(event("gop", content, choices.first), random_access=True)
 
     def _flag(self, sees: Scope, flag: Flag) -> BytesChunk | None:
         narrowed = flag_for(flag, sees, self._service.board.resolve)
-        return None if narrowed is None else BytesChunk(event("flag", narrowed), start=True)
+        return None if narrowed is None else BytesChunk(event("flag", narrowed), random_access=True)
 
     def _on_flag(self, flag: Flag) -> None:
         for sees, line in self._lines.items():
             chunk = self._flag(sees, flag)
             if chunk is not None:
-                line.channel.tell(chunk)
+                line.channel.publish_once(chunk)
 
     def _on_decision(self, choices: GopChoices) -> None:
         self._recent.append(choices)

@@ -41,7 +41,7 @@ def problem(status: int, error: str) -> web.Response:
 
 def no_camera(service: BestViewService, camera: str) -> web.Response:
     """Say that there is no camera of this name, and which there are."""
-    return problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
+    return problem(404, f"there is no camera {camera!r}; there are {', '.join(service.frame_buffers)}")
 
 
 def no_object(service: BestViewService, number: int) -> web.Response:

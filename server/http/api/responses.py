@@ -64,7 +64,7 @@ def camera_info(service: BestViewService, camera: str, state: CameraState) -> Ca
     return CameraInfo(
         camera=camera,
         state=state.word,
-        pulse=service.shelves[camera].newest,
+        pulse=service.frame_buffers[camera].newest,
         late=service.aligner.late_messages[camera],
         fps=status.fps if status else 0.0,
         missed=status.missed if status else 0,

@@ -34,7 +34,7 @@ async def newest(request: web.Request, reel: HlsSegmenter, pulse0: float | None)
         return wanted
     if wanted is not None and not await _waited(reel, *wanted):
         return not_now("the part that was asked for has not come")
-    if not reel.listed:
+    if not reel.playlist_segments:
         return not_now("the first segment is not whole yet")
     return playlist_answer(_newest(reel, pulse0))
 
@@ -48,7 +48,7 @@ async def coming_part(reel: HlsSegmenter, number: int, index: int) -> HlsPart | 
 
 def _newest(reel: HlsSegmenter, pulse0: float | None) -> str:
     """Write the newest playlist, once however many wait for it."""
-    state = (reel.until, reel.ended, pulse0)
+    state = (reel.until, reel.has_ended, pulse0)
     known = _WRITTEN.get(reel)
     if known is None or known[0] != state:
         known = _WRITTEN[reel] = (state, _written(reel, pulse0))
@@ -56,9 +56,9 @@ def _newest(reel: HlsSegmenter, pulse0: float | None) -> str:
 
 
 def _written(reel: HlsSegmenter, pulse0: float | None) -> str:
-    plan, growing = reel.plan, reel.growing
+    plan, growing = reel.layout, reel.open_segment
     oldest = reel.until - _RECENT * plan.target_s * plan.fps
-    listed = [Listed(it.number, it.first, it.until, _parts(it, oldest)) for it in reel.listed]
+    listed = [Listed(it.number, it.first, it.until, _parts(it, oldest)) for it in reel.playlist_segments]
     if growing is not None and growing.parts:
         parts = _parts(growing, oldest)
         listed.append(Listed(growing.number, growing.first, growing.until, parts, whole=False))
@@ -69,24 +69,24 @@ def _written(reel: HlsSegmenter, pulse0: float | None) -> str:
             f"#EXT-X-SERVER-CONTROL:CAN-BLOCK-RELOAD=YES,PART-HOLD-BACK={_HELD_BACK * length:.5f}",
             f"#EXT-X-PART-INF:PART-TARGET={length:.5f}",
         ]
-    hint = part_name(*_next(reel)) if plan.has_parts and not reel.ended else None
-    return playlist(listed, plan, pulse0, extra, ended=reel.ended, hint=hint)
+    hint = part_name(*_next(reel)) if plan.has_parts and not reel.has_ended else None
+    return playlist(listed, plan, pulse0, extra, ended=reel.has_ended, hint=hint)
 
 
 def _parts(segment: HlsSegment, oldest: float) -> list[ListedPart]:
     if segment.until <= oldest:
         return []
-    return [ListedPart(it.footage.until - it.footage.first, it.independent) for it in segment.parts]
+    return [ListedPart(it.chunk.until - it.chunk.first, it.independent) for it in segment.parts]
 
 
 def _next(reel: HlsSegmenter) -> tuple[int, int]:
     """Give segment and index of the part that comes next."""
-    number, pulses = divmod(reel.until, reel.plan.frames)
-    return number, pulses // reel.plan.gop
+    number, pulses = divmod(reel.until, reel.layout.segment_frames)
+    return number, pulses // reel.layout.gop
 
 
 def _is_next(reel: HlsSegmenter, number: int, index: int) -> bool:
-    return reel.plan.has_parts and not reel.ended and (number, index) == _next(reel)
+    return reel.layout.has_parts and not reel.has_ended and (number, index) == _next(reel)
 
 
 def _wanted(request: web.Request, reel: HlsSegmenter) -> tuple[int, int | None] | web.Response | None:
@@ -99,8 +99,8 @@ def _wanted(request: web.Request, reel: HlsSegmenter) -> tuple[int, int | None] 
     for name, value in (("_HLS_msn", number), ("_HLS_part", index)):
         if value is not None and not (value.isascii() and value.isdecimal() and len(value) <= len("9" * 12)):
             return problem(400, f"{name}={value}: must be a whole number")
-    last = reel.until // reel.plan.frames
-    if int(number) > last + _FAR and not reel.ended:
+    last = reel.until // reel.layout.segment_frames
+    if int(number) > last + _FAR and not reel.has_ended:
         return problem(400, f"_HLS_msn={number}: is too far ahead; the newest segment is {last}")
     return int(number), None if index is None else int(index)
 
@@ -108,9 +108,9 @@ def _wanted(request: web.Request, reel: HlsSegmenter) -> tuple[int, int | None] 
 async def _waited(reel: HlsSegmenter, number: int, index: int | None) -> bool:
     """Wait until a part, or a whole segment, is there; tell whether it is, or the stream is over."""
     try:
-        async with asyncio.timeout(_WAIT * reel.plan.target_s):
-            while not reel.ended and not reel.reaches(number, index):
-                await reel.more()
+        async with asyncio.timeout(_WAIT * reel.layout.target_s):
+            while not reel.has_ended and not reel.has_reached(number, index):
+                await reel.wait_for_update()
     except TimeoutError:
         return False
     return True

@@ -37,7 +37,7 @@ def long_playlist(
     first, last = listing.numbers[0], listing.numbers[-1]
     lines = head_lines(plan, first, extra)
     dated = [first, *range(first // _STEP * _STEP + _STEP, last + 1, _STEP)]
-    whole = f"#EXTINF:{plan.frames / plan.fps:.5f},\n"
+    whole = f"#EXTINF:{plan.segment_frames / plan.fps:.5f},\n"
     for begin, after in pairwise([*dated, last + 1]):
         lines += _told(listing, begin, plan, pulse0)
         lines += [f"{whole}{number}.m4s" for number in range(begin + 1, min(after, last))]

@@ -111,8 +111,8 @@ async def get_part(request: web.Request, stream: Stream) -> web.Response:
 
 def _media(request: web.Request, data: bytes) -> web.Response:
     """Give bytes that never change. A site that starts anew counts anew: they are not kept for long."""
-    plan = request.app[SERVICE].splicer.plan
-    kept_s = int(2 * plan.listed * plan.frames / plan.fps)
+    plan = request.app[SERVICE].splicer.layout
+    kept_s = int(2 * plan.playlist_length * plan.segment_frames / plan.fps)
     headers = {**_ANYBODY, "Cache-Control": f"public, max-age={kept_s}, immutable"}
     return web.Response(body=data, content_type="video/mp4", headers=headers)
 
@@ -121,12 +121,12 @@ def _stream(request: web.Request) -> Stream | None:
     service = request.app[SERVICE]
     if "camera" in request.match_info:
         camera = request.match_info["camera"]
-        reel = service.splicer.camera_reel(camera)
+        reel = service.splicer.segmenter_of_camera(camera)
         return (
             None if reel is None else Stream(f"camera {camera}", reel, CameraPlayback(service.past, camera))
         )
     number = int(request.match_info["object"])
-    reel = service.splicer.reel(service.board.resolve(number), scoped=sees_one_person(request))
+    reel = service.splicer.segmenter_of_person(service.board.resolve(number), scoped=sees_one_person(request))
     stream = Stream(f"object {number}", reel, object_past(request, number))
     return stream if stream.exists else None
 
@@ -148,7 +148,7 @@ def _connected(request: web.Request) -> tuple[str, int]:
     if "camera" in names:
         return of_live(names["camera"]), service.splicer.cameras[names["camera"]].viewers
     number = service.board.resolve(int(names["object"]))
-    return of_person(number), service.splicer.watched(number)
+    return of_person(number), service.splicer.viewers_of(number)
 
 
 def _nobody(request: web.Request) -> web.Response:

@@ -58,14 +58,14 @@ async def playlist_of_the_past(request: web.Request, stream: Stream) -> web.Resp
     missing = await nothing_kept(stream.source, wish, stream.what)
     if missing is not None:
         return missing
-    rewound, plan = _rewound(service, stream), service.splicer.plan
+    rewound, plan = _rewound(service, stream), service.splicer.layout
     listing = rewound.listing(wish.start, wish.end)
     if listing is None:
         return not_now("the first segment is not whole yet")
     grows = not rewound.over and (wish.end is None or wish.end > rewound.end)
     if wish.end is not None:
         most = MOST_GROWING if grows else MOST
-        until = (listing.numbers.start + most) * plan.frames
+        until = (listing.numbers.start + most) * plan.segment_frames
         if (wish.end if grows else listing.end) > until:
             return problem(400, _too_long(most, plan, until, grows=grows))
     if not (_PULSE.fullmatch(request.query["from"]) and _NAMED_END.fullmatch(request.query.get("to", ""))):
@@ -78,7 +78,10 @@ async def playlist_of_the_past(request: web.Request, stream: Stream) -> web.Resp
 
 async def segment_of_the_past(request: web.Request, stream: Stream, number: int) -> HlsSegment | None:
     """Give a segment that is not in the newest playlist any more; None where it is not kept."""
-    rewound, frames = _rewound(request.app[SERVICE], stream), request.app[SERVICE].splicer.plan.frames
+    rewound, frames = (
+        _rewound(request.app[SERVICE], stream),
+        request.app[SERVICE].splicer.layout.segment_frames,
+    )
     with suppress(OSError):  # what cannot be read is a hole
         await run_in_reader_thread(forget_missing_ends, stream.source, number * frames, (number + 1) * frames)
     return await rewound.segment(number)
@@ -88,7 +91,7 @@ def _rewound(service: BestViewService, stream: Stream) -> TimeShift:
     past = service.past
     hearing = partial(_hearing, service)
     timeline = partial(new_timeline, service)
-    plan, gop, decided = service.splicer.plan, service.config.encode.gop, past.recent.end
+    plan, gop, decided = service.splicer.layout, service.config.encode.gop, past.recent.end
     over = _is_over(stream)
     return TimeShift(stream.source, plan, timeline, hearing, gop=gop, decided=decided, over=over)
 
@@ -99,12 +102,12 @@ def _hearing(service: BestViewService) -> PlaybackAudio | None:
 
 
 def _is_over(stream: Stream) -> bool:
-    return stream.reel is None or stream.reel.ended
+    return stream.reel is None or stream.reel.has_ended
 
 
 def _too_long(most: int, plan: SegmentLayout, until: int, *, grows: bool) -> str:
     what, instead = ("a list that grows", f"to={_LIVE}, or ") if grows else ("a list", "")
-    seconds = most * plan.frames / plan.fps
+    seconds = most * plan.segment_frames / plan.fps
     return f"to: {what} has {most} segments at most, here {seconds:.0f} s; say {instead}to=p{until}"
 
 

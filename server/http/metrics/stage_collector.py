@@ -66,9 +66,11 @@ class ServiceStages(Collector):
         service = self._app[SERVICE]
         splicer = service.splicer
         kinds = {
-            "object": splicer.viewers_of_objects,
-            "camera": sum(it.viewers for it in (*splicer.cameras.values(), *splicer.decided.values())),
-            "preferred": splicer.viewers_who_prefer,
+            "object": splicer.person_viewers,
+            "camera": sum(
+                it.viewers for it in (*splicer.cameras.values(), *splicer.decided_cameras.values())
+            ),
+            "preferred": splicer.preferred_camera_viewers,
             "hls": self._app[READERS].all,
             "past": service.past.viewers,
             "pictures": self._app[PICTURES].viewers,

@@ -73,10 +73,10 @@ def _merge(service: BestViewService, people: People, number: int, other: int) ->
 
 
 def _part(service: BestViewService, people: People, number: int, cameras: list[str]) -> web.Response:
-    unknown = [it for it in cameras if it not in service.shelves]
+    unknown = [it for it in cameras if it not in service.frame_buffers]
     if unknown:
         return no_camera(service, unknown[0])
-    parted = people.part(number, cameras or list(service.shelves))
+    parted = people.part(number, cameras or list(service.frame_buffers))
     if parted is None:
         return problem(409, f"no such camera shows object {number} now")
     return answer(_told(service, parted))

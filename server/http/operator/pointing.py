@@ -54,7 +54,7 @@ async def post_pointing(request: web.Request) -> web.Response:
     said = await asked_for(request, Said)
     if _cannot(service):
         return problem(409, _cannot(service))
-    if said.camera not in service.shelves:
+    if said.camera not in service.frame_buffers:
         return no_camera(service, said.camera)
     people = service.decider.people
     number = people.roll.whose(said.object)

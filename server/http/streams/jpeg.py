@@ -134,14 +134,14 @@ def _subject(request: web.Request) -> Subject:
 def _person(request: web.Request) -> Subject:
     service, number = request.app[SERVICE], int(request.match_info["object"])
     known, scoped = service.board.resolve(number), sees_one_person(request)
-    if known not in (service.splicer.scoped if scoped else service.splicer.objects):
+    if known not in (service.splicer.scoped_persons if scoped else service.splicer.persons):
         raise _RefusedError(no_object(service, number))
     return PersonView(known, scoped)
 
 
 def _camera(request: web.Request) -> Subject:
     service, camera = request.app[SERVICE], request.match_info["camera"]
-    if camera not in service.shelves:
+    if camera not in service.frame_buffers:
         raise _RefusedError(no_camera(service, camera))
     return CameraView(camera, decided=wants_boxes(request))
 

@@ -12,7 +12,8 @@ from functools import lru_cache
 from aiohttp import web
 
 from server.http.traffic import SENT, Sent
-from server.service.streaming.broadcaster import Broadcaster, Chunk, Subscriber
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.subscriber_queue import Chunk, Subscriber
 
 log = logging.getLogger(__name__)
 
@@ -40,11 +41,11 @@ async def send_stream(
     request: web.Request, channel: Broadcaster, head: bytes, headers: Mapping[str, str], form: Form = plain
 ) -> web.StreamResponse:
     """Send ``head`` and then the channel for as long as both live."""
-    viewer = channel.join()
+    viewer = channel.subscribe()
     try:
         return await send_viewer(request, viewer, head, headers, form)
     finally:
-        channel.leave(viewer)
+        channel.unsubscribe(viewer)
 
 
 async def send_viewer(
@@ -55,15 +56,15 @@ async def send_viewer(
     def ready(response: web.StreamResponse) -> None:
         if request.transport is not None:
             chunked = response.headers.get("Transfer-Encoding") == "chunked"
-            viewer.at_once = _at_once(request.transport, form, sent, chunked=chunked)
+            viewer.direct_send = _at_once(request.transport, form, sent, chunked=chunked)
 
     sent = request.app[SENT]
     sent.join(viewer)
-    pieces = (form(piece) async for piece in viewer.pieces())
+    pieces = (form(piece) async for piece in viewer.chunks())
     try:
         return await send_bytes(request, pieces, head, headers, ready)
     finally:
-        viewer.at_once = None
+        viewer.direct_send = None
         sent.leave(viewer)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from server.service.service import BestViewService
-from server.service.streaming.broadcaster import Chunk
 from server.service.streaming.media_chunk import MediaChunk
+from server.service.streaming.subscriber_queue import Chunk
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +29,11 @@ def mp4_head(service: BestViewService) -> bytes | None:
 
 
 def _mp4(piece: Chunk) -> bytes:
-    return piece.with_sound if isinstance(piece, MediaChunk) else piece.data
+    return piece.data_with_audio if isinstance(piece, MediaChunk) else piece.data
 
 
 def _ts(piece: Chunk) -> bytes:
-    return piece.ts if isinstance(piece, MediaChunk) else piece.data
+    return piece.mpegts if isinstance(piece, MediaChunk) else piece.data
 
 
 MP4 = Form("video/mp4", mp4_head, _mp4)

@@ -53,7 +53,7 @@ async def best_of_the_past(request: web.Request, form: Form) -> web.StreamRespon
     number = int(request.match_info["object"])
     source = object_past(request, number)
     splicer = service.splicer
-    channels = splicer.scoped if sees_one_person(request) else splicer.objects
+    channels = splicer.scoped_persons if sees_one_person(request) else splicer.persons
 
     def live() -> Broadcaster | None:
         return channels.get(service.board.resolve(number))
@@ -74,7 +74,7 @@ async def camera_of_the_past(request: web.Request, form: Form) -> web.StreamResp
     """Stream one camera from a moment on."""
     service = request.app[SERVICE]
     camera = request.match_info["camera"]
-    if camera not in service.shelves:
+    if camera not in service.frame_buffers:
         return no_camera(service, camera)
     source = CameraPlayback(service.past, camera)
 
@@ -101,7 +101,7 @@ async def get_camera_past(request: web.Request) -> web.Response:
     """Say from when to when a camera can be seen again; from= and to= say of which time."""
     service = request.app[SERVICE]
     camera = request.match_info["camera"]
-    if camera not in service.shelves:
+    if camera not in service.frame_buffers:
         return no_camera(service, camera)
     return await _past(request, CameraPlayback(service.past, camera))
 

@@ -63,21 +63,21 @@ async def _best(request: web.Request, form: Form) -> web.StreamResponse:
     number = int(request.match_info["object"])
     person = service.board.resolve(number)
     scoped, splicer = sees_one_person(request), service.splicer
-    channel = (splicer.scoped if scoped else splicer.objects).get(person)
+    channel = (splicer.scoped_persons if scoped else splicer.persons).get(person)
     if channel is None:
         return no_object(service, number)
     held, preferred = request.query.get("camera"), request.query.get("prefer")
     for camera in (held, preferred):
-        if camera is not None and camera not in service.shelves:
+        if camera is not None and camera not in service.frame_buffers:
             return no_camera(service, camera)
-    by_channel, beside = of_person(person), splicer.watched(person) - channel.viewers
+    by_channel, beside = of_person(person), splicer.viewers_of(person) - channel.viewers
     fetched: str | None = by_channel
     if held is not None:
-        channel = splicer.decided[held]
+        channel = splicer.decided_cameras[held]
         by_channel, fetched, beside = of_decided(held), of_camera(held), 0
     elif preferred is not None:
-        preferring = splicer.preferring_scoped if scoped else splicer.preferring
-        channel = preferring.channel(person, preferred)
+        preferring = splicer.preferred_scoped if scoped else splicer.preferred
+        channel = preferring.broadcaster(person, preferred)
         by_channel, fetched, beside = f"object {person} preferring {preferred}", None, 0
     return await _send(request, channel, by_channel, fetched, form, beside)
 

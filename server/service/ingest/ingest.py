@@ -12,6 +12,7 @@ import msgspec
 
 from camsync.lines import RateLimit
 from logthrottle import LogThrottle
+from server.media.picture import Picture
 from server.media.stream_format import ParameterMismatchError
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
@@ -28,7 +29,7 @@ from server.service.ingest.epoch_aligner import Aligner
 from server.service.ingest.validation import makes_sense
 from server.service.metrics.camera_metrics import Gauge
 from server.service.streaming.audio_buffer import AudioBuffer
-from server.service.streaming.frame_buffer import FrameBuffer, Shelved, UndecodableFrameError
+from server.service.streaming.frame_buffer import FrameBuffer, UndecodableFrameError
 
 log = logging.getLogger(__name__)
 
@@ -104,9 +105,9 @@ class Intake:
 
     def __init__(
         self,
-        shelves: Mapping[str, FrameBuffer],
+        frame_buffers: Mapping[str, FrameBuffer],
         aligner: Aligner,
-        on_frame: Callable[[str, Shelved], None],
+        on_frame: Callable[[str, Picture], None],
         sound: AudioBuffer | None = None,
         *,
         sounding: str | None = None,
@@ -114,13 +115,13 @@ class Intake:
         ahead: int = 0,
     ) -> None:
         self._now, self._ahead = now, ahead
-        self._shelves, self._aligner, self._on_frame = shelves, aligner, on_frame
+        self._shelves, self._aligner, self._on_frame = frame_buffers, aligner, on_frame
         self._sound, self._sounding = sound, sounding
         self._unknown = LogThrottle()
-        self._told = {camera: RateLimit(_TOLD_MOST, _TOLD_RATE, time.monotonic()) for camera in shelves}
-        self.states = {camera: CameraState() for camera in shelves}
+        self._told = {camera: RateLimit(_TOLD_MOST, _TOLD_RATE, time.monotonic()) for camera in frame_buffers}
+        self.states = {camera: CameraState() for camera in frame_buffers}
         self._thumbnails: dict[str, OrderedDict[tuple[int, int], Thumbnail]] = {
-            camera: OrderedDict() for camera in shelves
+            camera: OrderedDict() for camera in frame_buffers
         }
         """By camera, boot and track; the newest is the last."""
         self._frame_head = msgspec.json.Decoder(FrameHeader)
@@ -159,8 +160,8 @@ class Intake:
             head = self._frame_head.decode(message.attachment)
             if state.refused or self._is_far_ahead(state, head.pulse):
                 return
-            shelf = self._shelves[camera]
-            frame = shelf.put(head.pulse, head.boot, message.payload, key=head.key, after=head.after)
+            frame_buffer = self._shelves[camera]
+            frame = frame_buffer.put(head.pulse, head.boot, message.payload, key=head.key, after=head.after)
         except (*DECODE_ERRORS, UndecodableFrameError) as error:
             state.bad(error)
         except ParameterMismatchError as error:

@@ -22,17 +22,17 @@ class Lacking:
 
     def __init__(
         self,
-        shelves: Mapping[str, FrameBuffer],
+        frame_buffers: Mapping[str, FrameBuffer],
         states: Mapping[str, CameraState],
         stride: int,
         clock: Clock = time.monotonic,
     ) -> None:
-        self._shelves, self._states, self._stride = shelves, states, stride
-        self._late = {camera: LogThrottle(clock) for camera in shelves}
+        self._shelves, self._states, self._stride = frame_buffers, states, stride
+        self._late = {camera: LogThrottle(clock) for camera in frame_buffers}
         self.recorder: LiveDecisionWriter | None = None
         self.late_epochs = 0
         """Windows that were decided without a camera that was there."""
-        self.lost_pictures = dict.fromkeys(shelves, 0)
+        self.lost_pictures = dict.fromkeys(frame_buffers, 0)
         """By camera: pictures of decided GOPs that did not come though it was delivering."""
         self._holes = LogThrottle(clock)
         self._until: int | None = None
@@ -63,8 +63,8 @@ class Lacking:
         if self._until is not None and decision.first > self._until:
             self._hole(range(self._until, decision.first))
         self._until = decision.first + decision.frames
-        for camera, shelf in self._shelves.items():
-            lost = shelf.lost(decision.first, decision.frames)
+        for camera, frame_buffer in self._shelves.items():
+            lost = frame_buffer.missing(decision.first, decision.frames)
             self.lost_pictures[camera] += len(lost)
             if self.recorder is not None:
                 self.recorder.late(camera, lost, "no picture")

@@ -13,8 +13,8 @@ from server.service.streaming.frame_buffer import FrameBuffer
 class RecentGops:
     """Finds GOPs on the shelves, of cameras and of people. ``gop`` is the length of a GOP in frames."""
 
-    def __init__(self, shelves: Mapping[str, FrameBuffer], gop: int, frames: int) -> None:
-        self._shelves, self._gop, self._frames = shelves, gop, frames
+    def __init__(self, frame_buffers: Mapping[str, FrameBuffer], gop: int, frames: int) -> None:
+        self._shelves, self._gop, self._frames = frame_buffers, gop, frames
         self._choices: deque[GopChoices] = deque()
 
     def put(self, choices: GopChoices) -> None:
@@ -55,9 +55,9 @@ class RecentGops:
 
     def of_camera(self, camera: str, pulse: int) -> RecordedGop | None:
         """Give a camera's GOP that holds a pulse, or the next one, as far as it has come."""
-        shelf = self._shelves[camera]
-        earliest = max(pulse, shelf.newest - self._frames)
-        for first in range(earliest // self._gop * self._gop, shelf.newest + 1, self._gop):
+        frame_buffer = self._shelves[camera]
+        earliest = max(pulse, frame_buffer.newest - self._frames)
+        for first in range(earliest // self._gop * self._gop, frame_buffer.newest + 1, self._gop):
             gop = self.delivered(camera, first, self._gop)
             if gop is not None and gop.end > pulse:
                 return gop

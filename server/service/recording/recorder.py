@@ -35,7 +35,7 @@ class Recorder:
     def __init__(
         self,
         config: Config,
-        shelves: Mapping[str, FrameBuffer],
+        frame_buffers: Mapping[str, FrameBuffer],
         agreement: Agreement,
         frames: int,
         sound: AudioBuffer | None = None,
@@ -43,7 +43,7 @@ class Recorder:
         self._config, self._agreement = config, agreement
         self.sound = sound
         """The newest sound; None: the site has none."""
-        self.recent = RecentGops(shelves, config.encode.gop, frames)
+        self.recent = RecentGops(frame_buffers, config.encode.gop, frames)
         self.pulse0: float | None = None
         self.numbers_since: float | None = None
         self._held: deque[GopChoices] = deque()
@@ -123,7 +123,7 @@ class Recorder:
         }
         cameras = {camera: gop for camera, gop in delivered.items() if gop is not None}
         end = choices.first + choices.frames
-        heard = None if self.sound is None else self.sound.between(choices.first, end)
+        heard = None if self.sound is None else self.sound.audio_between(choices.first, end)
         writer.put(GopRecord(choices, cameras, heard))
 
     @property

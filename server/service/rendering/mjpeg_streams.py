@@ -6,7 +6,8 @@ from collections import deque
 from dataclasses import dataclass
 
 from server.media.rendering_messages import Canvas, Drawn, Jpeg, belongs
-from server.service.streaming.broadcaster import Broadcaster, BytesChunk, Subscriber
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.subscriber_queue import BytesChunk, Subscriber
 
 
 class PicturePacer:
@@ -88,14 +89,14 @@ class MjpegStreams:
 
     def join(self, series: MjpegVariant) -> Subscriber:
         """Let a viewer in; call :meth:`leave` in the end."""
-        channel = self._channels.setdefault(series, Broadcaster(queue_starts=_NEWEST))
+        channel = self._channels.setdefault(series, Broadcaster(queue_gops=_NEWEST))
         if self._closed:
             channel.close()
-        return channel.join()
+        return channel.subscribe()
 
     def leave(self, series: MjpegVariant, viewer: Subscriber) -> None:
         """Let a viewer go."""
-        self._channels[series].leave(viewer)
+        self._channels[series].unsubscribe(viewer)
         if not self._channels[series].viewers:
             del self._channels[series]
 
@@ -116,7 +117,7 @@ class MjpegStreams:
         """Pass on what is due; give the moment of the next picture, None where none waits."""
         while self._waiting and self._waiting[0].at <= now:
             due = self._waiting.popleft()
-            chunk = BytesChunk(multipart_part(due.picture), start=True)
+            chunk = BytesChunk(multipart_part(due.picture), random_access=True)
             for series, channel in self._channels.items():
                 if series.boxed is due.boxed and belongs(due.picture.pulse, series.rate, self._fps):
                     channel.publish(chunk)

@@ -38,7 +38,7 @@ class OverlayVideo:
         self._agreement = Agreement()
         self._time = GaplessTimeline(self._agreement, canvas.fps, canvas.gop)
         self._process = 0
-        self.channel = Broadcaster(queue_starts=queue_gops)
+        self.channel = Broadcaster(queue_gops=queue_gops)
         self.wanted = 0
         """How many watch, or wait for its beginning."""
         self.head: bytes | None = None
@@ -51,13 +51,13 @@ class OverlayVideo:
 
         Where they are ``silent``, the site's sound is not heard meanwhile.
         """
-        pictures = [shown for unit in units for shown in self._time.take(self._picture(unit))]
+        pictures = [shown for unit in units for shown in self._time.push(self._picture(unit))]
         for gop in _gops(pictures):
-            heard = None if self._sound is None else self._sound.beside(gop[0].pulse, gop[-1].until)
+            heard = None if self._sound is None else self._sound.next_audio(gop[0].pulse, gop[-1].until)
             bridged = gop[0].pulse < units[0].pulse
             if heard is not None and (silent or (self._silent_holes and bridged)):
                 heard = heard.silenced
-            self.channel.publish(self._tally.footage(gop, heard))
+            self.channel.publish(self._tally.chunk(gop, heard))
 
     def interrupted(self) -> None:
         """Another process goes on from here: what it encodes builds on nothing that was before."""

@@ -142,7 +142,7 @@ class RenderPool:
             return None
         if subject.decided:
             return self._decided.newest
-        return service.shelves[subject.camera].newest
+        return service.frame_buffers[subject.camera].newest
 
     async def close(self) -> None:
         """End all sources and their processes."""
@@ -175,10 +175,10 @@ class RenderPool:
         told: Callable[[bytes], GopOverlay]
         match subject:
             case PersonView(number, scoped):
-                stream = (splicer.scoped if scoped else splicer.objects)[number]
+                stream = (splicer.scoped_persons if scoped else splicer.persons)[number]
                 told = partial(decided.of_person, number, alone=scoped)
             case CameraView(camera, decided=True):
-                stream, told = splicer.decided[camera], partial(decided.of_camera, camera)
+                stream, told = splicer.decided_cameras[camera], partial(decided.of_camera, camera)
             case CameraView(camera):
                 stream, told = splicer.cameras[camera], _nothing
         live = isinstance(subject, CameraView) and not subject.decided

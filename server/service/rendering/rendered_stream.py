@@ -15,9 +15,13 @@ from server.service.rendering.mjpeg_streams import MjpegStreams
 from server.service.rendering.overlay_video import OverlayVideo
 from server.service.rendering.worker_process import RenderWorker, WorkerDiedError
 from server.service.streaming.audio_buffer import AudioBuffer
-from server.service.streaming.broadcaster import Broadcaster, Chunk, Subscriber
+from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.media_chunk import MediaChunk
+
 from server.system.backoff import Backoff
+
+from server.service.streaming.subscriber_queue import Chunk, Subscriber
+
 
 
 @dataclass(slots=True)
@@ -119,7 +123,7 @@ class RenderedStream:
     @property
     def lost(self) -> int:
         """How many GOPs the process was too slow for."""
-        return self._lost + (0 if self._viewer is None else self._viewer.lost)
+        return self._lost + (0 if self._viewer is None else self._viewer.lost_gops)
 
     def use(self) -> None:
         """Somebody uses it."""
@@ -217,16 +221,16 @@ class RenderedStream:
         """Draw what comes, while somebody wants it, until the stream ends."""
         while True:
             await self._used.wait()
-            viewer = self._viewer = self._stream.join()
+            viewer = self._viewer = self._stream.subscribe()
             try:
-                async for piece in viewer.pieces():
+                async for piece in viewer.chunks():
                     await self._draw(process, piece)
                     if not self.users:
                         break
                 else:
                     return
             finally:
-                self._stream.leave(viewer)
+                self._stream.unsubscribe(viewer)
                 self._lost, self._viewer = self.lost, None
 
     async def _draw(self, process: RenderWorker, piece: Chunk) -> None:
@@ -244,7 +248,7 @@ class RenderedStream:
             )
         )
         self.newest, self._answered = drawn.newest, True
-        self.film.put(drawn.film, silent=isinstance(piece, MediaChunk) and piece.silent)
+        self.film.put(drawn.film, silent=isinstance(piece, MediaChunk) and piece.is_muted)
         self.series.put(drawn, asyncio.get_running_loop().time())
         self._shown.set()
         self._stills.asked.set()

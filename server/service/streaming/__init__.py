@@ -1,1 +1,1 @@
-"""The streams: the cameras' own frames, spliced, to any number of viewers."""
+"""Live streams: the cameras' encoded frames, spliced into a stream per person, for any number of viewers."""

@@ -1,75 +1,70 @@
-"""One camera's newest frames as fragments, by pulse: what every stream takes from."""
+"""One camera's newest frames as container fragments, by pulse: every stream is put together from them."""
 
 from __future__ import annotations
-
-from typing import TypeAlias
 
 from server.media.h264.annexb import ParameterSets
 from server.media.picture import Picture
 from server.media.stream_format import Agreement
 
-Shelved: TypeAlias = Picture
-"""One frame, ready to be sent to anybody."""
-
 
 class UndecodableFrameError(ValueError):
-    """An access unit in which there is no picture, or none that says what it follows."""
+    """An access unit without a picture, or without the frame number that decoding needs."""
 
 
 class FrameBuffer:
-    """Keeps the last ``frames`` frames of one camera; each is made into a fragment once, when it comes.
+    """Keeps the last ``frames`` frames of one camera; each is packed into a fragment once, when it arrives.
 
-    All shelves of a site have one ``agreement`` about what its streams are made of.
+    All frame buffers of a site share one ``agreement``, the format of its streams.
     """
 
     def __init__(self, fps: float, frames: int, agreement: Agreement) -> None:
         self._fps = fps
-        self._frames = frames
+        self._max_frames = frames
         self._agreement = agreement
-        self._shelved: dict[int, Shelved] = {}
+        self._pictures: dict[int, Picture] = {}
         self._parameters: ParameterSets | None = None
         self.newest = -1
 
     def put(
         self, pulse: int, boot: int, access_unit: bytes, *, key: bool, after: int | None = None
-    ) -> Shelved:
-        """Shelve an access unit; ``after`` is the pulse of the one that it is decoded by, if that is known.
+    ) -> Picture:
+        """Store an access unit; ``after`` is the pulse of its reference frame, if known.
 
         Raises:
-            ParameterMismatchError: its parameters are not the site's, and the camera must be refused.
-            NoPictureError: it is damaged; nothing is shelved.
+            ParameterMismatchError: its parameter sets are not the site's, and the camera must be refused.
+            UndecodableFrameError: it is damaged; nothing is stored.
         """
         if key:
             self._parameters = self._agreement.accept(access_unit)
-        made = self._agreement.pack(access_unit, pulse, self._fps, key=key)
-        shelved = Shelved(pulse, key, made, boot, parameters=self._parameters, after=after)
-        bridge = self._agreement.bridge(shelved, self._fps)
-        if bridge is not None and not bridge.can_follow(shelved):
+        fragment = self._agreement.pack(access_unit, pulse, self._fps, key=key)
+        picture = Picture(pulse, key, fragment, boot, parameters=self._parameters, after=after)
+        bridge = self._agreement.bridge(picture, self._fps)
+        if bridge is not None and not bridge.can_follow(picture):
             raise UndecodableFrameError(f"no picture can be read in the access unit of pulse {pulse}")
-        self._shelved[pulse] = shelved
+        self._pictures[pulse] = picture
         self.newest = max(self.newest, pulse)
-        while len(self._shelved) > self._frames:
-            del self._shelved[next(iter(self._shelved))]
-        return shelved
+        while len(self._pictures) > self._max_frames:
+            del self._pictures[next(iter(self._pictures))]
+        return picture
 
-    def lost(self, first: int, frames: int) -> list[int]:
-        """List the pulses among these whose frames did not come, though earlier and later ones did."""
-        oldest = next(iter(self._shelved), self.newest + 1)
-        span = range(max(first, oldest), min(first + frames, self.newest + 1))
-        return [pulse for pulse in span if pulse not in self._shelved]
+    def missing(self, first: int, frames: int) -> list[int]:
+        """Return the pulses among these that are missing although earlier and later frames have arrived."""
+        oldest = next(iter(self._pictures), self.newest + 1)
+        pulses = range(max(first, oldest), min(first + frames, self.newest + 1))
+        return [pulse for pulse in pulses if pulse not in self._pictures]
 
     def has(self, pulse: int) -> bool:
-        """Tell whether the frame is here."""
-        return pulse in self._shelved
+        """Return whether a frame is in the buffer."""
+        return pulse in self._pictures
 
-    def get(self, pulse: int) -> Shelved | None:
-        """Give one frame."""
-        return self._shelved.get(pulse)
+    def get(self, pulse: int) -> Picture | None:
+        """Return one frame; None if it is not in the buffer."""
+        return self._pictures.get(pulse)
 
-    def pictures(self, first: int, frames: int) -> list[Shelved]:
-        """Give those of some consecutive frames that are here."""
-        return [self._shelved[pulse] for pulse in range(first, first + frames) if pulse in self._shelved]
+    def pictures(self, first: int, frames: int) -> list[Picture]:
+        """Return the frames of ``first … first + frames - 1`` that are in the buffer."""
+        return [self._pictures[pulse] for pulse in range(first, first + frames) if pulse in self._pictures]
 
     def gop(self, first: int, frames: int) -> bytes:
-        """Give the fragments of consecutive frames in one piece; all of them must be here."""
-        return b"".join(self._shelved[pulse].fragment for pulse in range(first, first + frames))
+        """Return the joined fragments of consecutive frames, all of which must be in the buffer."""
+        return b"".join(self._pictures[pulse].fragment for pulse in range(first, first + frames))

@@ -1,8 +1,7 @@
-"""One stream's time: no hole in it, whatever does not come.
+"""One stream's time without gaps: a missing picture is filled by repeating the one before it.
 
-A player that has nothing for a moment stops there, some for good. So where a picture is missing, the one
-before it is shown again, by a picture that says just that (`media/bridge.py`): a decoder sees an ordinary
-stream.
+A player that receives nothing for a moment stops there, some for good. So a picture that encodes "the same
+again" takes the place of a missing one (:mod:`server.media.gap_filler`): a decoder sees an ordinary stream.
 """
 
 from __future__ import annotations
@@ -11,27 +10,27 @@ from server.media.gap_filler import Bridge
 from server.media.picture import Picture
 from server.media.stream_format import Agreement
 
-_LONG_S = 2
-"""Holes up to so long get a picture for every pulse, longer ones a single picture that lasts."""
+_PER_PULSE_S = 2
+"""Gaps up to so long get a picture for every pulse, longer ones a single picture of that duration."""
 LONGEST_GAP_S = 3600
-"""Nobody waits that long: a longer hole stays one, and a duration fits into MP4's 32 bits."""
-_ANEW_S = 10
-"""A key picture so far back is of pulses that began anew, not a late one."""
+"""A longer gap is not filled: nobody waits for so long, and the duration would not fit MP4's 32 bits."""
+_RESTART_S = 10
+"""A keyframe so far back belongs to pulses that started again; it is not a late one."""
 
 
 class GaplessTimeline:
-    """What a stream has shown so far, and what it must show so that the next picture follows.
+    """The pictures that a stream has shown, and those that it must show so that the next one follows.
 
-    ``gop`` is the number of pulses from key picture to key picture.
+    ``gop`` is the number of pulses from keyframe to keyframe.
     """
 
     def __init__(self, agreement: Agreement, fps: float, gop: int) -> None:
         self.agreement, self._fps, self._gop = agreement, fps, gop
         self._newest: Picture | None = None
-        """The picture that the next one is decoded by."""
+        """The reference of the next picture."""
         self._until = 0
-        self._broken = False
-        """A picture is missing that the next ones are decoded by, up to a key picture."""
+        self._is_broken = False
+        """Whether a reference picture of the present GOP is missing; until the next keyframe."""
 
     @property
     def newest(self) -> Picture | None:
@@ -40,42 +39,43 @@ class GaplessTimeline:
 
     @property
     def until(self) -> int | None:
-        """The first pulse that is not filled yet; None before the first picture."""
+        """The first pulse that is not shown yet; None before the first picture."""
         return None if self._newest is None else self._until
 
-    def take(self, picture: Picture) -> list[Picture]:
-        """Give what to show now that this picture has come: it, if it can be, after what bridges a hole.
+    def push(self, picture: Picture) -> list[Picture]:
+        """Return what to show when a picture arrives: the filler of a gap before it, then the picture.
 
-        Late ones give nothing, and neither does what comes before the first key picture.
+        Late pictures, and those before the first keyframe, are dropped. A picture that cannot be decoded is
+        replaced by a repetition.
         """
-        if self._newest is None or self._begins_anew(picture):
+        if self._newest is None or self._is_restart(picture):
             return self._show(picture) if picture.key else []
         if picture.pulse < self._until:
             return []
-        if not picture.key and self._lost_before(picture):
+        if not picture.key and self._reference_is_lost(picture):
             return self.fill(picture.until)
-        return self._slip_in(picture) + self._show(picture)
+        return self._fill_before(picture) + self._show(picture)
 
-    def pass_by(self, last: Picture) -> None:
-        """Note that a whole GOP is shown, of which this is the last picture: nothing has to be bridged."""
+    def advance_past(self, last: Picture) -> None:
+        """Note that a complete GOP was shown, of which this is the last picture: there is no gap to fill."""
         self._show(last)
 
     def fill(self, until: int) -> list[Picture]:
-        """Give what repeats the last picture up to a pulse; nothing before the first picture."""
+        """Return repetitions of the last picture up to a pulse; none before the first picture."""
         bridge, missing = self._bridge(), until - self._until
         if bridge is None or self._newest is None or not 0 < missing <= LONGEST_GAP_S * self._fps:
             return []
-        each = 1 if missing <= _LONG_S * self._fps else missing
-        filled = bridge.after(self._newest, [(pulse, each) for pulse in range(self._until, until, each)])
-        self._newest, self._until, self._broken = filled[-1], until, True
-        return filled
+        each = 1 if missing <= _PER_PULSE_S * self._fps else missing
+        filler = bridge.after(self._newest, [(pulse, each) for pulse in range(self._until, until, each)])
+        self._newest, self._until, self._is_broken = filler[-1], until, True
+        return filler
 
     def _show(self, picture: Picture) -> list[Picture]:
-        self._newest, self._until, self._broken = picture, picture.until, False
+        self._newest, self._until, self._is_broken = picture, picture.until, False
         return [picture]
 
-    def _slip_in(self, picture: Picture) -> list[Picture]:
-        """Give what bridges the hole before a picture that can be decoded after the last one."""
+    def _fill_before(self, picture: Picture) -> list[Picture]:
+        """Return the filler of the gap before a picture that can be decoded after the last one."""
         if picture.pulse == self._until:
             return []
         if picture.key:
@@ -83,21 +83,21 @@ class GaplessTimeline:
         bridge = self._bridge()
         return [] if bridge is None else bridge.before(picture, (self._until, picture.pulse - self._until))
 
-    def _lost_before(self, picture: Picture) -> bool:
-        """Tell whether something is missing that a picture is decoded by."""
+    def _reference_is_lost(self, picture: Picture) -> bool:
+        """Return whether a reference of a picture is missing."""
         bridge, newest = self._bridge(), self._newest
         if bridge is None or newest is None:
             return False
         if (
-            self._broken
+            self._is_broken
             or picture.boot != newest.boot
             or picture.pulse // self._gop != newest.pulse // self._gop
         ):
             return True
         return bridge.is_lost_between(newest, picture, picture.pulse - self._until)
 
-    def _begins_anew(self, picture: Picture) -> bool:
-        return picture.key and picture.pulse < self._until - _ANEW_S * self._fps
+    def _is_restart(self, picture: Picture) -> bool:
+        return picture.key and picture.pulse < self._until - _RESTART_S * self._fps
 
     def _bridge(self) -> Bridge | None:
         return None if self._newest is None else self.agreement.bridge(self._newest, self._fps)

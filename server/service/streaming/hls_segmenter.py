@@ -1,8 +1,7 @@
-"""The newest GOPs of a stream as segments, and each GOP as a part of one, for players that fetch (HLS).
+"""Cuts one stream into HLS segments and parts (RFC 8216 and its low-latency successor).
 
-They are references, not copies. Which segment a GOP is in follows from its pulse alone, and so does the
-segment's number. So nothing has to be remembered about who watches, and after a restart of the service the
-numbers go on where they were.
+Segments and parts refer to the stream's chunks; nothing is copied. The number of a segment follows from its
+pulses alone: no state about viewers is kept, and after a restart of the service the numbers go on.
 """
 
 from __future__ import annotations
@@ -15,38 +14,8 @@ from itertools import takewhile
 from server.media.containers.fmp4 import Sample, still
 from server.service.streaming.media_chunk import MediaChunk
 
-
-@dataclass(frozen=True)
-class HlsPart:
-    """One GOP of a segment. ``lead`` is what stands if nothing has been shown in the segment yet."""
-
-    segment: int
-    footage: MediaChunk
-    lead: MediaChunk | None
-    fps: float
-
-    @property
-    def independent(self) -> bool:
-        """Whether it can be decoded without the parts before."""
-        return self.footage.start or self.lead is not None
-
-    @property
-    def data(self) -> bytes:
-        """The part as fragments of MP4."""
-        shown = self.footage
-        if self.lead is None:
-            return shown.with_sound
-        return shown.sound + repeat_last_picture(self.lead, shown.first, shown.until, self.fps)
-
-
-def repeat_last_picture(lead: MediaChunk, first: int, until: int, fps: float) -> bytes:
-    """Show the lead's last picture for some pulses: what it is decoded by passes within a few ticks."""
-    samples = [Sample(picture.sample, picture.key) for picture in lead.pictures]
-    return still(samples, first, until, fps)
-
-
-_LEAST_PART_S = 0.1
-"""Players ask twice for every part."""
+_SHORTEST_PART_S = 0.1
+"""Players send two requests for every part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,161 +25,197 @@ class SegmentLayout:
     fps: float
     gop: int
     """Pulses in a GOP."""
-    frames: int
+    segment_frames: int
     """Pulses in a segment: whole GOPs."""
-    listed: int
+    playlist_length: int
     """Segments in a playlist."""
 
     @property
     def has_parts(self) -> bool:
-        """Whether a GOP is worth a question of its own."""
-        return self.gop / self.fps >= _LEAST_PART_S
+        """Whether a GOP is long enough for a request of its own."""
+        return self.gop / self.fps >= _SHORTEST_PART_S
 
     @property
     def target_s(self) -> int:
-        """What no segment is longer than, when rounded: the seconds of EXT-X-TARGETDURATION."""
-        return max(1, int(self.frames / self.fps + 0.5))
+        """The longest rounded duration of a segment: EXT-X-TARGETDURATION in seconds."""
+        return max(1, int(self.segment_frames / self.fps + 0.5))
 
 
 def segment_layout(fps: float, gop: int, segment_s: float, window_s: float) -> SegmentLayout:
-    """Plan segments of as many whole GOPs as fit, at least one, and a window of at least three of them."""
+    """Return the layout: as many whole GOPs per segment as fit, and at least three segments."""
     frames = gop * max(1, int(segment_s * fps / gop + 1e-9))
     return SegmentLayout(fps, gop, frames, max(3, -(-int(window_s * fps) // frames)))
 
 
+@dataclass(frozen=True)
+class HlsPart:
+    """One GOP of a segment, which low-latency players fetch before the segment is complete.
+
+    ``lead`` holds the picture to repeat if no picture was shown in the segment yet.
+    """
+
+    segment: int
+    chunk: MediaChunk
+    lead: MediaChunk | None
+    fps: float
+
+    @property
+    def independent(self) -> bool:
+        """Whether it can be decoded without the parts before it (INDEPENDENT=YES)."""
+        return self.chunk.random_access or self.lead is not None
+
+    @property
+    def data(self) -> bytes:
+        """The part as MP4 fragments."""
+        chunk = self.chunk
+        if self.lead is None:
+            return chunk.data_with_audio
+        return chunk.audio_fragment + repeat_last_picture(self.lead, chunk.first, chunk.until, self.fps)
+
+
+def repeat_last_picture(lead: MediaChunk, first: int, until: int, fps: float) -> bytes:
+    """Return a fragment that shows the last picture of ``lead`` during the pulses ``first … until - 1``.
+
+    The pictures that it is decoded from are in it, too, and last a few clock ticks.
+    """
+    samples = [Sample(picture.sample, picture.key) for picture in lead.pictures]
+    return still(samples, first, until, fps)
+
+
 class HlsSegment:
-    """Consecutive GOPs. It can be decoded without any other segment."""
+    """Consecutive GOPs that can be decoded without any other segment."""
 
     def __init__(self, number: int, layout: SegmentLayout, lead: MediaChunk) -> None:
         self.number = number
-        self._plan = layout
+        self._layout = layout
         self._lead = lead
         """What the first GOP repeats the last picture of, if it repeats one."""
-        self._footage: list[MediaChunk] = []
+        self._chunks: list[MediaChunk] = []
 
-    def add(self, footage: MediaChunk) -> None:
-        """Take the next GOP, which has been sent."""
-        self._footage.append(footage)
+    def add(self, chunk: MediaChunk) -> None:
+        """Add the next GOP of the stream."""
+        self._chunks.append(chunk)
 
     @property
     def first(self) -> int:
         """The first pulse."""
-        return self._footage[0].first
+        return self._chunks[0].first
 
     @property
     def until(self) -> int:
-        """The first pulse after it."""
-        return self._footage[-1].until
+        """The pulse after the last."""
+        return self._chunks[-1].until
 
     @property
-    def whole(self) -> bool:
-        """Whether nothing will be added to it."""
-        return self.until >= (self.number + 1) * self._plan.frames
+    def is_complete(self) -> bool:
+        """Whether all its GOPs are there."""
+        return self.until >= (self.number + 1) * self._layout.segment_frames
 
     @property
     def data(self) -> bytes:
-        """The segment as fragments of MP4."""
-        standing = list(takewhile(lambda it: not it.start, self._footage))
-        rest = b"".join(it.with_sound for it in self._footage[len(standing) :])
-        heard = b"".join(it.sound for it in standing)
-        if not standing:
+        """The segment as MP4 fragments."""
+        filler = list(takewhile(lambda chunk: not chunk.random_access, self._chunks))
+        rest = b"".join(chunk.data_with_audio for chunk in self._chunks[len(filler) :])
+        audio = b"".join(chunk.audio_fragment for chunk in filler)
+        if not filler:
             return rest
-        return heard + repeat_last_picture(self._lead, self.first, standing[-1].until, self._plan.fps) + rest
+        return audio + repeat_last_picture(self._lead, self.first, filler[-1].until, self._layout.fps) + rest
 
     @property
     def parts(self) -> Sequence[HlsPart]:
-        """The parts that there are by now; none where it is not of whole GOPs, or they are too short."""
-        if not self._plan.has_parts:
+        """The parts so far; none if GOPs are too short for parts, or the segment has partial GOPs."""
+        if not self._layout.has_parts:
             return ()
-        gop, fps, began = self._plan.gop, self._plan.fps, False
+        gop, fps, has_started = self._layout.gop, self._layout.fps, False
         parts: list[HlsPart] = []
-        for it in self._footage:
-            if it.first % gop or it.until - it.first != gop:
+        for chunk in self._chunks:
+            if chunk.first % gop or chunk.until - chunk.first != gop:
                 return ()
-            began |= it.start
-            parts.append(HlsPart(self.number, it, None if began else self._lead, fps))
+            has_started |= chunk.random_access
+            parts.append(HlsPart(self.number, chunk, None if has_started else self._lead, fps))
         return parts
 
 
 class HlsSegmenter:
-    """The last segments of one stream: those in the playlist, and those that were until a moment ago."""
+    """The last segments of one stream: those in the playlist, and those that left it a moment ago."""
 
     def __init__(self, layout: SegmentLayout) -> None:
-        self.plan = layout
-        self.ended = False
+        self.layout = layout
+        self.has_ended = False
         self._segments: dict[int, HlsSegment] = {}
         self._lead: MediaChunk | None = None
-        self._grown: asyncio.Event | None = None
-        """What somebody waits for; None: nobody does."""
+        self._updated: asyncio.Event | None = None
+        """Set at the next change; None while nobody waits."""
         self.until = 0
         """The first pulse that is not here yet."""
 
-    def put(self, footage: MediaChunk) -> None:
-        """Take the next GOP."""
-        if footage.start:
-            self._lead = footage
+    def put(self, chunk: MediaChunk) -> None:
+        """Add the next GOP."""
+        if chunk.random_access:
+            self._lead = chunk
         if self._lead is None:
             return
-        number = footage.first // self.plan.frames
-        long = footage.until > (number + 1) * self.plan.frames
-        if footage.first != self.until or long:
-            self._segments.clear()  # began anew, or nothing came for long: no number is left out
-        self.until = footage.until
-        if long:
-            self._tell()
+        number = chunk.first // self.layout.segment_frames
+        is_long = chunk.until > (number + 1) * self.layout.segment_frames
+        if chunk.first != self.until or is_long:
+            self._segments.clear()  # the pulses started again, or a long gap: no number may be left out
+        self.until = chunk.until
+        if is_long:
+            self._notify()
             return
         if number not in self._segments:
-            self._segments[number] = HlsSegment(number, self.plan, self._lead)
-        self._segments[number].add(footage)
-        # RFC 8216, 6.2.2: what leaves the playlist stays available for as long as the playlist was.
-        while next(iter(self._segments)) < number - 2 * self.plan.listed:
+            self._segments[number] = HlsSegment(number, self.layout, self._lead)
+        self._segments[number].add(chunk)
+        # RFC 8216, 6.2.2: a segment stays available for a playlist's duration after it left the playlist.
+        while next(iter(self._segments)) < number - 2 * self.layout.playlist_length:
             del self._segments[next(iter(self._segments))]
-        self._tell()
+        self._notify()
 
     def end(self) -> None:
-        """Add nothing any more."""
-        self.ended = True
-        self._tell()
+        """End the stream."""
+        self.has_ended = True
+        self._notify()
 
-    def _tell(self) -> None:
-        if self._grown is not None:
-            self._grown.set()
-            self._grown = None
+    def _notify(self) -> None:
+        if self._updated is not None:
+            self._updated.set()
+            self._updated = None
 
-    async def more(self) -> None:
-        """Wait until there is more, or the end."""
-        if self._grown is None:
-            self._grown = asyncio.Event()
-        await self._grown.wait()
+    async def wait_for_update(self) -> None:
+        """Wait until a GOP is added or the stream ends."""
+        if self._updated is None:
+            self._updated = asyncio.Event()
+        await self._updated.wait()
 
     @property
-    def growing(self) -> HlsSegment | None:
-        """The segment that is not whole yet; None where there is nothing of it."""
+    def open_segment(self) -> HlsSegment | None:
+        """The segment that is not complete yet; None if it has no GOP."""
         newest = next(reversed(self._segments.values()), None)
         return None if newest is None or self._is_listed(newest) else newest
 
     def part(self, number: int, index: int) -> HlsPart | None:
-        """Give a part of a segment, which need not be whole."""
+        """Return a part of a segment, which may be the open one; None if there is no such part."""
         segment = self._segments.get(number)
         parts = () if segment is None else segment.parts
         return parts[index] if index < len(parts) else None
 
-    def reaches(self, number: int, index: int | None) -> bool:
-        """Tell whether a segment is here as a whole; or, with ``index``, that part of it or what follows."""
-        frames, gop = self.plan.frames, self.plan.gop
+    def has_reached(self, number: int, index: int | None) -> bool:
+        """Return whether a segment is complete or, with ``index``, that part of it or a later one is here."""
+        frames, gop = self.layout.segment_frames, self.layout.gop
         if index is None:
             return self.until >= (number + 1) * frames
         return self.until >= number * frames + min((index + 1) * gop, frames + gop)
 
     def get(self, number: int) -> HlsSegment | None:
-        """Give a segment that is or was in the playlist."""
+        """Return a segment that is or was in the playlist."""
         segment = self._segments.get(number)
         return segment if segment is not None and self._is_listed(segment) else None
 
     @property
-    def listed(self) -> Sequence[HlsSegment]:
+    def playlist_segments(self) -> Sequence[HlsSegment]:
         """The segments of the playlist, in order."""
-        return [it for it in self._segments.values() if self._is_listed(it)][-self.plan.listed :]
+        listed = [segment for segment in self._segments.values() if self._is_listed(segment)]
+        return listed[-self.layout.playlist_length :]
 
     def _is_listed(self, segment: HlsSegment) -> bool:
-        return segment.whole or self.ended
+        return segment.is_complete or self.has_ended

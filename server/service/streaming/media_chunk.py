@@ -1,4 +1,4 @@
-"""Pictures of a stream in a row, packed once however many watch them."""
+"""Consecutive pictures of a stream, packed once as MP4 or MPEG-TS however many viewers receive them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from server.media.picture import Picture
 
 
 class MediaChunk:
-    """Consecutive pictures as a piece of a stream (:class:`server.service.streaming.broadcaster.Piece`).
+    """Consecutive pictures with their audio, as a :class:`~server.service.streaming.subscriber_queue.Chunk`.
 
-    Each form is made when it is first asked for, and then shared by all who are given this piece.
+    Each container format is packed when it is first needed and then shared by all subscribers.
     """
 
     def __init__(
@@ -22,18 +22,18 @@ class MediaChunk:
         fps: float,
         counters: Counters,
         *,
-        fills: bool = False,
-        heard: Heard | None = None,
-        silent: bool = False,
+        is_filler: bool = False,
+        audio: Heard | None = None,
+        is_muted: bool = False,
     ) -> None:
         self.pictures = tuple(pictures)
         self._fps, self._counters = fps, counters
-        self.start = self.pictures[0].key
-        self.fills = fills
-        self.heard = heard
-        """What is to be heard meanwhile; None at a site without sound."""
-        self.silent = silent
-        """Whether nothing may be heard meanwhile, by who joins it with sound of their own."""
+        self.random_access = self.pictures[0].key
+        self.is_filler = is_filler
+        self.audio = audio
+        """The audio of the same time; None at a site without audio."""
+        self.is_muted = is_muted
+        """Whether a viewer who adds the audio from elsewhere must not hear any meanwhile."""
 
     @property
     def first(self) -> int:
@@ -42,41 +42,46 @@ class MediaChunk:
 
     @property
     def until(self) -> int:
-        """The first pulse after it."""
+        """The pulse after the last."""
         return self.pictures[-1].until
 
     @cached_property
     def data(self) -> bytes:
-        """The pictures as fragments of MP4."""
+        """The pictures as MP4 fragments."""
         return b"".join(picture.fragment for picture in self.pictures)
 
     @property
-    def sound(self) -> bytes:
-        """What is to be heard meanwhile as a fragment of MP4; nothing at a site without sound."""
-        return b"" if self.heard is None else self.heard.fragment
+    def audio_fragment(self) -> bytes:
+        """The audio as one MP4 fragment; empty at a site without audio."""
+        return b"" if self.audio is None else self.audio.fragment
 
     @cached_property
-    def with_sound(self) -> bytes:
-        """The pictures as fragments of MP4, behind what is to be heard with them."""
-        return self.sound + self.data
+    def data_with_audio(self) -> bytes:
+        """The audio fragment, then the fragments of the pictures."""
+        return self.audio_fragment + self.data
 
     @cached_property
-    def ts(self) -> bytes:
-        """The pictures as an MPEG transport stream."""
-        return pack(self.pictures, self._fps, self._counters, self.heard)
+    def mpegts(self) -> bytes:
+        """The pictures and the audio as an MPEG transport stream."""
+        return pack(self.pictures, self._fps, self._counters, self.audio)
 
 
 class TsContinuity:
-    """Counts the packets of one stream, so that each piece of it goes on where the one before ended."""
+    """Counts one stream's MPEG-TS packets, so that the continuity counters go on from chunk to chunk.
+
+    For streams whose chunks nobody shares: there no padding is needed to keep the counters aligned.
+    """
 
     def __init__(self, fps: float) -> None:
         self._fps = fps
-        self._tables = self._packets = self._sound_packets = 0
+        self._tables = self._packets = self._audio_packets = 0
 
-    def footage(self, pictures: Sequence[Picture], heard: Heard | None, *, fills: bool = False) -> MediaChunk:
-        """Give the next pictures, at least one, with what is heard meanwhile."""
-        counters = Counters(self._tables, self._packets, self._sound_packets, whole=False)
-        self._sound_packets += 0 if heard is None else sound_packets(heard)
+    def chunk(
+        self, pictures: Sequence[Picture], audio: Heard | None, *, is_filler: bool = False
+    ) -> MediaChunk:
+        """Return the next pictures, at least one, with their audio as a chunk."""
+        counters = Counters(self._tables, self._packets, self._audio_packets, whole=False)
+        self._audio_packets += 0 if audio is None else sound_packets(audio)
         self._tables += pictures[0].key
         self._packets += sum(packets(picture) for picture in pictures)
-        return MediaChunk(pictures, self._fps, counters, fills=fills, heard=heard)
+        return MediaChunk(pictures, self._fps, counters, is_filler=is_filler, audio=audio)

@@ -1,4 +1,4 @@
-"""Everybody's streams, one each, from the first decision about somebody until nobody knows them any more."""
+"""The best-view stream of every person, from the first decision about them until they are forgotten."""
 
 from __future__ import annotations
 
@@ -10,65 +10,65 @@ from server.service.streaming.presence import Presence
 from server.service.streaming.spliced_stream import GopAssembler, SplicedStream
 
 PresenceLookup = Callable[[int], Presence]
-"""Says what the newest GOP shows of a person."""
+"""Returns what the newest GOP shows of a person."""
 
 
 def always_present(number: int) -> Presence:
-    """Return that the best view is shown, of anybody."""
+    """Return that the person is present: the best view is shown."""
     del number
     return Presence.PRESENT
 
 
 class PersonStreams:
-    """Shows every person by the camera that is chosen for them; ``presence`` says whether they are shown."""
+    """Shows every person from their chosen camera; ``presence`` returns whether they may be shown."""
 
     def __init__(
         self, new_stream: Callable[[], SplicedStream], presence: PresenceLookup = always_present
     ) -> None:
         self._new_stream, self._presence = new_stream, presence
         self._streams: dict[int, SplicedStream] = {}
-        self._gone: dict[int, SplicedStream] = {}
-        """Those whose stream has ended a moment ago: players still fetch its end."""
-        self.channels: dict[int, Broadcaster] = {}
+        self._ended: dict[int, SplicedStream] = {}
+        """Streams that ended a moment ago: HLS players still fetch their last segments."""
+        self.broadcasters: dict[int, Broadcaster] = {}
 
     def show(self, cameras: Mapping[int, str | None], merged: Mapping[int, int], gop: GopAssembler) -> None:
-        """Pass everybody's chosen GOP on to those who watch it."""
+        """Publish a GOP of every person's chosen camera."""
         for number, camera in cameras.items():
             if number not in self._streams:
                 stream = self._streams[number] = self._new_stream()
-                self.channels[number] = stream.channel
+                self.broadcasters[number] = stream.broadcaster
             self._streams[number].show(camera, gop, self._presence(number))
-        # The streams of numbers that turned out to be another's go on with that person.
+        # The stream of a number that was merged into another goes on with that person.
         for lost, kept in merged.items():
             if lost in self._streams and kept in cameras and lost not in cameras:
                 self._streams[lost].show(cameras[kept], gop, self._presence(kept))
 
     def forget(self, known: Collection[int]) -> None:
-        """End the streams of those whom nobody remembers any more."""
-        for number in [it for it in self.channels if it not in known]:
-            del self.channels[number]
-            self._gone[number] = self._streams.pop(number)
-            self._gone[number].close()
+        """End the streams of persons that are not known any more."""
+        for number in [number for number in self.broadcasters if number not in known]:
+            del self.broadcasters[number]
+            self._ended[number] = self._streams.pop(number)
+            self._ended[number].close()
 
     def forget_ended_before(self, pulse: int) -> None:
-        """Let go of what is left of streams that ended before a pulse."""
-        for number in [it for it, stream in self._gone.items() if stream.reel.until < pulse]:
-            del self._gone[number]
+        """Drop the segments of streams that ended before a pulse."""
+        for number in [n for n, stream in self._ended.items() if stream.segmenter.until < pulse]:
+            del self._ended[number]
 
-    def watched(self, number: int) -> int:
-        """Return how many watch a person's stream."""
-        channel = self.channels.get(number)
-        return 0 if channel is None else channel.viewers
+    def viewers_of(self, number: int) -> int:
+        """Return the number of viewers of a person's stream."""
+        broadcaster = self.broadcasters.get(number)
+        return 0 if broadcaster is None else broadcaster.viewers
 
     @property
     def viewers(self) -> int:
-        """How many watch, all streams together."""
-        return sum(channel.viewers for channel in self.channels.values())
+        """The number of viewers of all streams."""
+        return sum(broadcaster.viewers for broadcaster in self.broadcasters.values())
 
-    def reel(self, number: int) -> HlsSegmenter | None:
+    def segmenter(self, number: int) -> HlsSegmenter | None:
         """Return the newest segments of a person's stream, for a while even when it has ended."""
-        stream = self._streams.get(number) or self._gone.get(number)
-        return None if stream is None else stream.reel
+        stream = self._streams.get(number) or self._ended.get(number)
+        return None if stream is None else stream.segmenter
 
     def close(self) -> None:
         """End all streams."""

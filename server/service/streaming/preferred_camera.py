@@ -1,8 +1,8 @@
-"""A camera that somebody prefers: it is shown while it sees the person, and else whichever sees them best.
+"""Best views in which the viewer prefers a camera: it is shown while it sees the person, else the best one.
 
-It is decided by what everybody is told of a GOP, and of the one before, so that whoever reads the events
-knows which camera's pictures come: it has the person in more than half of the frames of both. A glimpse is
-not worth two cuts.
+The camera counts as seeing the person if it has a box of them in more than half of the frames of a GOP and of
+the GOP before: a glimpse is not worth two cuts. Only published decisions count, so a client that reads the
+events can tell which camera is shown.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from server.service.view_selection.decider import GopDecision
 
 
 class PreferredCameraStreams:
-    """The streams that prefer a camera, each from the first viewer to the last.
+    """The streams with a preferred camera, each from its first viewer to its last.
 
-    ``presence`` says whether a person is shown.
+    ``presence`` returns whether a person may be shown.
     """
 
     def __init__(
@@ -27,36 +27,36 @@ class PreferredCameraStreams:
     ) -> None:
         self._new_stream, self._presence = new_stream, presence
         self._streams: dict[tuple[int, str], SplicedStream] = {}
-        self._before: Boxes | None = None
-        self._now: tuple[GopDecision, GopAssembler] | None = None
+        self._previous_boxes: Boxes | None = None
+        self._newest: tuple[GopDecision, GopAssembler] | None = None
 
-    def channel(self, number: int, camera: str) -> Broadcaster:
-        """Give the stream of a person in which a camera is preferred; who asks joins it at once."""
+    def broadcaster(self, number: int, camera: str) -> Broadcaster:
+        """Return the stream of a person with a preferred camera; the caller subscribes to it at once."""
         stream = self._streams.get((number, camera))
         if stream is None:
             stream = self._streams[number, camera] = self._new_stream()
-            if self._now is not None:
-                self._show(stream, number, camera)  # or there would be nothing to see before the next GOP
-        return stream.channel
+            if self._newest is not None:
+                self._show(stream, number, camera)  # or there would be nothing to show until the next GOP
+        return stream.broadcaster
 
     def show(self, decision: GopDecision, gop: GopAssembler) -> None:
-        """Pass a GOP on to those who watch; a stream that nobody watches is given up."""
-        self._before = None if self._now is None else self._now[0].boxes
-        self._now = (decision, gop)
-        for key in [key for key, stream in self._streams.items() if not stream.channel.viewers]:
+        """Publish a GOP in all streams; a stream without viewers ends."""
+        self._previous_boxes = None if self._newest is None else self._newest[0].boxes
+        self._newest = (decision, gop)
+        for key in [key for key, stream in self._streams.items() if not stream.broadcaster.viewers]:
             self._streams.pop(key).close()
         for (number, camera), stream in self._streams.items():
             self._show(stream, number, camera)
 
     def forget(self, known: Collection[int]) -> None:
-        """End the streams of those whom nobody remembers any more."""
+        """End the streams of persons that are not known any more."""
         for key in [key for key in self._streams if key[0] not in known]:
             self._streams.pop(key).close()
 
     @property
     def viewers(self) -> int:
-        """How many are watching."""
-        return sum(stream.channel.viewers for stream in self._streams.values())
+        """The number of viewers of all streams."""
+        return sum(stream.broadcaster.viewers for stream in self._streams.values())
 
     def close(self) -> None:
         """End all streams."""
@@ -64,18 +64,18 @@ class PreferredCameraStreams:
             stream.close()
 
     def _show(self, stream: SplicedStream, number: int, camera: str) -> None:
-        assert self._now is not None  # noqa: S101 — who calls has looked
-        decision, gop = self._now
+        assert self._newest is not None  # noqa: S101 — the callers check it
+        decision, gop = self._newest
         person = decision.merged.get(number, number)
-        best = next((it.camera for it in decision.choices if it.number == person), None)
-        seen = {person, *(lost for lost, kept in decision.merged.items() if kept == person)}
-        steady = _sees(decision.boxes, camera, seen) and (
-            self._before is None or _sees(self._before, camera, seen)
+        best = next((choice.camera for choice in decision.choices if choice.number == person), None)
+        numbers = {person, *(lost for lost, kept in decision.merged.items() if kept == person)}
+        is_seen = _sees(decision.boxes, camera, numbers) and (
+            self._previous_boxes is None or _sees(self._previous_boxes, camera, numbers)
         )
-        stream.show(camera if steady else best, gop, self._presence(person))
+        stream.show(camera if is_seen else best, gop, self._presence(person))
 
 
 def _sees(boxes: Boxes, camera: str, numbers: Collection[int]) -> bool:
-    """Tell whether a camera sees somebody, by any of their numbers, in more than half of a GOP's frames."""
+    """Return whether a camera has a box of any of these numbers in more than half of a GOP's frames."""
     frames = boxes.get(camera, ())
     return 2 * sum(any(box[0] in numbers for box in frame) for frame in frames) > len(frames)

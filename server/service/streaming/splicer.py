@@ -1,4 +1,4 @@
-"""The streams: one per person and one per camera, made of references to the cameras' fragments."""
+"""All live streams of a site, one per person and one per camera, made of the cameras' fragments."""
 
 from __future__ import annotations
 
@@ -7,136 +7,171 @@ from collections.abc import Collection, Mapping
 from server.config.site_config import Config
 from server.media.picture import Picture
 from server.media.stream_format import Agreement
-from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.gapless_timeline import GaplessTimeline
 from server.service.streaming.hls_segmenter import HlsSegmenter, segment_layout
+from server.service.streaming.media_chunk import TsContinuity
 from server.service.streaming.person_streams import PersonStreams
 from server.service.streaming.preferred_camera import PreferredCameraStreams
 from server.service.streaming.presence import PresenceLog
-from server.service.streaming.spliced_stream import GopAssembler, LiveStream, SplicedStream
+from server.service.streaming.spliced_stream import GopAssembler, SplicedStream
 from server.service.view_selection.decider import GopDecision
 
-_SILENT_S = 2
-"""How long behind the decisions a camera's stream may be before it is filled: its pictures may still come."""
+_LATE_S = 2
+"""How far a camera's stream may be behind the decisions before it is filled: pictures may still arrive."""
+
+
+class LiveStream:
+    """A camera's own stream: every picture as soon as it arrives."""
+
+    def __init__(
+        self,
+        broadcaster: Broadcaster,
+        timeline: GaplessTimeline,
+        fps: float,
+        audio_buffer: AudioBuffer | None = None,
+    ) -> None:
+        self.broadcaster = broadcaster
+        self._timeline, self._ts = timeline, TsContinuity(fps)
+        self._audio = None if audio_buffer is None else AudioFollower(audio_buffer)
+
+    def push(self, picture: Picture) -> None:
+        """Publish a picture, after the filler of a gap before it."""
+        for shown in self._timeline.push(picture):
+            self._publish([shown], is_filler=False)
+
+    def fill(self, until: int) -> None:
+        """Repeat the last picture, if there is one, up to a pulse."""
+        self._publish(self._timeline.fill(until), is_filler=True)
+
+    def _publish(self, pictures: list[Picture], *, is_filler: bool) -> None:
+        if not pictures:
+            return
+        first, until = pictures[0].pulse, pictures[-1].until
+        audio = None if self._audio is None else self._audio.next_audio(first, until)
+        self.broadcaster.publish(self._ts.chunk(pictures, audio, is_filler=is_filler))
 
 
 class Splicer:
-    """Cuts from camera to camera by passing on other bytes: nothing is decoded or encoded here.
+    """Publishes all live streams; it cuts between cameras by choosing fragments, without decoding.
 
-    Who may see one person alone watches streams of their own (``scoped``): there the person's picture gives
-    way to grey while nobody has seen them for long. Only a site with tokens has any.
+    Viewers with access to one person alone have streams of their own (``scoped``), in which the person's
+    picture gives way to gray while nobody has seen them for long. Only a site with tokens has any.
     """
 
     def __init__(
         self,
-        shelves: Mapping[str, FrameBuffer],
+        frame_buffers: Mapping[str, FrameBuffer],
         agreement: Agreement,
         config: Config,
-        sound: AudioBuffer | None = None,
+        audio_buffer: AudioBuffer | None = None,
     ) -> None:
-        self._shelves, self._agreement, self._config = shelves, agreement, config
-        self._sound = sound
+        self._frame_buffers, self._agreement, self._config = frame_buffers, agreement, config
+        self._audio_buffer = audio_buffer
         site, http = config.site, config.http
-        self.plan = segment_layout(site.fps, config.encode.gop, http.hls_segment_s, http.hls_window_s)
+        self.layout = segment_layout(site.fps, config.encode.gop, http.hls_segment_s, http.hls_window_s)
         self._live = {
-            camera: LiveStream(self._channel(), self._time(), site.fps, sound) for camera in shelves
+            camera: LiveStream(self._broadcaster(), self._timeline(), site.fps, audio_buffer)
+            for camera in frame_buffers
         }
-        self._decided = {camera: self._stream() for camera in shelves}
-        """Each camera as if it were always chosen."""
+        self._decided = {camera: self._stream() for camera in frame_buffers}
+        """Each camera, as late as the best views."""
         self._presence = PresenceLog(round(config.access.unseen_s * site.fps))
-        self._is_scoped = config.access.tokens is not None
-        self._people = PersonStreams(self._stream)
-        self._scoped = PersonStreams(self._stream, self._presence.of)
-        self.preferring = PreferredCameraStreams(self._stream)
-        self.preferring_scoped = PreferredCameraStreams(self._stream, self._presence.of)
+        self._has_scoped = config.access.tokens is not None
+        self._persons = PersonStreams(self._stream)
+        self._scoped = PersonStreams(self._stream, self._presence.presence_of)
+        self.preferred = PreferredCameraStreams(self._stream)
+        self.preferred_scoped = PreferredCameraStreams(self._stream, self._presence.presence_of)
         self._gops = 0
-        self.objects = self._people.channels
-        self.scoped = self._scoped.channels
-        self.cameras = {camera: stream.channel for camera, stream in self._live.items()}
-        self.decided = {camera: stream.channel for camera, stream in self._decided.items()}
+        self.persons = self._persons.broadcasters
+        self.scoped_persons = self._scoped.broadcasters
+        self.cameras = {camera: stream.broadcaster for camera, stream in self._live.items()}
+        self.decided_cameras = {camera: stream.broadcaster for camera, stream in self._decided.items()}
 
-    def frame(self, camera: str, frame: Picture) -> None:
-        """Pass a camera's frame on to those who watch that camera."""
-        self._live[camera].take(frame)
+    def publish_frame(self, camera: str, frame: Picture) -> None:
+        """Publish a camera's frame in the live stream of that camera."""
+        self._live[camera].push(frame)
 
-    def decision(self, decision: GopDecision) -> None:
-        """Pass every object's chosen GOP on to those who watch it; a camera's GOP is put together once."""
+    def publish_decision(self, decision: GopDecision) -> None:
+        """Publish a decided GOP in the streams of all persons and cameras."""
         fps = self._config.site.fps
-        gop = GopAssembler(self._shelves, decision.first, decision.frames, fps, self._gops, self._sound)
+        gop = GopAssembler(
+            self._frame_buffers, decision.first, decision.frames, fps, self._gops, self._audio_buffer
+        )
         self._gops += 1
         cameras = {choice.number: choice.camera for choice in decision.choices}
-        self._people.show(cameras, decision.merged, gop)
-        if self._is_scoped:
-            self._presence.take(decision)
+        self._persons.show(cameras, decision.merged, gop)
+        if self._has_scoped:
+            self._presence.update(decision)
             self._scoped.show(cameras, decision.merged, gop)
-        for camera, decided in self._decided.items():
-            decided.show(camera, gop)
-        self.preferring.show(decision, gop)
-        self.preferring_scoped.show(decision, gop)
+        for camera, stream in self._decided.items():
+            stream.show(camera, gop)
+        self.preferred.show(decision, gop)
+        self.preferred_scoped.show(decision, gop)
         for live in self._live.values():
-            live.fill(decision.first - round(_SILENT_S * fps))
-        ended = decision.first - 2 * self.plan.listed * self.plan.frames
-        for streams in (self._people, self._scoped):
+            live.fill(decision.first - round(_LATE_S * fps))
+        ended = decision.first - 2 * self.layout.playlist_length * self.layout.segment_frames
+        for streams in (self._persons, self._scoped):
             streams.forget_ended_before(ended)
 
     def forget(self, known: Collection[int], merged: Collection[int]) -> None:
-        """End the streams of those whom nobody remembers any more, and of numbers that are another's now.
+        """End the streams of persons that are no longer known, and of numbers that were merged into others.
 
-        The latter last as long as anybody watches them: who comes later is given that person's.
+        The latter go on while they are watched; a later viewer receives the stream of the kept number.
         """
-        watched = {it for it in merged if self.watched(it)}
-        for streams in (self._people, self._scoped):
+        watched = {number for number in merged if self.viewers_of(number)}
+        for streams in (self._persons, self._scoped):
             streams.forget({*known, *watched})
         self._presence.forget({*known, *watched})
-        for preferring in (self.preferring, self.preferring_scoped):
-            preferring.forget({*known, *merged})
+        for preferred in (self.preferred, self.preferred_scoped):
+            preferred.forget({*known, *merged})
 
-    def watched(self, number: int) -> int:
-        """Return how many watch an object's stream."""
-        return self._people.watched(number) + self._scoped.watched(number)
+    def viewers_of(self, number: int) -> int:
+        """Return the number of viewers of a person's stream."""
+        return self._persons.viewers_of(number) + self._scoped.viewers_of(number)
 
-    def reel(self, number: int, *, scoped: bool = False) -> HlsSegmenter | None:
-        """Give the newest segments of an object's stream, for a while even when it has ended."""
-        return (self._scoped if scoped else self._people).reel(number)
+    def segmenter_of_person(self, number: int, *, scoped: bool = False) -> HlsSegmenter | None:
+        """Return the newest segments of a person's stream, for a while even when it has ended."""
+        return (self._scoped if scoped else self._persons).segmenter(number)
 
-    def camera_reel(self, camera: str) -> HlsSegmenter | None:
-        """Give the newest segments of a camera."""
+    def segmenter_of_camera(self, camera: str) -> HlsSegmenter | None:
+        """Return the newest segments of a camera's stream."""
         stream = self._decided.get(camera)
-        return None if stream is None else stream.reel
+        return None if stream is None else stream.segmenter
 
-    def _channel(self) -> Broadcaster:
-        return Broadcaster(queue_starts=self._config.http.viewer_queue_gops)
+    def _broadcaster(self) -> Broadcaster:
+        return Broadcaster(queue_gops=self._config.http.viewer_queue_gops)
 
-    def _time(self) -> GaplessTimeline:
+    def _timeline(self) -> GaplessTimeline:
         return GaplessTimeline(self._agreement, self._config.site.fps, self._config.encode.gop)
 
     def _stream(self) -> SplicedStream:
-        return SplicedStream(self._channel(), self._time(), HlsSegmenter(self.plan))
+        return SplicedStream(self._broadcaster(), self._timeline(), HlsSegmenter(self.layout))
 
     @property
-    def viewers_of_objects(self) -> int:
-        """How many streams of objects are being watched, but those in which a camera is preferred."""
-        return self._people.viewers + self._scoped.viewers
+    def person_viewers(self) -> int:
+        """The number of viewers of best views in which no camera is preferred."""
+        return self._persons.viewers + self._scoped.viewers
 
     @property
-    def viewers_who_prefer(self) -> int:
-        """How many streams are being watched in which a camera is preferred."""
-        return self.preferring.viewers + self.preferring_scoped.viewers
+    def preferred_camera_viewers(self) -> int:
+        """The number of viewers of best views in which a camera is preferred."""
+        return self.preferred.viewers + self.preferred_scoped.viewers
 
     @property
     def viewers(self) -> int:
-        """How many streams are being watched."""
-        channels = [*self.cameras.values(), *self.decided.values()]
-        watched = sum(channel.viewers for channel in channels)
-        return watched + self.viewers_of_objects + self.viewers_who_prefer
+        """The number of viewers of all streams."""
+        broadcasters = [*self.cameras.values(), *self.decided_cameras.values()]
+        camera_viewers = sum(broadcaster.viewers for broadcaster in broadcasters)
+        return camera_viewers + self.person_viewers + self.preferred_camera_viewers
 
     def close(self) -> None:
         """End all streams."""
-        for streams in (self._people, self._scoped, self.preferring, self.preferring_scoped):
+        for streams in (self._persons, self._scoped, self.preferred, self.preferred_scoped):
             streams.close()
         for stream in self._decided.values():
             stream.close()
-        for channel in self.cameras.values():
-            channel.close()
+        for broadcaster in self.cameras.values():
+            broadcaster.close()

@@ -74,7 +74,7 @@ class TimeShift:
         Only whole ones, and the last one where it is over. In between, the last picture stands where
         nothing was shown: no number is left out. None where there is none.
         """
-        frames = self._plan.frames
+        frames = self._plan.segment_frames
         begin, earliest = first_available(self._source, start), first_available(self._source, 0)
         if begin is None or earliest is None:
             return None
@@ -85,7 +85,7 @@ class TimeShift:
 
     async def segment(self, number: int) -> HlsSegment | None:
         """Put a segment together; None where it is not whole yet, or nothing is kept of it or before it."""
-        first, until = number * self._plan.frames, (number + 1) * self._plan.frames
+        first, until = number * self._plan.segment_frames, (number + 1) * self._plan.segment_frames
         until = min(until, self.end) if self.over else until
         if not first < until <= self.end:
             return None
@@ -98,18 +98,18 @@ class TimeShift:
             else (await visible_pictures(lead, self._source, agreement, self._plan.fps)).pictures
         )
         if led:  # as if it had been shown just now: what repeats it does not say how old it is
-            timeline.pass_by(replace(led[-1], pulse=first - 1))
+            timeline.advance_past(replace(led[-1], pulse=first - 1))
         came, heard_from = await self._came(first, until, agreement)
         footage: list[MediaChunk] = []
         for begin in range(first, until, self._gop):
             end = min(begin + self._gop, until)
-            pictures = [it for one in came if begin <= one.pulse < end for it in timeline.take(one)]
+            pictures = [it for one in came if begin <= one.pulse < end for it in timeline.push(one)]
             pictures += timeline.fill(end)
             if pictures:
                 heard = None if hearing is None else await hearing.beside(begin, end)
                 if heard is not None and self._source.presence is not None and begin not in heard_from:
                     heard = heard.silenced
-                footage.append(MediaChunk(pictures, self._plan.fps, Counters(), heard=heard))
+                footage.append(MediaChunk(pictures, self._plan.fps, Counters(), audio=heard))
         if not footage:
             return None
         lead_footage = MediaChunk(led, self._plan.fps, Counters()) if led else footage[0]

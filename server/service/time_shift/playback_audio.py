@@ -23,25 +23,25 @@ class PlaybackAudio:
 
     def __init__(
         self,
-        shelf: AudioBuffer,
+        buffer: AudioBuffer,
         recorded: Callable[[], Sequence[SessionEntries]],
         now: Callable[[], int] | None = None,
     ) -> None:
-        self._shelf, self._recorded, self._now = shelf, recorded, now
+        self._shelf, self._recorded, self._now = buffer, recorded, now
         self._next: int | None = None
         self._live: AudioFollower | None = None
 
     async def beside(self, first: int, until: int) -> Heard:
         """Give what follows what was heard, now that the pulses ``first … until - 1`` are shown."""
-        shelf = self._shelf
-        form = shelf.format
-        begin, end = form.frame_at(first, shelf.fps), form.frame_at(until, shelf.fps)
-        longest = form.frame_at(round(LONGEST_GAP_S * shelf.fps), shelf.fps)
+        buffer = self._shelf
+        form = buffer.format
+        begin, end = form.frame_at(first, buffer.fps), form.frame_at(until, buffer.fps)
+        longest = form.frame_at(round(LONGEST_GAP_S * buffer.fps), buffer.fps)
         if self._next is None or begin > self._next + longest:  # nor is such a hole bridged by pictures
             self._next = begin
         begin = self._next
-        late = end if self._now is None else form.frame_at(self._now(), shelf.fps) - shelf.patience
-        frames = {number: shelf.get(number) for number in range(begin, end)}
+        late = end if self._now is None else form.frame_at(self._now(), buffer.fps) - buffer.max_late_frames
+        frames = {number: buffer.get(number) for number in range(begin, end)}
         missing = [number for number, frame in frames.items() if frame is None]
         if missing and (recorded := self._recorded()):
             frames |= await run_in_reader_thread(self._read, recorded, missing[0], missing[-1] + 1)
@@ -53,7 +53,7 @@ class PlaybackAudio:
         """Go on with the present: nothing is looked up any more."""
         if self._live is None:
             self._live = AudioFollower(self._shelf, self._next)
-        return self._live.beside(first, until)
+        return self._live.next_audio(first, until)
 
     def _read(self, recorded: Sequence[SessionEntries], begin: int, end: int) -> dict[int, bytes]:
         form, fps = self._shelf.format, self._shelf.fps

@@ -77,10 +77,10 @@ class TimeShiftStream:
     async def _joined(
         self, channel: Broadcaster, at: int, end: int | None
     ) -> AsyncGenerator[MediaChunk, None]:
-        viewer = channel.join()
+        viewer = channel.subscribe()
         begun = False
         try:
-            async for piece in viewer.pieces():
+            async for piece in viewer.chunks():
                 came = piece.pictures if isinstance(piece, MediaChunk) else ()
                 pictures = [it for it in came if begun or it.pulse >= at]
                 if not pictures:
@@ -92,18 +92,18 @@ class TimeShiftStream:
                         yield await self._recalled(shown)
                     begun = True
                 if pictures:
-                    yield self._present(pictures, silent=isinstance(piece, MediaChunk) and piece.silent)
+                    yield self._present(pictures, silent=isinstance(piece, MediaChunk) and piece.is_muted)
                 if over:
                     return
         finally:
-            channel.leave(viewer)
+            channel.unsubscribe(viewer)
 
     def _shown(self, gop: VisiblePictures) -> Iterator[VisiblePictures]:
         """Give a GOP's pictures as they can be shown, behind what repeats the picture before them."""
         if not gop.pictures:
             return
         yield from self._bridged(gop.pictures[0].pulse)
-        shown = [it for picture in gop.pictures for it in self._timeline.take(picture)]
+        shown = [it for picture in gop.pictures for it in self._timeline.push(picture)]
         if shown:
             yield VisiblePictures(shown, gop.silent)
 
@@ -130,7 +130,7 @@ class TimeShiftStream:
         return self._footage(pictures, heard, silent=silent)
 
     def _footage(self, pictures: list[Picture], heard: Heard | None, *, silent: bool) -> MediaChunk:
-        return self._tally.footage(pictures, heard.silenced if silent and heard is not None else heard)
+        return self._tally.chunk(pictures, heard.silenced if silent and heard is not None else heard)
 
 
 class _RealTimePacer:

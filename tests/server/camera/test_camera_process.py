@@ -117,8 +117,8 @@ async def test_recordings_run_to_their_end_and_every_frame_and_word_is_there(
     await asyncio.to_thread(plain.wait_and_close, "bestview/choices", len(gops))
 
     for camera in config.camera_ids:
-        shelf = it.service.shelves[camera]
-        assert [pulse for pulse in range(FRAMES + 5) if shelf.has(pulse)] == list(range(FRAMES))
+        frame_buffer = it.service.frame_buffers[camera]
+        assert [pulse for pulse in range(FRAMES + 5) if frame_buffer.has(pulse)] == list(range(FRAMES))
         assert it.service.intake.states[camera].word == "ended"
         assert it.service.intake.states[camera].bad_messages == 0
     assert sum(gop.frames for gop in gops) == FRAMES
@@ -234,7 +234,7 @@ async def test_a_camera_started_after_its_recording_was_over_lets_everything_end
     over = await it.start()
     first, second = it.camera("c0"), it.camera("c1")
     async with asyncio.timeout(PATIENCE):
-        while it.service.shelves["c0"].newest < 10:  # noqa: ASYNC110 — no event tells of frames
+        while it.service.frame_buffers["c0"].newest < 10:  # noqa: ASYNC110 — no event tells of frames
             await asyncio.sleep(0.01)
         first.cancel()  # as if killed, before it could say that it has ended
         await second

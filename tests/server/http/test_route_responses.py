@@ -13,7 +13,7 @@ from fakes.cameras import status, tracks, word
 from fakes.site import A, B, Hall
 from server.http.api import openapi
 from server.http.app import make_app
-from server.service.streaming.broadcaster import Subscriber
+from server.service.streaming.subscriber_queue import Subscriber
 
 
 @pytest.mark.parametrize(

@@ -165,7 +165,7 @@ def decide(hall: Hall, gops: range) -> None:
         choice = ObjectChoice(1, CAMERAS[gop % 2], None, away=False)
         decision = GopDecision(gop * GOP, GOP, (choice,), {A: []}, {}, (), NO_REASON)
         hall.service.past.put(hall.service.board.put(decision), None)
-        hall.service.splicer.decision(decision)
+        hall.service.splicer.publish_decision(decision)
 
 
 async def watched(hall: Hall, *ways: str) -> list[bytes]:

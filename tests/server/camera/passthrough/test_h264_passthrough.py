@@ -59,8 +59,8 @@ def written(folder: Path, form: str, seed: int = 0) -> Path:
         path.write_bytes(b"".join(unit.data for unit in units))
         return path
     if form == "ts":
-        shelf = FrameBuffer(FPS, FRAMES, Agreement())
-        pictures = [shelf.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
+        frame_buffer = FrameBuffer(FPS, FRAMES, Agreement())
+        pictures = [frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
         path.write_bytes(pack(pictures, FPS, Counters()))
         return path
     with av.open(str(path), "w", format="mp4" if form == "mp4" else "matroska") as container:
@@ -116,10 +116,10 @@ def test_the_tracker_is_given_the_pictures_that_are_sent(tmp_path: Path) -> None
 def test_it_can_be_cut_with_what_another_camera_encodes(tmp_path: Path) -> None:
     pipeline = CameraPipeline(site(written(tmp_path, "mp4")), "c0")
     agreement = Agreement()
-    shelves = [FrameBuffer(FPS, FRAMES, agreement) for _ in range(2)]
-    for shelf, units in zip(shelves, (passed(pipeline, range(FRAMES)), encoded(1)), strict=True):
+    frame_buffers = [FrameBuffer(FPS, FRAMES, agreement) for _ in range(2)]
+    for frame_buffer, units in zip(frame_buffers, (passed(pipeline, range(FRAMES)), encoded(1)), strict=True):
         for unit in units:
-            shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+            frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
     pipeline.close()
 
 
@@ -350,8 +350,8 @@ def rtsp() -> Iterator[RtspCamera]:
 @pytest.fixture
 def network() -> Iterator[NetworkCamera]:
     units = encoded(0, 1000)
-    shelf = FrameBuffer(FPS, 1000, Agreement())
-    pictures = [shelf.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
+    frame_buffer = FrameBuffer(FPS, 1000, Agreement())
+    pictures = [frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
     gops = [pictures[first : first + GOP] for first in range(0, 1000, GOP)]
     camera = NetworkCamera([pack(gop, FPS, Counters()) for gop in gops])
     yield camera

@@ -58,11 +58,11 @@ def test_the_files_are_these_bytes(tmp_path: Path) -> None:
 
 def films(folder: Path, codec: Codec = "h264") -> tuple[FilmWriter, dict[str, FrameBuffer]]:
     agreement = agreement_for(codec, (WIDTH, HEIGHT))
-    shelves = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
+    frame_buffers = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, codec=codec):
-            shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
-    return FilmWriter(folder, shelves, agreement, SITE), shelves
+            frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+    return FilmWriter(folder, frame_buffers, agreement, SITE), frame_buffers
 
 
 def own_pictures(seed: int, codec: Codec) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
@@ -106,15 +106,15 @@ def test_a_film_ends_with_the_last_gop_in_which_the_person_was_about(tmp_path: P
 def test_what_cannot_be_shown_or_did_not_come_is_bridged_as_it_is_live(
     tmp_path: Path, codec: Codec, container: str
 ) -> None:
-    it, shelves = films(tmp_path / "best", codec)
+    it, frame_buffers = films(tmp_path / "best", codec)
     for pulse in (3 * GOP + 2, *range(5 * GOP, 6 * GOP)):
-        del shelves[A]._shelved[pulse]
+        del frame_buffers[A]._pictures[pulse]
     shown: list[str | None] = [A, None, B, A, B, A, B]
     for gop, camera in enumerate(shown):
         if camera is None:
-            for shelf in shelves.values():
+            for frame_buffer in frame_buffers.values():
                 for pulse in range(gop * GOP, (gop + 1) * GOP):
-                    del shelf._shelved[pulse]
+                    del frame_buffer._pictures[pulse]
         it.write(decision(gop, choice(1, camera)))
     it.close()
     with av.open(str(tmp_path / "best" / f"object-1.{container}"), "r") as film:
@@ -124,7 +124,7 @@ def test_what_cannot_be_shown_or_did_not_come_is_bridged_as_it_is_live(
     last = pictures[0].to_ndarray(format="yuv420p")
     for pulse, picture in enumerate(pictures):
         camera = shown[pulse // GOP]
-        if camera is not None and shelves[camera].has(pulse) and not 3 * GOP + 2 < pulse < 4 * GOP:
+        if camera is not None and frame_buffers[camera].has(pulse) and not 3 * GOP + 2 < pulse < 4 * GOP:
             last = alone[camera][pulse]
         np.testing.assert_array_equal(picture.to_ndarray(format="yuv420p"), last, str(pulse))
 
@@ -134,11 +134,11 @@ def test_a_film_has_the_sites_sound_in_step(tmp_path: Path, codec: Literal["aac"
     recording = write_flashes(tmp_path / "flashes.mkv", SOUNDING)
     config = small_config(sound={"source": str(recording), "codec": codec})
     agreement, track = agreement_for(config.encode.codec, config.site.size), Soundtrack(config)
-    shelves = {camera: FrameBuffer(FPS, SOUNDING, agreement) for camera in CAMERAS}
+    frame_buffers = {camera: FrameBuffer(FPS, SOUNDING, agreement) for camera in CAMERAS}
     for unit in flashing(recording):
-        for shelf in shelves.values():
-            shelf.put(unit.pulse, 1, unit.data, key=unit.key)
-    it = FilmWriter(tmp_path / "best", shelves, agreement, config.site, track.shelf)
+        for frame_buffer in frame_buffers.values():
+            frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
+    it = FilmWriter(tmp_path / "best", frame_buffers, agreement, config.site, track.frame_buffer)
     begin = 3
     for gop in range(begin, SOUNDING // GOP):
         track.read(gop * GOP, (gop + 1) * GOP)

@@ -169,7 +169,7 @@ async def test_no_token_is_ever_written_to_a_log(site: Hall, caplog: pytest.LogC
                 assert token not in str(answer.headers)
                 if answer.status >= 400:
                     assert token not in await answer.text()
-    site.service.shelves = {}  # a mistake of the server's own is logged, too
+    site.service.frame_buffers = {}  # a mistake of the server's own is logged, too
     async with site.session.get("/api/cameras", params={"token": token_of("lead")}) as answer:
         assert answer.status == 500
     log = [

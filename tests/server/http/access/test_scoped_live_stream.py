@@ -30,7 +30,7 @@ from fakes.media.browser_playback import PLAY, seen_in_chromium
 from fakes.programs import needs_chromium
 from fakes.site import Hall
 from fakes.tokens import token_of
-from server.service.streaming.broadcaster import Chunk
+from server.service.streaming.subscriber_queue import Chunk
 
 HLS = {**PATIENT, "hls_segment_s": 0.4, "hls_window_s": 8.0}
 """Two GOPs in a segment, and all that there is in the playlist."""
@@ -139,14 +139,14 @@ async def test_grey_is_written_once_for_all_who_are_shown_it(tmp_path: Path) -> 
             hall.service.feed(epoch, {camera: {1: LARGE, 2: LARGE} for camera in CAMERAS})
         for epoch in range(2, 14):
             hall.service.feed(epoch, {camera: {1: None, 2: None} for camera in CAMERAS})
-        viewers = [hall.service.splicer.scoped[number].join() for number in (1, 2)]
+        viewers = [hall.service.splicer.scoped_persons[number].subscribe() for number in (1, 2)]
         pieces: list[Chunk] = [viewer._queue[-1] for viewer in viewers]
     assert pieces[0] is pieces[1]
-    assert pieces[0].start
+    assert pieces[0].random_access
 
 
 async def test_a_site_without_tokens_has_no_such_streams(tmp_path: Path) -> None:
     async with left(tmp_path, access={"tokens": None}) as hall:
         told = go_on(hall, range(14))
         assert told[-1].choices[1]
-        assert not hall.service.splicer.scoped
+        assert not hall.service.splicer.scoped_persons

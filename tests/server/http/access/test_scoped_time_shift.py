@@ -74,7 +74,7 @@ async def test_what_begins_in_the_past_goes_on_with_what_is_shown_now(tmp_path: 
     async with left(tmp_path) as hall:
         told = go_on(hall, range(12))
         theirs = await begun(hall, "/objects/1/best.mp4?from=p25", "family")
-        while not hall.service.splicer.scoped[1].viewers:  # noqa: ASYNC110
+        while not hall.service.splicer.scoped_persons[1].viewers:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
         told += go_on(hall, range(12, EPOCHS))
         shown = decoded((await to_the_end(hall, theirs))[0])
@@ -93,7 +93,7 @@ async def test_segments_of_the_past_are_grey_without_the_person(
         listed = (await fetched(hall, "/objects/1/hls/index.m3u8?from=p0&to=p90", who)).decode()
         names = ["init.mp4", *re.findall(r"^[0-9]+\.m4s$", listed, re.MULTILINE)]
         for scoped in (True, False):
-            reel = hall.service.splicer.reel(1, scoped=scoped)
+            reel = hall.service.splicer.segmenter_of_person(1, scoped=scoped)
             assert reel is not None
             reel._segments.clear()
         shown[who] = decoded(b"".join([await fetched(hall, f"/objects/1/hls/{it}", who) for it in names]))
@@ -120,7 +120,7 @@ async def test_the_room_of_the_past_is_not_heard_without_the_person(tmp_path: Pa
             if hls:
                 names = [f"hls/{it}" for it in ("init.mp4", *(f"{number}.m4s" for number in range(11)))]
                 for scoped in (True, False):
-                    reel = hall.service.splicer.reel(1, scoped=scoped)
+                    reel = hall.service.splicer.segmenter_of_person(1, scoped=scoped)
                     assert reel is not None
                     reel._segments.clear()
             data = b"".join([await fetched(hall, f"/objects/1/{it}", who) for it in names])

@@ -55,13 +55,13 @@ async def test_a_cut_is_told_with_both_cameras(busy: Hall) -> None:
 async def test_the_gop_is_told_before_its_video_is_sent(hall: Hall) -> None:
     order: list[str] = []
     hall.service.on_decision.append(lambda _: order.append("told"))
-    sent = hall.service.splicer.decision
+    sent = hall.service.splicer.publish_decision
 
     def decision(it: Any) -> None:
         order.append("sent")
         sent(it)
 
-    hall.service.splicer.decision = decision  # type: ignore[method-assign,assignment]
+    hall.service.splicer.publish_decision = decision  # type: ignore[method-assign,assignment]
     hall.service.come(*CAMERAS)
     for epoch in range(4):
         hall.service.feed(epoch, {A: {1: SMALL}, B: {}})
@@ -73,7 +73,7 @@ async def test_who_fell_behind_is_told_again_what_goes_on_to_hold(busy: Hall) ->
     reader = told.join(ALL)
     for epoch in range(3, 120):
         busy.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
-    assert reader.lost, "some of what was told, maybe a list"
+    assert reader.lost_gops, "some of what was told, maybe a list"
     speaking = asyncio.create_task(told.run())
     lists: set[str] = set()
     try:

@@ -133,11 +133,11 @@ async def test_live_is_an_end_of_hls_alone(hall: Hall) -> None:
 
 
 def test_the_time_of_day_is_told_of_the_first_and_of_some_others() -> None:
-    listing = SegmentList(range(100, 400), PLAN.frames, 1003, 3996)
+    listing = SegmentList(range(100, 400), PLAN.segment_frames, 1003, 3996)
     listed = long_playlist(listing, PLAN, PULSE0, ended=True)
     assert numbers(listed) == list(range(100, 400))
     told = {number: when.timestamp() for number, when in dated(listed).items()}
-    pulses = {100: 1003} | {number: number * PLAN.frames for number in (128, 192, 256, 320, 384)}
+    pulses = {100: 1003} | {number: number * PLAN.segment_frames for number in (128, 192, 256, 320, 384)}
     assert told == pytest.approx({number: PULSE0 + pulse / FPS for number, pulse in pulses.items()})
     lengths = [float(it) for it in re.findall(r"#EXTINF:([\d.]+),", listed)]
     assert lengths == [7 / FPS, *[10 / FPS] * 298, 6 / FPS]
@@ -145,7 +145,7 @@ def test_the_time_of_day_is_told_of_the_first_and_of_some_others() -> None:
 
 @pytest.mark.parametrize("stop", range(MOST_GROWING + 100, MOST_GROWING + 300, 7))
 def test_what_is_first_after_others_have_gone_was_dated_before(stop: int) -> None:
-    whole = SegmentList(range(100, stop), PLAN.frames, 1000, stop * PLAN.frames)
+    whole = SegmentList(range(100, stop), PLAN.segment_frames, 1000, stop * PLAN.segment_frames)
     left = newest(whole)
     assert MOST_GROWING - 64 < len(left.numbers) <= MOST_GROWING
     before, after = (entries(long_playlist(it, PLAN, PULSE0, ended=False)) for it in (whole, left))

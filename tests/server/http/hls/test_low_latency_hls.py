@@ -46,7 +46,7 @@ def shows(hall: Hall, gops: range, nobody: frozenset[int] = frozenset()) -> None
             for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
                 hall.service.intake.video(video(camera, unit))
         choice = ObjectChoice(1, None if gop in nobody else CAMERAS[gop % 2], None, away=False)
-        hall.service.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+        hall.service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
 async def text_of(hall: Hall, query: str = "") -> str:
@@ -142,7 +142,7 @@ async def test_playlists_keep_to_the_draft_and_go_on_part_by_part(hall: Hall) ->
 
 async def test_a_playlist_is_written_once_for_all_who_ask_and_anew_for_the_next_part(hall: Hall) -> None:
     shows(hall, range(PARTS))
-    reel = hall.service.splicer.reel(1)
+    reel = hall.service.splicer.segmenter_of_person(1)
     assert reel is not None
     texts = [_newest(reel, pulse0) for pulse0 in (None, None, 1_800_000_000.0)]
     assert texts[0] is texts[1]
@@ -239,7 +239,7 @@ async def test_parts_show_what_their_segments_show_and_any_that_says_so_can_be_b
     together = decoded(init + b"".join([await data_of(hall, uri) for uri, _ in uris]))
     for pulse in range(PARTS * GOP, gops * GOP):
         np.testing.assert_array_equal(at(together, pulse), at(segments, pulse), str(pulse))
-    reel = hall.service.splicer.reel(1)
+    reel = hall.service.splicer.segmenter_of_person(1)
     assert reel is not None
     alone = [
         (uri, gop) for uri, gop in uris if (part := reel.part(gop // PARTS, gop % PARTS)) and part.independent
@@ -280,14 +280,14 @@ async def test_gops_that_are_too_short_are_no_parts_but_segments_can_be_waited_f
         choice = ObjectChoice(1, A, None, away=False)
         decisions = [GopDecision(2 * gop, 2, (choice,), {}, {}, (), NO_REASON) for gop in range(gops)]
         for decision in decisions[: gops // 2]:
-            hall.service.splicer.decision(decision)
+            hall.service.splicer.publish_decision(decision)
         waiting = asyncio.create_task(text_of(hall, "?_HLS_msn=3"))
         now = await text_of(hall)
         assert "CAN-BLOCK-RELOAD=YES\n" in now
         assert "PART" not in now
         assert "3.m4s" not in now
         for decision in decisions[gops // 2 :]:
-            hall.service.splicer.decision(decision)
+            hall.service.splicer.publish_decision(decision)
         assert "3.m4s" in await waiting
         assert (await hall.get(STREAM + "5.0.m4s"))[0] == 404
 

@@ -72,7 +72,7 @@ async def test_a_segment_has_the_bytes_that_it_had_when_it_was_new(hall: Hall, s
                 new[number] = await fetch(hall, f"{stream}/hls/{number}.m4s")
     await until_written(hall, GOPS)
     forget(hall)
-    for reel in (hall.service.splicer.reel(1), hall.service.splicer.camera_reel("c0")):
+    for reel in (hall.service.splicer.segmenter_of_person(1), hall.service.splicer.segmenter_of_camera("c0")):
         assert reel is not None
         reel._segments.clear()
     assert len(new) > 15
@@ -147,7 +147,7 @@ async def test_what_was_somebodys_can_be_fetched_when_they_are_forgotten(hall: H
     shows(hall, range(21))
     await until_written(hall, 21)
     hall.service.splicer.forget([], [])
-    hall.service.splicer._people._gone.clear()
+    hall.service.splicer._persons._gone.clear()
     listed = await text(hall, "/objects/1/hls/index.m3u8?from=p0&to=live")
     assert numbers(listed) == list(range(11))
     assert listed.endswith("#EXT-X-ENDLIST\n")

@@ -21,7 +21,7 @@ from server.messaging.inbox import Message
 from server.messaging.messages import FrameHeader, SolverReport, ZenohKeys
 from server.service.metrics.histogram import Histogram
 from server.service.readiness import most_behind
-from server.service.streaming.broadcaster import BytesChunk, Subscriber
+from server.service.streaming.subscriber_queue import BytesChunk, Subscriber
 
 
 async def samples(hall: Hall) -> dict[tuple[str, ...], float]:
@@ -110,10 +110,10 @@ async def test_deciding_and_sending_are_counted_by_epoch_and_by_gop(busy: Hall) 
 
 async def test_pictures_that_did_not_come_are_counted(hall: Hall) -> None:
     hall.service.come(*CAMERAS)
-    shelf = hall.service.shelves[A]
+    frame_buffer = hall.service.frame_buffers[A]
     for epoch in range(2):
         hall.service.feed(epoch, {A: {1: SMALL}, B: {1: LARGE}})
-    del shelf._shelved[7]
+    del frame_buffer._pictures[7]
     hall.service.feed(2, {A: {1: SMALL}, B: {1: LARGE}})
     told = await samples(hall)
     assert told["myview_camera_lost_pictures_total", A] == 1
@@ -140,10 +140,10 @@ async def test_viewers_are_counted_by_kind_and_what_is_sent_to_them_in_bytes(bus
 
 
 async def test_what_slow_viewers_lose_stays_counted_when_they_have_gone() -> None:
-    sent, slow = Sent(), Subscriber([], starts_max=2)
+    sent, slow = Sent(), Subscriber([], max_gops=2)
     sent.join(slow)
     for number in range(4):
-        slow.put(BytesChunk(b"gop", start=True))
+        slow.put(BytesChunk(b"gop", random_access=True))
         assert sent.longest == (number % 2) + 1
     assert sent.lost == 2
     sent.leave(slow)

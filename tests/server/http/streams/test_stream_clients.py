@@ -10,7 +10,7 @@ import pytest
 
 from fakes.cameras import CAMERAS, GOP, SMALL
 from fakes.site import A, B, Hall, opened
-from server.service.streaming.broadcaster import BytesChunk
+from server.service.streaming.subscriber_queue import BytesChunk
 
 STREAMS = {
     "/objects/1/best.mp4": "video/mp4",
@@ -117,7 +117,7 @@ async def test_beyond_the_limit_a_viewer_is_told_when_to_come_again(limit: str) 
 
 
 async def test_a_viewer_that_does_not_read_loses_whole_gops_and_harms_nobody(busy: Hall) -> None:
-    channel = busy.service.splicer.objects[1]
+    channel = busy.service.splicer.persons[1]
     stalled = socket.socket()
     stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     stalled.connect(("127.0.0.1", busy.port))
@@ -128,11 +128,11 @@ async def test_a_viewer_that_does_not_read_loses_whole_gops_and_harms_nobody(bus
     await reader.readuntil(b"mdat")
     gops = [b"<GOP %05d" % number + bytes([65 + number % 26]) * 100_000 + b">" for number in range(150)]
     for gop in gops:
-        channel.publish(BytesChunk(gop, start=True))
+        channel.publish(BytesChunk(gop, random_access=True))
         await reader.readuntil(gop)
-    slow = next(viewer for viewer in channel._viewers if viewer.lost)
+    slow = next(viewer for viewer in channel._subscribers if viewer.lost)
     assert len(slow._queue) <= busy.service.config.http.viewer_queue_gops
-    assert sum(viewer.lost for viewer in channel._viewers) == slow.lost, "only who does not read loses"
+    assert sum(viewer.lost for viewer in channel._subscribers) == slow.lost, "only who does not read loses"
     if hasattr(socket, "TCP_NOTSENT_LOWAT"):
         assert slow.lost > len(gops) - 50, "the system keeps little: what waits there would be shown late"
     channel.close()
@@ -148,17 +148,17 @@ async def test_a_viewer_that_does_not_read_loses_whole_gops_and_harms_nobody(bus
 
 
 async def test_a_viewer_who_is_gone_while_the_server_waits_for_it_is_forgotten(busy: Hall) -> None:
-    channel = busy.service.splicer.objects[1]
+    channel = busy.service.splicer.persons[1]
     _, writer, _ = await asked(busy, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
     for _ in range(100):
-        channel.publish(BytesChunk(bytes(100_000), start=True))
+        channel.publish(BytesChunk(bytes(100_000), random_access=True))
         await asyncio.sleep(0)
     writer.transport.abort()
     await deserted(busy)
 
 
 async def test_a_transport_stream_is_packed_only_when_somebody_watches_one(busy: Hall) -> None:
-    kept = busy.service.splicer.objects[1]._kept
+    kept = busy.service.splicer.persons[1]._backlog
     assert not any("ts" in vars(piece) for piece in kept)
     async with busy.session.get("/objects/1/best.ts") as one, busy.session.get("/objects/1/best.ts") as two:
         data = await one.content.readexactly(188 * 16)

@@ -92,19 +92,19 @@ LOST = 22
 
 @needs_chromium
 async def test_chromium_plays_over_cuts_and_what_is_missing_to_the_end(free: Hall) -> None:
-    splicer, shelves = free.service.splicer, free.service.shelves
+    splicer, frame_buffers = free.service.splicer, free.service.frame_buffers
     splicer.forget([], [])  # begin with somebody new
     for seed, camera in enumerate((A, B)):
         for unit in encoded(seed, codec="vp8"):
             if unit.pulse // GOP not in SILENT and unit.pulse != LOST:
-                shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
-            elif shelves[camera].has(unit.pulse):
-                del shelves[camera]._shelved[unit.pulse]
+                frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+            elif frame_buffers[camera].has(unit.pulse):
+                del frame_buffers[camera]._pictures[unit.pulse]
 
     def show(gop: int) -> None:
         camera = (A, B)[gop % 2]
-        choice = ObjectChoice(7, camera if shelves[camera].has(gop * GOP) else None, None, away=False)
-        splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+        choice = ObjectChoice(7, camera if frame_buffers[camera].has(gop * GOP) else None, None, away=False)
+        splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     show(0)
     seen = await seen_in_chromium(

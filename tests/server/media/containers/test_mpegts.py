@@ -81,12 +81,12 @@ def test_the_time_reference_comes_often_and_before_its_picture(pulse: int, fps: 
 def spliced(cameras: list[int]) -> tuple[bytes, list[tuple[int, int]]]:
     """Return a stream of GOPs of these cameras, and which camera and pulse each picture is."""
     agreement, data, frames = Agreement(), b"", []
-    shelves = [FrameBuffer(FPS, 40, agreement) for _ in CAMERAS]
-    for seed, shelf in enumerate(shelves):
+    frame_buffers = [FrameBuffer(FPS, 40, agreement) for _ in CAMERAS]
+    for seed, frame_buffer in enumerate(frame_buffers):
         for unit in encoded(seed):
-            shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+            frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
     for place, camera in enumerate(cameras):
-        data += pack(shelves[camera].pictures(place * GOP, GOP), FPS, Counters(place))
+        data += pack(frame_buffers[camera].pictures(place * GOP, GOP), FPS, Counters(place))
         frames += [(camera, pulse) for pulse in range(place * GOP, (place + 1) * GOP)]
     return data, frames
 

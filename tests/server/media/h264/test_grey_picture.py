@@ -78,10 +78,10 @@ def test_so_it_is_in_vp8(blocks: tuple[int, int]) -> None:
 def test_a_grey_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> None:
     agreement = OwnParameters() if own else Agreement()
     cameras = list(MAKES) if own else list(MAKES)[:1] * 2
-    shelves = {camera: FrameBuffer(FPS, 99, agreement) for camera in cameras}
-    for camera, shelf in shelves.items():
+    frame_buffers = {camera: FrameBuffer(FPS, 99, agreement) for camera in cameras}
+    for camera, frame_buffer in frame_buffers.items():
         for unit in sent(camera):
-            shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+            frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
     shown: list[Picture] = agreement.blank(None, 0, GOP, FPS)
     for gop, camera in enumerate([cameras[0], None, cameras[1], None, cameras[0]], start=1):
         first = gop * GOP
@@ -89,7 +89,7 @@ def test_a_grey_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> Non
         shown += (
             agreement.blank(newest, first, GOP, FPS)
             if camera is None
-            else shelves[camera].pictures(first, GOP)
+            else frame_buffers[camera].pictures(first, GOP)
         )
         if camera is None:
             assert shown[-1].parameters == newest.parameters

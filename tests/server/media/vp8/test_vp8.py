@@ -74,23 +74,23 @@ def test_the_size_is_read_from_key_frames_alone(width: int, height: int) -> None
     assert size_of(key[:9]) is None
 
 
-def shelf(width: int = 64, height: int = 48) -> FrameBuffer:
+def frame_buffer(width: int = 64, height: int = 48) -> FrameBuffer:
     return FrameBuffer(FPS, FRAMES, Vp8Agreement(width, height))
 
 
 def test_a_camera_of_another_size_or_codec_is_refused() -> None:
     other = encoded(96, 48)[0]
     with pytest.raises(ParameterMismatchError, match="not VP8 of the site's size"):
-        shelf().put(0, 1, other.data, key=True)
+        frame_buffer().put(0, 1, other.data, key=True)
     h264 = Encoder(SiteSettings(width=64, height=48), EncodeSettings()).encode(
         0, np.zeros((48, 64, 3), dtype=np.uint8)
     )
     with pytest.raises(ParameterMismatchError):
-        shelf().put(0, 1, h264.data, key=True)
+        frame_buffer().put(0, 1, h264.data, key=True)
 
 
 def shelved(units: tuple[AccessUnit, ...], boot: int = 1) -> list[Picture]:
-    on = shelf()
+    on = frame_buffer()
     return [on.put(unit.pulse, boot, unit.data, key=unit.key) for unit in units]
 
 
@@ -122,7 +122,7 @@ def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(
         unit = None if pulse in lost else units.get(pulse)
         if unit is not None:
             after = None if unit.after is None else first + unit.after
-            shown += time.take(on.put(first + pulse, 1, unit.data, key=unit.key, after=after))
+            shown += time.push(on.put(first + pulse, 1, unit.data, key=unit.key, after=after))
         if unit is not None and (unit.key or unit.after in seen):
             seen.append(pulse)
         elif seen:
@@ -142,7 +142,7 @@ def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(
 def test_a_long_hole_is_one_picture_that_lasts() -> None:
     agreement = Vp8Agreement(64, 48)
     time, (first, *_) = GaplessTimeline(agreement, FPS, GOP), encoded(64, 48)
-    shown = time.take(Picture(0, key=True, fragment=agreement.pack(first.data, 0, FPS, key=True), boot=1))
+    shown = time.push(Picture(0, key=True, fragment=agreement.pack(first.data, 0, FPS, key=True), boot=1))
     shown += time.fill(1000)
     assert [(picture.pulse, picture.lasts) for picture in shown] == [(0, 1), (1, 999)]
     data = header(64, 48, FPS) + b"".join(picture.fragment for picture in shown)

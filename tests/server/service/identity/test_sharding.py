@@ -100,11 +100,11 @@ def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
     for epoch in range(6):
         service.feed(epoch, {"c0": {1: SMALL, 2: LARGE}, "c1": {}})
         if epoch == 2:
-            service.splicer.objects[2].join()
+            service.splicer.persons[2].subscribe()
     assert service.board.resolve(2) == 1
     assert list(service.board.standings) == [1]
     assert service.decider.people.elsewhere == []
-    assert set(service.splicer.objects) == {1, 2}
+    assert set(service.splicer.persons) == {1, 2}
     service.close()
 
 

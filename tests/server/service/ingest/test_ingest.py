@@ -33,7 +33,7 @@ from server.messaging.messages import ZenohKeys
 from server.service.identity.people import People
 from server.service.ingest.epoch_aligner import Aligner
 from server.service.ingest.ingest import Intake
-from server.service.streaming.frame_buffer import FrameBuffer, Shelved
+from server.service.streaming.frame_buffer import FrameBuffer
 
 KEYS = ZenohKeys("hall")
 
@@ -43,10 +43,10 @@ class Hall:
 
     def __init__(self) -> None:
         agreement = Agreement()
-        self.shelves = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
+        self.frame_buffers = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
         self.aligner = Aligner(CAMERAS, STRIDE, grace=5)
-        self.frames: list[tuple[str, Shelved]] = []
-        self.intake = Intake(self.shelves, self.aligner, lambda *frame: self.frames.append(frame))
+        self.frames: list[tuple[str]] = []
+        self.intake = Intake(self.frame_buffers, self.aligner, lambda *frame: self.frames.append(frame))
         for camera in CAMERAS:
             self.intake.alive(KEYS.camera(camera, "alive"), there=True)
 
@@ -199,7 +199,7 @@ def test_a_camera_of_other_parameters_is_refused_and_its_frames_reach_nobody() -
     assert "same configuration?" in state.refused
     assert "\n" not in state.refused
     assert [camera for camera, _ in hall.frames] == ["c0"]
-    assert not any(hall.shelves["c1"].has(pulse) for pulse in range(10))
+    assert not any(hall.frame_buffers["c1"].has(pulse) for pulse in range(10))
 
 
 def test_a_refused_camera_that_is_started_again_with_the_right_settings_is_welcome() -> None:
@@ -210,7 +210,7 @@ def test_a_refused_camera_that_is_started_again_with_the_right_settings_is_welco
     hall.intake.alive(KEYS.camera("c1", "alive"), there=True)
     hall.intake.video(video("c1", encoded(1)[5], boot=2))
     assert hall.intake.states["c1"].word == "live"
-    assert hall.shelves["c1"].has(5)
+    assert hall.frame_buffers["c1"].has(5)
 
 
 def test_a_cameras_state_follows_what_it_does() -> None:
@@ -244,14 +244,14 @@ def test_small_pictures_are_kept_by_run_and_track_until_they_are_old_or_the_came
 
 def test_what_is_of_pulses_that_nobody_can_have_counted_to_is_counted_and_dropped() -> None:
     hall = Hall()
-    hall.intake = Intake(hall.shelves, hall.aligner, lambda *_: None, now=lambda: 20, ahead=50)
+    hall.intake = Intake(hall.frame_buffers, hall.aligner, lambda *_: None, now=lambda: 20, ahead=50)
     far = 2**40
     unit = dataclasses.replace(encoded(0)[0], pulse=far)
     hall.handle("video", video("c0", unit))
     hall.handle("tracks", tracks(word("c0", far // STRIDE, {})))
     hall.handle("thumbs", thumbnail("c0", 1, b"jpeg", pulse=far))
     assert hall.bad() == 3
-    assert hall.shelves["c0"].newest == -1
+    assert hall.frame_buffers["c0"].newest == -1
     assert not hall.intake.thumbnails
     hall.handle("tracks", tracks(word("c0", 0, {})))
     hall.handle("tracks", tracks(word("c1", 0, {})))

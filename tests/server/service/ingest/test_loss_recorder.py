@@ -19,9 +19,9 @@ class Told:
 
     def __init__(self) -> None:
         self.now = 0.0
-        shelves = {camera: FrameBuffer(FPS, 50, Agreement()) for camera in CAMERAS}
+        frame_buffers = {camera: FrameBuffer(FPS, 50, Agreement()) for camera in CAMERAS}
         states = {camera: CameraState() for camera in CAMERAS}
-        self.lacking = Lacking(shelves, states, STRIDE, lambda: self.now)
+        self.lacking = Lacking(frame_buffers, states, STRIDE, lambda: self.now)
 
     def epochs(self, numbers: range, late: str | None = None) -> None:
         """Decide epochs, to which all have spoken but one."""

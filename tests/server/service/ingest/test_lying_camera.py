@@ -152,7 +152,7 @@ class Lived:
         self.decided: list[GopChoices] = []
         service.on_decision.append(self.decided.append)
         service.come(*CAMERAS)
-        self._viewer = service.splicer.decided[OTHER].join()
+        self._viewer = service.splicer.decided_cameras[OTHER].subscribe()
         self.shown: list[MediaChunk] = []
         """What those are sent who watch the other camera."""
         service.pulse = 0
@@ -235,10 +235,10 @@ def test_sound_of_more_frames_than_any_is_none_and_takes_no_time() -> None:
     head = {"first": 2**62, "sizes": [1] * (AUDIO_FRAMES_MAX + 1)}
     with pytest.raises(msgspec.ValidationError):
         msgspec.json.decode(json.dumps(head).encode(), type=AudioHeader)
-    shelf = AudioBuffer(SoundFormat(48_000, 2), 25.0, 10.0)
+    frame_buffer = AudioBuffer(SoundFormat(48_000, 2), 25.0, 10.0)
     for first in range(0, 20 * AUDIO_FRAMES_MAX, AUDIO_FRAMES_MAX):
-        shelf.put(AudioHeader(first=first, sizes=[1] * AUDIO_FRAMES_MAX), bytes(AUDIO_FRAMES_MAX))
-    assert len(shelf._frames) == 469
+        frame_buffer.put(AudioHeader(first=first, sizes=[1] * AUDIO_FRAMES_MAX), bytes(AUDIO_FRAMES_MAX))
+    assert len(frame_buffer._frames) == 469
 
 
 def test_what_is_said_by_hand_here_is_what_cameras_say() -> None:

@@ -95,8 +95,8 @@ def test_streams_go_on_after_a_leap_with_one_picture_that_bridges_it_or_with_a_h
     service: FedService, minutes: int
 ) -> None:
     lived(service, range(BEFORE))
-    channels = [service.splicer.decided["c0"], *service.splicer.objects.values()]
-    viewers = [it.join() for it in channels]
+    channels = [service.splicer.decided_cameras["c0"], *service.splicer.persons.values()]
+    viewers = [it.subscribe() for it in channels]
     until, then = service.board.end, minutes * HOUR // 60 // ENCODED * ENCODED
     lived(service, range(then, then + BEFORE))
     for viewer in viewers:
@@ -182,9 +182,9 @@ async def test_a_site_without_a_pulse_server_is_decided_all_the_same(monkeypatch
 
 def test_a_camera_that_slept_is_not_followed_by_hours_of_silence() -> None:
     following = AudioFollower(AudioBuffer(SoundFormat(48_000, 2), FPS, 10.0))
-    following.beside(0, FPS)
+    following.next_audio(0, FPS)
     hours = 8 * 3600 * FPS
-    heard = following.beside(hours, hours + FPS)
+    heard = following.next_audio(hours, hours + FPS)
     assert (heard.first, len(heard.frames)) == (
         hours // FPS * 48_000 // SAMPLES,
         pytest.approx(47 / 2, abs=1),

@@ -76,7 +76,7 @@ def shows(hall: Hall, recording: Path, gops: range, choices: Mapping[int, str | 
         )
         service.past.put(told, PULSE0)
         choice = ObjectChoice(1, camera, None, away=False)
-        service.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+        service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
 async def until_written(service: FedService, gops: int) -> None:

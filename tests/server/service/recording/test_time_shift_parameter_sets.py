@@ -26,14 +26,14 @@ async def hall(tmp_path: Path) -> AsyncIterator[Hall]:
     async for hall in opened(**OWN, record=record, http={"hls_segment_s": 0.4}):
         service = hall.service
         service.past.open()
-        put(service.shelves)
+        put(service.frame_buffers)
         for gop in range(GOPS):
             chosen = decision(gop)
             choices = {it.number: it.camera for it in chosen.choices}
             service.past.put(
                 GopChoices(first=gop * GOP, frames=GOP, choices=choices, boxes={}, cuts=[]), PULSE0
             )
-            service.splicer.decision(chosen)
+            service.splicer.publish_decision(chosen)
         while service.past.writer is not None and service.past.writer.written < GOPS - 2:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
         yield hall
@@ -50,7 +50,7 @@ async def fetch(hall: Hall, *paths: str) -> bytes:
 
 @pytest.mark.parametrize("form", ["mp4", "ts", "hls"])
 async def test_the_past_is_what_was_live(hall: Hall, form: str) -> None:
-    reel = hall.service.splicer.reel(1)
+    reel = hall.service.splicer.segmenter_of_person(1)
     assert reel is not None
     reel._segments.clear()
     if form == "hls":

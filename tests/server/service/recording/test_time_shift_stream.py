@@ -287,8 +287,8 @@ class OnDisk:
 
 def site_of(store: RecordingFolder) -> tuple[Agreement, bytes]:
     del store
-    shelves, header = filled()
-    return shelves[A]._agreement, header
+    frame_buffers, header = filled()
+    return frame_buffers[A]._agreement, header
 
 
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

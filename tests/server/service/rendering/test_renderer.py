@@ -23,8 +23,8 @@ from server.service.rendering.mjpeg_streams import MjpegStreams, MjpegVariant, P
 from server.service.rendering.overlay_video import OverlayVideo
 from server.service.rendering.rendered_stream import StillRequests
 from server.service.streaming.audio_buffer import AudioBuffer
-from server.service.streaming.broadcaster import Subscriber
 from server.service.streaming.media_chunk import MediaChunk
+from server.service.streaming.subscriber_queue import Subscriber
 
 EVERY = MjpegVariant(FPS, boxed=False)
 
@@ -70,7 +70,7 @@ def pulses_sent(viewer: Subscriber) -> bytes:
 def test_a_film_that_goes_on_with_another_process_has_no_hole_and_never_goes_back() -> None:
     film = OverlayVideo(CANVAS, 8)
     assert film.head is None
-    viewer = film.channel.join()
+    viewer = film.channel.subscribe()
     film.put(units(0, 2 * GOP))
     film.interrupted()
     film.put(units(GOP, GOP))  # seen already
@@ -89,35 +89,35 @@ def test_a_film_that_goes_on_with_another_process_has_no_hole_and_never_goes_bac
 
 def test_a_film_is_silent_where_its_pictures_are() -> None:
     form = SoundFormat(48_000, 2)
-    shelf = AudioBuffer(form, FPS, 60.0)
-    shelf.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
-    film = OverlayVideo(CANVAS, 8, shelf)
-    viewer = film.channel.join()
+    frame_buffer = AudioBuffer(form, FPS, 60.0)
+    frame_buffer.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
+    film = OverlayVideo(CANVAS, 8, frame_buffer)
+    viewer = film.channel.subscribe()
     for gop in range(3):
         film.put(units(gop * GOP, GOP), silent=gop == 1)
     pieces = [piece for piece in viewer._queue if isinstance(piece, MediaChunk)]
-    told = [set(it.heard.frames) for it in pieces if it.heard is not None]
+    told = [set(it.audio.frames) for it in pieces if it.audio is not None]
     assert told == [{b"not quiet"}, {form.silence}, {b"not quiet"}]
 
 
 @pytest.mark.parametrize("silent", [False, True])
 def test_the_holes_of_a_film_are_silent_where_nobody_knows_what_was_in_them(*, silent: bool) -> None:
     form = SoundFormat(48_000, 2)
-    shelf = AudioBuffer(form, FPS, 60.0)
-    shelf.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
-    film = OverlayVideo(CANVAS, 8, shelf, silent_holes=silent)
-    viewer = film.channel.join()
+    frame_buffer = AudioBuffer(form, FPS, 60.0)
+    frame_buffer.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
+    film = OverlayVideo(CANVAS, 8, frame_buffer, silent_holes=silent)
+    viewer = film.channel.subscribe()
     film.put(units(0, GOP))
     film.put(units(2 * GOP, GOP))
     pieces = [piece for piece in viewer._queue if isinstance(piece, MediaChunk)]
-    told = [set(it.heard.frames) for it in pieces if it.heard is not None]
+    told = [set(it.audio.frames) for it in pieces if it.audio is not None]
     assert told == [{b"not quiet"}, {form.silence if silent else b"not quiet"}, {b"not quiet"}]
 
 
 def test_whoever_comes_to_a_film_begins_with_its_newest_gop() -> None:
     film = OverlayVideo(CANVAS, 8)
     film.put(units(0, 2 * GOP))
-    assert pulses_sent(film.channel.join()) == fragments(GOP, GOP)
+    assert pulses_sent(film.channel.subscribe()) == fragments(GOP, GOP)
 
 
 def test_a_viewer_of_pictures_has_the_newest_waiting_and_no_other() -> None:

@@ -52,7 +52,7 @@ async def loud(recording: Path) -> AsyncIterator[Hall]:
 
 def decide(service: FedService, gop: int, camera: str | None) -> None:
     choice = ObjectChoice(1, camera, None, away=False)
-    service.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+    service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
 async def watched(
@@ -148,9 +148,9 @@ async def test_everybody_shares_the_bytes_of_sound(loud: Hall, recording: Path) 
         for unit in encoded(0):
             service.intake.video(video(camera, unit))
     both = (ObjectChoice(1, A, None, away=False), ObjectChoice(2, B, None, away=False))
-    service.splicer.decision(GopDecision(0, GOP, both, {}, {}, (), NO_REASON))
-    reels = [service.splicer.reel(number) for number in (1, 2)]
-    one, two = [reel._segments[0]._footage[0] for reel in reels if reel is not None]
+    service.splicer.publish_decision(GopDecision(0, GOP, both, {}, {}, (), NO_REASON))
+    reels = [service.splicer.segmenter_of_person(number) for number in (1, 2)]
+    one, two = [reel._segments[0]._chunks[0] for reel in reels if reel is not None]
     assert one.heard is not None
     assert one.heard is two.heard
 
@@ -203,11 +203,11 @@ async def test_where_boxes_are_burnt_in_a_beep_is_with_its_flash(loud: Hall, rec
     choice = ObjectChoice(1, A, None, away=False)
     decisions = [GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON) for gop in range(GOPS)]
     service.board.put(decisions[0])
-    service.splicer.decision(decisions[0])
+    service.splicer.publish_decision(decisions[0])
     answer = await loud.session.get("/objects/1/best.mp4?overlay=1")
     assert answer.status == 200, await answer.text()
     for decision in decisions[1:]:
-        service.splicer.decision(decision)
+        service.splicer.publish_decision(decision)
         await asyncio.sleep(0.02)
     service.splicer.close()
     data = await answer.read()

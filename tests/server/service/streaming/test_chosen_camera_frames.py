@@ -22,7 +22,7 @@ async def test_every_frame_of_vp8_is_the_chosen_cameras_too() -> None:
 
 
 async def test_another_cameras_gop_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    original = GopAssembler.whole
+    original = GopAssembler.complete_chunk
 
     def mistaken(self: GopAssembler, camera: str) -> MediaChunk | None:
         wrong = self.first == 40

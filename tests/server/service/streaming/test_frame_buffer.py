@@ -10,25 +10,25 @@ from server.media.stream_format import Agreement, ParameterMismatchError
 from server.service.streaming.frame_buffer import FrameBuffer
 
 
-def put(shelf: FrameBuffer, unit: AccessUnit) -> None:
-    shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+def put(frame_buffer: FrameBuffer, unit: AccessUnit) -> None:
+    frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
 
 
 def test_the_oldest_frames_make_room() -> None:
-    shelf = FrameBuffer(FPS, 10, Agreement())
+    frame_buffer = FrameBuffer(FPS, 10, Agreement())
     for unit in encoded(0)[:25]:
-        put(shelf, unit)
-    assert [pulse for pulse in range(30) if shelf.has(pulse)] == list(range(15, 25))
-    assert shelf.newest == 24
-    assert shelf.get(3) is None
+        put(frame_buffer, unit)
+    assert [pulse for pulse in range(30) if frame_buffer.has(pulse)] == list(range(15, 25))
+    assert frame_buffer.newest == 24
+    assert frame_buffer.get(3) is None
 
 
 def test_a_gop_is_the_fragments_of_its_frames_in_order() -> None:
-    shelf = FrameBuffer(FPS, 20, Agreement())
+    frame_buffer = FrameBuffer(FPS, 20, Agreement())
     for unit in encoded(0)[:10]:
-        put(shelf, unit)
-    frames = [shelf.get(pulse) for pulse in range(5, 10)]
-    assert shelf.gop(5, 5) == b"".join(frame.fragment for frame in frames if frame is not None)
+        put(frame_buffer, unit)
+    frames = [frame_buffer.get(pulse) for pulse in range(5, 10)]
+    assert frame_buffer.gop(5, 5) == b"".join(frame.fragment for frame in frames if frame is not None)
     assert [frame.key for frame in frames if frame is not None] == [True, False, False, False, False]
 
 
@@ -46,7 +46,7 @@ def test_other_parameters_are_refused_and_leave_no_trace() -> None:
 
 @pytest.mark.parametrize("data", [b"", b"\x00\x00\x01", b"\x00\x00\x01\x67", b"no H.264 at all"])
 def test_a_key_frame_without_parameter_sets_is_refused(data: bytes) -> None:
-    shelf = FrameBuffer(FPS, 10, Agreement())
+    frame_buffer = FrameBuffer(FPS, 10, Agreement())
     with pytest.raises(ParameterMismatchError, match="without parameter sets"):
-        shelf.put(0, 1, data, key=True)
-    assert not shelf.has(0)
+        frame_buffer.put(0, 1, data, key=True)
+    assert not frame_buffer.has(0)

@@ -27,16 +27,16 @@ async def hall() -> AsyncIterator[Hall]:
 
 @needs_chromium
 async def test_media_source_extensions_play_over_what_is_missing_to_the_end(hall: Hall) -> None:
-    splicer, shelf = hall.service.splicer, hall.service.shelves[A]
+    splicer, frame_buffer = hall.service.splicer, hall.service.frame_buffers[A]
     hall.service.come(*CAMERAS)
     hall.service.feed(0, {A: {1: SMALL}})
     for unit in encoded(0, GOPS * GOP):
         if unit.pulse // GOP not in SILENT and unit.pulse != LOST:
-            shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+            frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
 
     def show(gop: int) -> None:
-        choice = ObjectChoice(1, A if shelf.has(gop * GOP) else None, None, away=False)
-        splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+        choice = ObjectChoice(1, A if frame_buffer.has(gop * GOP) else None, None, away=False)
+        splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     show(0)
     parameters = hall.service.agreement.parameters

@@ -28,20 +28,20 @@ class Site:
 
     def __init__(self, silent: frozenset[int] = frozenset(), begin: int = 0) -> None:
         self.agreement = Agreement()
-        self.shelves = {camera: FrameBuffer(FPS, GOPS * GOP, self.agreement) for camera in CAMERAS}
-        self.splicer = Splicer(self.shelves, self.agreement, small_config(http={"hls_segment_s": 0.41}))
+        self.frame_buffers = {camera: FrameBuffer(FPS, GOPS * GOP, self.agreement) for camera in CAMERAS}
+        self.splicer = Splicer(self.frame_buffers, self.agreement, small_config(http={"hls_segment_s": 0.41}))
         for seed, camera in enumerate(CAMERAS):
             for unit in encoded(seed, GOPS * GOP):
                 if unit.pulse // GOP not in silent and unit.pulse // GOP >= begin:
-                    self.shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+                    self.frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
 
     def show(self, gop: int, camera: str | None) -> None:
         choice = ObjectChoice(1, camera, None, away=False)
-        self.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+        self.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     @property
     def reel(self) -> HlsSegmenter:
-        reel = self.splicer.reel(1)
+        reel = self.splicer.segmenter_of_person(1)
         assert reel is not None
         return reel
 
@@ -80,8 +80,8 @@ def test_a_segment_is_as_many_whole_gops_as_fit(
     fps: float, gop: int, segment_s: float, frames: int, target: int
 ) -> None:
     found = segment_layout(fps, gop, segment_s, 6.0)
-    assert (found.frames, found.target_s) == (frames, target)
-    assert found.listed >= 3, "RFC 8216, 6.2.2: a live playlist has three target durations"
+    assert (found.segment_frames, found.target_s) == (frames, target)
+    assert found.playlist_length >= 3, "RFC 8216, 6.2.2: a live playlist has three target durations"
     assert round(frames / fps + 1e-9) <= target
 
 
@@ -89,12 +89,12 @@ def test_segments_are_numbered_by_their_pulses_and_listed_when_they_are_whole() 
     site = Site()
     for gop in range(9):
         site.show(gop, CAMERAS[gop % 2])
-    assert [it.number for it in site.reel.listed] == [0, 1, 2, 3]
-    assert [it.until - it.first for it in site.reel.listed] == [2 * GOP] * 4
+    assert [it.number for it in site.reel.playlist_segments] == [0, 1, 2, 3]
+    assert [it.until - it.first for it in site.reel.playlist_segments] == [2 * GOP] * 4
     assert site.reel.get(4) is None, "it is not whole"
     site.splicer.close()
-    assert [it.number for it in site.reel.listed] == [0, 1, 2, 3, 4]
-    assert site.reel.listed[-1].until - site.reel.listed[-1].first == GOP
+    assert [it.number for it in site.reel.playlist_segments] == [0, 1, 2, 3, 4]
+    assert site.reel.playlist_segments[-1].until - site.reel.playlist_segments[-1].first == GOP
 
 
 def test_a_service_that_starts_later_gives_the_same_segments() -> None:
@@ -103,8 +103,8 @@ def test_a_service_that_starts_later_gives_the_same_segments() -> None:
         early.show(gop, CAMERAS[gop % 3 % 2])
         if gop >= 7:
             late.show(gop, CAMERAS[gop % 3 % 2])
-    assert [it.number for it in late.reel.listed] == list(range(3, 10))
-    for segment in late.reel.listed[1:]:
+    assert [it.number for it in late.reel.playlist_segments] == list(range(3, 10))
+    for segment in late.reel.playlist_segments[1:]:
         other = early.reel.get(segment.number)
         assert other is not None
         assert segment.data == other.data
@@ -112,10 +112,10 @@ def test_a_service_that_starts_later_gives_the_same_segments() -> None:
 
 def test_what_has_left_the_playlist_stays_for_as_long_as_it_was_in_it_and_no_longer() -> None:
     site = Site()
-    listed = site.splicer.plan.listed
+    listed = site.splicer.layout.playlist_length
     for gop in range(1000):
         site.show(gop, CAMERAS[0])
-        numbers = [it.number for it in site.reel.listed]
+        numbers = [it.number for it in site.reel.playlist_segments]
         assert len(site.reel._segments) <= 2 * listed + 1
         if numbers and numbers[0] >= listed:
             assert site.reel.get(numbers[0] - listed) is not None
@@ -125,9 +125,13 @@ def test_what_has_left_the_playlist_stays_for_as_long_as_it_was_in_it_and_no_lon
 def test_people_shown_by_one_camera_share_the_bytes_with_each_other_and_the_camera() -> None:
     site = Site()
     choices = tuple(ObjectChoice(number, CAMERAS[0], None, away=False) for number in (1, 2))
-    site.splicer.decision(GopDecision(0, GOP, choices, {}, {}, (), NO_REASON))
-    reels = [site.splicer.reel(1), site.splicer.reel(2), site.splicer.camera_reel(CAMERAS[0])]
-    held = {id(reel._segments[0]._footage[0]) for reel in reels if reel}
+    site.splicer.publish_decision(GopDecision(0, GOP, choices, {}, {}, (), NO_REASON))
+    reels = [
+        site.splicer.segmenter_of_person(1),
+        site.splicer.segmenter_of_person(2),
+        site.splicer.segmenter_of_camera(CAMERAS[0]),
+    ]
+    held = {id(reel._segments[0]._chunks[0]) for reel in reels if reel}
     assert len(held) == 1
 
 
@@ -146,9 +150,9 @@ def test_every_segment_decodes_by_itself_and_together_there_is_no_hole(
         assert last is not None
         for pulse in range(gop * GOP, (gop + 1) * GOP):
             shown.append(shown[-1] if gop in silent else alone[last][pulse])
-    for segment in site.reel.listed:
+    for segment in site.reel.playlist_segments:
         check(site.decoded([segment]), shown, segment.first)
-    check(site.decoded(list(site.reel.listed)), shown, site.reel.listed[0].first)
+    check(site.decoded(list(site.reel.playlist_segments)), shown, site.reel.playlist_segments[0].first)
 
 
 def check(
@@ -170,11 +174,11 @@ def test_the_end_of_somebody_forgotten_can_be_fetched_for_a_while() -> None:
         site.show(gop, CAMERAS[0])
     site.splicer.forget([], [])
     reel = site.reel
-    assert reel.ended
-    assert [it.number for it in reel.listed] == [0, 1, 2]
+    assert reel.has_ended
+    assert [it.number for it in reel.playlist_segments] == [0, 1, 2]
     for gop in range(5, 200):
-        site.splicer.decision(GopDecision(gop * GOP, GOP, (), {}, {}, (), NO_REASON))
-    assert site.splicer.reel(1) is None
+        site.splicer.publish_decision(GopDecision(gop * GOP, GOP, (), {}, {}, (), NO_REASON))
+    assert site.splicer.segmenter_of_person(1) is None
 
 
 @pytest.mark.parametrize("absent", [1, 4, 20, 100_000])
@@ -184,6 +188,8 @@ def test_numbers_follow_each_other_whatever_was_not_decided(absent: int) -> None
         site.show(gop, CAMERAS[0])
     for gop in range(9 + absent, 20 + absent):
         site.show(gop, CAMERAS[0])
-        numbers = [it.number for it in site.reel.listed]
+        numbers = [it.number for it in site.reel.playlist_segments]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-        assert all(it.until - it.first <= site.splicer.plan.frames for it in site.reel.listed)
+        assert all(
+            it.until - it.first <= site.splicer.layout.segment_frames for it in site.reel.playlist_segments
+        )

@@ -21,29 +21,28 @@ from server.config.site_config import Config
 from server.media.codec import agreement_for
 from server.media.h264.annexb import nal_units, parameter_sets
 from server.media.stream_format import ParameterMismatchError
-from server.service.streaming.broadcaster import Chunk
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.media_chunk import MediaChunk
 from server.service.streaming.splicer import Splicer
-
-
+from server.service.streaming.subscriber_queue import Chunk
+\n
 async def spliced(config: Config) -> tuple[bytes, bytes]:
     """Give a stream that changes camera at every GOP, as MP4 and as a transport stream."""
     agreement = agreement_for(
         config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
     )
-    shelves = {camera: FrameBuffer(FPS, GOPS * GOP, agreement) for camera in MAKES}
-    put(shelves)
-    splicer, pieces, viewer = Splicer(shelves, agreement, config), list[Chunk](), None
+    frame_buffers = {camera: FrameBuffer(FPS, GOPS * GOP, agreement) for camera in MAKES}
+    put(frame_buffers)
+    splicer, pieces, viewer = Splicer(frame_buffers, agreement, config), list[Chunk](), None
     for gop in range(GOPS):
-        splicer.decision(decision(gop))
-        viewer = viewer or splicer.objects[1].join()
+        splicer.publish_decision(decision(gop))
+        viewer = viewer or splicer.persons[1].subscribe()
     splicer.close()
     assert viewer is not None
-    pieces = [piece async for piece in viewer.pieces()]
+    pieces = [piece async for piece in viewer.chunks()]
     head = agreement.head(config.site.size, config.site.fps)
     assert head is not None
-    ts = b"".join(piece.ts for piece in pieces if isinstance(piece, MediaChunk))
+    ts = b"".join(piece.mpegts for piece in pieces if isinstance(piece, MediaChunk))
     return head + b"".join(piece.data for piece in pieces), ts
 
 
@@ -130,11 +129,11 @@ async def test_chromium_shows_the_chosen_cameras_pictures() -> None:
 
 async def _played(hall: Hall) -> dict[str, Any]:
     splicer, agreement = hall.service.splicer, hall.service.agreement
-    put(hall.service.shelves)
-    splicer.decision(decision(0))
+    put(hall.service.frame_buffers)
+    splicer.publish_decision(decision(0))
     assert agreement.codec is not None
     assert agreement.codec.startswith("avc3.")
     return await seen_in_chromium(
-        *(hall.port, splicer, GOPS, lambda gop: splicer.decision(decision(gop))),
+        *(hall.port, splicer, GOPS, lambda gop: splicer.publish_decision(decision(gop))),
         *(LOOK, "/objects/1/best.mp4", f'video/mp4; codecs="{agreement.codec}"', WIDTH, HEIGHT),
     )

@@ -11,9 +11,9 @@ from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
 from fakes.timeouts import PATIENCE
 from server.media.stream_format import Agreement
 from server.messaging.messages import NumberedBox
-from server.service.streaming.broadcaster import Subscriber
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
+from server.service.streaming.subscriber_queue import Subscriber
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 A, B = CAMERAS
@@ -24,11 +24,11 @@ class Site:
 
     def __init__(self) -> None:
         agreement = Agreement()
-        self.shelves = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
+        self.frame_buffers = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
         for seed, camera in enumerate(CAMERAS):
             for unit in encoded(seed):
-                self.shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
-        self.splicer = Splicer(self.shelves, agreement, small_config())
+                self.frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+        self.splicer = Splicer(self.frame_buffers, agreement, small_config())
         self.gops = 0
 
     def decide(self, frames_seen: int, number: int = 1, merged: dict[int, int] | None = None) -> None:
@@ -40,7 +40,7 @@ class Site:
         choices += (ObjectChoice(2, B, B, away=False),)
         boxes = {A: seen, B: [[] for _ in seen]}
         decision = GopDecision(self.gops * GOP, GOP, choices, boxes, merged or {}, (), NO_REASON)
-        self.splicer.decision(decision)
+        self.splicer.publish_decision(decision)
         self.gops += 1
 
     async def cameras(self, viewer: Subscriber) -> str:
@@ -50,7 +50,11 @@ class Site:
             sent = [data async for data in viewer]
         first = self.gops - len(sent)
         return "".join(
-            next(camera for camera in CAMERAS if self.shelves[camera].gop((first + at) * GOP, GOP) == data)[1]
+            next(
+                camera
+                for camera in CAMERAS
+                if self.frame_buffers[camera].gop((first + at) * GOP, GOP) == data
+            )[1]
             for at, data in enumerate(sent)
         )
 
@@ -68,7 +72,7 @@ class Site:
 async def test_a_preferred_camera_is_shown_while_it_sees_the_person(seen: Sequence[int], shown: str) -> None:
     site = Site()
     site.decide(seen[0])
-    viewer = site.splicer.preferring.channel(1, A).join()
+    viewer = site.splicer.preferred.broadcaster(1, A).subscribe()
     for frames in seen[1:]:
         site.decide(frames)
     assert await site.cameras(viewer) == shown
@@ -77,7 +81,10 @@ async def test_a_preferred_camera_is_shown_while_it_sees_the_person(seen: Sequen
 async def test_everybody_elses_stream_is_as_it_was() -> None:
     site = Site()
     site.decide(GOP)
-    preferring, other = site.splicer.preferring.channel(1, A).join(), site.splicer.objects[1].join()
+    preferring, other = (
+        site.splicer.preferred.broadcaster(1, A).subscribe(),
+        site.splicer.persons[1].subscribe(),
+    )
     site.decide(GOP)
     assert site.splicer.viewers == 2
     assert (await site.cameras(preferring), await site.cameras(other)) == ("00", "11")
@@ -86,21 +93,21 @@ async def test_everybody_elses_stream_is_as_it_was() -> None:
 async def test_whoever_prefers_the_same_shares_a_stream_that_ends_with_the_last_of_them() -> None:
     site = Site()
     site.decide(GOP)
-    channel = site.splicer.preferring.channel(1, A)
-    viewers = [channel.join(), channel.join()]
-    assert site.splicer.preferring.channel(1, A) is channel
+    channel = site.splicer.preferred.broadcaster(1, A)
+    viewers = [channel.subscribe(), channel.subscribe()]
+    assert site.splicer.preferred.broadcaster(1, A) is channel
     for viewer in viewers:
         site.decide(GOP)
-        assert site.splicer.preferring.channel(1, A) is channel
-        channel.leave(viewer)
+        assert site.splicer.preferred.broadcaster(1, A) is channel
+        channel.unsubscribe(viewer)
     site.decide(GOP)
-    assert site.splicer.preferring.channel(1, A) is not channel
+    assert site.splicer.preferred.broadcaster(1, A) is not channel
 
 
 async def test_it_goes_on_with_whom_the_person_turned_out_to_be() -> None:
     site = Site()
     site.decide(GOP)
-    viewer = site.splicer.preferring.channel(1, A).join()
+    viewer = site.splicer.preferred.broadcaster(1, A).subscribe()
     site.decide(GOP, number=2, merged={1: 2})
     site.decide(GOP, number=2, merged={1: 2})
     site.splicer.forget({1, 2}, [])
@@ -110,7 +117,7 @@ async def test_it_goes_on_with_whom_the_person_turned_out_to_be() -> None:
 async def test_the_stream_of_somebody_forgotten_ends() -> None:
     site = Site()
     site.decide(GOP)
-    viewer = site.splicer.preferring.channel(1, A).join()
+    viewer = site.splicer.preferred.broadcaster(1, A).subscribe()
     site.splicer.forget({2}, [])
     async with asyncio.timeout(PATIENCE):
         assert len([data async for data in viewer]) == 1

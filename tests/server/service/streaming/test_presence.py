@@ -27,56 +27,56 @@ def log() -> PresenceLog:
 
 
 def test_who_was_never_seen_is_absent(log: PresenceLog) -> None:
-    log.take(decision(0, {1: [0]}))
-    assert log.of(1) is Presence.PRESENT
-    assert log.of(2) is Presence.ABSENT
+    log.update(decision(0, {1: [0]}))
+    assert log.presence_of(1) is Presence.PRESENT
+    assert log.presence_of(2) is Presence.ABSENT
 
 
 @pytest.mark.parametrize(("place", "present"), [(0, 2), (GOP - 1, 2)])
 def test_who_leaves_is_present_for_a_while_then_held_then_absent(
     log: PresenceLog, place: int, present: int
 ) -> None:
-    log.take(decision(0, {1: [place]}))
+    log.update(decision(0, {1: [place]}))
     found = []
     for gop in range(1, 9):
-        log.take(decision(gop, {}))
-        found.append(log.of(1))
-    held = [Presence.HELD] * (found.index(Presence.ABSENT) - present)
+        log.update(decision(gop, {}))
+        found.append(log.presence_of(1))
+    held = [Presence.FROZEN] * (found.index(Presence.ABSENT) - present)
     assert found == [Presence.PRESENT] * present + held + [Presence.ABSENT] * (8 - present - len(held))
     assert len(held) == 2
 
 
 def test_one_glimpse_by_any_camera_is_enough(log: PresenceLog) -> None:
-    log.take(decision(0, {1: [0]}))
-    log.take(decision(9, {1: [GOP - 1]}, camera=B))
-    assert log.of(1) is Presence.PRESENT
+    log.update(decision(0, {1: [0]}))
+    log.update(decision(9, {1: [GOP - 1]}, camera=B))
+    assert log.presence_of(1) is Presence.PRESENT
 
 
 def test_what_two_numbers_were_seen_by_is_one_persons_when_they_are_merged(log: PresenceLog) -> None:
-    log.take(decision(0, {1: [0], 2: [0]}))
-    log.take(decision(4, {2: [0]}))
-    log.take(decision(5, {}, merged={2: 1}))
-    assert log.of(1) is log.of(2) is Presence.PRESENT
-    log.take(decision(8, {2: [3]}, merged={2: 1}))
-    assert log.of(1) is Presence.PRESENT, "also by boxes that still have the other number"
+    log.update(decision(0, {1: [0], 2: [0]}))
+    log.update(decision(4, {2: [0]}))
+    log.update(decision(5, {}, merged={2: 1}))
+    assert log.presence_of(1) is log.presence_of(2) is Presence.PRESENT
+    log.update(decision(8, {2: [3]}, merged={2: 1}))
+    assert log.presence_of(1) is Presence.PRESENT, "also by boxes that still have the other number"
 
 
 def test_pulses_that_begin_anew_make_everybody_absent(log: PresenceLog) -> None:
-    log.take(decision(100, {1: [0]}))
-    log.take(decision(0, {}))
-    assert log.of(1) is Presence.ABSENT
+    log.update(decision(100, {1: [0]}))
+    log.update(decision(0, {}))
+    assert log.presence_of(1) is Presence.ABSENT
 
 
 def test_who_is_forgotten_is_absent(log: PresenceLog) -> None:
-    log.take(decision(0, {1: [0], 2: [0]}))
+    log.update(decision(0, {1: [0], 2: [0]}))
     log.forget({2})
-    assert log.of(1) is Presence.ABSENT
-    assert log.of(2) is Presence.PRESENT
+    assert log.presence_of(1) is Presence.ABSENT
+    assert log.presence_of(2) is Presence.PRESENT
 
 
 def test_without_a_while_only_who_is_seen_in_a_gop_is_present_in_it() -> None:
     log = PresenceLog(0)
-    log.take(decision(0, {1: [GOP - 1]}))
-    assert log.of(1) is Presence.PRESENT
-    log.take(decision(1, {}))
-    assert log.of(1) is Presence.ABSENT
+    log.update(decision(0, {1: [GOP - 1]}))
+    assert log.presence_of(1) is Presence.PRESENT
+    log.update(decision(1, {}))
+    assert log.presence_of(1) is Presence.ABSENT

@@ -19,9 +19,9 @@ from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment
 from server.media.stream_format import Agreement
-from server.service.streaming.broadcaster import Subscriber
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
+from server.service.streaming.subscriber_queue import Subscriber
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 FRAMES = 6 * GOP
@@ -89,21 +89,25 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
     preset: str,
 ) -> None:
     agreement = Agreement()
-    shelves = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
-    splicer = Splicer(shelves, agreement, small_config())
+    frame_buffers = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
+    splicer = Splicer(frame_buffers, agreement, small_config())
     sent = {camera: taken(seed, missed, preset) for seed, camera in enumerate(CAMERAS)}
     own = {camera: alone(units) for camera, units in sent.items()}
-    live = {camera: splicer.cameras[camera].join() for camera in CAMERAS}
+    live = {camera: splicer.cameras[camera].subscribe() for camera in CAMERAS}
     for camera, gone in zip(CAMERAS, lost, strict=True):
         for unit in sent[camera]:
             if unit.pulse not in gone:
-                splicer.frame(camera, shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key))
+                splicer.publish_frame(
+                    camera, frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+                )
     best = None
     for number, wish in enumerate(wishes):
-        whole = wish and all(shelves[wish].has(pulse) for pulse in range(number * GOP, (number + 1) * GOP))
+        whole = wish and all(
+            frame_buffers[wish].has(pulse) for pulse in range(number * GOP, (number + 1) * GOP)
+        )
         choice = ObjectChoice(1, wish if whole else None, None, away=False)
-        splicer.decision(GopDecision(number * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
-        best = best or splicer.objects[1].join()
+        splicer.publish_decision(GopDecision(number * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+        best = best or splicer.persons[1].subscribe()
     assert best is not None
     if agreement.parameters is None:
         return
@@ -126,26 +130,26 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
 
 def splicing() -> tuple[Splicer, dict[str, FrameBuffer], bytes]:
     agreement = Agreement()
-    shelves = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
-    splicer = Splicer(shelves, agreement, small_config())
+    frame_buffers = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
+    splicer = Splicer(frame_buffers, agreement, small_config())
     for unit in taken(0, frozenset(), "ultrafast"):
-        shelves["c0"].put(unit.pulse, 1, unit.data, key=unit.key)
+        frame_buffers["c0"].put(unit.pulse, 1, unit.data, key=unit.key)
     assert agreement.parameters is not None
-    return splicer, shelves, init_segment(agreement.parameters, WIDTH, HEIGHT)
+    return splicer, frame_buffers, init_segment(agreement.parameters, WIDTH, HEIGHT)
 
 
 def decide(splicer: Splicer, gop: int, camera: str | None) -> None:
     choice = ObjectChoice(1, camera, None, away=False)
-    splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+    splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
 async def test_a_picture_that_the_camera_did_not_take_costs_only_itself() -> None:
-    splicer, shelves, head = splicing()
+    splicer, frame_buffers, head = splicing()
     units = taken(1, frozenset({7, 8}), "ultrafast")
     for unit in units:
-        shelves["c1"].put(unit.pulse, 1, unit.data, key=unit.key)
+        frame_buffers["c1"].put(unit.pulse, 1, unit.data, key=unit.key)
     decide(splicer, 0, "c1")
-    viewer = splicer.objects[1].join()
+    viewer = splicer.persons[1].subscribe()
     decide(splicer, 1, None)
     pictures = shown(head, await received(viewer))
     assert [(it.pulse, it.lasts) for it in pictures[GOP:]] == [(5, 1), (6, 1), (7, 2), (9, 1)]
@@ -156,15 +160,15 @@ async def test_a_picture_that_the_camera_did_not_take_costs_only_itself() -> Non
 
 async def test_a_camera_that_fell_silent_stands_still_until_it_comes_back() -> None:
     splicer, _, head = splicing()
-    viewer = splicer.cameras["c0"].join()
+    viewer = splicer.cameras["c0"].subscribe()
     units = taken(0, frozenset(), "ultrafast")
-    shelf = FrameBuffer(FPS, 10, Agreement())
+    frame_buffer = FrameBuffer(FPS, 10, Agreement())
     for unit in units[: GOP + 2]:
-        splicer.frame("c0", shelf.put(unit.pulse, 1, unit.data, key=unit.key))
+        splicer.publish_frame("c0", frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key))
     for gop in range(2, 14):
         decide(splicer, gop, None)
     for unit in units[GOP + 2 : GOP + 4]:
-        splicer.frame("c0", shelf.put(unit.pulse, 1, unit.data, key=unit.key))
+        splicer.publish_frame("c0", frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key))
     splicer.close()
     pictures = shown(head, await received(viewer))
     assert [it.pulse for it in pictures] == list(range(13 * GOP - 2 * FPS)), "what comes late is not shown"
@@ -175,31 +179,31 @@ async def test_a_camera_that_fell_silent_stands_still_until_it_comes_back() -> N
 async def test_whoever_comes_while_nothing_can_be_shown_for_long_waits_and_no_queue_grows() -> None:
     splicer, _, _ = splicing()
     decide(splicer, 0, "c0")
-    slow = splicer.objects[1].join()
+    slow = splicer.persons[1].subscribe()
     for gop in range(8, 2000):
         decide(splicer, gop, None)
     assert len(slow._queue) < 20
-    late = splicer.objects[1].join()
+    late = splicer.persons[1].subscribe()
     assert not late._queue
 
 
 async def test_after_hours_without_a_picture_the_stream_goes_on_all_the_same() -> None:
-    splicer, shelves, _ = splicing()
+    splicer, frame_buffers, _ = splicing()
     decide(splicer, 0, "c0")
-    viewer = splicer.objects[1].join()
+    viewer = splicer.persons[1].subscribe()
     day = 86_400 * FPS
     for unit in taken(0, frozenset(), "ultrafast")[:GOP]:
-        shelves["c0"].put(day + unit.pulse, 1, unit.data, key=unit.key)
+        frame_buffers["c0"].put(day + unit.pulse, 1, unit.data, key=unit.key)
     decide(splicer, day // GOP, "c0")
     assert len(await received(viewer)) == 2
 
 
 async def test_pulses_that_begin_anew_begin_the_stream_anew() -> None:
-    splicer, shelves, _ = splicing()
+    splicer, frame_buffers, _ = splicing()
     units = taken(0, frozenset(), "ultrafast")
     for unit in units[:GOP]:
-        splicer.frame("c0", shelves["c0"].put(100_000 + unit.pulse, 1, unit.data, key=unit.key))
-    viewer = splicer.cameras["c0"].join()
+        splicer.publish_frame("c0", frame_buffers["c0"].put(100_000 + unit.pulse, 1, unit.data, key=unit.key))
+    viewer = splicer.cameras["c0"].subscribe()
     for unit in units[:GOP]:
-        splicer.frame("c0", shelves["c0"].put(unit.pulse, 2, unit.data, key=unit.key))
+        splicer.publish_frame("c0", frame_buffers["c0"].put(unit.pulse, 2, unit.data, key=unit.key))
     assert len(await received(viewer)) == 2 * GOP

@@ -24,7 +24,7 @@ from fakes.cameras import (
 from fakes.site import A, B, Hall
 from server.config.sections import ViewSettings
 from server.http.access.csrf import CHANGES
-from server.service.streaming.broadcaster import Chunk
+from server.service.streaming.subscriber_queue import Chunk
 from server.service.view_selection.decider import Decider, GopDecision
 from server.system.errors import UserError
 
@@ -103,16 +103,16 @@ def test_streams_are_the_chosen_cameras_gops_without_a_hole(changes: Changes) ->
             service.choose_by(looking(service.config.view, changes[epoch]))
         one, other = (SMALL, LARGE) if epoch // 3 % 2 else (LARGE, SMALL)
         service.feed(epoch, {A: {1: one}, B: {1: other}})
-        if viewer is None and 1 in service.splicer.objects:
-            viewer = service.splicer.objects[1].join()
+        if viewer is None and 1 in service.splicer.persons:
+            viewer = service.splicer.persons[1].subscribe()
             begun = len(shown) - 1
             got += [it.data for it in viewer._queue]
             viewer._queue.clear()
-            viewer.at_once = take
+            viewer.direct_send = take
     if viewer is not None:
-        assert viewer.lost == 0
+        assert viewer.lost_gops == 0
         names = [it or "" for it in shown[begun:]]
-        assert got == [service.shelves[it].gop((begun + n) * GOP, GOP) for n, it in enumerate(names)]
+        assert got == [service.frame_buffers[it].gop((begun + n) * GOP, GOP) for n, it in enumerate(names)]
     service.close()
 
 
@@ -152,7 +152,7 @@ def test_what_is_kept_reaches_as_far_as_can_be_looked_ahead() -> None:
     for view in ({}, {"buffer_s": 1.0}, {"buffer_s": 60.0}, {"lookahead": 200}):
         service = FedService(small_config(view=view))
         config, fps = service.config, service.config.site.fps
-        kept = service.shelves[A]._frames
+        kept = service.frame_buffers[A]._max_frames
         late = round(config.view.late_after_s * fps) + round(config.track.backlog_s * fps)
         assert service.most_lookahead >= config.view.lookahead
         assert service.most_lookahead + late + STRIDE + GOP <= kept
