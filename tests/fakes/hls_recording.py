@@ -29,7 +29,7 @@ def shows(hall: Hall, gops: range, choices: dict[int, str | None] | None = None)
         told = {} if camera is None else {1: camera}
         service.past.put(GopChoices(first=gop * GOP, frames=GOP, choices=told, boxes={}, cuts=[]), PULSE0)
         choice = ObjectChoice(1, camera, None, away=False)
-        service.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+        service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
 async def until_written(hall: Hall, gops: int) -> None:

@@ -147,7 +147,7 @@ async def test_what_was_somebodys_can_be_fetched_when_they_are_forgotten(hall: H
     shows(hall, range(21))
     await until_written(hall, 21)
     hall.service.splicer.forget([], [])
-    hall.service.splicer._persons._gone.clear()
+    hall.service.splicer._persons._ended.clear()
     listed = await text(hall, "/objects/1/hls/index.m3u8?from=p0&to=live")
     assert numbers(listed) == list(range(11))
     assert listed.endswith("#EXT-X-ENDLIST\n")

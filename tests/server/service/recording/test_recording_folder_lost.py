@@ -367,7 +367,7 @@ async def test_who_is_nowhere_else_is_gone_with_what_was_recorded(
     assert store is not None
     hall.service.past.recent._choices.clear()
     hall.service.splicer.forget([], [])
-    hall.service.splicer._persons._gone.clear()
+    hall.service.splicer._persons._ended.clear()
     hall.service.decider.people.roll.first_seen.clear()
     assert len((await hall.get_json("/api/objects/1/past"))["spans"]) == 1
     shutil.rmtree(store.folder)

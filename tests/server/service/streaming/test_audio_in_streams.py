@@ -151,8 +151,8 @@ async def test_everybody_shares_the_bytes_of_sound(loud: Hall, recording: Path) 
     service.splicer.publish_decision(GopDecision(0, GOP, both, {}, {}, (), NO_REASON))
     reels = [service.splicer.segmenter_of_person(number) for number in (1, 2)]
     one, two = [reel._segments[0]._chunks[0] for reel in reels if reel is not None]
-    assert one.heard is not None
-    assert one.heard is two.heard
+    assert one.audio is not None
+    assert one.audio is two.audio
 
 
 async def test_a_site_without_sound_is_as_it_always_was(hall: Hall) -> None:

@@ -25,7 +25,8 @@ from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.media_chunk import MediaChunk
 from server.service.streaming.splicer import Splicer
 from server.service.streaming.subscriber_queue import Chunk
-\n
+
+
 async def spliced(config: Config) -> tuple[bytes, bytes]:
     """Give a stream that changes camera at every GOP, as MP4 and as a transport stream."""
     agreement = agreement_for(
