@@ -124,7 +124,7 @@ async def test_a_mistake_in_the_middle_of_an_answer_breaks_it_off(
         yield SimpleNamespace(data=b"some of it")
         raise PermissionError(13, "the disk is gone")
 
-    monkeypatch.setattr(Subscriber, "pieces", some)
+    monkeypatch.setattr(Subscriber, "chunks", some)
     reader, writer = await asyncio.open_connection("127.0.0.1", busy.port)
     writer.write(f"GET /objects/1/best.mp4 HTTP/{version}\r\nHost: 127.0.0.1\r\n\r\n".encode())
     head = await reader.readuntil(b"\r\n\r\n")

@@ -28,7 +28,7 @@ async def test_another_cameras_gop_is_noticed(monkeypatch: pytest.MonkeyPatch) -
         wrong = self.first == 40
         return original(self, "c0" if wrong and camera != "c0" else "c3" if wrong else camera)
 
-    monkeypatch.setattr(GopAssembler, "whole", mistaken)
+    monkeypatch.setattr(GopAssembler, "complete_chunk", mistaken)
     assert await judge(100, 5, seed=1) == Right(100, 5, contained=90, ts=90, alike=0)
     vp8 = EncodeSettings(codec="vp8")
     assert await judge(100, 5, seed=1, encode=vp8) == Right(100, 5, contained=90, ts=None, alike=0)
