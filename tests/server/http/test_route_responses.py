@@ -110,7 +110,7 @@ async def test_a_method_that_is_not_possible_is_405_and_says_what_is(hall: Hall)
 async def test_a_mistake_of_the_servers_own_is_500_without_a_traceback(
     hall: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hall.service, "shelves", {})
+    monkeypatch.setattr(hall.service, "frame_buffers", {})
     assert await hall.get("/api/cameras") == (500, {"error": "the server made a mistake; its log says more"})
 
 
