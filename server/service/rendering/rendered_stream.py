@@ -17,11 +17,8 @@ from server.service.rendering.worker_process import RenderWorker, WorkerDiedErro
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.media_chunk import MediaChunk
-
-from server.system.backoff import Backoff
-
 from server.service.streaming.subscriber_queue import Chunk, Subscriber
-
+from server.system.backoff import Backoff
 
 
 @dataclass(slots=True)

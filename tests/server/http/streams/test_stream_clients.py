@@ -132,9 +132,13 @@ async def test_a_viewer_that_does_not_read_loses_whole_gops_and_harms_nobody(bus
         await reader.readuntil(gop)
     slow = next(viewer for viewer in channel._subscribers if viewer.lost_gops)
     assert len(slow._queue) <= busy.service.config.http.viewer_queue_gops
-    assert sum(viewer.lost_gops for viewer in channel._subscribers) == slow.lost_gops, "only who does not read loses"
+    assert sum(viewer.lost_gops for viewer in channel._subscribers) == slow.lost_gops, (
+        "only who does not read loses"
+    )
     if hasattr(socket, "TCP_NOTSENT_LOWAT"):
-        assert slow.lost_gops > len(gops) - 50, "the system keeps little: what waits there would be shown late"
+        assert slow.lost_gops > len(gops) - 50, (
+            "the system keeps little: what waits there would be shown late"
+        )
     channel.close()
     loop, got = asyncio.get_running_loop(), b""
     stalled.setblocking(False)  # noqa: FBT003 — the name of the method says it
