@@ -18,7 +18,7 @@ from benchmarks.recordings import Recording, TrackSettings, find_recordings, tra
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
 from tracking import PAPER_COSTS
-from tracking.evaluation import Scores, average
+from tracking.evaluation import Scores, average_scores
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ def cell(name: str, without: Scores, default: Scores | None) -> str:
 def tables(report: Report, names: list[str], found: dict[str, list[Scores]]) -> None:
     """Print a table for each score: the default's, and what each term's absence changes."""
     several = len(names) > 1
-    wide = {name: scores + [average(scores)] * several for name, scores in found.items()}
+    wide = {name: scores + [average_scores(scores)] * several for name, scores in found.items()}
     for name in SCORES:
         rows = [
             [term, *(cell(name, *pair) for pair in zip(scores, _beside(term, wide), strict=True))]

@@ -26,9 +26,9 @@ from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
 from server.cli.track.command import DetectedFrame, config_for_video, detect_frames, final_rows
 from tracking import CostSettings, WindowSettings, create_solver
-from tracking.baselines import Preparing, tracker_named, tracker_names
-from tracking.evaluation import HEADINGS, Scores, cells, evaluate, perfect_association
+from tracking.evaluation import HEADINGS, Scores, evaluate, format_scores, oracle_association
 from tracking.motchallenge import MotRow, read_rows
+from tracking.registry import PrescanTracker, create_tracker, tracker_names
 from tracking.solvers import DEFAULT_SOLVER
 
 CEILING = "perfect association"
@@ -82,10 +82,10 @@ def views(data: Path, most: int | None) -> list[View]:
 def follow(name: str, view: View) -> tuple[list[MotRow], float]:
     """Return a tracker's tracks, and the milliseconds that it took for each frame."""
     frames = view.frames
-    tracker = tracker_named(
+    tracker = create_tracker(
         name, WindowSettings(), CostSettings(), lambda: create_solver(DEFAULT_SOLVER), fps=view.fps
     )
-    if isinstance(tracker, Preparing):  # as a recording is looked at ahead
+    if isinstance(tracker, PrescanTracker):  # as a recording is looked at ahead
         tracker.prepare(it.image for it in frames[:_AHEAD:_AHEAD_EVERY] if it.image is not None)
     rows: list[MotRow] = []
     began = time.perf_counter()
@@ -106,11 +106,11 @@ def measure(options: argparse.Namespace) -> None:
             rows, milliseconds = follow(name, view)
             found[name] = evaluate(view.truth, rows)
             took.setdefault(name, []).append(milliseconds)
-        found[CEILING] = evaluate(view.truth, perfect_association(view.detections, view.truth))
+        found[CEILING] = evaluate(view.truth, oracle_association(view.detections, view.truth))
         report.table(
             view.name,
             ["", *(HEADINGS[score] for score in _SHOWN)],
-            [[name, *cells(scores, _SHOWN)] for name, scores in found.items()],
+            [[name, *format_scores(scores, _SHOWN)] for name, scores in found.items()],
         )
     report.table(
         "What following takes: milliseconds a frame, the median of the views",

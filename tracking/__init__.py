@@ -1,6 +1,6 @@
 """Frames or detections in, tracks out: detectors, the network model, its solvers, the online window."""
 
-from tracking.appearance import grey_histograms
+from tracking.appearance import gray_histograms
 from tracking.interpolation import interpolate_detections
 from tracking.model.network import Network, build_network
 from tracking.model.object_state import Template
@@ -29,7 +29,7 @@ __all__ = [
     "WindowTrack",
     "build_network",
     "create_solver",
-    "grey_histograms",
+    "gray_histograms",
     "interpolate_detections",
     "merge_results",
     "solver_names",

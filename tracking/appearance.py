@@ -1,4 +1,4 @@
-"""How an object looks: grey histograms of its box, and the distances between them."""
+"""How an object looks: gray histograms of its box, and the distances between them."""
 
 from __future__ import annotations
 
@@ -9,32 +9,32 @@ from numpy.typing import NDArray
 
 from tracking.boxes import Floats
 
-GREY_LEVELS = 256
+GRAY_LEVELS = 256
 
 AppearanceMeasure = Literal["bhattacharyya", "intersection"]
 
 
-def grey_histograms(
-    grey: NDArray[np.uint8],
+def gray_histograms(
+    gray: NDArray[np.uint8],
     boxes: Floats,
     bins: int = 64,
     mask: NDArray[np.uint8] | None = None,
 ) -> Floats:
-    """Return the grey histogram of each box, shape (K, bins), rows summing to 1 (paper II.D, Example 1).
+    """Return the gray histogram of each box, shape (K, bins), rows summing to 1 (paper II.D, Example 1).
 
-    `grey` is (H, W); `boxes` (K, 4) in pixels are cut to the image; `mask` (H, W), where given, leaves
+    `gray` is (H, W); `boxes` (K, 4) in pixels are cut to the image; `mask` (H, W), where given, leaves
     only its non-zero pixels in. A box that holds no pixel gets the uniform histogram: it looks like
     nothing in particular.
 
     Raises:
         ValueError: `bins` is not between 1 and 256.
     """
-    if not 1 <= bins <= GREY_LEVELS:
-        raise ValueError(f"bins must be between 1 and {GREY_LEVELS}, not {bins}")
-    levels = np.arange(GREY_LEVELS) * bins // GREY_LEVELS
+    if not 1 <= bins <= GRAY_LEVELS:
+        raise ValueError(f"bins must be between 1 and {GRAY_LEVELS}, not {bins}")
+    levels = np.arange(GRAY_LEVELS) * bins // GRAY_LEVELS
     result = np.full((len(boxes), bins), 1.0 / bins)
-    for row, (left, top, right, bottom) in enumerate(_pixel_ranges(boxes, grey.shape)):
-        pixels = grey[top:bottom, left:right]
+    for row, (left, top, right, bottom) in enumerate(_pixel_ranges(boxes, gray.shape)):
+        pixels = gray[top:bottom, left:right]
         kept = pixels.ravel() if mask is None else pixels[mask[top:bottom, left:right] != 0]
         if kept.size:
             result[row] = np.bincount(levels[kept], minlength=bins) / kept.size

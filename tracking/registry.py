@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
-from tracking.baselines.prediction_method import Method
-from tracking.baselines.stepwise import StepwiseTracker
+from tracking.baselines.stepwise import PredictionMethod, StepwiseTracker
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.detectors.base import Image
-from tracking.interactive import AssistedTracker, AssistSettings
+from tracking.interactive import InteractiveSettings, InteractiveTracker
 from tracking.model.settings import CostSettings
 from tracking.solvers.base import Solver
 from tracking.tracker import OnlineTracker
@@ -20,14 +19,14 @@ from tracking.window import WindowResult, WindowSettings
 DEFAULT_TRACKER = "lp"
 """Multiple object tracking as one linear program in a moving window: MyView's own."""
 
-TEMPORAL = "temporal"
+TEMPORAL_TRACKER = "temporal"
 """Person-to-blob matching over a window of samples: it has settings of its own."""
 
 # Imported when asked for: a camera with the default tracker loads none of them.
 _METHODS = {
-    "kalman": ("tracking.baselines.kalman", "Kalman"),
+    "kalman": ("tracking.baselines.kalman_prediction", "KalmanPrediction"),
     "klt": ("tracking.baselines.optical_flow", "OpticalFlow"),
-    "mcmc": ("tracking.baselines.mcmc", "Mcmc"),
+    "mcmc": ("tracking.baselines.mcmc", "McmcFilter"),
     "mean-shift": ("tracking.baselines.mean_shift", "MeanShift"),
     "separated-particles": ("tracking.baselines.separated_particles", "SeparatedParticles"),
     "occlusion-cues": ("tracking.baselines.occlusion_cues", "OcclusionCues"),
@@ -54,7 +53,7 @@ class Tracker(Protocol):
 
 
 @runtime_checkable
-class Preparing(Protocol):
+class PrescanTracker(Protocol):
     """A tracker that learns the room from pictures of a recording, before its first frame."""
 
     def prepare(self, images: Iterable[Image]) -> None:
@@ -64,40 +63,42 @@ class Preparing(Protocol):
 
 def tracker_names() -> tuple[str, ...]:
     """Give the names of all trackers."""
-    return (DEFAULT_TRACKER, *sorted((*_METHODS, TEMPORAL, _GRAPH)))
+    return (DEFAULT_TRACKER, *sorted((*_METHODS, TEMPORAL_TRACKER, _GRAPH)))
 
 
-def needs_pictures(name: str) -> bool:
+def needs_images(name: str) -> bool:
     """Say whether a tracker looks at the pictures itself.
 
     Raises:
         ValueError: no tracker has that name.
     """
-    return name == TEMPORAL or (name not in {DEFAULT_TRACKER, _GRAPH} and bool(_method_of(name).sees))
+    return name == TEMPORAL_TRACKER or (
+        name not in {DEFAULT_TRACKER, _GRAPH} and bool(_method_of(name).uses_image)
+    )
 
 
-def tracker_named(
+def create_tracker(
     name: str,
     window: WindowSettings,
     costs: CostSettings,
     solver: Callable[[], Solver],
     temporal: TemporalSettings | None = None,
     fps: float = 25.0,
-    assist: AssistSettings | None = None,
+    assist: InteractiveSettings | None = None,
 ) -> Tracker:
     """Give a new tracker for `fps` frames a second.
 
     Only the network program has costs, a solver and an operator's help (where `assist` is enabled it is an
-    `AssistedTracker`), and only temporal consistency `temporal`.
+    `InteractiveTracker`), and only temporal consistency `temporal`.
 
     Raises:
         ValueError: no tracker has that name.
     """
     if name == DEFAULT_TRACKER:
         if assist is not None and assist.enabled:
-            return AssistedTracker(window, costs, solver(), assist)
+            return InteractiveTracker(window, costs, solver(), assist)
         return OnlineTracker(window, costs, solver())
-    if name == TEMPORAL:
+    if name == TEMPORAL_TRACKER:
         made: Tracker = import_module("tracking.baselines.temporal_consistency.tracker").TemporalTracker(
             window, temporal, fps
         )
@@ -109,9 +110,9 @@ def tracker_named(
     return StepwiseTracker(_method_of(name)(), window)
 
 
-def _method_of(name: str) -> type[Method[Any]]:
+def _method_of(name: str) -> type[PredictionMethod[Any]]:
     if name not in _METHODS:
         raise ValueError(f"no tracker is called {name!r}; there are {', '.join(tracker_names())}")
     module, method = _METHODS[name]
-    found: type[Method[Any]] = getattr(import_module(module), method)
+    found: type[PredictionMethod[Any]] = getattr(import_module(module), method)
     return found

@@ -114,7 +114,7 @@ class WindowResult:
             An object of which no frame is final yet may still vanish.
         tracks: the objects that are seen in any of the frames, by ascending id.
         report: what the solver has proven about the last window.
-        troubles: what the newest window foresees, the worst first; only where the tracker is set to.
+        risk_events: what the newest window foresees, the worst first; only where the tracker is set to.
         revised_from: the first frame that was final and has changed after all, since somebody was pointed at:
             all frames from `first` on are to be taken anew. None: nothing that was final has changed.
     """
@@ -124,7 +124,7 @@ class WindowResult:
     final_to: int
     tracks: tuple[WindowTrack, ...]
     report: SolveReport
-    troubles: tuple[RiskEvent, ...] = ()
+    risk_events: tuple[RiskEvent, ...] = ()
     revised_from: int | None = None
 
 

@@ -25,7 +25,7 @@ from tracking import Detections
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors import BackgroundDetector, Image
 from tracking.detectors.base import Mask, Plane
-from tracking.detectors.color_histogram import Looks
+from tracking.detectors.color_histogram import AppearanceExtractor
 
 _AHEAD, _EVERY = 31, 20
 """Pictures of which the background is the median, and frames between them."""
@@ -60,7 +60,7 @@ class Blobs:
 
     def __init__(self, ahead: Sequence[Image]) -> None:
         background = np.median(np.stack(ahead), axis=0).astype(np.uint8)
-        self._looks = Looks()
+        self._looks = AppearanceExtractor()
         self._round = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
         self._wide = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
         self._familiar = FamiliarColours((image, self._differing(image, background)) for image in ahead)
@@ -90,7 +90,7 @@ class Blobs:
         boxes = np.concatenate([whole, *(_parts(mask, labels, thinner) for thinner in _THINNER)])
         total, area = (_inside(np.asarray(table), boxes) for table in sums)
         scores = np.minimum(total / np.maximum(area, 1.0) / _SURE, 1.0)
-        return Detections(boxes, scores, self._looks.rows(image, boxes, mask))
+        return Detections(boxes, scores, self._looks.histograms(image, boxes, mask))
 
 
 def _pieces(mask: Mask, least: int) -> tuple[NDArray[np.int32], Floats]:

@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.assist.desk import Desk
 from benchmarks.experiments.scene import Truth
 from tracking.boxes import Floats, iou
-from tracking.interactive import Pointing, RiskEvent
+from tracking.interactive import PositionCorrection, RiskEvent
 
 _SEEN = 0.15
 """Share of a body that must be visible for anybody to point at it."""
@@ -109,7 +109,7 @@ class Operator:
                 others.append(it)
         self.flags += [Flag(it, it.objects[0], newest, it.frame) for it in self._desk.raised(newest, others)]
 
-    def look(self, newest: int, shown: Mapping[int, Mapping[int, Floats]]) -> Pointing | None:
+    def look(self, newest: int, shown: Mapping[int, Mapping[int, Floats]]) -> PositionCorrection | None:
         """Look at the screen and point at whom the flag names, if anybody can be seen there."""
         flag = self._now = self._now or self._next(newest, newest - self._delay)
         if flag is None or flag.begun is None or not 0 <= newest - flag.lag < self._truth.frames:
@@ -136,7 +136,7 @@ class Operator:
 
     def _see_to(
         self, flag: Flag, begun: int, newest: int, shown: Mapping[int, Mapping[int, Floats]]
-    ) -> Pointing | None:
+    ) -> PositionCorrection | None:
         screen = newest - flag.lag
         if flag.fish is None:
             self._recognise(flag, shown.get(screen, {}), screen)
@@ -181,9 +181,9 @@ class Operator:
         if over or newest - (flag.begun or 0) > _LONGEST_S * self._fps + flag.lag:
             flag.ended = screen
 
-    def _pointing(self, flag: Flag, screen: int) -> Pointing:
+    def _pointing(self, flag: Flag, screen: int) -> PositionCorrection:
         box = self._truth.boxes[flag.fish, screen]
         size = float(np.sqrt((box[2] - box[0]) * (box[3] - box[1])))
         off = self._rng.normal(0.0, self._person.error * size / np.sqrt(2.0), 2)
         x, y = (box[:2] + box[2:]) / 2.0 + off
-        return Pointing(screen, flag.object, float(x), float(y), max(size / 3.0, 1.0))
+        return PositionCorrection(screen, flag.object, float(x), float(y), max(size / 3.0, 1.0))

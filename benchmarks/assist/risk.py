@@ -24,7 +24,7 @@ from benchmarks.assist.watch import Watched, watch
 from benchmarks.report import Report
 from benchmarks.surroundings import parser
 from tracking.boxes import Floats
-from tracking.interactive import RiskReason, Signs
+from tracking.interactive import RiskFeatures, RiskReason
 
 _MARGIN, _GONE = 4.0, 5
 """What is foreseen here: more than anybody would be asked about, so that the risk of that is known, too."""
@@ -49,10 +49,12 @@ def examples(watched: Sequence[Watched], reason: RiskReason) -> tuple[Floats, Fl
     for it in watched:
         for newest, trouble in it.troubles:
             if trouble.reason == reason:
-                rows.append(Signs(trouble.margin, trouble.frame - newest, trouble.length).terms)
+                rows.append(
+                    RiskFeatures(trouble.margin, trouble.frame - newest, trouble.length).regression_terms
+                )
                 told = [tells(trouble, newest, failure, it.clip.fps, person) for failure in it.failures]
                 wrong.append(float(any(told)))
-    return np.array(rows).reshape(-1, len(Signs(0.0, 0.0, 0.0).terms)), np.array(wrong)
+    return np.array(rows).reshape(-1, len(RiskFeatures(0.0, 0.0, 0.0).regression_terms)), np.array(wrong)
 
 
 def main() -> None:
@@ -61,7 +63,7 @@ def main() -> None:
     options.add_argument("--clips", type=int, default=50, help="how many")
     chosen = options.parse_args()
     kind = kinds()["school"]
-    assist = replace(kind.setup.assist, margin=_MARGIN, alike=_MARGIN, gone=_GONE)
+    assist = replace(kind.setup.assist, swap_margin=_MARGIN, crossing_margin=_MARGIN, hidden_frames=_GONE)
     setup = replace(kind.setup, assist=assist)
     watched = [watch(clip, setup) for clip in kind.clips(chosen.clips, first=0)]
     table = []

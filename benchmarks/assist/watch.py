@@ -14,7 +14,7 @@ from benchmarks.assist.operator import Flag, Operator, Person
 from server.config.sections import FlagSettings
 from tracking import CostSettings, WindowResult, WindowSettings, create_solver
 from tracking.boxes import Floats
-from tracking.interactive import AssistedTracker, AssistSettings, Pointing, RiskEvent
+from tracking.interactive import InteractiveSettings, InteractiveTracker, PositionCorrection, RiskEvent
 from tracking.solvers import DEFAULT_SOLVER
 
 _ALL = FlagSettings(per_minute=600, risk=0.0)
@@ -28,7 +28,7 @@ class Setup:
 
     window: WindowSettings
     costs: CostSettings
-    assist: AssistSettings
+    assist: InteractiveSettings
 
 
 FISH = Setup(
@@ -42,13 +42,13 @@ FISH = Setup(
         birth_min_visible=0.8,
     ),
     CostSettings(displacement=1.0, gate=1.2, motion_slack=0.5, motion_drift=0.1, reappearance_drift=0.1),
-    AssistSettings(enabled=True),
+    InteractiveSettings(enabled=True),
 )
 """What is counted in heights of a box, for bodies that are three times as long as high, and turn.
 
 Nobody comes or goes: who is new where somebody is known is a part of them."""
 
-PLAYERS = Setup(WindowSettings(), CostSettings(), AssistSettings(enabled=True))
+PLAYERS = Setup(WindowSettings(), CostSettings(), InteractiveSettings(enabled=True))
 """MyView's defaults."""
 
 
@@ -78,17 +78,17 @@ def watch(clip: Clip, setup: Setup, person: Person | None = None, desk: Desk | N
     """
     desk = desk or Desk(_ALL, clip.fps)
     desk.begin()
-    tracker = AssistedTracker(setup.window, setup.costs, create_solver(DEFAULT_SOLVER), setup.assist)
+    tracker = InteractiveTracker(setup.window, setup.costs, create_solver(DEFAULT_SOLVER), setup.assist)
     operator = Operator(person, desk, clip.truth, clip.fps, clip.seed) if person else None
     shown: dict[int, dict[int, Floats]] = {}
     troubles: list[tuple[int, RiskEvent]] = []
-    waiting: list[Pointing] = []
+    waiting: list[PositionCorrection] = []
     count = len(clip.seen)
     for newest in range(count + (operator.after if operator else 0)):
         if newest < count:
             result = tracker.push(newest, clip.seen[newest])
             _show(shown, result)
-            found: Sequence[RiskEvent] = result.troubles if result else ()
+            found: Sequence[RiskEvent] = result.risk_events if result else ()
             troubles += [(newest, it) for it in found]
             if operator:
                 operator.hear(newest, found)
@@ -97,10 +97,10 @@ def watch(clip: Clip, setup: Setup, person: Person | None = None, desk: Desk | N
         pointing = operator.look(newest, shown) if operator else None
         waiting += [pointing] if pointing else []
         if waiting and newest % _BATCH == 0:
-            _show(shown, tracker.point(waiting))
+            _show(shown, tracker.apply_corrections(waiting))
             waiting = []
     _show(shown, tracker.flush())
-    _show(shown, tracker.point(waiting))
+    _show(shown, tracker.apply_corrections(waiting))
     failed = failures(clip.truth, shown, clip.fps)
     return Watched(clip, failed, troubles, operator.flags if operator else [], shown)
 

@@ -81,7 +81,7 @@ def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator
 
 def as_live(case: Case) -> Case:
     """Return the scene as cameras would show it: nothing is known of it before its first frame."""
-    return replace(case, content={**case.content, "detect": {"ahead_frames": 0}})
+    return replace(case, content={**case.content, "detect": {"prescan_frames": 0}})
 
 
 def row_of(it: Outcome) -> list[str]:

@@ -12,8 +12,8 @@ import numpy as np
 from benchmarks.bestview.watch import Messages, Rows
 from bestview import IdentitySettings, foot_points, person_heights, to_ground
 from tracking.boxes import Floats
-from tracking.evaluation import perfect_association
-from tracking.evaluation.frames import line_up
+from tracking.evaluation import oracle_association
+from tracking.evaluation.frame_matching import align_frames
 from tracking.motchallenge import MotRow
 
 LEAST_COMMON = 5
@@ -101,7 +101,7 @@ def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[
 
 def boxes_by_truth(rows: Rows, gt: Rows) -> dict[str, list[MotRow]]:
     """Return each box the number of the person it is at; boxes at nobody go."""
-    return {camera: perfect_association(found, gt[camera]) for camera, found in rows.items()}
+    return {camera: oracle_association(found, gt[camera]) for camera, found in rows.items()}
 
 
 def tracks_by_truth(rows: Rows, gt: Rows, least_iou: float = 0.5) -> dict[str, list[MotRow]]:
@@ -113,7 +113,7 @@ def tracks_by_truth(rows: Rows, gt: Rows, least_iou: float = 0.5) -> dict[str, l
     joined = {}
     for camera, found in rows.items():
         met: dict[int, Counter[int]] = defaultdict(Counter)
-        for frame in line_up(gt[camera], found, least_iou):
+        for frame in align_frames(gt[camera], found, least_iou):
             for person, track in zip(*np.nonzero(frame.similarity >= least_iou), strict=True):
                 met[int(frame.tracks[track])][int(frame.truth[person])] += 1
         best = {track: max(sorted(people), key=people.__getitem__) for track, people in met.items()}

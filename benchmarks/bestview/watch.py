@@ -75,7 +75,7 @@ def in_pictures(config: Config, camera: str) -> Frames:
 def in_file(config: Config, path: Path) -> Frames:
     """Read detections without pictures, as `myview track --det` does."""
     detector = MotFileDetector(path)
-    found = [detector.detect(_NO_PICTURE, pulse) for pulse in range(detector.last + 1)]
+    found = [detector.detect(_NO_PICTURE, pulse) for pulse in range(detector.last_frame + 1)]
     return Frames((config.site.width, config.site.height), found, [True] * len(found))
 
 

@@ -28,7 +28,7 @@ from server.cli.evaluate.ground_truth import SceneTruth, people_of_objects
 from server.cli.evaluate.view_scores import evaluate_views
 from server.cli.render.site_file import SiteInfo
 from server.service.view_selection.decider import homographies
-from tracking.evaluation import CameraScores, Recording, evaluate_cameras
+from tracking.evaluation import MultiCameraScores, TruthAndTracks, evaluate_cameras
 from tracking.motchallenge import MotRow, format_rows
 
 LEAST_IOU = 0.5
@@ -57,7 +57,7 @@ class Outcome:
     """How good it is."""
 
     name: str
-    tracks: CameraScores | None
+    tracks: MultiCameraScores | None
     views: ViewScore
 
 
@@ -172,7 +172,7 @@ def _lists(rows: Rows) -> dict[str, list[MotRow]]:
 
 def outcome(case: Case, truth: SceneTruth, way: Way) -> Outcome:
     """Score a way."""
-    recordings = {camera: Recording(case.gt[camera], way.rendering.tracks[camera]) for camera in case.gt}
+    recordings = {camera: TruthAndTracks(case.gt[camera], way.rendering.tracks[camera]) for camera in case.gt}
     if way.given:
         scores, person_of = None, {person: person for person in truth.people}
     else:

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.bestview.watch import Rows
 from tracking.assignment import assign_pairs
-from tracking.evaluation.frames import line_up
+from tracking.evaluation.frame_matching import align_frames
 
 Ints = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
@@ -54,7 +54,7 @@ class Met:
         found: list[tuple[int, int, int, int]] = []
         for camera, (name, truth) in enumerate(sorted(gt.items())):
             numbers = sorted({row.frame for rows in (truth, tracks[name]) for row in rows})
-            for number, it in zip(numbers, line_up(truth, tracks[name], least_iou), strict=True):
+            for number, it in zip(numbers, align_frames(truth, tracks[name], least_iou), strict=True):
                 rows, columns = assign_pairs(it.similarity, least_iou)
                 pairs = zip(it.truth[rows].tolist(), it.tracks[columns].tolist(), strict=True)
                 found += [(camera, number, person, track) for person, track in pairs]

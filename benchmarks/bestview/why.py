@@ -12,7 +12,7 @@ from benchmarks.bestview.ways import LEAST_IOU, Way
 from server.cli.evaluate.choices_file import views_of
 from server.cli.evaluate.ground_truth import SceneTruth, people_of_objects
 from tracking.boxes import iou
-from tracking.evaluation import Recording
+from tracking.evaluation import TruthAndTracks
 from tracking.motchallenge import MotRow
 
 Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
@@ -43,7 +43,7 @@ def losses(case: Case, truth: SceneTruth, way: Way) -> Losses:
     """
     if way.given:
         raise ValueError(f"{way.name}: its boxes are the truth's")
-    recordings = {camera: Recording(case.gt[camera], way.rendering.tracks[camera]) for camera in case.gt}
+    recordings = {camera: TruthAndTracks(case.gt[camera], way.rendering.tracks[camera]) for camera in case.gt}
     person_of = people_of_objects(truth.people, recordings, LEAST_IOU)
     visible = truth.views.visible
     views = views_of(way.rendering.choices, person_of, truth.people, truth.cameras, visible.shape[1])

@@ -80,7 +80,8 @@ def play_toys(frames: int, seed: int, peaks: int = 80) -> Scene:
     boxes = _boxes(made.middles)
     first = [_cut(shown[0][0], box) for box in boxes[:, 0]]
     detectors = [
-        TemplateDetector(picture, TemplateSettings(most_peaks=peaks, apart=_APART)) for picture in first
+        TemplateDetector(picture, TemplateSettings(max_peaks=peaks, peak_distance=_APART))
+        for picture in first
     ]
     seen = tuple(tuple(one.detect(image) for image, _ in shown) for one in detectors)
     templates = tuple(

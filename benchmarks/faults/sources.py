@@ -41,7 +41,7 @@ async def with_live(views: Views, folder: Path) -> AsyncIterator[Stand]:
     for of_a_recording in ("at_end", "detections"):
         live.pop(of_a_recording)
     played = replace(own, cameras=[*own.cameras[:-1], live])
-    detect = {"kind": "onnx", "onnx": {"model": str(reader), "apart": 1.0}}
+    detect = {"kind": "onnx", "onnx": {"model": str(reader), "nms_iou": 1.0}}
     try:
         async with with_up(played, folder, {"detect": detect}) as stand:
             told = await site(stand.url)

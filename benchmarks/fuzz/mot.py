@@ -116,7 +116,7 @@ class Detections(_Files):
             detector = MotFileDetector(self.written(data))
         except ValueError as error:
             return refused(error)
-        for frame in (0, 1, detector.last):
+        for frame in (0, 1, detector.last_frame):
             found = detector.detect(self._picture, frame)
             assert np.isfinite(found.boxes).all()
             assert np.isfinite(found.histograms).all()

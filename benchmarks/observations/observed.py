@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.surroundings import CannotRunError
 from tracking.detectors import Image
-from tracking.evaluation import Recording, evaluate, evaluate_cameras, perfect_association
+from tracking.evaluation import TruthAndTracks, evaluate, evaluate_cameras, oracle_association
 from tracking.motchallenge import MotRow, read_rows
 
 WATERMARK = ((130.0, 232.0), (354.0, 232.0), (354.0, 282.0), (130.0, 282.0))
@@ -78,7 +78,7 @@ class ViewScores:
 
 def scores_of_boxes(truth: list[MotRow], boxes: list[MotRow]) -> ViewScores:
     """Score detections: recall as much as any association can reach, precision of all of them."""
-    best = perfect_association(boxes, truth)
+    best = oracle_association(boxes, truth)
     people = sum(row.confidence != 0.0 for row in truth)
     recall = len(best) / max(people, 1)
     precision = len(best) / max(len(boxes), 1)
@@ -94,6 +94,6 @@ def scores_of_tracks(truth: list[MotRow], tracks: list[MotRow]) -> ViewScores:
 def oracle(truths: dict[str, list[MotRow]], boxes: dict[str, list[MotRow]]) -> float:
     """Return the joint IDF1 over all cameras of boxes that are given the true identity."""
     cameras = {
-        name: Recording(truth, perfect_association(boxes[name], truth)) for name, truth in truths.items()
+        name: TruthAndTracks(truth, oracle_association(boxes[name], truth)) for name, truth in truths.items()
     }
     return evaluate_cameras(cameras).joint.idf1

@@ -18,7 +18,7 @@ from tracking.detectors import (
     HogDetector,
     HogSettings,
     Image,
-    paper_boxes,
+    paper_settings,
 )
 from tracking.detectors.ignore_mask import visible_mask
 from tracking.motchallenge import MotRow
@@ -70,12 +70,12 @@ OBSERVERS = (
     Observer("MyView", lambda view: BackgroundDetector(_background(view))),
     Observer(
         "the paper's box filters",
-        lambda view: BackgroundDetector(paper_boxes(_background(view))),
+        lambda view: BackgroundDetector(paper_settings(_background(view))),
         with_peers=False,
     ),
     Observer("MOG2 + connected components", BlobDetector),
     Observer(
-        "OpenCV's HOG", lambda view: HogDetector(HogSettings(least_height=view.smallest), ignore=view.ignore)
+        "OpenCV's HOG", lambda view: HogDetector(HogSettings(min_height=view.smallest), ignore=view.ignore)
     ),
 )
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bestview import person_heights, to_ground
 from bestview.geometry.ground_plane import from_ground
 from tracking.boxes import Floats
-from tracking.detectors.background.height_model import HeightLine
+from tracking.detectors.background.height_model import HeightModel
 
 Ints = NDArray[np.int64]
 _BEYOND = 0.25
@@ -53,15 +53,15 @@ class View:
 
     homography: Floats
     size: tuple[int, int]
-    line: HeightLine
+    line: HeightModel
     weight: Floats
 
     def boxes(self, ground: Floats, aspect: float) -> Floats:
         """Return the boxes (..., 4) in pixels of people at places (..., 2), NaN where nobody can be seen."""
         foot = from_ground(self.homography, ground)
         x, y = foot[..., 0], foot[..., 1]
-        tall = self.line.at(y)
-        tall = np.where((tall >= self.line.smallest) & (tall > 0.0), tall, np.nan)
+        tall = self.line.expected_height(y)
+        tall = np.where((tall >= self.line.min_height) & (tall > 0.0), tall, np.nan)
         half = aspect * tall / 2.0
         return np.stack([x - half, y - tall, x + half, y], axis=-1)
 
@@ -86,8 +86,8 @@ class View:
         """Return points (K, 2) all over the ground that it shows people on."""
         width, height = self.size
         x, y = np.meshgrid(np.linspace(0, width, _ASKED), np.linspace(0, height * (1 + _BEYOND), _ASKED))
-        tall = self.line.at(y)
-        feet = np.stack([x, y], axis=-1)[(tall >= self.line.smallest) & (tall > 0.0)]
+        tall = self.line.expected_height(y)
+        feet = np.stack([x, y], axis=-1)[(tall >= self.line.min_height) & (tall > 0.0)]
         there = to_ground(self.homography, feet)
         return np.asarray(there[np.isfinite(there).all(axis=1)])
 
@@ -95,8 +95,8 @@ class View:
         """Return how long a person's height is in units of the ground: the median over the picture."""
         width, height = self.size
         x, y = np.meshgrid(np.linspace(0.2, 0.8, 7) * width, np.linspace(0.2, 1.0, 17) * height)
-        tall = self.line.at(y)
-        known = (tall >= self.line.smallest) & (tall > 0.0)
+        tall = self.line.expected_height(y)
+        known = (tall >= self.line.min_height) & (tall > 0.0)
         boxes = np.stack([x, y - tall, x, y], axis=-1)[known]
         return float(np.nanmedian(person_heights(self.homography, boxes)))
 

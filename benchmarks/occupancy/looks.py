@@ -13,11 +13,11 @@ from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEnded
 from server.config.site_config import Config
 from tracking.boxes import Floats
-from tracking.detectors.color_histogram import LooksSettings, colour_histograms
+from tracking.detectors.color_histogram import AppearanceSettings, color_histograms
 
 _EVERY = 2
 """Of so many frames one is looked at."""
-_BINS = LooksSettings().colour_bins
+_BINS = AppearanceSettings().color_bins
 
 
 def looks_of(
@@ -32,7 +32,7 @@ def looks_of(
         firsts: each path's first frame.
         boxes: each path's boxes (F, 4) in pixels of the camera's picture, NaN where it has none.
     """
-    looks = [np.zeros((len(it), LooksSettings().row), dtype=np.float32) for it in boxes]
+    looks = [np.zeros((len(it), AppearanceSettings().length), dtype=np.float32) for it in boxes]
     pixels = [np.zeros(len(it), dtype=np.float32) for it in boxes]
     pipeline = CameraPipeline(config, camera)
     for frame in range(len(masks.foreground)):
@@ -48,7 +48,7 @@ def looks_of(
         here = np.array([boxes[it][frame - firsts[it]] for it in there]).reshape(-1, 4)
         mask = _alone(foreground, image.shape[:2], here)
         for it, row, count in zip(
-            there, colour_histograms(image, here, _BINS, mask), _sums(mask, here), strict=True
+            there, color_histograms(image, here, _BINS, mask), _sums(mask, here), strict=True
         ):
             looks[it][frame - firsts[it]] = row
             pixels[it][frame - firsts[it]] = count

@@ -14,9 +14,9 @@ from server.camera.sources import SourceEnded
 from server.config.site_config import Config
 from tracking.boxes import Floats
 from tracking.detectors import BackgroundDetector
-from tracking.detectors.background.foreground_fit import Explanation
-from tracking.detectors.background.grid import Grid
-from tracking.detectors.background.height_model import HeightLine
+from tracking.detectors.background.cell_grid import CellGrid
+from tracking.detectors.background.foreground_fit import ForegroundFit
+from tracking.detectors.background.height_model import HeightModel
 from tracking.detectors.base import Mask
 
 CELL = 2
@@ -39,7 +39,7 @@ class Masks:
     foreground: list[Mask | None]
     shadow: list[Mask | None]
     weight: Floats
-    line: HeightLine
+    line: HeightModel
 
 
 class CannotMapError(Exception):
@@ -69,7 +69,7 @@ def masks_of(config: Config, camera: str) -> Masks:
         foreground.append(one)
         shadow.append(other)
     pipeline.close()
-    line, grid = detector.height_line, heard.grid
+    line, grid = detector.height_model, heard.grid
     if line is None or grid is None:
         raise CannotMapError(f"how tall people are in camera {camera} is never known")
     weight = np.asarray(_cells(grid.visible) > 127, dtype=np.float64)
@@ -82,9 +82,9 @@ class _Heard:
     def __init__(self, detector: BackgroundDetector) -> None:
         self._search = detector._hypotheses  # noqa: SLF001
         self._last: tuple[Mask | None, Mask | None] = (None, None)
-        self.grid: Grid | None = None
+        self.grid: CellGrid | None = None
 
-    def __call__(self, mask: Mask, shadow: Mask, grid: Grid) -> Explanation:
+    def __call__(self, mask: Mask, shadow: Mask, grid: CellGrid) -> ForegroundFit:
         """Search."""
         self.grid = grid
         self._last = _cells(mask), _cells(shadow)

@@ -27,7 +27,7 @@ from benchmarks.peers.plot import plot
 from benchmarks.recordings import Recording, find_recordings, track
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
-from tracking.evaluation import HEADINGS, Scores, average, cells, perfect_association
+from tracking.evaluation import HEADINGS, Scores, average_scores, format_scores, oracle_association
 from tracking.motchallenge import MotRow, read_rows
 
 _SHOWN = (
@@ -68,7 +68,7 @@ def tracks_of(
         yield PICTURES, track(sequence, pictures=True)
     if peers is not None:
         yield from _peers_tracks(sequence, peers, report)
-    yield CEILING, perfect_association(read_rows(sequence.detections), read_rows(sequence.truth))
+    yield CEILING, oracle_association(read_rows(sequence.detections), read_rows(sequence.truth))
 
 
 def _peers_tracks(
@@ -120,12 +120,13 @@ def run(options_data: Path, out: Path, folder: Path, names: list[str] | None, *,
         report.table(
             sequence.name,
             ["", *_HEADINGS],
-            [[name, *cells(scores, _SHOWN)] for name, scores in found.items()],
+            [[name, *format_scores(scores, _SHOWN)] for name, scores in found.items()],
         )
     if len(table) > 1:
         everywhere = [name for name in table[sequences[0].name] if all(name in it for it in table.values())]
         averages = [
-            [name, *cells(average([it[name] for it in table.values()]), _SHOWN)] for name in everywhere
+            [name, *format_scores(average_scores([it[name] for it in table.values()]), _SHOWN)]
+            for name in everywhere
         ]
         report.table("mean of the sequences; counts are totals", ["", *_HEADINGS], averages)
     ahead = lead(table)

@@ -81,7 +81,7 @@ class Filmed:
         return {
             "encode": {"gop": _GOP},
             "http": {"viewer_queue_gops": round(_VIEWER_S * self.tempo.fps / _GOP)},
-            "detect": {"work_width": WIDTH, "ahead_every": 10},
+            "detect": {"work_width": WIDTH, "prescan_every": 10},
             "view": {
                 "lookahead": _LOOKAHEAD,
                 "buffer_s": seconds(60.0),

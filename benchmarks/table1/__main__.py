@@ -32,8 +32,8 @@ from benchmarks.table1.words import WORDS, Words
 from benchmarks.yardsticks import View
 from server.cli.track.command import config_for_video, detect_frames
 from synthetic import Scene, write_recording
-from tracking.baselines import tracker_names
 from tracking.motchallenge import read_rows
+from tracking.registry import tracker_names
 
 _RECORDED = (("pets09", "view1", 7.0), ("terrace", "c0", 25.0))
 """Scene, view, frames a second."""

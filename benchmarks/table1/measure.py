@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from statistics import fmean
 
 from benchmarks.yardsticks import View, follow
-from tracking.evaluation import Scores, evaluate, occlusions, survived
+from tracking.evaluation import Scores, evaluate, find_occlusions, identities_kept
 
 REAL_TIME = 25.0
 """Frames a second that cameras send, and that the survey's videos have."""
@@ -56,10 +56,10 @@ def measured(view: View, tracker: str) -> Measured:
     """Let one tracker follow one view."""
     rows, milliseconds = follow(tracker, view)
     around = round(view.fps)
-    found = occlusions(view.truth, around)
+    found = find_occlusions(view.truth, around)
     scores = evaluate(view.truth, rows)
     there = sum(row.confidence != 0.0 for row in view.truth) / len(view.frames)
-    kept = sum(survived(found, view.truth, rows, around))
+    kept = sum(identities_kept(found, view.truth, rows, around))
     return Measured(kept, len(found), scores, scores.recall * there, there, milliseconds)
 
 

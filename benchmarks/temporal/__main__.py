@@ -29,10 +29,15 @@ from benchmarks.temporal.merges import events, merged, mistaken
 from benchmarks.temporal.plot import THEIR_EDGES, THEIRS, plot
 from benchmarks.temporal.room import SIZE, Clip, Played, played
 from tracking.baselines.temporal_consistency import TemporalSettings
-from tracking.baselines.temporal_consistency.edge_search import cheapest_by_edges
-from tracking.baselines.temporal_consistency.graph import Graph, all_edges, edges, ways
-from tracking.baselines.temporal_consistency.groups import joint_path
-from tracking.baselines.temporal_consistency.window import Commitment, TemporalWindow
+from tracking.baselines.temporal_consistency.edge_search import cheapest_path_by_edges
+from tracking.baselines.temporal_consistency.graph import (
+    WindowGraph,
+    count_joint_edges,
+    count_unpruned_edges,
+    prune_links,
+)
+from tracking.baselines.temporal_consistency.groups import solve_joint_path
+from tracking.baselines.temporal_consistency.window import StageDecision, TemporalWindow
 
 STAGES = (1, 2, 5, 10)
 STAGE_S = 0.5
@@ -77,28 +82,28 @@ def follow(seen: Played, settings: TemporalSettings, tally: Tally | None = None)
     window = TemporalWindow(settings, SIZE, seen.metre, STAGE_S)
     first = dict(enumerate(seen.blobs[0].tolist(), start=1))
     window.begin(seen.stages[0], list(first.items()))
-    told: list[Commitment] = []
+    told: list[StageDecision] = []
     for place, stage in enumerate(seen.stages[1:]):
         done = window.push(stage)
         if done is not None:
             told.append(done)
         if tally is not None and window.graph is not None:
-            tally.edges.append(edges(window.ways)[-1])
-            tally.unpruned.append(all_edges(window.graph)[-1])
+            tally.edges.append(count_joint_edges(window.links)[-1])
+            tally.unpruned.append(count_unpruned_edges(window.graph)[-1])
             if place % _TIMED_EVERY == 0:
                 _time(window.graph, settings, tally)
     while (done := window.commit()) is not None:
         told.append(done)
-    return [first, *(it.blobs for it in told)]
+    return [first, *(it.blob_by_id for it in told)]
 
 
-def _time(graph: Graph, settings: TemporalSettings, tally: Tally) -> None:
+def _time(graph: WindowGraph, settings: TemporalSettings, tally: Tally) -> None:
     """Solve a window in all ways, from the costs of its steps on."""
-    whole = replace(graph, longest=np.inf)
+    whole = replace(graph, max_step_cost=np.inf)
     solve: tuple[Callable[[], object], ...] = (
-        lambda: cheapest_by_edges(ways(whole), graph.shared, graph.merge),
-        lambda: cheapest_by_edges(ways(graph), graph.shared, graph.merge),
-        lambda: joint_path(graph, ways(graph), settings.most_states),
+        lambda: cheapest_path_by_edges(prune_links(whole), graph.shared, graph.merge_cost),
+        lambda: cheapest_path_by_edges(prune_links(graph), graph.shared, graph.merge_cost),
+        lambda: solve_joint_path(graph, prune_links(graph), settings.max_joint_states),
     )
     for way, run in zip(WAYS, solve, strict=True):
         began = time.perf_counter()
@@ -132,7 +137,7 @@ def count(seen: Played, tally: Tally, *, edges_too: bool) -> None:
     tally.merges += events(found, seen.blobs)
     tally.chances += len(found)
     for stages in STAGES:
-        settings = TemporalSettings(stages=stages, stage_s=STAGE_S, closed=True)
+        settings = TemporalSettings(window_stages=stages, stage_s=STAGE_S, closed_world=True)
         told = follow(seen, settings, tally if edges_too and stages == max(STAGES) else None)
         tally.errors[stages] += sum(mistaken(found, seen.blobs, told))
 

@@ -14,7 +14,7 @@ from benchmarks.temporal.merges import NOBODY
 from bestview import to_ground
 from synthetic import CameraTruth, Scene
 from tracking.baselines.temporal_consistency import BlobSettings
-from tracking.baselines.temporal_consistency.blobs import Blob, Blobs
+from tracking.baselines.temporal_consistency.blobs import Blob, BlobDetector
 from tracking.baselines.temporal_consistency.window import Stage
 from tracking.boxes import Floats
 from tracking.detectors import Image
@@ -64,7 +64,8 @@ def played(clip: Clip, stage_s: float, colours: Sequence[float] = (1.0,)) -> lis
         for eye in eyes:
             eye.look(frame, image, truth, clip.people)
     return [
-        Played(clip, tuple(eye.stages), np.stack(eye.rows), eye.finder.metre, eye.seconds) for eye in eyes
+        Played(clip, tuple(eye.stages), np.stack(eye.rows), eye.finder.pixels_per_meter, eye.seconds)
+        for eye in eyes
     ]
 
 
@@ -76,7 +77,7 @@ class _Eye:
             raise ValueError("people from above need a floor")
         across = np.array([[0.0, SIZE[1] / 2.0], [SIZE[0], SIZE[1] / 2.0]])
         left, right = to_ground(homography, across)
-        self.finder = Blobs(SIZE, float(np.hypot(*(right - left))), BlobSettings())
+        self.finder = BlobDetector(SIZE, float(np.hypot(*(right - left))), BlobSettings())
         self._colour = colour
         self.finder.prepare([faded(image, colour) for image in empty])
         self.stages: list[Stage] = []
@@ -86,7 +87,7 @@ class _Eye:
     def look(self, frame: int, image: Image, truth: CameraTruth, people: int) -> None:
         """Take a picture in; before everybody was alone once, nothing is kept of it."""
         began = time.perf_counter()
-        found = self.finder.find(faded(image, self._colour), learn=True)
+        found = self.finder.detect(faded(image, self._colour), learn=True)
         self.seconds += time.perf_counter() - began
         row = np.full(people, NOBODY, dtype=np.int64)
         for number, box in zip(truth.ids.tolist(), truth.boxes, strict=True):
@@ -120,7 +121,7 @@ def _blob_of(box: Floats, found: tuple[Blob, ...]) -> int:
 
 def _filled(blob: Blob, core: NDArray[np.int64]) -> int:
     left, top = blob.box[:2].astype(int).tolist()
-    part = blob.shape[
+    part = blob.mask[
         max(core[1] - top, 0) : max(core[3] - top, 0), max(core[0] - left, 0) : max(core[2] - left, 0)
     ]
     return int(np.count_nonzero(part))

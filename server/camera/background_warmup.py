@@ -22,6 +22,6 @@ def ready_detector(config: Config, camera: CameraSettings, source: Source, fit: 
     if isinstance(detector, FittedDetections) and isinstance(source, Recording):
         detector.count_by(source.counted)
     if isinstance(detector, BackgroundDetector):
-        places = range(0, settings.ahead_frames, settings.ahead_every)
-        detector.prepare((fit.image(image) for image in source.ahead(places)), settings.ahead_every)
+        places = range(0, settings.prescan_frames, settings.prescan_every)
+        detector.prepare((fit.image(image) for image in source.ahead(places)), settings.prescan_every)
     return detector

@@ -18,16 +18,16 @@ from server.media.letterbox import Image, Letterbox
 from server.system.errors import UserError
 from tracking import Detections
 from tracking.detectors import (
+    AppearanceExtractor,
     BackgroundDetector,
     Detector,
-    Floor,
+    FloorGeometry,
     HogDetector,
-    Looks,
     MotFileDetector,
     MotFileSettings,
     OnnxDetector,
-    paper_boxes,
-    seen_from_above,
+    overhead_settings,
+    paper_settings,
 )
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
@@ -42,7 +42,7 @@ class Observer(Detector, Protocol):
         ...
 
     @property
-    def blind(self) -> bool:
+    def warming_up(self) -> bool:
         """Whether the last frame could not be searched: that nobody was found in it says nothing."""
         ...
 
@@ -62,7 +62,7 @@ def make_detector(config: Config, camera: CameraSettings, fit: Letterbox) -> Obs
     with _told(f"camera {camera.id}: detect"):
         settings = replace(config.detect, ignore=(*config.detect.ignore, *ignore))
         if camera.kind == "overhead":
-            return _of_kind(seen_from_above(settings), None)
+            return _of_kind(overhead_settings(settings), None)
         return _of_kind(settings, _floor(config, camera, fit))
 
 
@@ -71,7 +71,7 @@ _LEAST_SLOPE, _MOST_SLOPE = 0.03, 1.5
 """A person's height over the camera's: cameras at 1.1 to 57 metres. Beyond these the unit is another."""
 
 
-def _floor(config: Config, camera: CameraSettings, fit: Letterbox) -> Floor | None:
+def _floor(config: Config, camera: CameraSettings, fit: Letterbox) -> FloorGeometry | None:
     """Return what the ground says about people's heights in the site's picture; None: nothing."""
     per_metre = UNITS_PER_METER.get(camera.ground_unit or "")
     if camera.ground is None:
@@ -88,22 +88,22 @@ def _floor(config: Config, camera: CameraSettings, fit: Letterbox) -> Floor | No
         return None
     if per_metre is None:
         # Far above the picture it is known badly, and there is no camera's height to check it by.
-        return Floor(seen, None) if seen >= -height else None
+        return FloorGeometry(seen, None) if seen >= -height else None
     above = camera_height(homography, middle)
     slope = _PERSON_M * per_metre / above if above else 0.0
-    return Floor(seen, slope) if _LEAST_SLOPE <= slope <= _MOST_SLOPE else None
+    return FloorGeometry(seen, slope) if _LEAST_SLOPE <= slope <= _MOST_SLOPE else None
 
 
-def _of_kind(settings: DetectSettings, floor: Floor | None) -> Observer:
+def _of_kind(settings: DetectSettings, floor: FloorGeometry | None) -> Observer:
     """Return the detector that the settings name."""
-    looks = Looks(settings.looks, settings.bins)
+    looks = AppearanceExtractor(settings.appearance, settings.gray_bins)
     match settings.kind:
         case "hog":
             return HogDetector(settings.hog, looks, settings.ignore)
         case "onnx":
             return OnnxDetector(settings.onnx, looks, settings.ignore)
         case "boxes":
-            return BackgroundDetector(paper_boxes(settings))
+            return BackgroundDetector(paper_settings(settings))
         case "background":
             return BackgroundDetector(settings, floor)
 
@@ -126,11 +126,11 @@ def _told(where: str) -> Iterator[None]:
 class FittedDetections:
     """Detections from a file, which are in the camera's own pixels, moved into the site's picture."""
 
-    blind = False
+    warming_up = False
 
     def __init__(self, file: MotFileDetector, fit: Letterbox, settings: DetectSettings) -> None:
         self._file, self._fit = file, fit
-        self._looks = Looks(settings.looks, settings.bins)
+        self._looks = AppearanceExtractor(settings.appearance, settings.gray_bins)
         self._counted: Callable[[int], int] = int
 
     def count_by(self, counted: Callable[[int], int]) -> None:
@@ -146,4 +146,4 @@ class FittedDetections:
         """Return the detections of a frame, with the appearance that the site's picture shows."""
         own = self._file.detect(_NO_PICTURE, None if frame is None else self._counted(frame))
         boxes = self._fit.boxes_to_site(own.boxes)
-        return Detections(boxes, own.scores, self._looks.rows(image, boxes))
+        return Detections(boxes, own.scores, self._looks.histograms(image, boxes))

@@ -11,7 +11,7 @@ from logthrottle import LogThrottle
 from server.messaging.inbox import Message
 from server.messaging.messages import DECODE_ERRORS
 from server.messaging.operator_messages import OPERATOR_POINTS_MAX, OperatorPoints
-from tracking.interactive import Pointing
+from tracking.interactive import PositionCorrection
 
 log = logging.getLogger(__name__)
 
@@ -23,7 +23,7 @@ class Pointed:
 
     def __init__(self, camera: str, boot: int) -> None:
         self._camera, self._boot = camera, boot
-        self._waiting: deque[Pointing] = deque(maxlen=OPERATOR_POINTS_MAX)
+        self._waiting: deque[PositionCorrection] = deque(maxlen=OPERATOR_POINTS_MAX)
         self.taken = 0
         """Places that the tracker was given."""
         self.bad_messages = 0
@@ -43,9 +43,11 @@ class Pointed:
             told = "camera %s: where somebody points is understood again; %d messages were not"
             log.info(told, self._camera, ended.count)
         if said.boot == self._boot:
-            self._waiting.extend(Pointing(it.pulse, it.track, it.x, it.y, it.reach) for it in said.points)
+            self._waiting.extend(
+                PositionCorrection(it.pulse, it.track, it.x, it.y, it.reach) for it in said.points
+            )
 
-    def take(self) -> list[Pointing]:
+    def take(self) -> list[PositionCorrection]:
         """Return what has come since this was last asked, in its order."""
         taken = list(self._waiting)
         self._waiting.clear()

@@ -24,7 +24,7 @@ from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks, FrameDetections
 from server.messaging.operator_messages import OPERATOR_POINTS_MAX
 from tracking import Detections, create_solver
-from tracking.interactive import Pointing
+from tracking.interactive import PositionCorrection
 
 _BY_ITSELF = Heard()
 _TOLD_MOST = 50_000
@@ -115,7 +115,7 @@ class CameraPipeline:
         self.begins = camera.offset if self.source.recorded else 0
         """The pulse at which the pictures begin."""
         self._last: int | None = None
-        self._pointings: deque[Pointing] = deque(maxlen=OPERATOR_POINTS_MAX)
+        self._pointings: deque[PositionCorrection] = deque(maxlen=OPERATOR_POINTS_MAX)
         self._without = 0
         """Pulses since the last picture."""
         self._patience = round(_WAITS_S * site.fps) + config.encode.gop
@@ -155,12 +155,12 @@ class CameraPipeline:
             detections, looked = Detections.empty(self._detector.bins), False
         else:
             detections = self._detector.detect(image, pulse)
-            looked = not self._detector.blind
+            looked = not self._detector.warming_up
         word = self.witness.word(pulse, detections if looked else None) if self.witness else None
         return Searched(pulse, image, detections, looked, word, left_out=left_out)
 
     def follow(
-        self, searched: Searched, heard: Heard = _BY_ITSELF, pointings: Sequence[Pointing] = ()
+        self, searched: Searched, heard: Heard = _BY_ITSELF, pointings: Sequence[PositionCorrection] = ()
     ) -> CameraTracks | None:
         """Follow everybody into a frame; give the tracks when a window has ended.
 

@@ -79,7 +79,7 @@ class Reporter:
             alone=_taken(self._alone),
             tracks=[_track(track) for track in result.tracks],
             solve=_solve(result.report),
-            troubles=[_trouble(it) for it in result.troubles[:RISK_EVENTS_MAX]],
+            troubles=[_trouble(it) for it in result.risk_events[:RISK_EVENTS_MAX]],
             mended_from=result.revised_from,
         )
 

@@ -14,8 +14,8 @@ from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from tracking import Solver
-from tracking.baselines import Preparing, Tracker, tracker_named
 from tracking.baselines.temporal_consistency import TemporalSettings
+from tracking.registry import PrescanTracker, Tracker, create_tracker
 
 
 def ready_tracker(
@@ -36,11 +36,11 @@ def ready_tracker(
     track = config.track
     seen = fit or (None if source is None else Letterbox(source.size, source.size))
     settings = track.temporal if seen is None else _measured(track.temporal, camera, seen)
-    tracker = tracker_named(
+    tracker = create_tracker(
         name, track.window, track.costs, solver, settings, config.site.fps, assist=track.assist
     )
-    if ready and source is not None and seen is not None and isinstance(tracker, Preparing):
-        places = range(0, config.detect.ahead_frames, config.detect.ahead_every)
+    if ready and source is not None and seen is not None and isinstance(tracker, PrescanTracker):
+        places = range(0, config.detect.prescan_frames, config.detect.prescan_every)
         tracker.prepare(seen.image(image) for image in source.ahead(places))
     return tracker
 

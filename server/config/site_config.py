@@ -30,7 +30,7 @@ from server.config.sections import (
     ZenohSettings,
 )
 from server.config.sections.detect import DetectSettings
-from tracking.baselines import TEMPORAL
+from tracking.registry import TEMPORAL_TRACKER
 
 PREFIX = "MYVIEW_"
 _SERVICE = re.compile(r"bestview(-\d+)?")
@@ -108,7 +108,7 @@ class Config(BaseSettings):
         """
         if view.lookahead < self.least_lookahead:
             lag = "track.window.window - track.window.stride"
-            if self.track.tracker == TEMPORAL:
+            if self.track.tracker == TEMPORAL_TRACKER:
                 lag = "the frames of all stages of track.temporal, less one"
             raise ValueError(
                 f"view.lookahead: is {view.lookahead} frames but must be at least {self.least_lookahead} "

@@ -76,13 +76,12 @@ def test_a_number_that_is_left_behind_is_a_mistake_of_whose_it_was() -> None:
 def test_two_people_are_followed_through_the_room_from_above(stages: int) -> None:
     seen, pale = played(Clip(2, 0.5, 1), 0.5, (1.0, 0.25))
     shares = [
-        np.mean([blob.colours.max() for stage in kind.stages for blob in stage.blobs])
-        for kind in (seen, pale)
+        np.mean([blob.colors.max() for stage in kind.stages for blob in stage.blobs]) for kind in (seen, pale)
     ]
     assert shares[0] < shares[1], "with little colour everything falls into a few bins"
     assert len(seen.stages) == len(seen.blobs) > 40
     assert (seen.blobs == NOBODY).mean() < 0.02
-    told = follow(seen, TemporalSettings(stages=stages, closed=True))
+    told = follow(seen, TemporalSettings(window_stages=stages, closed_world=True))
     assert len(told) == len(seen.stages)
     alone = [place for place, row in enumerate(seen.blobs) if row[0] != row[1] and NOBODY not in row]
     apart = [len(set(told[place].values())) == 2 for place in alone]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracking.appearance import AppearanceMeasure, appearance_distance, grey_histograms
+from tracking.appearance import AppearanceMeasure, appearance_distance, gray_histograms
 
 MEASURES: list[AppearanceMeasure] = ["bhattacharyya", "intersection"]
 
@@ -15,13 +15,13 @@ MEASURES: list[AppearanceMeasure] = ["bhattacharyya", "intersection"]
 def test_each_box_has_the_histogram_of_its_pixels() -> None:
     grey = np.zeros((10, 20), dtype=np.uint8)
     grey[:, 10:] = 255
-    found = grey_histograms(grey, np.array([[0.0, 0, 10, 10], [10.0, 0, 20, 10], [5.0, 0, 15, 10]]), bins=4)
+    found = gray_histograms(grey, np.array([[0.0, 0, 10, 10], [10.0, 0, 20, 10], [5.0, 0, 15, 10]]), bins=4)
     np.testing.assert_allclose(found, [[1, 0, 0, 0], [0, 0, 0, 1], [0.5, 0, 0, 0.5]])
 
 
 def test_boxes_are_cut_to_the_image_and_one_outside_looks_like_nothing_in_particular() -> None:
     grey = np.full((10, 10), 200, dtype=np.uint8)
-    found = grey_histograms(grey, np.array([[-5.0, -5, 5, 5], [50.0, 50, 60, 60]]), bins=2)
+    found = gray_histograms(grey, np.array([[-5.0, -5, 5, 5], [50.0, 50, 60, 60]]), bins=2)
     np.testing.assert_allclose(found, [[0.0, 1.0], [0.5, 0.5]])
 
 
@@ -30,14 +30,14 @@ def test_a_mask_leaves_only_its_pixels() -> None:
     grey[0] = 255
     mask = np.zeros_like(grey)
     mask[0] = 1
-    found = grey_histograms(grey, np.array([[0.0, 0, 4, 4]]), bins=2, mask=mask)
+    found = gray_histograms(grey, np.array([[0.0, 0, 4, 4]]), bins=2, mask=mask)
     np.testing.assert_allclose(found, [[0.0, 1.0]])
 
 
 @pytest.mark.parametrize("bins", [0, 257])
 def test_impossible_bins_are_refused(bins: int) -> None:
     with pytest.raises(ValueError, match="between 1 and 256"):
-        grey_histograms(np.zeros((2, 2), dtype=np.uint8), np.zeros((0, 4)), bins=bins)
+        gray_histograms(np.zeros((2, 2), dtype=np.uint8), np.zeros((0, 4)), bins=bins)
 
 
 @pytest.mark.parametrize("measure", MEASURES)

@@ -45,7 +45,7 @@ def picture(frame: int) -> Picture:
 def tracker(stride: int = 5) -> TemplateTracker:
     costs = replace(PAPER_COSTS, confidence=1.0)
     window = WindowSettings(window=15, stride=stride)
-    settings = TemplateSettings(most_peaks=30)
+    settings = TemplateSettings(max_peaks=30)
     return TemplateTracker(picture(0), places(0), settings, window, costs, create_solver("columns"))
 
 

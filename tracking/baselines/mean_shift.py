@@ -1,8 +1,8 @@
-"""Mean shift on how probable each pixel's colour is somebody's (Comaniciu et al. 2000; Bradski 1998).
+"""Mean shift on how probable each pixel's color is somebody's (Comaniciu et al. 2000; Bradski 1998).
 
 A histogram over hue and saturation is taken of the middle of the box that somebody begins with, over that of
-the ring around it: colours that the background has as well say little. The box goes to where the pixels of
-these colours are densest. It keeps its size.
+the ring around it: colors that the background has as well say little. The box goes to where the pixels of
+these colors are densest. It keeps its size.
 """
 
 from __future__ import annotations
@@ -23,38 +23,38 @@ _CORE, _RING = 0.6, 1.6
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.5)
 _FLOOR = 1e-3
 _LEAST = 0.05
-"""Mean probability in a box below which nobody of these colours is there."""
+"""Mean probability in a box below which nobody of these colors is there."""
 
 
 @dataclass(slots=True)
-class Coloured:
-    """Somebody who is followed: their colours' shares, 0..255, and where they are."""
+class MeanShiftTarget:
+    """Somebody who is followed: their colors' shares, 0..255, and where they are."""
 
-    colours: Plane
+    colors: Plane
     box: Floats
 
 
 class MeanShift:
-    """Climbs to the place of somebody's colours."""
+    """Climbs to the place of somebody's colors."""
 
     name = "mean-shift"
-    sees = True
+    uses_image = True
 
-    def begin(self, image: Image, box: Floats) -> Coloured:
-        """Take somebody's colours."""
+    def initialize(self, image: Image, box: Floats) -> MeanShiftTarget:
+        """Take somebody's colors."""
         space = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
         mine, around = (_histogram(space, _scaled(box, share)) for share in (_CORE, _RING))
         ratio = np.minimum(mine / np.maximum(around, _FLOOR), 1.0) * (mine > _FLOOR)
-        return Coloured((255.0 * ratio).astype(np.float32), box.copy())
+        return MeanShiftTarget((255.0 * ratio).astype(np.float32), box.copy())
 
-    def move(self, image: Image | None, objects: Sequence[Coloured]) -> Floats:
-        """Let everybody climb: `(N, 4)`, NaN where none of their colours is."""
+    def predict(self, image: Image | None, objects: Sequence[MeanShiftTarget]) -> Floats:
+        """Let everybody climb: `(N, 4)`, NaN where none of their colors is."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None:
             return boxes
         space = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
         for row, item in enumerate(objects):
-            likely = cv2.calcBackProject([space], [0, 1], item.colours, _RANGES, 1)
+            likely = cv2.calcBackProject([space], [0, 1], item.colors, _RANGES, 1)
             left, top = (round(it) for it in item.box[:2])
             wide, tall = (max(round(it), 1) for it in item.box[2:] - item.box[:2])
             _, (x, y, width, height) = cv2.meanShift(likely, (left, top, wide, tall), _STOP)
@@ -65,7 +65,7 @@ class MeanShift:
                 item.box = boxes[row] = np.concatenate([middle - size / 2, middle + size / 2])
         return boxes
 
-    def found(self, known: Coloured, box: Floats) -> Floats:  # noqa: ARG002 — the colours alone say where
+    def update(self, known: MeanShiftTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
         """Give where somebody is: detections move nobody."""
         return known.box
 
@@ -76,7 +76,7 @@ def _scaled(box: Floats, share: float) -> Floats:
 
 
 def _histogram(space: cv2.typing.MatLike, box: Floats) -> Floats:
-    """Give the shares of the colours in a box, `(16, 16)`; of none where it is outside the picture."""
+    """Give the shares of the colors in a box, `(16, 16)`; of none where it is outside the picture."""
     high, wide = space.shape[:2]
     left, top, right, bottom = np.clip(np.rint(box), 0, [wide, high, wide, high]).astype(int).tolist()
     if left >= right or top >= bottom:

@@ -13,49 +13,51 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking.baselines.resampling import drawn_anew
+from tracking.baselines.particle_filter import resample_if_degenerate
 from tracking.boxes import Floats
 
 
 @dataclass(slots=True)
-class Shares:
+class OccluderParticles:
     """What hides one object.
 
     Attributes:
-        who: numbers of those who are near.
+        occluder_ids: numbers of those who are near.
         states: `(P, len(who))`, the share that each hides.
         weights: `(P,)`, which sum to 1.
     """
 
-    who: tuple[int, ...]
+    occluder_ids: tuple[int, ...]
     states: Floats
     weights: Floats
 
     @staticmethod
-    def none(count: int) -> Shares:
+    def unoccluded(count: int) -> OccluderParticles:
         """Give particles of somebody whom nobody is near."""
-        return Shares((), np.zeros((count, 0)), np.full(count, 1.0 / count))
+        return OccluderParticles((), np.zeros((count, 0)), np.full(count, 1.0 / count))
 
     @property
-    def all(self) -> Floats:
+    def visible_and_hidden_shares(self) -> Floats:
         """Give the shares with somebody's own first: `(P, 1 + len(who))`, rows that sum to 1."""
         return np.column_stack([1.0 - self.states.sum(axis=1), self.states])
 
     @property
-    def hidden(self) -> Floats:
+    def hidden_share(self) -> Floats:
         """Give what all others hide together, `(P,)`."""
         return np.asarray(self.states.sum(axis=1))
 
-    def go_on(self, rng: np.random.Generator, near: Sequence[int], noise: float, jumps: float = 0.0) -> None:
+    def propagate(
+        self, rng: np.random.Generator, near: Sequence[int], noise: float, jumps: float = 0.0
+    ) -> None:
         """Draw anew where few count, let those who are near now in, and add noise.
 
         The share `jumps` of the particles becomes not hidden, and as many wholly hidden by somebody (mixed
         states: Isard, Blake, ICCV 1998): people come out, and go behind others, faster than the noise is.
         """
-        states, self.weights = drawn_anew(rng, self.states, self.weights)
-        known = {number: states[:, column] for column, number in enumerate(self.who)}
+        states, self.weights = resample_if_degenerate(rng, self.states, self.weights)
+        known = {number: states[:, column] for column, number in enumerate(self.occluder_ids)}
         nothing = np.zeros(len(states))
-        self.who = tuple(near)
+        self.occluder_ids = tuple(near)
         moved = np.stack([known.get(it, nothing) for it in near], axis=1) if near else states[:, :0]
         moved = np.maximum(moved + noise * rng.standard_normal(moved.shape), 0.0)
         moved /= np.maximum(moved.sum(axis=1, keepdims=True), 1.0)

@@ -1,7 +1,7 @@
 """Two particle filters for each object that depend on each other: position and occlusion (Todor 2009, ch. 9).
 
 A position is a window. How well it shows an object is the mean of `p(O|I)` over its pixels less the mean over
-the ring around it, O and the background being mixtures of Gaussians over colour. An occlusion says what share
+the ring around it, O and the background being mixtures of Gaussians over color. An occlusion says what share
 of somebody others hide. A window and an occlusion together are worth `S = Σ q_k S_k`: who is half hidden
 looks half like who hides them. Each particle of one filter is weighed by `exp(λ S - μ hidden)`, averaged over
 the particles of the other by their weights (the thesis draws one of them). The second term draws everybody
@@ -14,20 +14,61 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
 
+import cv2
 import numpy as np
 
-from tracking.baselines.center_surround import RING, WindowSums, ringed
-from tracking.baselines.color_mixture import MIDDLES, codes, fitted, posterior
-from tracking.baselines.occluder_particles import Shares
-from tracking.baselines.part_histograms import cores
-from tracking.baselines.particle_filter import particle_boxes, standing, stepped
-from tracking.baselines.resampling import drawn_anew
+from tracking.baselines.color_mixture import CODE_COLORS, color_codes, fit_mixture, posterior
+from tracking.baselines.occluder_particles import OccluderParticles
+from tracking.baselines.part_histograms import core_boxes
+from tracking.baselines.particle_filter import (
+    initial_state,
+    particle_boxes,
+    propagate,
+    resample_if_degenerate,
+)
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Image, Plane
 
+RING_AREA_RATIO = 0.5
+"""Pixels of the ring for each of the window's."""
+
+
+class CenterSurroundIntegral:
+    """Several maps' sums, by an integral image: any window costs as much as any other (Viola, Jones 2001)."""
+
+    def __init__(self, values: Plane, left: float, top: float) -> None:
+        """Sum N maps `(H, W, N)` up, the first pixel of which is at `left`, `top` of the picture."""
+        high, wide, maps = values.shape
+        self._corner, self._limits = np.array([left, top] * 2), np.array([wide, high, wide, high])
+        self._sums = np.zeros((high + 1, wide + 1, maps))
+        if values.size:
+            self._sums = cv2.integral(values, sdepth=cv2.CV_64F).reshape(self._sums.shape)
+
+    def contrast(self, windows: Floats) -> Floats:
+        """Give the mean in windows `(..., 4)` less the mean in the rings around them, `(..., N)`."""
+        inside, pixels = self._summed(windows)
+        around, all_pixels = self._summed(add_ring(windows))
+        ring = (around - inside) / np.maximum(all_pixels - pixels, 1.0)
+        return np.asarray(inside / np.maximum(pixels, 1.0) - ring)
+
+    def _summed(self, windows: Floats) -> tuple[Floats, Floats]:
+        """Give the sums over windows, `(..., N)`, and of how many pixels, `(..., 1)`."""
+        whole = np.clip(np.rint(windows) - self._corner, 0, self._limits).astype(np.int64)
+        left, top, right, bottom = np.moveaxis(whole, -1, 0)
+        sums = self._sums
+        totals = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
+        return totals, ((right - left) * (bottom - top)).astype(np.float64)[..., None]
+
+
+def add_ring(windows: Floats) -> Floats:
+    """Give windows `(..., 4)` with their rings."""
+    sides = windows[..., 2:] - windows[..., :2]
+    margin = sides * (np.sqrt(1.0 + RING_AREA_RATIO) - 1.0) / 2
+    return np.concatenate([windows[..., :2] - margin, windows[..., 2:] + margin], axis=-1)
+
 
 @dataclass(frozen=True, slots=True)
-class CueSettings:
+class OcclusionCueSettings:
     """The filters.
 
     Raises:
@@ -35,48 +76,54 @@ class CueSettings:
     """
 
     particles: int = 100  # of each filter
-    parts: int = 3  # Gaussians of somebody
-    parts_behind: int = 6  # Gaussians of the background
+    components: int = 3  # Gaussians of somebody
+    background_components: int = 6  # Gaussians of the background
     sharpness: float = 20.0  # λ
-    reluctance: float = 8.0  # μ: against being hidden
-    noise: float = 0.1  # of a share, from picture to picture
-    jumps: float = 0.1  # share of its particles that is seen again, and share that is hidden, at once
-    search: float = 0.1  # noise of a place for each share that is hidden, in heights
-    lost: float = 0.05  # S below which nobody of these colours is there
-    refresh: int = 250  # pictures after which the background is fitted again
+    occlusion_penalty: float = 8.0  # μ: against being hidden
+    occlusion_noise: float = 0.1  # of a share, from picture to picture
+    jump_share: float = 0.1  # share of its particles that is seen again, and share that is hidden, at once
+    occluded_search_noise: float = 0.1  # noise of a place for each share that is hidden, in heights
+    min_visibility: float = 0.05  # S below which nobody of these colors is there
+    background_refresh_frames: int = 250  # pictures after which the background is fitted again
     seed: int = 1  # of all noise
 
     def __post_init__(self) -> None:
-        if min(self.particles, self.parts, self.parts_behind, self.refresh) < 1:
-            raise ValueError("particles, parts, parts_behind and refresh must be at least 1")
-        if not 0.0 <= self.jumps <= 0.5:  # noqa: PLR2004 — both shares together are all
-            raise ValueError(f"jumps is a share between 0 and 0.5, not {self.jumps}")
-        if self.sharpness <= 0.0 or min(self.reluctance, self.noise, self.search) < 0.0:
-            raise ValueError("sharpness must be above 0, reluctance, noise and search at least 0")
+        if (
+            min(self.particles, self.components, self.background_components, self.background_refresh_frames)
+            < 1
+        ):
+            raise ValueError("numbers of particles, components and frames must be at least 1")
+        if not 0.0 <= self.jump_share <= 0.5:  # noqa: PLR2004 — both shares together are all
+            raise ValueError(f"jump_share is a share between 0 and 0.5, not {self.jump_share}")
+        if (
+            self.sharpness <= 0.0
+            or min(self.occlusion_penalty, self.occlusion_noise, self.occluded_search_noise) < 0.0
+        ):
+            raise ValueError("sharpness must be above 0; occlusion_penalty and noise must be at least 0")
 
 
 @dataclass(slots=True)
-class Target:
+class OcclusionCueTarget:
     """Somebody who is followed.
 
     Attributes:
-        number: nobody else has it.
-        likely: `(COLOURS,)`, p(I|O).
-        mine: `(COLOURS,)`, p(O|I).
+        id: nobody else has it.
+        color_likelihood: `(COLORS,)`, p(I|O).
+        color_posterior: `(COLORS,)`, p(O|I).
         aspect: width over height.
         states: `(P, 5)`, the positions: middle, height, step, in pixels.
         weights: `(P,)`, of the positions, which sum to 1.
-        shares: the occlusions.
+        occluders: the occlusions.
         box: `(4,)`, the mean.
     """
 
-    number: int
-    likely: Floats
-    mine: Plane
+    id: int
+    color_likelihood: Floats
+    color_posterior: Plane
     aspect: float
     states: Floats
     weights: Floats
-    shares: Shares
+    occluders: OccluderParticles
     box: Floats
 
 
@@ -84,46 +131,46 @@ class OcclusionCues:
     """Positions and occlusions, each weighed by the other."""
 
     name = "occlusion-cues"
-    sees = True
+    uses_image = True
 
-    def __init__(self, settings: CueSettings | None = None) -> None:
-        self._settings = settings or CueSettings()
+    def __init__(self, settings: OcclusionCueSettings | None = None) -> None:
+        self._settings = settings or OcclusionCueSettings()
         self._rng = np.random.default_rng(self._settings.seed)
         self._numbers = count(1)
         self._behind: Floats | None = None
-        """`(COLOURS,)`, p(I|B)."""
+        """`(COLORS,)`, p(I|B)."""
         self._age = 0
 
-    def begin(self, image: Image, box: Floats) -> Target:
+    def initialize(self, image: Image, box: Floats) -> OcclusionCueTarget:
         """Fit somebody's mixture to the middle of their box, and put all particles there."""
-        plan, (start, aspect) = self._settings, standing(box)
+        plan, (start, aspect) = self._settings, initial_state(box)
         if self._behind is None:
             self._learn_background(image, [box])
-        likely = fitted(_inside(image, cores(box)), plan.parts).densities(MIDDLES)
+        likely = fit_mixture(_inside(image, core_boxes(box)), plan.components).densities(CODE_COLORS)
         states, weights = np.tile(start, (plan.particles, 1)), np.full(plan.particles, 1.0 / plan.particles)
-        shares = Shares.none(plan.particles)
-        return Target(
+        shares = OccluderParticles.unoccluded(plan.particles)
+        return OcclusionCueTarget(
             next(self._numbers), likely, self._posterior(likely), aspect, states, weights, shares, box.copy()
         )
 
-    def move(self, image: Image | None, objects: Sequence[Target]) -> Floats:
-        """Let both filters of everybody go on: `(N, 4)`, NaN where nobody of an object's colours is."""
+    def predict(self, image: Image | None, objects: Sequence[OcclusionCueTarget]) -> Floats:
+        """Let both filters of everybody go on: `(N, 4)`, NaN where nobody of an object's colors is."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None:
             return boxes
         self._age += 1
-        if objects and self._age > self._settings.refresh:
+        if objects and self._age > self._settings.background_refresh_frames:
             self._learn_background(image, [item.box for item in objects])
             for item in objects:
-                item.mine = self._posterior(item.likely)
+                item.color_posterior = self._posterior(item.color_likelihood)
         seen = [self._go_on(image, item, objects) for item in objects]
         for row, (item, worth) in enumerate(zip(objects, seen, strict=True)):
             item.box = particle_boxes(item.weights @ item.states, item.aspect)
-            if worth >= self._settings.lost:
+            if worth >= self._settings.min_visibility:
                 boxes[row] = item.box
         return boxes
 
-    def found(self, known: Target, box: Floats) -> Floats:  # noqa: ARG002 — the colours alone say where
+    def update(self, known: OcclusionCueTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
         """Give where somebody is: detections move nobody."""
         return known.box
 
@@ -131,34 +178,43 @@ class OcclusionCues:
         """Fit the background's mixture to the picture outside everybody's boxes."""
         free = np.ones(image.shape[:2], dtype=bool)
         for box in boxes:
-            left, top, right, bottom = np.maximum(np.rint(ringed(box)), 0).astype(int).tolist()
+            left, top, right, bottom = np.maximum(np.rint(add_ring(box)), 0).astype(int).tolist()
             free[top:bottom, left:right] = False
         pixels = image[free] if free.any() else image.reshape(-1, 3)
-        self._behind, self._age = fitted(pixels, self._settings.parts_behind).densities(MIDDLES), 0
+        self._behind, self._age = (
+            fit_mixture(pixels, self._settings.background_components).densities(CODE_COLORS),
+            0,
+        )
 
     def _posterior(self, likely: Floats) -> Plane:
-        return posterior(likely, likely if self._behind is None else self._behind, RING)
+        return posterior(likely, likely if self._behind is None else self._behind, RING_AREA_RATIO)
 
-    def _go_on(self, image: Image, item: Target, objects: Sequence[Target]) -> float:
+    def _go_on(self, image: Image, item: OcclusionCueTarget, objects: Sequence[OcclusionCueTarget]) -> float:
         """Let one object's two filters go on, and weigh them; how well it is seen, S."""
         plan = self._settings
-        states, item.weights = drawn_anew(self._rng, item.states, item.weights)
-        item.states = stepped(self._rng, states)
-        if item.shares.who:
-            spread = plan.search * float(item.shares.weights @ item.shares.hidden) * item.states[:, 2:3]
+        states, item.weights = resample_if_degenerate(self._rng, item.states, item.weights)
+        item.states = propagate(self._rng, states)
+        if item.occluders.occluder_ids:
+            spread = (
+                plan.occluded_search_noise
+                * float(item.occluders.weights @ item.occluders.hidden_share)
+                * item.states[:, 2:3]
+            )
             item.states[:, :2] += spread * self._rng.standard_normal((plan.particles, 2))
         windows = particle_boxes(item.states, item.aspect)
-        wide = ringed(windows)
+        wide = add_ring(windows)
         area = np.concatenate([wide[:, :2].min(axis=0), wide[:, 2:].max(axis=0)])
         near = [it for it in objects if it is not item and _touch(it.box, area)]
-        item.shares.go_on(self._rng, [it.number for it in near], plan.noise, plan.jumps)
+        item.occluders.propagate(self._rng, [it.id for it in near], plan.occlusion_noise, plan.jump_share)
         worths = _worths(image, area, windows, [item, *near])
-        pairs = worths @ item.shares.all.T
-        good = np.exp(plan.sharpness * (pairs - pairs.max()) - plan.reluctance * item.shares.hidden)
-        before = item.weights, item.shares.weights
+        pairs = worths @ item.occluders.visible_and_hidden_shares.T
+        good = np.exp(
+            plan.sharpness * (pairs - pairs.max()) - plan.occlusion_penalty * item.occluders.hidden_share
+        )
+        before = item.weights, item.occluders.weights
         item.weights = _normal(before[0] * (good @ before[1]))
-        item.shares.weights = _normal(before[1] * (before[0] @ good))
-        return float(item.weights @ pairs @ item.shares.weights)
+        item.occluders.weights = _normal(before[1] * (before[0] @ good))
+        return float(item.weights @ pairs @ item.occluders.weights)
 
 
 def _inside(image: Image, box: Floats) -> Image:
@@ -173,14 +229,14 @@ def _touch(box: Floats, area: Floats) -> bool:
     return bool((box[:2] < area[2:]).all() and (area[:2] < box[2:]).all())
 
 
-def _worths(image: Image, area: Floats, windows: Floats, objects: Sequence[Target]) -> Floats:
+def _worths(image: Image, area: Floats, windows: Floats, objects: Sequence[OcclusionCueTarget]) -> Floats:
     """Say how well windows `(P, 4)` show each object: `(P, N)`."""
     high, wide = image.shape[:2]
     left, top = np.clip(np.floor(area[:2]), 0, [wide, high]).astype(int).tolist()
     right, bottom = np.clip(np.ceil(area[2:]), [left, top], [wide, high]).astype(int).tolist()
-    found = codes(image[top:bottom, left:right])
-    likely = np.stack([it.mine[found] for it in objects], axis=-1)
-    return WindowSums(likely, left, top).contrasts(windows)
+    found = color_codes(image[top:bottom, left:right])
+    likely = np.stack([it.color_posterior[found] for it in objects], axis=-1)
+    return CenterSurroundIntegral(likely, left, top).contrast(windows)
 
 
 def _normal(weights: Floats) -> Floats:

@@ -31,7 +31,7 @@ _GROWS = 1.1
 
 
 @dataclass(slots=True)
-class Flowing:
+class FlowTarget:
     """Somebody who is followed."""
 
     box: Floats
@@ -41,16 +41,16 @@ class OpticalFlow:
     """The median of the flow of a box's corners."""
 
     name = "klt"
-    sees = True
+    uses_image = True
 
     def __init__(self) -> None:
         self._before: Mask | None = None
 
-    def begin(self, image: Image, box: Floats) -> Flowing:  # noqa: ARG002 — the next picture tells
+    def initialize(self, image: Image, box: Floats) -> FlowTarget:  # noqa: ARG002 — the next picture tells
         """Take somebody new in: their corners are looked for when the next picture comes."""
-        return Flowing(box.copy())
+        return FlowTarget(box.copy())
 
-    def move(self, image: Image | None, objects: Sequence[Flowing]) -> Floats:
+    def predict(self, image: Image | None, objects: Sequence[FlowTarget]) -> Floats:
         """Follow everybody's corners: `(N, 4)`, NaN where too few came back."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None:
@@ -65,7 +65,7 @@ class OpticalFlow:
                 boxes[row] = item.box = moved
         return boxes
 
-    def found(self, known: Flowing, box: Floats) -> Floats:  # noqa: ARG002 — the flow alone says where
+    def update(self, known: FlowTarget, box: Floats) -> Floats:  # noqa: ARG002 — the flow alone says where
         """Give where somebody is: detections move nobody."""
         return known.box
 

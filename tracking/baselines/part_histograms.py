@@ -1,4 +1,4 @@
-"""The three colour channels' histograms in the parts of many boxes at once, by one integral image.
+"""The three color channels' histograms in the parts of many boxes at once, by one integral image.
 
 The picture is cut to where the boxes are. Each pixel's three levels are written as ones among zeros, one
 after the other for all channels, so that a corner of a box is one row of sums in memory (Porikli, CVPR 2005).
@@ -18,7 +18,7 @@ _CORE = np.array([0.6, 0.9])
 _ONES = np.eye(LEVELS, dtype=np.uint8)
 
 
-class PartField:
+class PartHistograms:
     """What the parts of boxes in one part of a picture show."""
 
     def __init__(self, image: Image, around: Floats) -> None:
@@ -44,14 +44,14 @@ class PartField:
         return np.asarray((counts / pixels[..., None]).reshape(*boxes.shape[:-1], CHANNELS, LEVELS))
 
 
-def cores(boxes: Floats) -> Floats:
+def core_boxes(boxes: Floats) -> Floats:
     """Give the middles of boxes `(..., 4)`, where somebody is."""
     middles = (boxes[..., :2] + boxes[..., 2:]) / 2
     halves = _CORE * (boxes[..., 2:] - boxes[..., :2]) / 2
     return np.concatenate([middles - halves, middles + halves], axis=-1)
 
 
-def parts_of(boxes: Floats, rows: int, columns: int) -> Floats:
+def split_boxes(boxes: Floats, rows: int, columns: int) -> Floats:
     """Cut boxes `(..., 4)` into equal parts, row by row: `(..., rows * columns, 4)`."""
     xs = np.linspace(boxes[..., 0], boxes[..., 2], columns + 1, axis=-1)
     ys = np.linspace(boxes[..., 1], boxes[..., 3], rows + 1, axis=-1)
@@ -59,6 +59,6 @@ def parts_of(boxes: Floats, rows: int, columns: int) -> Floats:
     return np.stack([xs[..., column], ys[..., row], xs[..., column + 1], ys[..., row + 1]], axis=-1)
 
 
-def likeness(found: Floats, known: Floats) -> Floats:
+def bhattacharyya_coefficient(found: Floats, known: Floats) -> Floats:
     """Compare histograms `(..., 8)`: their Bhattacharyya coefficients `(...)`, 1 for alike, 0 for unlike."""
     return np.asarray(np.sqrt(found * known).sum(axis=-1))

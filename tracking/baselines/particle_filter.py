@@ -1,7 +1,7 @@
-"""One particle filter for each object, by its colours (Pérez et al., ECCV 2002; Nummiaro et al. 2003).
+"""One particle filter for each object, by its colors (Pérez et al., ECCV 2002; Nummiaro et al. 2003).
 
 A particle is a box: its middle, its height and the step that it took. It goes on as it went, with noise that
-grows with its height, and weighs `exp(-λ d²)`, d being the Bhattacharyya distance of the colours in its upper
+grows with its height, and weighs `exp(-λ d²)`, d being the Bhattacharyya distance of the colors in its upper
 and lower halves from those that the object began with. Particles are drawn anew by their weights when
 fewer than half of them count. Filters know nothing of each other.
 """
@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tracking.baselines.color_histograms import ColourFields, halves, unlike
-from tracking.baselines.resampling import drawn_anew
+from tracking.baselines.color_integral import ColorIntegralCache, color_distance, upper_and_lower_halves
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Image
 
@@ -24,7 +24,7 @@ _STEP, _GROW = 0.04, 0.01
 _GOES_ON = 0.8
 """Of a step, what the next one keeps."""
 _LOST = 0.5
-"""Mean squared distance above which nobody of these colours is among the particles."""
+"""Mean squared distance above which nobody of these colors is among the particles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,18 +44,18 @@ class ParticleSettings:
 
 
 @dataclass(slots=True)
-class Swarm:
+class ParticleTarget:
     """Somebody who is followed.
 
     Attributes:
-        colours: `(2, 64)` of the upper and the lower half.
+        colors: `(2, 64)` of the upper and the lower half.
         aspect: width over height.
         states: `(P, 5)`: middle, height, step, in pixels.
         weights: `(P,)`, which sum to 1.
         box: `(4,)`, the mean.
     """
 
-    colours: Floats
+    colors: Floats
     aspect: float
     states: Floats
     weights: Floats
@@ -66,58 +66,62 @@ class ParticleFilters:
     """Independent filters, the basic tracker of the survey."""
 
     name = "particle"
-    sees = True
+    uses_image = True
 
     def __init__(self, settings: ParticleSettings | None = None) -> None:
         self._settings = settings or ParticleSettings()
         self._rng = np.random.default_rng(self._settings.seed)
-        self._colours = ColourFields()
+        self._colors = ColorIntegralCache()
 
-    def begin(self, image: Image, box: Floats) -> Swarm:
-        """Take somebody's colours, and put all particles at them."""
-        count, (start, aspect) = self._settings.particles, standing(box)
-        colours = self._colours.of(image).histograms(halves(box))
-        return Swarm(colours, aspect, np.tile(start, (count, 1)), np.full(count, 1 / count), box.copy())
+    def initialize(self, image: Image, box: Floats) -> ParticleTarget:
+        """Take somebody's colors, and put all particles at them."""
+        count, (start, aspect) = self._settings.particles, initial_state(box)
+        colors = self._colors.get(image).histograms(upper_and_lower_halves(box))
+        return ParticleTarget(
+            colors, aspect, np.tile(start, (count, 1)), np.full(count, 1 / count), box.copy()
+        )
 
-    def move(self, image: Image | None, objects: Sequence[Swarm]) -> Floats:
+    def predict(self, image: Image | None, objects: Sequence[ParticleTarget]) -> Floats:
         """Let all particles go on and weigh them: `(N, 4)`, NaN where none is like its object."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None:
             return boxes
         for row, item in enumerate(objects):
             self._go_on(item)
-            distance = unlike(self._colours.of(image), particle_boxes(item.states, item.aspect), item.colours)
-            item.weights = weighed(item.weights, distance, _LAMBDA)
+            distance = color_distance(
+                self._colors.get(image), particle_boxes(item.states, item.aspect), item.colors
+            )
+            item.weights = reweight(item.weights, distance, _LAMBDA)
             item.box = particle_boxes(item.weights @ item.states, item.aspect)
             if float(item.weights @ distance) <= _LOST:
                 boxes[row] = item.box
         return boxes
 
-    def found(self, known: Swarm, box: Floats) -> Floats:  # noqa: ARG002 — the colours alone say where
+    def update(self, known: ParticleTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
         """Give where somebody is: detections move nobody."""
         return known.box
 
-    def _go_on(self, item: Swarm) -> None:
+    def _go_on(self, item: ParticleTarget) -> None:
         """Draw anew where few particles count, and move all of them."""
-        states, item.weights = drawn_anew(self._rng, item.states, item.weights)
-        item.states = stepped(self._rng, states)
+        states, item.weights = resample_if_degenerate(self._rng, item.states, item.weights)
+        item.states = propagate(self._rng, states)
 
 
-def standing(box: Floats) -> tuple[Floats, float]:
+def initial_state(box: Floats) -> tuple[Floats, float]:
     """Give the state `(5,)` of somebody in a box `(4,)` who stands, and width over height."""
     tall = max(box[3] - box[1], 1.0)
     state = np.array([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2, tall, 0.0, 0.0])
     return state, (box[2] - box[0]) / tall
 
 
-def weighed(weights: Floats, distance: Floats, sharpness: float) -> Floats:
+def reweight(weights: Floats, distance: Floats, sharpness: float) -> Floats:
     """Weigh particles `(P,)` anew by how unlike they are, `(P,)`; the weights sum to 1."""
     # Relative to the nearest: what all of them lack, a shadow or a passer-by, is no weight.
     anew = weights * np.exp(-sharpness * (distance - distance.min()))
     return np.asarray(anew / anew.sum())
 
 
-def stepped(rng: np.random.Generator, states: Floats) -> Floats:
+def propagate(rng: np.random.Generator, states: Floats) -> Floats:
     """Move particles `(..., 5)` as they went, with noise."""
     noise = rng.standard_normal((*states.shape[:-1], 3)) * states[..., 2:3]
     moved = states.copy()
@@ -132,3 +136,24 @@ def particle_boxes(states: Floats, aspect: float | Floats) -> Floats:
     x, y, tall = states[..., 0], states[..., 1], states[..., 2]
     wide = tall * aspect
     return np.stack([x - wide / 2, y - tall / 2, x + wide / 2, y + tall / 2], axis=-1)
+
+
+Indices = NDArray[np.intp]
+
+
+def systematic_resample(rng: np.random.Generator, weights: Floats) -> Indices:
+    """Draw as many particles as there are by their weights `(P,)`, which sum to 1: which ones, `(P,)`."""
+    count = len(weights)
+    # Systematic: one draw for all.
+    marks = (rng.random() + np.arange(count)) / count
+    return np.minimum(np.searchsorted(np.cumsum(weights), marks), count - 1)
+
+
+def resample_if_degenerate(
+    rng: np.random.Generator, states: Floats, weights: Floats
+) -> tuple[Floats, Floats]:
+    """Give the particles `(P, S)` and weights `(P,)` to go on with: others where fewer than half count."""
+    count = len(weights)
+    if 1.0 / float(np.square(weights).sum()) >= count / 2:
+        return states, weights
+    return states[systematic_resample(rng, weights)], np.full(count, 1.0 / count)

@@ -1,7 +1,7 @@
 """Particle filters kept apart (Todor 2009, section 8.3, which has the separation from its reference 49).
 
 A particle weighs `exp(-λ Σ D²)`, summed over the parts of its box (the middle of it, where somebody is) and
-the three colour channels, D² being one less the Bhattacharyya coefficient of a part's histogram and that of
+the three color channels, D² being one less the Bhattacharyya coefficient of a part's histogram and that of
 the same part of the box that the object began with.
 
 Where particles of several objects are, each weighs the square of its overlap factor as well, so that two
@@ -17,19 +17,29 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tracking.baselines.part_histograms import PartField, cores, likeness, parts_of
-from tracking.baselines.particle_filter import Swarm, particle_boxes, standing, stepped, weighed
-from tracking.baselines.particle_overlap import overlap_factors
-from tracking.baselines.resampling import drawn_anew
+from tracking.baselines.part_histograms import (
+    PartHistograms,
+    bhattacharyya_coefficient,
+    core_boxes,
+    split_boxes,
+)
+from tracking.baselines.particle_filter import (
+    ParticleTarget,
+    initial_state,
+    particle_boxes,
+    propagate,
+    resample_if_degenerate,
+    reweight,
+)
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Image
 
 _LOST = 0.5
-"""Mean D² above which nobody of these colours is among the particles."""
+"""Mean D² above which nobody of these colors is among the particles."""
 
 
 @dataclass(frozen=True, slots=True)
-class SeparatedSettings:
+class SeparatedParticleSettings:
     """The filters.
 
     Raises:
@@ -40,86 +50,110 @@ class SeparatedSettings:
     rows: int = 4  # of parts of a box
     columns: int = 2
     sharpness: float = 8.0  # λ, of a sum over parts and channels
-    reduced: int = 4  # R, pixels: particles nearer than this overlap
-    power: float = 2.0  # of the overlap factor; 0: independent filters
-    first: int = 20  # pictures in which somebody's own likeness is learned
-    alike: float = 0.9  # of that likeness below which somebody is behind another
+    cell_pixels: int = 4  # R, pixels: particles nearer than this overlap
+    overlap_power: float = 2.0  # of the overlap factor; 0: independent filters
+    reference_frames: int = 20  # pictures in which somebody's own likeness is learned
+    min_relative_similarity: float = 0.9  # of that likeness below which somebody is behind another
     seed: int = 1  # of all noise
 
     def __post_init__(self) -> None:
-        if min(self.particles, self.rows, self.columns, self.reduced, self.first) < 1:
-            raise ValueError("particles, rows, columns, reduced and first must be at least 1")
-        if self.sharpness <= 0.0 or self.power < 0.0:
-            raise ValueError("sharpness must be above 0, power at least 0")
+        if min(self.particles, self.rows, self.columns, self.cell_pixels, self.reference_frames) < 1:
+            raise ValueError("particles, rows, columns, cell_pixels and reference_frames must be at least 1")
+        if self.sharpness <= 0.0 or self.overlap_power < 0.0:
+            raise ValueError("sharpness must be above 0, overlap_power at least 0")
 
 
 @dataclass(slots=True)
-class Apart(Swarm):
-    """Somebody who is followed, whose colours are `(parts, 3, 8)`: each part's histograms.
+class SeparatedTarget(ParticleTarget):
+    """Somebody who is followed, whose colors are `(parts, 3, 8)`: each part's histograms.
 
     Attributes:
-        likenesses: how like themselves they were in their first pictures.
+        reference_similarities: how like themselves they were in their first pictures.
     """
 
-    likenesses: list[float] = field(default_factory=list)
+    reference_similarities: list[float] = field(default_factory=list)
 
 
 class SeparatedParticles:
     """One filter for each; who is dressed alike keeps apart."""
 
     name = "separated-particles"
-    sees = True
+    uses_image = True
 
-    def __init__(self, settings: SeparatedSettings | None = None) -> None:
-        self._settings = settings or SeparatedSettings()
+    def __init__(self, settings: SeparatedParticleSettings | None = None) -> None:
+        self._settings = settings or SeparatedParticleSettings()
         self._rng = np.random.default_rng(self._settings.seed)
 
-    def begin(self, image: Image, box: Floats) -> Apart:
-        """Take the colours of somebody's parts, and put all particles at them."""
-        count, (start, aspect) = self._settings.particles, standing(box)
-        colours = PartField(image, box).histograms(self._parts(box))
-        return Apart(colours, aspect, np.tile(start, (count, 1)), np.full(count, 1.0 / count), box.copy())
+    def initialize(self, image: Image, box: Floats) -> SeparatedTarget:
+        """Take the colors of somebody's parts, and put all particles at them."""
+        count, (start, aspect) = self._settings.particles, initial_state(box)
+        colors = PartHistograms(image, box).histograms(self._parts(box))
+        return SeparatedTarget(
+            colors, aspect, np.tile(start, (count, 1)), np.full(count, 1.0 / count), box.copy()
+        )
 
-    def move(self, image: Image | None, objects: Sequence[Apart]) -> Floats:
+    def predict(self, image: Image | None, objects: Sequence[SeparatedTarget]) -> Floats:
         """Let all particles go on, weigh and separate them: `(N, 4)`, NaN where none is like its object."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None:
             return boxes
         seen = [self._weigh(image, item) for item in objects]
-        factors = overlap_factors([item.states[:, :2] for item in objects], self._settings.reduced)
+        factors = overlap_factors([item.states[:, :2] for item in objects], self._settings.cell_pixels)
         for row, (item, (places, unlike), factor) in enumerate(zip(objects, seen, factors, strict=True)):
             if not self._behind_another(places, item):
-                weights = item.weights * factor**self._settings.power
+                weights = item.weights * factor**self._settings.overlap_power
                 item.weights = weights / weights.sum()
             item.box = particle_boxes(item.weights @ item.states, item.aspect)
             if float(item.weights @ unlike) <= _LOST:
                 boxes[row] = item.box
         return boxes
 
-    def found(self, known: Apart, box: Floats) -> Floats:  # noqa: ARG002 — the colours alone say where
+    def update(self, known: SeparatedTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
         """Give where somebody is: detections move nobody."""
         return known.box
 
     def _parts(self, boxes: Floats) -> Floats:
-        return parts_of(cores(boxes), self._settings.rows, self._settings.columns)
+        return split_boxes(core_boxes(boxes), self._settings.rows, self._settings.columns)
 
-    def _weigh(self, image: Image, item: Apart) -> tuple[PartField, Floats]:
-        """Let one object's particles go on and weigh them alone: the colours there, and their D² `(P,)`."""
-        states, item.weights = drawn_anew(self._rng, item.states, item.weights)
-        item.states = stepped(self._rng, states)
+    def _weigh(self, image: Image, item: SeparatedTarget) -> tuple[PartHistograms, Floats]:
+        """Let one object's particles go on and weigh them alone: the colors there, and their D² `(P,)`."""
+        states, item.weights = resample_if_degenerate(self._rng, item.states, item.weights)
+        item.states = propagate(self._rng, states)
         places = particle_boxes(item.states, item.aspect)
         around = np.concatenate([places[:, :2].min(axis=0), places[:, 2:].max(axis=0)])
-        colours = PartField(image, around)
-        distances = 1.0 - likeness(colours.histograms(self._parts(places)), item.colours)
+        colors = PartHistograms(image, around)
+        distances = 1.0 - bhattacharyya_coefficient(colors.histograms(self._parts(places)), item.colors)
         total = distances.sum(axis=(-2, -1))
-        item.weights = weighed(item.weights, total, self._settings.sharpness)
-        return colours, distances.mean(axis=(-2, -1))
+        item.weights = reweight(item.weights, total, self._settings.sharpness)
+        return colors, distances.mean(axis=(-2, -1))
 
-    def _behind_another(self, colours: PartField, item: Apart) -> bool:
+    def _behind_another(self, colors: PartHistograms, item: SeparatedTarget) -> bool:
         """Whether somebody is less like themselves than at first; learn from their first pictures."""
         box = particle_boxes(item.weights @ item.states, item.aspect)
-        alike = float(likeness(colours.histograms(self._parts(box)), item.colours).mean())
-        if len(item.likenesses) < self._settings.first:
-            item.likenesses.append(alike)
+        alike = float(bhattacharyya_coefficient(colors.histograms(self._parts(box)), item.colors).mean())
+        if len(item.reference_similarities) < self._settings.reference_frames:
+            item.reference_similarities.append(alike)
             return False
-        return alike < self._settings.alike * float(np.mean(item.likenesses))
+        return alike < self._settings.min_relative_similarity * float(np.mean(item.reference_similarities))
+
+
+def overlap_factors(middles: Sequence[Floats], reduced: int) -> list[Floats]:
+    """Give each object's particles their factor.
+
+    Args:
+        middles: of each object `(P, 2)`, x and y in pixels.
+        reduced: pixels that a cell is wide and high, R.
+
+    Returns:
+        Of each object `(P,)`, in (0, 1]: 1 where nobody else has particles.
+    """
+    if not middles:
+        return []
+    owner = np.repeat(np.arange(len(middles)), [len(it) for it in middles])
+    cells = np.floor(np.concatenate(middles) / reduced).astype(np.int64)
+    _, cell = np.unique(cells, axis=0, return_inverse=True)
+    cell = cell.ravel()
+    counts = np.zeros((len(middles), int(cell.max(initial=-1)) + 1))
+    np.add.at(counts, (owner, cell), 1.0)
+    factors = counts[owner, cell] / counts.sum(axis=0)[cell]
+    return [factors[owner == number] for number in range(len(middles))]

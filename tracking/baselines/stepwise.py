@@ -8,16 +8,15 @@ matched with the detections by one assignment over the overlaps (IoU). Who is ma
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracking.appearance_samples import add_appearance_samples
 from tracking.assignment import assign_pairs
-from tracking.baselines.prediction_method import Method
 from tracking.boxes import BOX_SIDES, Floats, iou
 from tracking.detectors.base import Image
 from tracking.model.object_state import mean_histogram
@@ -26,6 +25,29 @@ from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings, WindowTrack
 
 S = TypeVar("S")
+"""What a method remembers of one object."""
+
+
+class PredictionMethod(Protocol, Generic[S]):
+    """One way of following objects from picture to picture. Deterministic: no clock, a seed of its own."""
+
+    name: str
+    uses_image: bool
+    """It looks at the picture: where it says that somebody is counts without a detection there, too."""
+
+    def initialize(self, image: Image, box: Floats) -> S:
+        """Take somebody new in, who is in this `(4,)` box. Who does not look is not given the picture."""
+        ...
+
+    def predict(self, image: Image | None, objects: Sequence[S]) -> Floats:
+        """Say where all of them are in the next picture: `(N, 4)`, NaN for those who are lost."""
+        ...
+
+    def update(self, known: S, box: Floats) -> Floats:
+        """Hear of the detection `(4,)` that somebody was matched with; give where they are then, `(4,)`."""
+        ...
+
+
 _NO_PICTURE: Image = np.empty((0, 0, 3), dtype=np.uint8)
 
 
@@ -37,35 +59,43 @@ class StepwiseSettings:
         ValueError: a share is none, or a number of frames makes no sense.
     """
 
-    birth_score: float = 0.5  # least score of a detection that somebody new begins with
-    apart: float = 0.3  # overlap (IoU) with a known object above which a detection is not somebody new
-    match: float = 0.3  # least overlap (IoU) of an object and the detection it is matched with
-    confirm: int = 3  # frames in a row in which somebody new must be matched
-    patience: int = 25  # frames without a match after which an object is gone
-    unseen: int = 5  # frames without a match in which a method that looks at the picture is believed
+    min_birth_score: float = 0.5  # least score of a detection that somebody new begins with
+    max_birth_iou: float = (
+        0.3  # overlap (IoU) with a known object above which a detection is not somebody new
+    )
+    min_match_iou: float = 0.3  # least overlap (IoU) of an object and the detection it is matched with
+    confirm_frames: int = 3  # frames in a row in which somebody new must be matched
+    max_missed_frames: int = 25  # frames without a match after which an object is gone
+    max_unmatched_frames: int = (
+        5  # frames without a match in which a method that looks at the picture is believed
+    )
 
     def __post_init__(self) -> None:
-        shares = (self.birth_score, self.apart, self.match)
+        shares = (self.min_birth_score, self.max_birth_iou, self.min_match_iou)
         if not all(0.0 <= share <= 1.0 for share in shares):
-            raise ValueError(f"birth_score, apart and match are shares between 0 and 1, not {shares}")
-        if self.confirm < 1 or self.patience < 1 or self.unseen < 0:
-            raise ValueError("confirm and patience must be at least 1 frame, unseen at least 0")
+            raise ValueError(
+                f"min_birth_score, max_birth_iou and min_match_iou are shares between 0 and 1, not {shares}"
+            )
+        if self.confirm_frames < 1 or self.max_missed_frames < 1 or self.max_unmatched_frames < 0:
+            raise ValueError(
+                "confirm_frames and max_missed_frames must be at least 1, max_unmatched_frames at least 0"
+            )
 
 
 @dataclass(slots=True)
-class Followed(Generic[S]):
+class StepwiseTrack(Generic[S]):
     """Somebody who is followed."""
 
-    number: int
+    id: int
     """0: not told of yet."""
-    known: S
+    target: S
     box: Floats
     serial: int
     """Nobody else has it, whether they are told of or not."""
     matches: int = 1
-    away: int = 0
+    missed_frames: int = 0
     """Frames since the last match."""
-    shown: dict[int, tuple[Floats, int]] = field(default_factory=dict)
+    observations: dict[int, tuple[Floats, int]] = field(default_factory=dict)
     """By frame of the window: the box, and which detection it is, -1 for none."""
 
 
@@ -73,12 +103,12 @@ class StepwiseTracker(Generic[S]):
     """Follows everybody by a method. What it says of a frame is final at once."""
 
     def __init__(
-        self, method: Method[S], window: WindowSettings, settings: StepwiseSettings | None = None
+        self, method: PredictionMethod[S], window: WindowSettings, settings: StepwiseSettings | None = None
     ) -> None:
         self._method, self._window = method, window
         self._settings = settings or StepwiseSettings()
-        self._objects: list[Followed[S]] = []
-        self._ended: list[Followed[S]] = []
+        self._objects: list[StepwiseTrack[S]] = []
+        self._ended: list[StepwiseTrack[S]] = []
         """Those who are gone since the last result."""
         self._numbers = self._serials = 0
         self._seen: dict[int, Detections] = {}
@@ -125,21 +155,21 @@ class StepwiseTracker(Generic[S]):
     def _pass_by(self, frames: int) -> None:
         """Let frames go by of which nothing is known."""
         for item in self._objects:
-            item.away += frames
+            item.missed_frames += frames
         self._end_some()
 
     def _step(self, frame: int, detections: Detections, image: Image | None) -> None:
-        moved = self._method.move(image, [item.known for item in self._objects])
+        moved = self._method.predict(image, [item.target for item in self._objects])
         for item, box in zip(self._objects, moved, strict=True):
             item.box = box if not np.isnan(box).any() else item.box
         taken = self._match(frame, detections)
         for item in self._objects:
-            if frame not in item.shown:
-                item.away += 1
-                if item.matches < self._settings.confirm:
-                    item.away = self._settings.patience  # nobody yet, and not there
-                elif self._method.sees and item.away <= self._settings.unseen:
-                    item.shown[frame] = (item.box, OCCLUDED)
+            if frame not in item.observations:
+                item.missed_frames += 1
+                if item.matches < self._settings.confirm_frames:
+                    item.missed_frames = self._settings.max_missed_frames  # nobody yet, and not there
+                elif self._method.uses_image and item.missed_frames <= self._settings.max_unmatched_frames:
+                    item.observations[frame] = (item.box, OCCLUDED)
         self._end_some()
         self._begin(frame, detections, taken, image)
 
@@ -150,11 +180,11 @@ class StepwiseTracker(Generic[S]):
             return taken
         places = np.stack([item.box for item in self._objects])
         overlaps = iou(places[:, None], detections.boxes[None])
-        for row, column in zip(*assign_pairs(overlaps, max(self._settings.match, 1e-9)), strict=True):
+        for row, column in zip(*assign_pairs(overlaps, max(self._settings.min_match_iou, 1e-9)), strict=True):
             item = self._objects[row]
-            item.box = self._method.found(item.known, detections.boxes[column])
-            item.matches, item.away = item.matches + 1, 0
-            item.shown[frame] = (item.box, int(column))
+            item.box = self._method.update(item.target, detections.boxes[column])
+            item.matches, item.missed_frames = item.matches + 1, 0
+            item.observations[frame] = (item.box, int(column))
             taken[column] = True
         return taken
 
@@ -163,26 +193,28 @@ class StepwiseTracker(Generic[S]):
     ) -> None:
         """Take in whoever a detection shows that is at nobody, the surest first."""
         if image is None:
-            if self._method.sees:
+            if self._method.uses_image:
                 return  # there is nothing to know them by
             image = _NO_PICTURE
         order = np.argsort(-detections.scores, kind="stable")
         for place in (int(it) for it in order if not taken[it]):
             box = detections.boxes[place]
-            if detections.scores[place] < self._settings.birth_score:
+            if detections.scores[place] < self._settings.min_birth_score:
                 break
             near = [item.box for item in self._objects]
-            if near and float(iou(box[None], np.stack(near)).max()) > self._settings.apart:
+            if near and float(iou(box[None], np.stack(near)).max()) > self._settings.max_birth_iou:
                 continue
             self._serials += 1
-            item = Followed(0, self._method.begin(image, box), box, self._serials)
-            item.shown[frame] = (box, place)
+            item = StepwiseTrack(0, self._method.initialize(image, box), box, self._serials)
+            item.observations[frame] = (box, place)
             self._objects.append(item)
 
     def _end_some(self) -> None:
-        gone = [item for item in self._objects if item.away >= self._settings.patience]
-        self._ended += [item for item in gone if item.matches >= self._settings.confirm]
-        self._objects = [item for item in self._objects if item.away < self._settings.patience]
+        gone = [item for item in self._objects if item.missed_frames >= self._settings.max_missed_frames]
+        self._ended += [item for item in gone if item.matches >= self._settings.confirm_frames]
+        self._objects = [
+            item for item in self._objects if item.missed_frames < self._settings.max_missed_frames
+        ]
 
     def _result(self, last: int) -> WindowResult:
         """Tell of all frames that were not told of yet."""
@@ -190,43 +222,46 @@ class StepwiseTracker(Generic[S]):
         frames = range(first, last + 1)
         told = [item for item in self._everybody() if self._counts(item)]
         for item in told:
-            if not item.number:
+            if not item.id:
                 self._numbers += 1
-                item.number = self._numbers
-        told = sorted((item for item in told if item.shown), key=lambda item: item.number)
+                item.id = self._numbers
+        told = sorted((item for item in told if item.observations), key=lambda item: item.id)
         seen = [self._seen.get(frame, Detections.empty(self._bins())) for frame in frames]
         tracks = [self._track(item, frames, seen) for item in told]
         states = [
-            np.array([item.shown[it][1] if it in item.shown else OCCLUDED for it in frames], dtype=np.int64)
+            np.array(
+                [item.observations[it][1] if it in item.observations else OCCLUDED for it in frames],
+                dtype=np.int64,
+            )
             for item in told
         ]
         report = SolveReport(self._method.name, 0.0, 0.0, integral=False, conflicts=0, rounds=0)
         result = WindowResult(first, last, last, add_appearance_samples(tracks, states, first, seen), report)
         for item in self._everybody():
             # Who does not count yet is not told of; when they do, it is from the next window on.
-            item.shown = {}
+            item.observations = {}
         self._ended, self._seen, self._first = [], {}, last + 1
         return result
 
-    def _everybody(self) -> Iterable[Followed[S]]:
+    def _everybody(self) -> Iterable[StepwiseTrack[S]]:
         """Give all of whom there may be something to tell."""
         return (*self._ended, *self._objects)
 
-    def _counts(self, item: Followed[S]) -> bool:
+    def _counts(self, item: StepwiseTrack[S]) -> bool:
         """Whether somebody is surely somebody."""
-        return item.matches >= self._settings.confirm
+        return item.matches >= self._settings.confirm_frames
 
     def _bins(self) -> int:
         return next((seen.histograms.shape[1] for seen in self._seen.values()), 0)
 
-    def _track(self, item: Followed[S], frames: range, seen: list[Detections]) -> WindowTrack:
+    def _track(self, item: StepwiseTrack[S], frames: range, seen: list[Detections]) -> WindowTrack:
         boxes = np.full((len(frames), BOX_SIDES), np.nan)
         looks, scores = [], 0.0
         for row, frame in enumerate(frames):
-            if frame in item.shown:
-                boxes[row], place = item.shown[frame]
+            if frame in item.observations:
+                boxes[row], place = item.observations[frame]
                 if place != OCCLUDED:
                     looks.append(seen[row].histograms[place])
                     scores += float(seen[row].scores[place])
         histogram = mean_histogram(np.stack(looks)) if looks else np.empty(self._bins())
-        return WindowTrack(item.number, boxes, boxes, histogram, scores / len(frames))
+        return WindowTrack(item.id, boxes, boxes, histogram, scores / len(frames))

@@ -1,10 +1,10 @@
 """The track graph: who merges into a group is known again when it splits (Todor 2009, chapter 7).
 
-Tracks are followed by a Kalman filter and assignment. Somebody who is no longer detected where somebody else
-covers them merges into that one's track, which is of several people from then on. Somebody new who begins
-beside such a track splits from it: when they were seen for some frames, `who_left` says who they are, and who
-the one is that goes on. The original sees a whole recording first; here a split is decided after some frames,
-and what was told before that stays.
+Tracks are followed by a Kalman filter and assignment. Somebody who is no longer detected where somebody
+else covers them merges into that one's track, which is of several people from then on. Somebody new who
+begins beside such a track splits from it: after some frames, `departed_member` decides who left and who
+goes on. The original sees a whole recording first; here a split is decided after some frames, and what was
+told before that stays.
 """
 
 from __future__ import annotations
@@ -14,10 +14,16 @@ from collections.abc import Iterable
 import cv2
 import numpy as np
 
-from tracking.baselines.kalman import Kalman
+from tracking.baselines.kalman_prediction import KalmanPrediction
 from tracking.baselines.stepwise import StepwiseSettings, StepwiseTracker
-from tracking.baselines.track_groups import GraphSettings, Group, Leaving, Look, Person
-from tracking.baselines.track_links import End, who_left
+from tracking.baselines.track_groups import (
+    KalmanTrack,
+    MeanAppearance,
+    SplitCandidate,
+    TrackGraphSettings,
+    TrackGroup,
+)
+from tracking.baselines.track_links import TrackEnd, departed_member
 from tracking.boxes import Floats, areas, intersections
 from tracking.detectors.base import Image
 from tracking.solvers.base import OCCLUDED
@@ -35,13 +41,13 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         self,
         window: WindowSettings,
         settings: StepwiseSettings | None = None,
-        graph: GraphSettings | None = None,
+        graph: TrackGraphSettings | None = None,
     ) -> None:
-        super().__init__(Kalman(), window, settings)
-        self._graph = graph or GraphSettings()
-        self._looks: dict[int, Look] = {}
-        self._groups: dict[int, Group] = {}
-        self._leaving: dict[int, Leaving] = {}
+        super().__init__(KalmanPrediction(), window, settings)
+        self._graph = graph or TrackGraphSettings()
+        self._looks: dict[int, MeanAppearance] = {}
+        self._groups: dict[int, TrackGroup] = {}
+        self._leaving: dict[int, SplitCandidate] = {}
 
     def _step(self, frame: int, detections: Detections, image: Image | None) -> None:
         super()._step(frame, detections, image)
@@ -51,10 +57,13 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         self._leave(frame)
         self._split()
 
-    def _everybody(self) -> Iterable[Person]:
-        return (*super()._everybody(), *(item for group in self._groups.values() for item in group.hidden))
+    def _everybody(self) -> Iterable[KalmanTrack]:
+        return (
+            *super()._everybody(),
+            *(item for group in self._groups.values() for item in group.merged_tracks),
+        )
 
-    def _counts(self, item: Person) -> bool:
+    def _counts(self, item: KalmanTrack) -> bool:
         return super()._counts(item) and item.serial not in self._leaving
 
     def _tidy(self, frame: int) -> None:
@@ -63,15 +72,15 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         self._leaving = {
             it: who
             for it, who in self._leaving.items()
-            if it in alive and who.group_of.serial in alive and who.group_of.serial in self._groups
+            if it in alive and who.host.serial in alive and who.host.serial in self._groups
         }
         for serial, group in list(self._groups.items()):
-            long = [frame - end.frame > self._graph.remember for end in group.ends[1:]]
+            long = [frame - end.frame > self._graph.max_group_frames for end in group.entries[1:]]
             gone = [serial not in alive or it for it in long]
-            self._ended += [item for item, it in zip(group.hidden, gone, strict=True) if it]
-            group.ends[1:] = [end for end, it in zip(group.ends[1:], gone, strict=True) if not it]
-            group.hidden = [item for item, it in zip(group.hidden, gone, strict=True) if not it]
-            if not group.hidden:
+            self._ended += [item for item, it in zip(group.merged_tracks, gone, strict=True) if it]
+            group.entries[1:] = [end for end, it in zip(group.entries[1:], gone, strict=True) if not it]
+            group.merged_tracks = [item for item, it in zip(group.merged_tracks, gone, strict=True) if not it]
+            if not group.merged_tracks:
                 del self._groups[serial]
         known = {item.serial for item in self._everybody()}
         self._looks = {serial: look for serial, look in self._looks.items() if serial in known}
@@ -79,107 +88,115 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
     def _learn(self, frame: int, detections: Detections) -> None:
         """See how everybody looks who is matched: alone, come out of a group, or the rest of one."""
         for item in self._objects:
-            _, place = item.shown.get(frame, (item.box, OCCLUDED))
+            _, place = item.observations.get(frame, (item.box, OCCLUDED))
             if place == OCCLUDED:
                 continue
             histogram = detections.histograms[place]
             if item.serial in self._leaving:
-                self._leaving[item.serial].out.add(histogram)
+                self._leaving[item.serial].appearance.add(histogram)
             elif item.serial in self._groups:
                 for who in self._leaving.values():
-                    if who.group_of is item:
-                        who.rest.add(histogram)
+                    if who.host is item:
+                        who.host_appearance.add(histogram)
             else:
-                self._looks.setdefault(item.serial, Look.none(detections)).add(histogram)
+                self._looks.setdefault(item.serial, MeanAppearance.empty(detections)).add(histogram)
 
     def _merge(self, frame: int) -> None:
         """Let those who are not detected any more into the track of whoever covers them."""
         sure = [item for item in self._objects if self._counts(item)]
         for item in sure:
-            hosts = [it for it in sure if it.away == 0 and it in self._objects]
-            if item.away < self._graph.gone or not hosts:
+            hosts = [it for it in sure if it.missed_frames == 0 and it in self._objects]
+            if item.missed_frames < self._graph.merge_after_frames or not hosts:
                 continue
             shared = intersections(np.stack([it.box for it in hosts]), item.box)
             best = int(np.argmax(shared))
-            if shared[best] >= self._graph.covered * float(areas(item.box)):
+            if shared[best] >= self._graph.min_covered_share * float(areas(item.box)):
                 self._join(hosts[best], item, frame)
 
-    def _join(self, host: Person, item: Person, frame: int) -> None:
+    def _join(self, host: KalmanTrack, item: KalmanTrack, frame: int) -> None:
         """Merge two tracks; `item` may be of several people itself."""
-        group = self._groups.setdefault(host.serial, Group([self._end(host, frame)]))
+        group = self._groups.setdefault(host.serial, TrackGroup([self._end(host, frame)]))
         merged = self._groups.pop(item.serial, None)
-        group.ends += [self._end(item, frame)] if merged is None else merged.ends
-        group.hidden += [item] if merged is None else [item, *merged.hidden]
+        group.entries += [self._end(item, frame)] if merged is None else merged.entries
+        group.merged_tracks += [item] if merged is None else [item, *merged.merged_tracks]
         self._objects.remove(item)
-        self._leaving = {it: who for it, who in self._leaving.items() if who.group_of is not item}
+        self._leaving = {it: who for it, who in self._leaving.items() if who.host is not item}
 
-    def _end(self, item: Person, frame: int) -> End:
+    def _end(self, item: KalmanTrack, frame: int) -> TrackEnd:
         """Say how somebody goes into a group."""
-        step = np.asarray(item.known.statePost, dtype=np.float64)[_VELOCITY, 0]
+        step = np.asarray(item.target.statePost, dtype=np.float64)[_VELOCITY, 0]
         return _ended(frame, item.box, step, self._looks[item.serial].mean)
 
     def _leave(self, frame: int) -> None:
         """Note who is new beside a group: they came out of it."""
         hosts = [it for it in self._objects if it.serial in self._groups]
         for item in self._objects:
-            if item.matches > 1 or frame not in item.shown or not hosts:
+            if item.matches > 1 or frame not in item.observations or not hosts:
                 continue
             near = intersections(np.stack([self._around(it.box) for it in hosts]), item.box)
             host = hosts[int(np.argmax(near))]
             if near.max() > 0.0 and item is not host:
-                look, rest = (Look(np.zeros_like(self._looks[host.serial].total)) for _ in range(2))
-                self._leaving[item.serial] = Leaving(item, host, frame, item.box, host.box, look, rest)
+                look, rest = (MeanAppearance(np.zeros_like(self._looks[host.serial].total)) for _ in range(2))
+                self._leaving[item.serial] = SplitCandidate(item, host, frame, item.box, host.box, look, rest)
 
     def _around(self, box: Floats) -> Floats:
-        margin = self._graph.beside * (box[2] - box[0])
+        margin = self._graph.split_margin * (box[2] - box[0])
         return np.asarray(box + np.array([-margin, -margin, margin, margin]))
 
     def _split(self) -> None:
         """Decide who those are that came out of a group and were seen for long enough."""
         for serial, who in list(self._leaving.items()):
-            enough = who.person.matches >= self._graph.wait and who.rest.frames and who.out.frames
-            group = self._groups.get(who.group_of.serial)
+            enough = (
+                who.track.matches >= self._graph.split_decision_frames
+                and who.host_appearance.frames
+                and who.appearance.frames
+            )
+            group = self._groups.get(who.host.serial)
             if not enough and group is not None:
                 continue
             del self._leaving[serial]
             if group is None:
                 continue
             still = np.zeros(2)
-            out = _ended(who.first, who.box, still, who.out.mean)
-            rest = _ended(who.first, who.rest_box, still, who.rest.mean)
-            left = who_left(group.ends, out, rest, self._graph.close, self._graph.unlike)
+            out = _ended(who.first_frame, who.first_box, still, who.appearance.mean)
+            rest = _ended(who.first_frame, who.first_host_box, still, who.host_appearance.mean)
+            left = departed_member(
+                group.entries, out, rest, self._graph.motion_frames, self._graph.max_distance
+            )
             if left is not None:
                 self._part(who, group, left)
 
-    def _part(self, who: Leaving, group: Group, left: int) -> None:
+    def _part(self, who: SplitCandidate, group: TrackGroup, left: int) -> None:
         """Give tracks to those whose they are: the `left`th of a group came out of it."""
-        host = who.group_of
+        host = who.host
         del self._groups[host.serial]
         followed, place = host, left
         if left == 0:
             # Who is followed was the one who left: the next of the group is followed in their place.
-            followed, place = group.hidden[0], 1
+            followed, place = group.merged_tracks[0], 1
             self._objects.append(followed)
-            _take_over(followed, host, who.first)
-            _take_over(host, who.person, who.first)
-            group.ends[0], group.ends[1] = group.ends[1], group.ends[0]
+            _take_over(followed, host, who.first_frame)
+            _take_over(host, who.track, who.first_frame)
+            group.entries[0], group.entries[1] = group.entries[1], group.entries[0]
         else:
-            self._objects.append(group.hidden[left - 1])
-            _take_over(group.hidden[left - 1], who.person, who.first)
-        self._objects.remove(who.person)
-        del group.ends[place], group.hidden[place - 1]
-        if group.hidden:
+            self._objects.append(group.merged_tracks[left - 1])
+            _take_over(group.merged_tracks[left - 1], who.track, who.first_frame)
+        self._objects.remove(who.track)
+        del group.entries[place], group.merged_tracks[place - 1]
+        if group.merged_tracks:
             self._groups[followed.serial] = group
         for other in self._leaving.values():
-            other.group_of = followed if other.group_of is host else other.group_of
+            other.host = followed if other.host is host else other.host
 
 
-def _ended(frame: int, box: Floats, step: Floats, look: Floats) -> End:
-    return End(frame, (box[:2] + box[2:]) / 2, step, float(box[3] - box[1]), look)
+def _ended(frame: int, box: Floats, step: Floats, look: Floats) -> TrackEnd:
+    return TrackEnd(frame, (box[:2] + box[2:]) / 2, step, float(box[3] - box[1]), look)
 
 
-def _take_over(item: Person, track: Person, first: int) -> None:
+def _take_over(item: KalmanTrack, track: KalmanTrack, first: int) -> None:
     """Let a person go on as a track, with what it showed from the frame `first` on."""
-    item.known, item.box, item.away = track.known, track.box, track.away
-    item.shown.update({frame: track.shown[frame] for frame in track.shown if frame >= first})
-    track.shown = {frame: it for frame, it in track.shown.items() if frame < first}
+    item.target, item.box, item.missed_frames = track.target, track.box, track.missed_frames
+    item.observations.update(
+        {frame: track.observations[frame] for frame in track.observations if frame >= first}
+    )
+    track.observations = {frame: it for frame, it in track.observations.items() if frame < first}

@@ -7,49 +7,51 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from tracking.baselines.stepwise import Followed
-from tracking.baselines.track_links import End
+from tracking.baselines.stepwise import StepwiseTrack
+from tracking.baselines.track_links import TrackEnd
 from tracking.boxes import Floats
 from tracking.types import Detections
 
-Person = Followed[cv2.KalmanFilter]
+KalmanTrack = StepwiseTrack[cv2.KalmanFilter]
 """Somebody who is followed."""
 
 
 @dataclass(frozen=True, slots=True)
-class GraphSettings:
+class TrackGraphSettings:
     """Merges and splits.
 
     Raises:
         ValueError: a number makes no sense.
     """
 
-    covered: float = 0.5  # share of a box that another must cover for its person to merge into it
-    gone: int = 3  # frames without a match after which they do
-    beside: float = 0.5  # widths around a group in which somebody new comes out of it
-    wait: int = 6  # frames in which who came out is seen before it is decided who they are
-    remember: int = 250  # frames after which somebody in a group is gone
-    close: int = 25  # frames between two tracks up to which their motion counts
-    unlike: float = 0.5  # distance above which who came out was never in the group
+    min_covered_share: float = 0.5  # share of a box that another must cover for its person to merge into it
+    merge_after_frames: int = 3  # frames without a match after which they do
+    split_margin: float = 0.5  # widths around a group in which somebody new comes out of it
+    split_decision_frames: int = 6  # frames in which who came out is seen before it is decided who they are
+    max_group_frames: int = 250  # frames after which somebody in a group is gone
+    motion_frames: int = 25  # frames between two tracks up to which their motion counts
+    max_distance: float = 0.5  # distance above which who came out was never in the group
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.covered <= 1.0 or self.beside < 0.0:
-            raise ValueError("covered is a share above 0, beside at least 0")
-        if min(self.gone, self.wait, self.remember) < 1:
-            raise ValueError("gone, wait and remember must be at least 1 frame")
+        if not 0.0 < self.min_covered_share <= 1.0 or self.split_margin < 0.0:
+            raise ValueError("min_covered_share is a share above 0, split_margin at least 0")
+        if min(self.merge_after_frames, self.split_decision_frames, self.max_group_frames) < 1:
+            raise ValueError(
+                "merge_after_frames, split_decision_frames and max_group_frames must be at least 1 frame"
+            )
 
 
 @dataclass(slots=True, eq=False)
-class Look:
+class MeanAppearance:
     """How somebody looks, the mean of some frames."""
 
     total: Floats
     frames: int = 0
 
     @staticmethod
-    def none(detections: Detections) -> Look:
+    def empty(detections: Detections) -> MeanAppearance:
         """Give the look of somebody not seen yet."""
-        return Look(np.zeros(detections.histograms.shape[1]))
+        return MeanAppearance(np.zeros(detections.histograms.shape[1]))
 
     def add(self, histogram: Floats) -> None:
         """Take a frame's `(B,)` in."""
@@ -62,24 +64,24 @@ class Look:
 
 
 @dataclass(slots=True, eq=False)
-class Group:
+class TrackGroup:
     """Several people in one track, which is the first one's."""
 
-    ends: list[End]
+    entries: list[TrackEnd]
     """How everybody went in; the first is who is followed on."""
-    hidden: list[Person] = field(default_factory=list)
+    merged_tracks: list[KalmanTrack] = field(default_factory=list)
     """All but the first."""
 
 
 @dataclass(slots=True, eq=False)
-class Leaving:
+class SplitCandidate:
     """Somebody who came out of a group, and it is not decided yet who they are."""
 
-    person: Person
-    group_of: Person
-    first: int
-    box: Floats
-    rest_box: Floats
+    track: KalmanTrack
+    host: KalmanTrack
+    first_frame: int
+    first_box: Floats
+    first_host_box: Floats
     """Where the group was then."""
-    out: Look
-    rest: Look
+    appearance: MeanAppearance
+    host_appearance: MeanAppearance

@@ -22,39 +22,41 @@ _MOTION = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class End:
+class TrackEnd:
     """One end of one person's track: where a person went into a group, or where they came out.
 
     Attributes:
         frame: the last of the track that went in, the first of the one that came out.
-        place: `(2,)`, the middle of the box in that frame, pixels.
-        step: `(2,)`, pixels a frame; of one that came out it does not matter.
+        position: `(2,)`, the middle of the box in that frame, pixels.
+        velocity: `(2,)`, pixels a frame; of one that came out it does not matter.
         height: of the box, pixels.
-        look: `(B,)`, the mean histogram of the track; B is 0 where none is known.
+        histogram: `(B,)`, the mean histogram of the track; B is 0 where none is known.
     """
 
     frame: int
-    place: Floats
-    step: Floats
+    position: Floats
+    velocity: Floats
     height: float
-    look: Floats
+    histogram: Floats
 
 
-def distance(before: End, after: End, close: int) -> float:
+def track_distance(before: TrackEnd, after: TrackEnd, close: int) -> float:
     """Say how unlike one person two tracks are, I: 0 to 1.
 
     The motion counts where they are at most `close` frames apart: how far from where the first was heading
     the second begins, in heights.
     """
-    looks = float(appearance_distance(before.look[None], after.look[None])[0, 0])
+    looks = float(appearance_distance(before.histogram[None], after.histogram[None])[0, 0])
     frames = after.frame - before.frame
     if frames > close:
         return looks
-    off = np.hypot(*(after.place - before.place - frames * before.step)) / max(before.height, 1.0)
+    off = np.hypot(*(after.position - before.position - frames * before.velocity)) / max(before.height, 1.0)
     return (1.0 - _MOTION) * looks + _MOTION * min(float(off), 1.0)
 
 
-def who_left(group: Sequence[End], out: End, rest: End, close: int, unlike: float) -> int | None:
+def departed_member(
+    group: Sequence[TrackEnd], out: TrackEnd, rest: TrackEnd, close: int, unlike: float
+) -> int | None:
     """Say which of a group is the one who came out; None: nobody of them, who was never in it.
 
     Args:
@@ -64,9 +66,9 @@ def who_left(group: Sequence[End], out: End, rest: End, close: int, unlike: floa
         close: frames between two tracks up to which their motion counts.
         unlike: distance above which nobody of the group is who came out.
     """
-    costs = np.array([distance(member, out, close) for member in group])
+    costs = np.array([track_distance(member, out, close) for member in group])
     if len(group) == 2:  # noqa: PLR2004 — the state leaves one person on either side
-        left = np.array([distance(member, rest, close) for member in group])
+        left = np.array([track_distance(member, rest, close) for member in group])
         totals = costs + left[::-1]
     else:
         totals = costs

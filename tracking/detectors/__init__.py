@@ -2,19 +2,19 @@
 
 from tracking.detectors.background.box_filter import BoxFilterSettings
 from tracking.detectors.background.detector import (
-    PAPER_BOXES,
+    PAPER_DETECTOR,
     BackgroundDetector,
     BackgroundSettings,
-    paper_boxes,
-    seen_from_above,
+    overhead_settings,
+    paper_settings,
 )
-from tracking.detectors.background.foreground_fit import ExplainSettings
-from tracking.detectors.background.height_model import Floor, HeightLineSettings
+from tracking.detectors.background.foreground_fit import ForegroundFitSettings
+from tracking.detectors.background.height_model import FloorGeometry, HeightModelSettings
 from tracking.detectors.background.median import MedianSettings
 from tracking.detectors.background.mog2 import Mog2Settings
-from tracking.detectors.background.static_foreground import GhostSettings
+from tracking.detectors.background.static_foreground import StaticForegroundSettings
 from tracking.detectors.base import Detector, Image
-from tracking.detectors.color_histogram import Looks, LooksSettings, colour_histograms
+from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSettings, color_histograms
 from tracking.detectors.hog import HogDetector, HogSettings
 from tracking.detectors.mot_file import MotFileDetector, MotFileSettings
 from tracking.detectors.neural.onnx import OnnxDetector, OnnxSettings
@@ -22,30 +22,30 @@ from tracking.detectors.subimage_appearance import SubimageSettings
 from tracking.detectors.template import TemplateDetector, TemplateSettings
 
 __all__ = [
-    "PAPER_BOXES",
+    "PAPER_DETECTOR",
+    "AppearanceExtractor",
+    "AppearanceSettings",
     "BackgroundDetector",
     "BackgroundSettings",
     "BoxFilterSettings",
     "Detector",
-    "ExplainSettings",
-    "Floor",
-    "GhostSettings",
-    "HeightLineSettings",
+    "FloorGeometry",
+    "ForegroundFitSettings",
+    "HeightModelSettings",
     "HogDetector",
     "HogSettings",
     "Image",
-    "Looks",
-    "LooksSettings",
     "MedianSettings",
     "Mog2Settings",
     "MotFileDetector",
     "MotFileSettings",
     "OnnxDetector",
     "OnnxSettings",
+    "StaticForegroundSettings",
     "SubimageSettings",
     "TemplateDetector",
     "TemplateSettings",
-    "colour_histograms",
-    "paper_boxes",
-    "seen_from_above",
+    "color_histograms",
+    "overhead_settings",
+    "paper_settings",
 ]

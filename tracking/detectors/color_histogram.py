@@ -1,9 +1,9 @@
-"""How people look in colour: upper and lower body apart, brightness and two chromas each.
+"""How people look in color: upper and lower body apart, brightness and two chromas each.
 
 Six histograms beside each other in one row: brightness, red share and blue share of the upper half of a
 box, then of its lower half. Every one of the six holds a sixth of the row's mass, so that measures on
 rows (Bhattacharyya, intersection, earth mover's distance between cumulative rows) are the means of the
-same measures on the six. Grey alone, the paper's 64 bins, tells a red jumper from a green one badly, and
+same measures on the six. Gray alone, the paper's 64 bins, tells a red jumper from a green one badly, and
 not at all from another camera.
 """
 
@@ -15,16 +15,16 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tracking.appearance import grey_histograms
+from tracking.appearance import gray_histograms
 from tracking.boxes import Floats
 from tracking.detectors.base import Image, Mask
 
 _LEVELS = 256
 _CHANNELS = 3
 _HALVES = ((0.05, 0.5), (0.5, 1.0))
-# Chroma shares lie around a third; beyond these shares everything is one colour.
+# Chroma shares lie around a third; beyond these shares everything is one color.
 _LEAST_SHARE, _MOST_SHARE = 0.15, 0.6
-# Added to each channel, in grey levels: the chroma of a dark pixel is mostly noise.
+# Added to each channel, in gray levels: the chroma of a dark pixel is mostly noise.
 _DARK = 12.0
 # Neighbouring bins share, so that a little more light does not make another person.
 _SMOOTH = np.array([0.25, 0.5, 0.25])
@@ -33,50 +33,50 @@ _LEAST_PIXELS = 12
 
 
 @dataclass(frozen=True, slots=True)
-class LooksSettings:
+class AppearanceSettings:
     """The appearance of the hypotheses.
 
     Raises:
         ValueError: so many bins do not fit.
     """
 
-    colour: bool = True  # false: grey histograms of `bins` bins over the whole box (the paper)
-    colour_bins: int = 16  # bins of each of the six colour histograms, at most 85
+    color: bool = True  # false: gray histograms of `bins` bins over the whole box (the paper)
+    color_bins: int = 16  # bins of each of the six color histograms, at most 85
 
     def __post_init__(self) -> None:
-        if not 1 <= self.colour_bins <= _LEVELS // _CHANNELS:
-            raise ValueError(f"colour_bins must be 1 to {_LEVELS // _CHANNELS}, not {self.colour_bins}")
+        if not 1 <= self.color_bins <= _LEVELS // _CHANNELS:
+            raise ValueError(f"color_bins must be 1 to {_LEVELS // _CHANNELS}, not {self.color_bins}")
 
     @property
-    def row(self) -> int:
-        """The length of a row of colour histograms."""
-        return len(_HALVES) * _CHANNELS * self.colour_bins
+    def length(self) -> int:
+        """The length of a row of color histograms."""
+        return len(_HALVES) * _CHANNELS * self.color_bins
 
 
 @dataclass(frozen=True, slots=True)
-class Looks:
-    """What a detector says that its boxes look like: colour histograms, or the paper's grey ones."""
+class AppearanceExtractor:
+    """What a detector says that its boxes look like: color histograms, or the paper's gray ones."""
 
-    settings: LooksSettings = field(default_factory=LooksSettings)
-    grey_bins: int = 64  # bins of the grey histograms
+    settings: AppearanceSettings = field(default_factory=AppearanceSettings)
+    gray_bins: int = 64  # bins of the gray histograms
 
     @property
     def bins(self) -> int:
         """The length of a row."""
-        return self.settings.row if self.settings.colour else self.grey_bins
+        return self.settings.length if self.settings.color else self.gray_bins
 
-    def rows(self, image: Image, boxes: Floats, mask: Mask | None = None) -> Floats:
+    def histograms(self, image: Image, boxes: Floats, mask: Mask | None = None) -> Floats:
         """Give the look of each box `(K, 4)` of a picture `(H, W, 3)`: `(K, bins)`, rows summing to 1.
 
         Only the pixels count at which `mask` `(H, W)`, where there is one, is not 0.
         """
-        if self.settings.colour:
-            return colour_histograms(image, boxes, self.settings.colour_bins, mask)
-        grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        return grey_histograms(grey, boxes, self.grey_bins, mask)
+        if self.settings.color:
+            return color_histograms(image, boxes, self.settings.color_bins, mask)
+        gray = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        return gray_histograms(gray, boxes, self.gray_bins, mask)
 
 
-def colour_histograms(image: Image, boxes: Floats, bins: int, mask: Mask | None = None) -> Floats:
+def color_histograms(image: Image, boxes: Floats, bins: int, mask: Mask | None = None) -> Floats:
     """Give the six histograms of each box, `(K, 6 bins)`, rows summing to 1.
 
     Args:

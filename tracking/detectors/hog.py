@@ -9,10 +9,10 @@ import numpy as np
 
 from tracking.boxes import Floats
 from tracking.detectors.base import Image
-from tracking.detectors.color_histogram import Looks
-from tracking.detectors.ignore_mask import Ignored, Polygons
-from tracking.detectors.non_maximum_suppression import best_apart
-from tracking.detectors.validation import checked_image
+from tracking.detectors.color_histogram import AppearanceExtractor
+from tracking.detectors.ignore_mask import IgnoreFilter, Polygons
+from tracking.detectors.non_maximum_suppression import non_maximum_suppression
+from tracking.detectors.validation import validate_image
 from tracking.types import Detections
 
 # The detector's window is 64x128 pixels, the person in its middle is 96 tall, with 16 above and below.
@@ -32,30 +32,33 @@ class HogSettings:
         ValueError: a setting makes no sense.
     """
 
-    least_height: float = 0.14  # smallest person, in picture heights: the smaller the slower
-    step: float = 1.08  # each size of the scan is this factor above the one before
-    least_margin: float = 0.0  # least distance from the SVM's border; below 0 gives more, and more false ones
-    apart: float = 0.5  # of two boxes that overlap (IoU) by more, the one of lower score is left out
-    most: int = 40  # boxes handed on at most
+    min_height: float = 0.14  # smallest person, in picture heights: the smaller the slower
+    scale_step: float = 1.08  # each size of the scan is this factor above the one before
+    min_margin: float = 0.0  # least distance from the SVM's border; below 0 gives more, and more false ones
+    nms_iou: float = 0.5  # of two boxes that overlap (IoU) by more, the one of lower score is left out
+    max_detections: int = 40  # boxes handed on at most
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.least_height <= 1.0:
-            raise ValueError(f"least_height is a share above 0 up to 1, not {self.least_height}")
-        if not self.step > 1.0:
-            raise ValueError(f"step must be above 1, not {self.step}")
+        if not 0.0 < self.min_height <= 1.0:
+            raise ValueError(f"min_height is a share above 0 up to 1, not {self.min_height}")
+        if not self.scale_step > 1.0:
+            raise ValueError(f"scale_step must be above 1, not {self.scale_step}")
 
 
 class HogDetector:
     """Finds upright people in single pictures; remembers nothing. Scores are `1 / (1 + exp(-margin))`."""
 
-    blind = False
+    warming_up = False
 
     def __init__(
-        self, settings: HogSettings | None = None, looks: Looks | None = None, ignore: Polygons = ()
+        self,
+        settings: HogSettings | None = None,
+        looks: AppearanceExtractor | None = None,
+        ignore: Polygons = (),
     ) -> None:
         self.settings = settings or HogSettings()
-        self._looks = looks or Looks()
-        self._ignored = Ignored(ignore)
+        self._looks = looks or AppearanceExtractor()
+        self._ignored = IgnoreFilter(ignore)
         self._hog = cv2.HOGDescriptor()
         self._hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector(), dtype=np.float32))
 
@@ -70,26 +73,26 @@ class HogDetector:
         Raises:
             ValueError: not an `(H, W, 3)` uint8 picture.
         """
-        checked_image(image)
+        validate_image(image)
         boxes, scores = self._found(image)
-        seen = self._ignored.leaves(image.shape, boxes)
+        seen = self._ignored.keep(image.shape, boxes)
         boxes, scores = boxes[seen], scores[seen]
-        kept = best_apart(boxes, scores, self.settings.apart, self.settings.most)
+        kept = non_maximum_suppression(boxes, scores, self.settings.nms_iou, self.settings.max_detections)
         boxes = boxes[kept]
-        return Detections(boxes, scores[kept], self._looks.rows(image, boxes))
+        return Detections(boxes, scores[kept], self._looks.histograms(image, boxes))
 
     def _found(self, image: Image) -> tuple[Floats, Floats]:
         """Give all windows in which the SVM sees somebody, cut down to the person: boxes and scores."""
         height, width = image.shape[:2]
-        factor = _PERSON_ROWS / (self.settings.least_height * height)
+        factor = _PERSON_ROWS / (self.settings.min_height * height)
         size = (max(round(width * factor), 64), max(round(height * factor), 128))
         scaled = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
         windows, margins = self._hog.detectMultiScale(
             scaled,
-            hitThreshold=self.settings.least_margin,
+            hitThreshold=self.settings.min_margin,
             winStride=_STRIDE,
             padding=_PADDING,
-            scale=self.settings.step,
+            scale=self.settings.scale_step,
             groupThreshold=0,
         )
         sides = np.asarray(windows, dtype=np.float64).reshape(-1, 4)

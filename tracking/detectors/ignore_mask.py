@@ -39,14 +39,14 @@ def visible_mask(height: int, width: int, polygons: Sequence[Polygon], scale: fl
     return mask
 
 
-class Ignored:
+class IgnoreFilter:
     """Tells which boxes of whole-picture detectors lie too far inside what is ignored."""
 
     def __init__(self, polygons: Polygons) -> None:
         self._polygons = polygons
         self._sums: Floats | None = None
 
-    def leaves(self, shape: tuple[int, ...], boxes: Floats) -> npt.NDArray[np.bool_]:
+    def keep(self, shape: tuple[int, ...], boxes: Floats) -> npt.NDArray[np.bool_]:
         """Say of each box `(N, 4)` in a picture of `shape` whether enough of it counts, `(N,)`."""
         if not self._polygons:
             return np.ones(len(boxes), dtype=np.bool_)

@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from tracking.appearance import grey_histograms
+from tracking.appearance import gray_histograms
 from tracking.boxes import BOX_SIDES, iou
 from tracking.detectors.base import Image
 from tracking.motchallenge import MotRow, read_rows
@@ -20,9 +20,9 @@ from tracking.types import Detections
 class MotFileSettings:
     """Reading public detections."""
 
-    bins: int = 64  # bins of the grey histograms, where there is a picture
-    least_score: float = 0.0  # detections below this score (0..1, see `MotFileDetector`) are left out
-    apart: float = 0.7  # of two detections that overlap (IoU) by more, the one of lower score is left out
+    bins: int = 64  # bins of the gray histograms, where there is a picture
+    min_score: float = 0.0  # detections below this score (0..1, see `MotFileDetector`) are left out
+    nms_iou: float = 0.7  # of two detections that overlap (IoU) by more, the one of lower score is left out
     first_frame: int = 0  # frame number (pulse) of the file's frame 1
 
 
@@ -49,7 +49,7 @@ class MotFileDetector:
         self._next = self.settings.first_frame
 
     @property
-    def last(self) -> int:
+    def last_frame(self) -> int:
         """The last frame number with a detection."""
         return self.settings.first_frame + max(self._frames, default=0) - 1
 
@@ -65,8 +65,8 @@ class MotFileDetector:
         boxes, scores = rows[keep, :BOX_SIDES], rows[keep, BOX_SIDES]
         if not bins:
             return Detections(boxes, scores, np.empty((len(boxes), 0)))
-        grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        return Detections(boxes, scores, grey_histograms(grey, boxes, bins))
+        gray = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        return Detections(boxes, scores, gray_histograms(gray, boxes, bins))
 
 
 def _by_frame(rows: Sequence[MotRow]) -> dict[int, np.ndarray[tuple[int, int], np.dtype[np.float64]]]:
@@ -89,9 +89,9 @@ def _by_frame(rows: Sequence[MotRow]) -> dict[int, np.ndarray[tuple[int, int], n
 def _kept(rows: np.ndarray[tuple[int, int], np.dtype[np.float64]], settings: MotFileSettings) -> list[int]:
     kept: list[int] = []
     for index, row in enumerate(rows):
-        if row[BOX_SIDES] < settings.least_score:
+        if row[BOX_SIDES] < settings.min_score:
             break
         overlaps = iou(rows[kept, :BOX_SIDES], row[:BOX_SIDES])
-        if overlaps.max(initial=0.0) <= settings.apart:
+        if overlaps.max(initial=0.0) <= settings.nms_iou:
             kept.append(index)
     return kept

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from tracking.boxes import Floats, heights, widths
 
 
-def best_apart(boxes: Floats, scores: Floats, apart: float, most: int) -> npt.NDArray[np.int64]:
+def non_maximum_suppression(boxes: Floats, scores: Floats, apart: float, most: int) -> npt.NDArray[np.int64]:
     """Give the indices of boxes `(N, 4)` that overlap (IoU) none better by more than `apart`, best first.
 
     At most `most` of them. Of equal scores the leftmost, then the topmost comes first, so that the answer

@@ -18,7 +18,7 @@ from tracking.detectors.base import Image
 
 @dataclass(frozen=True, slots=True)
 class SubimageSettings:
-    """The size and colours of a sub-image.
+    """The size and colors of a sub-image.
 
     Raises:
         ValueError: a side has no pixel.
@@ -26,31 +26,31 @@ class SubimageSettings:
 
     columns: int = 12  # pixels across, whatever the box's width
     rows: int = 12  # pixels down
-    colour: bool = True  # false: grey
+    color: bool = True  # false: gray
 
     def __post_init__(self) -> None:
         if self.columns < 1 or self.rows < 1:
             raise ValueError(f"a sub-image has at least 1x1 pixels, not {self.columns}x{self.rows}")
 
     @property
-    def row(self) -> int:
+    def length(self) -> int:
         """The length of a row."""
-        return 2 * self.columns * self.rows * (_CHANNELS if self.colour else 1)
+        return 2 * self.columns * self.rows * (_CHANNELS if self.color else 1)
 
 
 _CHANNELS = 3
 _WHITE = 255.0
 
 
-def subimages(image: Image, boxes: Floats, settings: SubimageSettings) -> Floats:
+def subimage_histograms(image: Image, boxes: Floats, settings: SubimageSettings) -> Floats:
     """Give the sub-image in each box, made small, as a row: `(K, B)`, rows summing to 1.
 
     Args:
         image: `(H, W, 3)`.
-        boxes: `(K, 4)` in pixels, cut at the picture's borders; where nothing is left the row is grey.
+        boxes: `(K, 4)` in pixels, cut at the picture's borders; where nothing is left the row is gray.
         settings: the sub-images' size.
     """
-    rows = np.full((len(boxes), settings.row), 1.0 / settings.row)
+    rows = np.full((len(boxes), settings.length), 1.0 / settings.length)
     limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)
     for k, edges in enumerate(np.rint(np.clip(boxes, 0.0, limits)).astype(np.int64)):
         left, top, right, bottom = edges
@@ -58,7 +58,7 @@ def subimages(image: Image, boxes: Floats, settings: SubimageSettings) -> Floats
             continue
         size = (settings.columns, settings.rows)
         small = cv2.resize(image[top:bottom, left:right], size, interpolation=cv2.INTER_AREA)
-        if not settings.colour:
+        if not settings.color:
             small = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY)
         light = small.ravel() / _WHITE
         rows[k] = np.concatenate([light, 1.0 - light]) / light.size

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from tracking.boxes import Floats
 from tracking.detectors.base import Image
-from tracking.detectors.color_histogram import Looks, LooksSettings
-from tracking.detectors.subimage_appearance import SubimageSettings, subimages
-from tracking.detectors.validation import checked_image
+from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSettings
+from tracking.detectors.subimage_appearance import SubimageSettings, subimage_histograms
+from tracking.detectors.validation import validate_image
 from tracking.types import Detections
 
 _LEAST_SIDE = 4
@@ -28,25 +28,25 @@ class TemplateSettings:
         ValueError: a setting makes no sense.
     """
 
-    most_peaks: int = 80  # K: peaks handed on at most, best first
-    least_score: float = 0.0  # least correlation of a peak, 0 to 1
-    apart: float = 0.06  # no other peak within this share of the template's width and height
-    looks: Literal["subimage", "grey", "colour"] = "subimage"  # what an observation looks like
-    bins: int = 64  # looks grey: bins of the histogram
-    colour_bins: int = 16  # looks colour: bins of each of the six histograms
+    max_peaks: int = 80  # K: peaks handed on at most, best first
+    min_score: float = 0.0  # least correlation of a peak, 0 to 1
+    peak_distance: float = 0.06  # no other peak within this share of the template's width and height
+    appearance: Literal["subimage", "gray", "color"] = "subimage"  # what an observation looks like
+    bins: int = 64  # looks gray: bins of the histogram
+    color_bins: int = 16  # looks color: bins of each of the six histograms
     subimage: SubimageSettings = field(default_factory=SubimageSettings)
 
     def __post_init__(self) -> None:
-        if self.most_peaks < 1:
-            raise ValueError(f"most_peaks must be at least 1, not {self.most_peaks}")
-        if not 0.0 <= self.least_score <= 1.0:
-            raise ValueError(f"least_score is a share between 0 and 1, not {self.least_score}")
-        if self.apart < 0.0:
-            raise ValueError(f"apart must not be negative, not {self.apart}")
+        if self.max_peaks < 1:
+            raise ValueError(f"max_peaks must be at least 1, not {self.max_peaks}")
+        if not 0.0 <= self.min_score <= 1.0:
+            raise ValueError(f"min_score is a share between 0 and 1, not {self.min_score}")
+        if self.peak_distance < 0.0:
+            raise ValueError(f"peak_distance must not be negative, not {self.peak_distance}")
 
 
 class TemplateDetector:
-    """Finds one object in every frame by normalised cross-correlation with a picture of it.
+    """Finds one object in every frame by normalized cross-correlation with a picture of it.
 
     Each object has observations of its own, as many as there are peaks: `build_network_per_object` takes
     them, `TemplateTracker` does it all. Nothing is remembered from one frame to the next.
@@ -57,13 +57,13 @@ class TemplateDetector:
 
     def __init__(self, template: Image, settings: TemplateSettings | None = None) -> None:
         self.settings = settings or TemplateSettings()
-        self._template = checked_image(template)
+        self._template = validate_image(template)
         height, width = template.shape[:2]
         if min(height, width) < _LEAST_SIDE:
             raise ValueError(f"a template has at least {_LEAST_SIDE} pixels a side, not {width}x{height}")
         self._size = (width, height)
         # Odd, so that a peak is in the middle of what it is compared with.
-        reach = [2 * max(1, round(self.settings.apart * side)) + 1 for side in (height, width)]
+        reach = [2 * max(1, round(self.settings.peak_distance * side)) + 1 for side in (height, width)]
         self._around = np.ones(reach, dtype=np.uint8)
         self.histogram: Floats = self._looks(self._template, np.array([[0.0, 0.0, width, height]]))[0]
         """`(B,)`, what the template itself looks like, in the terms of the observations."""
@@ -79,7 +79,7 @@ class TemplateDetector:
         Raises:
             ValueError: not an `(H, W, 3)` uint8 picture, or smaller than the template.
         """
-        checked_image(image)
+        validate_image(image)
         width, height = self._size
         if image.shape[0] < height or image.shape[1] < width:
             raise ValueError(
@@ -92,20 +92,20 @@ class TemplateDetector:
     def _peaks(self, image: Image) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Floats]:
         """Give left, top and score of the local maxima, best first."""
         match = cv2.matchTemplate(image, self._template, cv2.TM_CCOEFF_NORMED)
-        # Where the picture is of one colour the correlation is not defined: nothing is there.
+        # Where the picture is of one color the correlation is not defined: nothing is there.
         match = np.where(np.isfinite(match), np.clip(match, 0.0, 1.0), 0.0).astype(np.float32)
         highest = cv2.dilate(match, self._around, borderType=cv2.BORDER_CONSTANT, borderValue=0.0)
-        peak = (match >= highest) & (match > 0.0) & (match >= self.settings.least_score)
+        peak = (match >= highest) & (match > 0.0) & (match >= self.settings.min_score)
         tops, lefts = np.nonzero(peak)
         scores = match[tops, lefts].astype(np.float64)
         # Best first; equal ones by place, so that the order never depends on the sort.
-        order = np.lexsort((tops, lefts, -scores))[: self.settings.most_peaks]
+        order = np.lexsort((tops, lefts, -scores))[: self.settings.max_peaks]
         return lefts[order], tops[order], scores[order]
 
     def _looks(self, image: Image, boxes: Floats) -> Floats:
         settings = self.settings
-        if settings.looks == "subimage":
-            return subimages(image, boxes, settings.subimage)
-        return Looks(LooksSettings(settings.looks == "colour", settings.colour_bins), settings.bins).rows(
-            image, boxes
-        )
+        if settings.appearance == "subimage":
+            return subimage_histograms(image, boxes, settings.subimage)
+        return AppearanceExtractor(
+            AppearanceSettings(settings.appearance == "color", settings.color_bins), settings.bins
+        ).histograms(image, boxes)

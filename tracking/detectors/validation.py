@@ -9,7 +9,7 @@ from tracking.detectors.base import Image
 _CHANNELS = 3
 
 
-def checked_image(image: Image) -> Image:
+def validate_image(image: Image) -> Image:
     """Give the picture back.
 
     Raises:
@@ -20,7 +20,7 @@ def checked_image(image: Image) -> Image:
     return image
 
 
-def at_least_one(settings: object, *names: str) -> None:
+def require_at_least_one(settings: object, *names: str) -> None:
     """Check counts among a detector's settings.
 
     Raises:

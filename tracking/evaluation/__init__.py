@@ -3,23 +3,27 @@
 Needs the extra `evaluate` (`pip install myview[evaluate]`); the tracker itself does not use it.
 """
 
-from tracking.evaluation.formatting import HEADINGS, cells
-from tracking.evaluation.multi_camera import CameraScores, Recording, average, evaluate_cameras
-from tracking.evaluation.occlusions import Occlusion, occlusions, survived
-from tracking.evaluation.oracle_association import perfect_association
-from tracking.evaluation.scores import Scores, evaluate
+from tracking.evaluation.multi_camera import (
+    MultiCameraScores,
+    TruthAndTracks,
+    average_scores,
+    evaluate_cameras,
+)
+from tracking.evaluation.occlusions import Occlusion, find_occlusions, identities_kept
+from tracking.evaluation.oracle_association import oracle_association
+from tracking.evaluation.scores import HEADINGS, Scores, evaluate, format_scores
 
 __all__ = [
     "HEADINGS",
-    "CameraScores",
+    "MultiCameraScores",
     "Occlusion",
-    "Recording",
     "Scores",
-    "average",
-    "cells",
+    "TruthAndTracks",
+    "average_scores",
     "evaluate",
     "evaluate_cameras",
-    "occlusions",
-    "perfect_association",
-    "survived",
+    "find_occlusions",
+    "format_scores",
+    "identities_kept",
+    "oracle_association",
 ]

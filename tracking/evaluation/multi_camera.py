@@ -7,13 +7,13 @@ from dataclasses import dataclass, fields
 from statistics import fmean
 from typing import Any
 
-from tracking.evaluation.frames import Frame, line_up
-from tracking.evaluation.scores import DEFAULT_IOU, Scores, score
+from tracking.evaluation.frame_matching import FrameSimilarity, align_frames
+from tracking.evaluation.scores import DEFAULT_MIN_IOU, Scores, score_frames
 from tracking.motchallenge import MotRow
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class TruthAndTracks:
     """One camera: what is there and what was found."""
 
     truth: Sequence[MotRow]
@@ -21,7 +21,7 @@ class Recording:
 
 
 @dataclass(frozen=True, slots=True)
-class CameraScores:
+class MultiCameraScores:
     """Scores by camera, and of all of them as one.
 
     Attributes:
@@ -37,10 +37,10 @@ class CameraScores:
     @property
     def mean(self) -> Scores:
         """Shares are the mean over the cameras, each counting as much; counts are totals."""
-        return average(list(self.cameras.values()))
+        return average_scores(list(self.cameras.values()))
 
 
-def average(scores: Sequence[Scores]) -> Scores:
+def average_scores(scores: Sequence[Scores]) -> Scores:
     """Give the mean of the shares and the total of the counts.
 
     Raises:
@@ -55,19 +55,21 @@ def average(scores: Sequence[Scores]) -> Scores:
     return Scores(**columns)
 
 
-def evaluate_cameras(cameras: Mapping[str, Recording], least_iou: float = DEFAULT_IOU) -> CameraScores:
+def evaluate_cameras(
+    cameras: Mapping[str, TruthAndTracks], least_iou: float = DEFAULT_MIN_IOU
+) -> MultiCameraScores:
     """Score the tracks of several cameras, each and together.
 
     Raises:
         ValueError: an id is twice in one frame of a camera, which the message names.
     """
-    frames: dict[str, list[Frame]] = {}
+    frames: dict[str, list[FrameSimilarity]] = {}
     for name, it in cameras.items():
         try:
-            frames[name] = line_up(it.truth, it.tracks, least_iou)
+            frames[name] = align_frames(it.truth, it.tracks, least_iou)
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
-    return CameraScores(
-        cameras={name: score(found, least_iou) for name, found in frames.items()},
-        joint=score([frame for found in frames.values() for frame in found], least_iou),
+    return MultiCameraScores(
+        cameras={name: score_frames(found, least_iou) for name, found in frames.items()},
+        joint=score_frames([frame for found in frames.values() for frame in found], least_iou),
     )

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.boxes import BOX_SIDES, areas, intersections
-from tracking.evaluation.frames import line_up
-from tracking.evaluation.matching import matched
-from tracking.evaluation.scores import DEFAULT_IOU
+from tracking.evaluation.frame_matching import align_frames, match_frames
+from tracking.evaluation.scores import DEFAULT_MIN_IOU
 from tracking.motchallenge import MotRow
 
 HIDDEN_BELOW = 0.25
@@ -31,7 +30,7 @@ class Occlusion:
     last: int
 
 
-def occlusions(truth: Iterable[MotRow], around: int) -> list[Occlusion]:
+def find_occlusions(truth: Iterable[MotRow], around: int) -> list[Occlusion]:
     """Find who is hidden and comes back, by the visible shares of the truth.
 
     Truth without shares between 0 and 1 only says whom its annotator called hidden, or nothing at all (-1).
@@ -47,12 +46,12 @@ def occlusions(truth: Iterable[MotRow], around: int) -> list[Occlusion]:
     return [found for person, frames in seen.items() for found in _of(person, frames, around)]
 
 
-def survived(
+def identities_kept(
     found: Sequence[Occlusion],
     truth: Iterable[MotRow],
     tracks: Iterable[MotRow],
     around: int,
-    least_iou: float = DEFAULT_IOU,
+    least_iou: float = DEFAULT_MIN_IOU,
 ) -> list[bool]:
     """Say of each occlusion whether its person's number is the same before and after.
 
@@ -60,10 +59,10 @@ def survived(
     somebody who has none on either side did not keep it.
     """
     truth, tracks = list(truth), list(tracks)
-    lined = line_up(truth, tracks, least_iou)
+    lined = align_frames(truth, tracks, least_iou)
     numbers: dict[int, dict[int, int]] = {}
     order = sorted({row.frame for row in (*truth, *tracks)})
-    for number, frame, pairs in zip(order, lined, matched(lined, least_iou), strict=True):
+    for number, frame, pairs in zip(order, lined, match_frames(lined, least_iou), strict=True):
         for person, track in np.argwhere(pairs).tolist():
             numbers.setdefault(int(frame.truth[person]), {})[number] = int(frame.tracks[track])
     return [_same(numbers.get(it.person, {}), it, around) for it in found]

@@ -9,12 +9,12 @@ import numpy as np
 
 from tracking.assignment import assign_pairs
 from tracking.boxes import BOX_SIDES, iou
-from tracking.evaluation.scores import DEFAULT_IOU
+from tracking.evaluation.scores import DEFAULT_MIN_IOU
 from tracking.motchallenge import MotRow
 
 
-def perfect_association(
-    detections: Iterable[MotRow], truth: Iterable[MotRow], least_iou: float = DEFAULT_IOU
+def oracle_association(
+    detections: Iterable[MotRow], truth: Iterable[MotRow], least_iou: float = DEFAULT_MIN_IOU
 ) -> list[MotRow]:
     """Give each detection the id of the person it is at, and leave out those that are at nobody.
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import motrics
 
-from tracking.evaluation.frames import Frame, line_up
-from tracking.evaluation.matching import matched
+from tracking.evaluation.frame_matching import FrameSimilarity, align_frames, match_frames
 from tracking.motchallenge import MotRow
 
-DEFAULT_IOU = 0.5
+DEFAULT_MIN_IOU = 0.5
 """The overlap from which a box is taken to be at a person, as in MOTChallenge."""
 
 
@@ -53,26 +52,26 @@ class Scores:
     tracks: int
 
 
-def evaluate(truth: Iterable[MotRow], tracks: Iterable[MotRow], least_iou: float = DEFAULT_IOU) -> Scores:
+def evaluate(truth: Iterable[MotRow], tracks: Iterable[MotRow], least_iou: float = DEFAULT_MIN_IOU) -> Scores:
     """Score the tracks of one camera.
 
     Args:
-        truth: rows whose confidence is 0 do not count; see `line_up`.
+        truth: rows whose confidence is 0 do not count; see `align_frames`.
         tracks: what was found.
         least_iou: the overlap from which a box is taken to be at a person, for all but HOTA.
 
     Raises:
         ValueError: an id is twice in one frame.
     """
-    return score(line_up(truth, tracks, least_iou), least_iou)
+    return score_frames(align_frames(truth, tracks, least_iou), least_iou)
 
 
-def score(frames: Sequence[Frame], least_iou: float) -> Scores:
+def score_frames(frames: Sequence[FrameSimilarity], least_iou: float) -> Scores:
     """Score frames that are lined up."""
     people = [frame.truth.tolist() for frame in frames]
     found = [frame.tracks.tolist() for frame in frames]
     overlaps = [frame.similarity.tolist() for frame in frames]
-    pairs = [matrix.astype(float).tolist() for matrix in matched(frames, least_iou)]
+    pairs = [matrix.astype(float).tolist() for matrix in match_frames(frames, least_iou)]
     hota = motrics.compute_hota_from_similarity(people, found, overlaps)
     identity = motrics.compute_identity_from_similarity(people, found, overlaps, least_iou)
     clear = motrics.compute_clear_from_similarity(people, found, pairs)
@@ -91,3 +90,25 @@ def score(frames: Sequence[Frame], least_iou: float) -> Scores:
         objects=len({number for frame in people for number in frame}),
         tracks=len({number for frame in found for number in frame}),
     )
+
+
+HEADINGS = {
+    "hota": "HOTA",
+    "deta": "DetA",
+    "assa": "AssA",
+    "mota": "MOTA",
+    "idf1": "IDF1",
+    "recall": "Rcll",
+    "precision": "Prcn",
+    "switches": "IDSW",
+    "fragments": "Frag",
+    "objects": "GT",
+    "tracks": "IDs",
+}
+"""MOTChallenge's headings by the scores' names, in the order of a table."""
+
+
+def format_scores(scores: Scores, names: Iterable[str]) -> list[str]:
+    """Give some of the scores as text: counts as they are, shares in percent."""
+    values = (getattr(scores, name) for name in names)
+    return [f"{value}" if isinstance(value, int) else f"{100.0 * value:.1f}" for value in values]

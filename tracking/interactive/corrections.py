@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.boxes import Floats
-from tracking.interactive.settings import AssistSettings
+from tracking.interactive.settings import InteractiveSettings
 from tracking.model.network import Network
 
 
 @dataclass(frozen=True, slots=True)
-class Pointing:
+class PositionCorrection:
     """At this frame this object is at this pixel.
 
     Attributes:
@@ -22,7 +22,7 @@ class Pointing:
         object: the track's id.
         x: pixels from the left.
         y: pixels from the top.
-        reach: how far off the pointing may be, pixels: where it is usually within.
+        tolerance: how far off the pointing may be, pixels: where it is usually within.
 
     Raises:
         ValueError: the reach is not positive, or a number is none.
@@ -32,14 +32,14 @@ class Pointing:
     object: int
     x: float
     y: float
-    reach: float
+    tolerance: float
 
     def __post_init__(self) -> None:
-        if not (np.isfinite([self.x, self.y, self.reach]).all() and self.reach > 0.0):
-            raise ValueError(f"a pointing needs a place and a positive reach, not {self}")
+        if not (np.isfinite([self.x, self.y, self.tolerance]).all() and self.tolerance > 0.0):
+            raise ValueError(f"a correction needs finite coordinates and a positive tolerance, not {self}")
 
 
-def farness(pointing: Pointing, boxes: Floats) -> Floats:
+def normalized_offset(pointing: PositionCorrection, boxes: Floats) -> Floats:
     """Say how far boxes `(..., 4)` are from what is pointed at, `(...)` in [0, 1].
 
     The squared distance of the point from the middle of the box, in units of twice the reach, 1 at most:
@@ -47,37 +47,38 @@ def farness(pointing: Pointing, boxes: Floats) -> Floats:
     is more than elsewhere, however far.
     """
     middles = (boxes[..., :2] + boxes[..., 2:]) / 2.0
-    squared = ((middles - [pointing.x, pointing.y]) ** 2).sum(axis=-1) / (2.0 * pointing.reach) ** 2
+    squared = ((middles - [pointing.x, pointing.y]) ** 2).sum(axis=-1) / (2.0 * pointing.tolerance) ** 2
     return np.asarray(np.minimum(squared, 1.0))
 
 
-def pointed_at(pointing: Pointing, boxes: Floats) -> NDArray[np.bool_]:
+def near_correction(pointing: PositionCorrection, boxes: Floats) -> NDArray[np.bool_]:
     """Say which boxes `(K, 4)` may be what is pointed at, `(K,)`."""
-    return np.asarray(farness(pointing, boxes) < 1.0)
+    return np.asarray(normalized_offset(pointing, boxes) < 1.0)
 
 
-def with_pointings(
+def apply_corrections(
     network: Network,
     first: int,
     ids: Sequence[int],
-    pointings: Mapping[int, Mapping[int, Pointing]],
-    settings: AssistSettings,
+    pointings: Mapping[int, Mapping[int, PositionCorrection]],
+    settings: InteractiveSettings,
     comeback: float,
 ) -> Network:
-    """Give the network of a window from the frame `first` with what pointings cost added to its nodes.
+    """Return the network of a window with the corrections' costs added to its nodes.
 
-    With `far` as in `farness`, the place v of the object that is pointed at costs `weight far(v)` more, and
-    its being hidden `weight hidden`: who points at somebody who is covered is nearer to their own place
-    than to the middle of who covers them. Others need not be charged: one place is for one. Who is pointed
-    at comes out of hiding anywhere near: an arc that there is none for costs `comeback`.
+    With `far` the `normalized_offset`, being at node v costs the corrected object `correction_weight
+    far(v)` more, and being occluded costs it `correction_weight hidden_share` more: an operator who points
+    at a covered object points closer to its true position than to the center of the object in front. Other
+    objects are not charged, since a place holds one object only. The corrected object may reappear anywhere
+    near the point: arcs out of the occlusion node that were gated away get the cost `comeback`.
 
     Args:
-        network: whose objects are `ids`, all of which share the observations.
-        first: its first frame.
-        ids: the tracks.
-        pointings: by frame and object.
+        network: objects `ids`, which share their observations.
+        first: the window's first frame.
+        ids: the tracks, in the order of the network's objects.
+        pointings: corrections by frame and object.
         settings: the weights.
-        comeback: what the dearest way out of hiding costs.
+        comeback: cost of the most expensive way out of an occlusion.
     """
     frames = [m for m in range(network.frames) if first + m in pointings]
     if not frames:
@@ -89,9 +90,9 @@ def with_pointings(
             own = np.flatnonzero(owners == it.object)
             if not len(own):
                 continue
-            far = farness(it, network.boxes[0, m])
-            node[own, m, :-1] += settings.weight * far
-            node[own, m, -1] += settings.weight * settings.hidden
+            far = normalized_offset(it, network.boxes[0, m])
+            node[own, m, :-1] += settings.correction_weight * far
+            node[own, m, -1] += settings.correction_weight * settings.hidden_share
             way = source[own[0]] if m == 0 else pair[network.pair_sets[own[0]], m - 1, -1]
             way[:-1][(far < 1.0) & np.isinf(way[:-1])] = comeback
     return replace(network, node=node, source=source, pair=pair)

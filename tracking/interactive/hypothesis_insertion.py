@@ -13,30 +13,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.boxes import Floats, areas
-from tracking.interactive.corrections import Pointing, pointed_at
+from tracking.interactive.corrections import PositionCorrection, near_correction
 from tracking.model.network import Network
 from tracking.types import Detections
 
 _ALIKE = 1.6
 """Factor between the areas of somebody and a box that is still theirs; two bodies side by side have more."""
 
-Places = Mapping[int, Mapping[int, int]]
+InsertedHypotheses = Mapping[int, Mapping[int, int]]
 """Which observation was made for whom: the index by object, by frame."""
 
 
-def place_of(pointing: Pointing, size: Floats) -> Floats:
+def box_around(pointing: PositionCorrection, size: Floats) -> Floats:
     """Give the box `(4,)` of somebody of a size `(2,)`, across and down, around what is pointed at."""
     middle = np.array([pointing.x, pointing.y])
     return np.concatenate([middle - size / 2.0, middle + size / 2.0])
 
 
-def is_found(pointing: Pointing, size: Floats, boxes: Floats) -> bool:
+def has_hypothesis(pointing: PositionCorrection, size: Floats, boxes: Floats) -> bool:
     """Say whether any of the boxes `(K, 4)` may be whom somebody of that size points at."""
     ratio = areas(boxes) / max(float(size[0] * size[1]), 1.0)
-    return bool((pointed_at(pointing, boxes) & (ratio < _ALIKE) & (ratio > 1.0 / _ALIKE)).any())
+    return bool((near_correction(pointing, boxes) & (ratio < _ALIKE) & (ratio > 1.0 / _ALIKE)).any())
 
 
-def with_place(seen: Detections, box: Floats, look: Floats) -> Detections:
+def insert_hypothesis(seen: Detections, box: Floats, look: Floats) -> Detections:
     """Add an observation that no detector has made: of score 0, so that nobody new begins with it."""
     return Detections(
         np.concatenate([seen.boxes, box[None]]),
@@ -45,7 +45,9 @@ def with_place(seen: Detections, box: Floats, look: Floats) -> Detections:
     )
 
 
-def with_places(network: Network, first: int, ids: Sequence[int], places: Places, change: float) -> Network:
+def apply_insertions(
+    network: Network, first: int, ids: Sequence[int], places: InsertedHypotheses, change: float
+) -> Network:
     """Give the network of a window from the frame `first` where what was made for somebody is theirs alone.
 
     To others such a place is none. It conflicts with nothing, since what is found there is one box of

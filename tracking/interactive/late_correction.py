@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.boxes import Floats, heights, normalized_distance
-from tracking.interactive.corrections import Pointing, farness
-from tracking.interactive.swap_margins import exchanges
-from tracking.interactive.window_memory import Memory
+from tracking.interactive.corrections import PositionCorrection, normalized_offset
+from tracking.interactive.swap_margins import swap_margins
+from tracking.interactive.window_memory import WindowMemory
 from tracking.model.network import build_network
 from tracking.model.object_state import Template
 from tracking.model.settings import CostSettings
@@ -18,29 +18,32 @@ from tracking.solvers.base import OCCLUDED
 from tracking.types import Detections
 
 _SURE = 0.5
-"""How far (`farness`) a track may be from the point to be the one that is pointed at."""
+"""How far (`normalized_offset`) a track may be from the point to be the one that is pointed at."""
 
 
-def carried(pointing: Pointing, memory: Memory, costs: CostSettings, since: int) -> list[Pointing]:
-    """Give what a pointing at somebody else's track says of the frames before it, back to `since`.
+def backdate_correction(
+    pointing: PositionCorrection, memory: WindowMemory, costs: CostSettings, since: int
+) -> list[PositionCorrection]:
+    """Return the corrections for earlier frames that a correction implies, back to the frame `since`.
 
-    Somebody, a, is pointed at who was said to be elsewhere, or hidden, while b was said to be there. The two
-    have exchanged their identities from some frame on: from that one on from which exchanging the tracks, as
-    they were found, costs least (`exchanges`, with only the two and their own boxes in it, and nothing said
-    of where they should be by now); where b began while a was hidden, since b began. From there on a was
-    where b was said to be, and b where a was. Empty where a is what is pointed at, or nobody else is,
-    and where a may just be behind b.
+    The operator pointed at object a where the tracker had object b, while a was elsewhere or hidden: a and
+    b swapped identities earlier. The swap is placed at the frame from which exchanging the two tracks costs
+    least (`swap_margins` in a network of the two and their own boxes, without motion). If b began while a
+    was hidden, it is placed where b began. From that frame on, a is corrected to b's boxes and b to a's.
+
+    Returns an empty list where a is already at the point, where no other track is, or where a may be
+    occluded by b.
     """
     a, b = pointing.object, _instead(pointing, memory)
     if b is None:
         return []
-    frames = [n for n in sorted(memory.where) if since <= n <= pointing.frame]
-    states = np.array([[memory.where[n].get(k, OCCLUDED) for n in frames] for k in (a, b)])
+    frames = [n for n in sorted(memory.assignments) if since <= n <= pointing.frame]
+    states = np.array([[memory.assignments[n].get(k, OCCLUDED) for n in frames] for k in (a, b)])
     if _covered(states != OCCLUDED):
         return []
-    start = _start(states, [memory.seen.get(n) for n in frames], costs)
+    start = _start(states, [memory.detections.get(n) for n in frames], costs)
     return [
-        Pointing(n, ours, *_aim(memory.seen[n].boxes[state]))
+        PositionCorrection(n, ours, *_aim(memory.detections[n].boxes[state]))
         for place, n in enumerate(frames)
         if start <= place < len(frames) - 1
         for ours, state in ((a, states[1, place]), (b, states[0, place]))
@@ -48,11 +51,11 @@ def carried(pointing: Pointing, memory: Memory, costs: CostSettings, since: int)
     ]
 
 
-def _instead(pointing: Pointing, memory: Memory) -> int | None:
+def _instead(pointing: PositionCorrection, memory: WindowMemory) -> int | None:
     """Give the track that is at the point instead of the one that is pointed at, if there is one."""
-    there = memory.where.get(pointing.frame, {})
+    there = memory.assignments.get(pointing.frame, {})
     far = {
-        number: float(farness(pointing, memory.seen[pointing.frame].boxes[state]))
+        number: float(normalized_offset(pointing, memory.detections[pointing.frame].boxes[state]))
         for number, state in there.items()
     }
     if not far:
@@ -90,7 +93,7 @@ def _start(states: NDArray[np.int64], frames: Sequence[Detections | None], costs
     ).T
     if seen.any(axis=1).all():
         templates = [_template(n, row, few) for n, row in enumerate(local)]
-        found = exchanges(build_network(templates, few, costs), local)
+        found = swap_margins(build_network(templates, few, costs), local)
         if np.isfinite(found.margins[0, 1]):
             return int(found.frames[0, 1])
     return _nearest(local, few)

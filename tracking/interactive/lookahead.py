@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.boxes import Floats, overlap
-from tracking.interactive.solved_window import Solved
-from tracking.interactive.swap_margins import exchanges
+from tracking.interactive.solved_window import SolvedWindow
+from tracking.interactive.swap_margins import swap_margins
 from tracking.model.motion import MotionModel
 from tracking.model.network import build_network
 from tracking.model.object_state import Template
@@ -43,17 +43,17 @@ class Crossing:
     margin: float
 
 
-def ways(window: Solved, frames: int) -> dict[int, tuple[int, Floats]]:
+def predict_paths(window: SolvedWindow, frames: int) -> dict[int, tuple[int, Floats]]:
     """Give where everybody goes who was seen often enough: for how long they are hidden, and `(frames, 4)`.
 
     The first of these boxes is in the frame after the last sighting.
     """
     found = {}
-    for n in range(len(window.known)):
-        seen = np.flatnonzero(~np.isnan(window.trail[n, :, 0]))
+    for n in range(len(window.known_ids)):
+        seen = np.flatnonzero(~np.isnan(window.recent_boxes[n, :, 0]))
         if len(seen) >= _RECENT:
-            motion = _motion(window.trail[n], int(seen[-1]) + 1)
-            found[n] = window.trail.shape[1] - 1 - int(seen[-1]), motion.predict(frames)
+            motion = _motion(window.recent_boxes[n], int(seen[-1]) + 1)
+            found[n] = window.recent_boxes.shape[1] - 1 - int(seen[-1]), motion.predict(frames)
     return found
 
 
@@ -63,14 +63,14 @@ def _motion(trail: Floats, first: int) -> MotionModel:
     return MotionModel.of(seen.tolist(), trail[seen], first)
 
 
-def crossings(window: Solved, horizon: int, costs: CostSettings) -> list[Crossing]:
-    """Give those who are apart now and in each other's way within the horizon.
+def predict_crossings(window: SolvedWindow, horizon: int, costs: CostSettings) -> list[Crossing]:
+    """Return the pairs that are apart now and overlap within the horizon.
 
-    The margin is that of `exchanges` in a window of `horizon` frames that lies ahead, in which everybody is
-    found where they will be, looking as they did: whose looks, speeds or directions differ, or who pass at
-    a distance, would cost much to be taken for each other.
+    The margin is that of `swap_margins` in a predicted window of `horizon` frames, in which each object is
+    detected where it is expected, with its present appearance. Pairs that differ in appearance, speed or
+    direction, or that pass at a distance, have large margins.
     """
-    known = {n: it for n, it in ways(window, horizon + _RECENT).items() if it[0] < _RECENT}
+    known = {n: it for n, it in predict_paths(window, horizon + _RECENT).items() if it[0] < _RECENT}
     if len(known) < 2:  # noqa: PLR2004 — a pair
         return []
     rows = list(known)
@@ -79,18 +79,18 @@ def crossings(window: Solved, horizon: int, costs: CostSettings) -> list[Crossin
     near = np.triu(meeting.any(axis=2) & ~meeting[:, :, 0], 1)
     if not near.any():
         return []
-    looks = window.looks[rows]
+    looks = window.known_histograms[rows]
     seen = [Detections(ahead[:, m], np.ones(len(rows)), looks) for m in range(horizon)]
-    motions = [_motion(window.trail[n], window.trail.shape[1]) for n in rows]
+    motions = [_motion(window.recent_boxes[n], window.recent_boxes.shape[1]) for n in rows]
     templates = [
         Template(n, look, motion.box, motion) for n, look, motion in zip(rows, looks, motions, strict=True)
     ]
     states = np.tile(np.arange(len(rows))[:, None], (1, horizon))
-    found = exchanges(build_network(templates, seen, costs), states)
+    found = swap_margins(build_network(templates, seen, costs), states)
     return [
         Crossing(
-            window.known[rows[a]],
-            window.known[rows[b]],
+            window.known_ids[rows[a]],
+            window.known_ids[rows[b]],
             int(meeting[a, b].argmax()),
             int(np.count_nonzero(meeting[a, b])),
             max(float(found.margins[a, b]), 0.0),

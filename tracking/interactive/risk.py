@@ -15,7 +15,7 @@ _LEAD = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Signs:
+class RiskFeatures:
     """What a risk is told from.
 
     Attributes:
@@ -29,7 +29,7 @@ class Signs:
     length: float
 
     @property
-    def terms(self) -> tuple[float, float, float, float, float]:
+    def regression_terms(self) -> tuple[float, float, float, float, float]:
         """The terms of the log odds: a constant, the margin, and what is ahead and what has begun apart."""
         ahead = float(self.lead > 0.0)
         begun = math.log1p(self.length) * (1.0 - ahead)
@@ -47,7 +47,7 @@ answers, so that no school ever has such a trouble. What stands there is a guess
 twenty, and less the surer the two are told apart."""
 
 
-def risk_of(reason: RiskReason, signs: Signs) -> float:
+def failure_probability(reason: RiskReason, signs: RiskFeatures) -> float:
     """Give the probability of a failure, by a logistic regression on its signs."""
-    odds = sum(weight * term for weight, term in zip(WEIGHTS[reason], signs.terms, strict=True))
+    odds = sum(weight * term for weight, term in zip(WEIGHTS[reason], signs.regression_terms, strict=True))
     return 1.0 / (1.0 + math.exp(-odds))

@@ -6,11 +6,11 @@ import numpy as np
 
 from tracking.appearance import appearance_distance
 from tracking.boxes import Floats, overlap
-from tracking.interactive.lookahead import crossings, ways
-from tracking.interactive.risk import Signs, risk_of
-from tracking.interactive.settings import AssistSettings
-from tracking.interactive.solved_window import Solved
-from tracking.interactive.swap_margins import Exchanges, exchanges
+from tracking.interactive.lookahead import predict_crossings, predict_paths
+from tracking.interactive.risk import RiskFeatures, failure_probability
+from tracking.interactive.settings import InteractiveSettings
+from tracking.interactive.solved_window import SolvedWindow
+from tracking.interactive.swap_margins import SwapMargins, swap_margins
 from tracking.model.settings import CostSettings
 from tracking.types import RiskEvent, RiskReason
 
@@ -21,16 +21,16 @@ _RECENT = 5
 """Sightings that a decay or a way is taken from at least."""
 
 
-class Foresight:
+class RiskPredictor:
     """Looks for troubles. Without memory: the same window has the same."""
 
-    def __init__(self, settings: AssistSettings, costs: CostSettings) -> None:
+    def __init__(self, settings: InteractiveSettings, costs: CostSettings) -> None:
         self._settings = settings
         self._costs = costs
 
-    def troubles(self, window: Solved) -> tuple[RiskEvent, ...]:
+    def predict(self, window: SolvedWindow) -> tuple[RiskEvent, ...]:
         """Give the troubles of a window, the worst first: each pair once for a reason."""
-        found = exchanges(window.network, window.states)
+        found = swap_margins(window.network, window.states)
         troubles = [
             *self._exchanges(window, found),
             *self._alike(window),
@@ -43,13 +43,13 @@ class Foresight:
             once.setdefault((it.reason, tuple(sorted(it.objects))), it)
         return tuple(once.values())
 
-    def _exchanges(self, window: Solved, found: Exchanges) -> list[RiskEvent]:
+    def _exchanges(self, window: SolvedWindow, found: SwapMargins) -> list[RiskEvent]:
         """Give the pairs whose identities could be exchanged for little, in a frame that becomes final now.
 
         Of later frames more will be known when they become final.
         """
         settled = window.first + found.frames <= window.final_to
-        first, second = np.nonzero(np.triu((found.margins < self._settings.margin) & settled, 1))
+        first, second = np.nonzero(np.triu((found.margins < self._settings.swap_margin) & settled, 1))
         return [
             _trouble(
                 "exchange",
@@ -62,9 +62,9 @@ class Foresight:
             for a, b in zip(first.tolist(), second.tolist(), strict=True)
         ]
 
-    def _alike(self, window: Solved) -> list[RiskEvent]:
+    def _alike(self, window: SolvedWindow) -> list[RiskEvent]:
         """Give those whose ways cross within the horizon, and who could then be exchanged for little."""
-        found = crossings(window, self._settings.horizon, self._costs)
+        found = predict_crossings(window, self._settings.horizon_frames, self._costs)
         return [
             _trouble(
                 "alike",
@@ -75,52 +75,52 @@ class Foresight:
                 it.length,
             )
             for it in found
-            if it.margin < self._settings.alike
+            if it.margin < self._settings.crossing_margin
         ]
 
-    def _vanished(self, window: Solved) -> list[RiskEvent]:
+    def _vanished(self, window: SolvedWindow) -> list[RiskEvent]:
         """Give those who have been hidden for a while: with who covers them and looks alike, or alone.
 
         The margin is what the looks of a whole window tell of the two, over what one differs from oneself;
         nothing tells anything of who is just not seen.
         """
-        looks, found = window.looks, []
+        looks, found = window.known_histograms, []
         length = window.last - window.first + 1
-        for n, (hidden, way) in ways(window, window.trail.shape[1]).items():
-            if hidden < self._settings.gone:
+        for n, (hidden, way) in predict_paths(window, window.recent_boxes.shape[1]).items():
+            if hidden < self._settings.hidden_frames:
                 continue
-            here = window.trail[:, -hidden:].copy()
+            here = window.recent_boxes[:, -hidden:].copy()
             here[n] = np.nan
             covers = np.nan_to_num(overlap(here, way[:hidden])).max(axis=1, initial=0.0)
             b = int(covers.argmax())
             frame = window.last - hidden + 1
             differ = float(appearance_distance(looks[n, None], looks[b, None], self._costs.measure)[0, 0])
             margin = length * max(differ - self._costs.unknown_appearance, 0.0)
-            if covers[b] > _TOUCH and margin < self._settings.alike:
-                pair = window.known[n], window.known[b]
+            if covers[b] > _TOUCH and margin < self._settings.crossing_margin:
+                pair = window.known_ids[n], window.known_ids[b]
                 found.append(_trouble("alike", pair, window, frame, margin, hidden))
             else:
-                found.append(_trouble("fading", (window.known[n],), window, frame, 0.0, hidden))
+                found.append(_trouble("fading", (window.known_ids[n],), window, frame, 0.0, hidden))
         return found
 
-    def _fading(self, window: Solved) -> list[RiskEvent]:
+    def _fading(self, window: SolvedWindow) -> list[RiskEvent]:
         """Give those whose detections have become faint of late, or will within the horizon at this rate."""
         found = []
-        scores, faint = window.scores, self._settings.faint
+        scores, faint = window.scores, self._settings.min_confidence
         for n, number in enumerate(window.ids):
             seen = np.flatnonzero(~np.isnan(scores[n]))
             if len(seen) < 2 * _RECENT or seen[-1] < scores.shape[1] - _RECENT:
                 continue
             slope, level = np.polyfit(seen - seen[-1], scores[n, seen], 1)
             left = (level - faint) / -slope if slope < 0.0 else np.inf
-            if level <= faint or left <= self._settings.horizon:
+            if level <= faint or left <= self._settings.horizon_frames:
                 frame = window.last + max(int(left), 0) if level > faint else window.last
                 found.append(_trouble("fading", (number,), window, frame, float(level - faint), 0))
         return found
 
-    def _gap(self, window: Solved, margins: Floats) -> list[RiskEvent]:
+    def _gap(self, window: SolvedWindow, margins: Floats) -> list[RiskEvent]:
         """Give the two who are nearest to being exchanged, where the window's answer is not proven."""
-        if window.report.gap <= self._settings.gap or not np.isfinite(margins).any():
+        if window.report.gap <= self._settings.max_solver_gap or not np.isfinite(margins).any():
             return []
         a, b = divmod(int(margins.argmin()), margins.shape[1])
         pair = _pair(window, a, b)
@@ -128,20 +128,20 @@ class Foresight:
 
 
 def _trouble(
-    reason: RiskReason, objects: tuple[int, ...], window: Solved, frame: int, margin: float, length: int
+    reason: RiskReason, objects: tuple[int, ...], window: SolvedWindow, frame: int, margin: float, length: int
 ) -> RiskEvent:
-    """Give a trouble with its risk; `length` as in `Signs`."""
+    """Give a trouble with its risk; `length` as in `RiskFeatures`."""
     margin = max(margin, 0.0)
-    likely = risk_of(reason, Signs(margin, frame - window.last, length))
+    likely = failure_probability(reason, RiskFeatures(margin, frame - window.last, length))
     return RiskEvent(reason, objects, frame, margin, length, likely)
 
 
-def _unclear(window: Solved, a: int, b: int) -> int:
+def _unclear(window: SolvedWindow, a: int, b: int) -> int:
     """Give in how many of the last frames the objects a and b were in each other's way, or one was hidden."""
-    one, other = (window.trail[window.known.index(window.ids[n])] for n in (a, b))
+    one, other = (window.recent_boxes[window.known_ids.index(window.ids[n])] for n in (a, b))
     hidden = np.isnan(one[:, 0]) | np.isnan(other[:, 0])
     return int(np.count_nonzero(hidden | (np.nan_to_num(overlap(one, other)) > _TOUCH)))
 
 
-def _pair(window: Solved, a: int, b: int) -> tuple[int, ...]:
+def _pair(window: SolvedWindow, a: int, b: int) -> tuple[int, ...]:
     return tuple(sorted((window.ids[a], window.ids[b])))

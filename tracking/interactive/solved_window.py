@@ -15,7 +15,7 @@ from tracking.types import Detections
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solved:
+class SolvedWindow:
     """One window.
 
     Attributes:
@@ -23,35 +23,35 @@ class Solved:
         ids: the tracks that were in the program, in the order of the network's objects.
         network: what it was solved on.
         states: `(n, M)`, -1 where hidden.
-        frames: its M frames.
+        detections: its M frames.
         report: what is proven.
         final_to: the last frame that becomes final with it.
-        known: all tracks that are remembered, those that nothing in the window can be, too.
-        trail: `(k, T, 4)` pixels, where those were in the T frames up to the last one, NaN where hidden.
-        looks: `(k, B)`, their templates.
+        known_ids: all tracks that are remembered, those that nothing in the window can be, too.
+        recent_boxes: `(k, T, 4)` pixels, the known tracks' boxes in the last T frames, NaN where hidden.
+        known_histograms: `(k, B)`, their templates.
     """
 
     first: int
     ids: tuple[int, ...]
     network: Network
     states: NDArray[np.int64]
-    frames: Sequence[Detections]
+    detections: Sequence[Detections]
     report: SolveReport
     final_to: int
-    known: tuple[int, ...]
-    trail: Floats
-    looks: Floats
+    known_ids: tuple[int, ...]
+    recent_boxes: Floats
+    known_histograms: Floats
 
     @property
     def last(self) -> int:
         """The newest frame."""
-        return self.first + len(self.frames) - 1
+        return self.first + len(self.detections) - 1
 
     @property
     def scores(self) -> Floats:
         """How sure the detector is of them, `(n, M)`, NaN where hidden."""
         found = np.full(self.states.shape, np.nan)
-        for m, seen in enumerate(self.frames):
+        for m, seen in enumerate(self.detections):
             there = self.states[:, m] != OCCLUDED
             found[there, m] = seen.scores[self.states[there, m]]
         return found

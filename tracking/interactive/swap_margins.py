@@ -14,7 +14,7 @@ from tracking.solvers.objective import nodes_from_states
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Exchanges:
+class SwapMargins:
     """The cheapest exchange of every two objects of a window.
 
     Attributes:
@@ -27,12 +27,12 @@ class Exchanges:
     frames: NDArray[np.int64]
 
 
-def exchange_margins(network: Network, states: NDArray[np.int64]) -> Floats:
-    """Give the margins of `exchanges`, (n, n)."""
-    return exchanges(network, states).margins
+def swap_margin_matrix(network: Network, states: NDArray[np.int64]) -> Floats:
+    """Give the margins of `swap_margins`, (n, n)."""
+    return swap_margins(network, states).margins
 
 
-def exchanges(network: Network, states: NDArray[np.int64]) -> Exchanges:
+def swap_margins(network: Network, states: NDArray[np.int64]) -> SwapMargins:
     """Price the exchange of every two objects from some frame on, for all pairs and frames at once.
 
     From frame f on, a goes where b went and b where a went; everybody else stays, so nothing new conflicts.
@@ -48,10 +48,10 @@ def exchanges(network: Network, states: NDArray[np.int64]) -> Exchanges:
         ValueError: objects have observations of their own.
     """
     if not network.shared:
-        raise ValueError("objects with observations of their own have nothing to exchange")
+        raise ValueError("identities can only be swapped between objects that share observations")
     n = network.objects
     if not n:
-        return Exchanges(np.empty((0, 0)), np.empty((0, 0), dtype=np.int64))
+        return SwapMargins(np.empty((0, 0)), np.empty((0, 0), dtype=np.int64))
     own, crossed = _ways(network, nodes_from_states(network, states))
     both = crossed + crossed.transpose(1, 0, 2)
     # Two who stay hidden to the end have exchanged nothing that could be seen.
@@ -62,7 +62,7 @@ def exchanges(network: Network, states: NDArray[np.int64]) -> Exchanges:
     least, now = both.min(axis=2), own[:, None] + own[None]
     margins = np.subtract(least, now, out=np.full((n, n), np.inf), where=np.isfinite(now))
     np.fill_diagonal(margins, np.inf)
-    return Exchanges(margins, frames)
+    return SwapMargins(margins, frames)
 
 
 def _ways(network: Network, nodes: NDArray[np.int64]) -> tuple[Floats, Floats]:

@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from tracking.boxes import BOX_SIDES
 from tracking.detectors.base import Image
-from tracking.interactive.corrections import Pointing, pointed_at, with_pointings
-from tracking.interactive.hypothesis_insertion import with_places
-from tracking.interactive.late_correction import carried
-from tracking.interactive.risk_prediction import Foresight
-from tracking.interactive.settings import AssistSettings
-from tracking.interactive.solved_window import Solved
-from tracking.interactive.window_memory import Memory, Step
+from tracking.interactive.corrections import PositionCorrection, apply_corrections, near_correction
+from tracking.interactive.hypothesis_insertion import apply_insertions
+from tracking.interactive.late_correction import backdate_correction
+from tracking.interactive.risk_prediction import RiskPredictor
+from tracking.interactive.settings import InteractiveSettings
+from tracking.interactive.solved_window import SolvedWindow
+from tracking.interactive.window_memory import WindowMemory, WindowSnapshot
 from tracking.lifecycle.initiation import Birth
 from tracking.model.network import Network
 from tracking.model.object_state import TrackedObject
@@ -33,62 +33,62 @@ _TRAIL = 75
 """Frames up to the newest over which it is looked where everybody was."""
 
 
-class AssistedTracker(OnlineTracker):
+class InteractiveTracker(OnlineTracker):
     """An `OnlineTracker` that says what it foresees, and mends the past where it is told who is where.
 
     Without a pointing its tracks are those of an `OnlineTracker`. Memory is bounded by `assist.memory`.
     """
 
     def __init__(
-        self, window: WindowSettings, costs: CostSettings, solver: Solver, assist: AssistSettings
+        self, window: WindowSettings, costs: CostSettings, solver: Solver, assist: InteractiveSettings
     ) -> None:
         super().__init__(window, costs, solver)
         self._assist = assist
-        self._foresight = Foresight(assist, costs)
-        self._memory = Memory(assist.memory)
-        self._pointings: dict[int, dict[int, Pointing]] = {}
+        self._foresight = RiskPredictor(assist, costs)
+        self._memory = WindowMemory(assist.memory_frames)
+        self._pointings: dict[int, dict[int, PositionCorrection]] = {}
         """By frame and object: who points twice means the second."""
         self._doubtful: list[int] = []
         """Frames of pointings that say something else than the answer, which is to be sought again."""
         self._doubt = 0.0
         """What the answer would save by following them."""
         self._network: tuple[Sequence[int], Network] | None = None
-        self._solved: Solved | None = None
+        self._solved: SolvedWindow | None = None
         self._foresees = True
 
     def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
         """Take the detections of a frame; see `OnlineTracker.push`."""
         gap = 1 if self._last is None else frame - self._last
         if 0 < gap <= self._window.forget_after:
-            self._memory.look(frame, detections)
+            self._memory.add_detections(frame, detections)
         result = super().push(frame, detections, image)
         if gap > self._window.forget_after:
             # Nobody is remembered over such a gap: what was before it cannot be mended any more.
-            self._memory = Memory(self._assist.memory)
-            self._memory.look(frame, detections)
-        oldest = frame - self._assist.memory
+            self._memory = WindowMemory(self._assist.memory_frames)
+            self._memory.add_detections(frame, detections)
+        oldest = frame - self._assist.memory_frames
         self._pointings = {number: it for number, it in self._pointings.items() if number >= oldest}
         return result
 
     def remembers(self, frame: int) -> bool:
         """Say whether a pointing at this frame can still be taken."""
         if self._last is None or frame > self._last:
-            return self._last is not None and frame <= self._last + self._assist.memory
-        steps = self._memory.steps
+            return self._last is not None and frame <= self._last + self._assist.memory_frames
+        steps = self._memory.snapshots
         first = steps[0].first if steps else self._first
-        return first is not None and frame >= max(first, self._last - self._assist.memory)
+        return first is not None and frame >= max(first, self._last - self._assist.memory_frames)
 
-    def point(self, pointings: Sequence[Pointing]) -> WindowResult | None:
-        """Hear where objects are, in frames that may be final already; give what changes by that.
+    def apply_corrections(self, pointings: Sequence[PositionCorrection]) -> WindowResult | None:
+        """Apply an operator's corrections, also to final frames; return what changes.
 
-        The windows since the first of these frames are solved again, with what the pointings cost
-        (`with_pointings`); so are those that come later, where a pointing's frame is in them. Who is pointed
-        at where somebody else was said to be was exchanged earlier: then the windows are solved again since
-        that frame (`carried`). The result spans all of these windows, up to the end of the newest: what was
-        said of these frames before is to be replaced by it. Tracks keep their numbers.
+        The windows since the first corrected frame are solved again with the corrections' costs
+        (`corrections.apply_corrections`), and so is every later window that contains a corrected frame.
+        Where the operator pointed at a position held by another track, the identities were swapped earlier;
+        the windows are then solved again from that frame on (`backdate_correction`). The result spans all
+        of these windows and replaces what was published for their frames. Tracks keep their ids.
 
-        `None` where nothing changes: what is pointed at is where it was said to be, the newest windows
-        are still to come, or the frame is forgotten (ask `remembers`).
+        Returns `None` where nothing changes: the tracks agree with the corrections already, the windows are
+        still to come, or the frames are no longer remembered (see `remembers`).
         """
         frames: list[int] = []
         for it in sorted(pointings, key=lambda it: (it.frame, it.object)):
@@ -96,70 +96,70 @@ class AssistedTracker(OnlineTracker):
                 frames += self._hear(it)
         # Doubts too small to be followed at once wait for others; what is forgotten meanwhile is not mended.
         self._doubtful = [frame for frame in (*self._doubtful, *frames) if self.remembers(frame)]
-        if not self._doubtful or self._doubt < _DOUBT * self._assist.weight:
+        if not self._doubtful or self._doubt < _DOUBT * self._assist.correction_weight:
             return None
         frame = min(self._doubtful)
         self._doubtful, self._doubt = [], 0.0
         return self._again(frame)
 
-    def _hear(self, pointing: Pointing) -> list[int]:
+    def _hear(self, pointing: PositionCorrection) -> list[int]:
         """Take down a pointing; give the frames that it says something else of than the answer there."""
         self._pointings.setdefault(pointing.frame, {})[pointing.object] = pointing
         self._place(pointing)
-        doubt = self._memory.doubt(pointing, self._assist)
+        doubt = self._memory.disagreement(pointing, self._assist)
         if not doubt:
             return []
         self._doubt += doubt
         frames = [pointing.frame]
-        steps = self._memory.since(pointing.frame)
-        for it in carried(pointing, self._memory, self._costs, self._agreed(pointing)):
+        steps = self._memory.windows_since(pointing.frame)
+        for it in backdate_correction(pointing, self._memory, self._costs, self._agreed(pointing)):
             if it.frame < steps[0].first or len(frames) > 1:
                 self._pointings.setdefault(it.frame, {}).setdefault(it.object, it)
                 frames.append(it.frame)
         if len(frames) > 1:
-            self._doubt += self._assist.weight
+            self._doubt += self._assist.correction_weight
         return frames
 
-    def _place(self, pointing: Pointing) -> None:
+    def _place(self, pointing: PositionCorrection) -> None:
         """Make sure that there is something at the place that is pointed at."""
         look = next((it.histogram for it in self._objects if it.id == pointing.object), None)
-        if look is None or pointing.frame not in self._memory.seen:
+        if look is None or pointing.frame not in self._memory.detections:
             return
-        self._memory.place(pointing, look)
+        self._memory.insert_hypothesis(pointing, look)
         if pointing.frame in self._seen:
-            self._seen[pointing.frame] = self._memory.seen[pointing.frame]
+            self._seen[pointing.frame] = self._memory.detections[pointing.frame]
 
-    def _agreed(self, pointing: Pointing) -> int:
+    def _agreed(self, pointing: PositionCorrection) -> int:
         """Give the frame since which the object may have been somebody else: it was pointed at before."""
         before = [
             frame + 1
             for frame, said in self._pointings.items()
             if frame < pointing.frame
             and pointing.object in said
-            and not self._memory.doubt(said[pointing.object], self._assist)
+            and not self._memory.disagreement(said[pointing.object], self._assist)
         ]
-        return max(before, default=self._memory.steps[0].first)
+        return max(before, default=self._memory.snapshots[0].first)
 
     def _again(self, frame: int) -> WindowResult | None:
         """Solve the windows since a frame once more."""
-        steps = list(self._memory.since(frame))
+        steps = list(self._memory.windows_since(frame))
         if not steps:
             return None
-        before = dict(self._memory.where)
+        before = dict(self._memory.assignments)
         final_before = steps[-1].final_to
         self._objects = [item.copy() for item in steps[0].objects]
-        self._warm_start, self._first = steps[0].told, steps[0].first
+        self._warm_start, self._first = steps[0].warm_start, steps[0].first
         results = []
         for step in steps:
             first = self._first
-            self._seen = {n: it for n, it in self._memory.seen.items() if first <= n <= step.end}
+            self._seen = {n: it for n, it in self._memory.detections.items() if first <= n <= step.end}
             # What was foreseen before has been told.
             self._foresees = step is steps[-1]
             results.append(self._solve(step.end, step.final_to))
         first = self._first
-        self._seen = {n: it for n, it in self._memory.seen.items() if n >= first}
+        self._seen = {n: it for n, it in self._memory.detections.items() if n >= first}
         result = merge_results(results)
-        changed = [n for n, it in sorted(self._memory.where.items()) if it != before.get(n)]
+        changed = [n for n, it in sorted(self._memory.assignments.items()) if it != before.get(n)]
         if result is None or not changed:
             return None
         return replace(result, revised_from=changed[0] if changed[0] <= final_before else None)
@@ -167,28 +167,28 @@ class AssistedTracker(OnlineTracker):
     def _solve(self, end: int, final_to: int) -> WindowResult:
         first = self._first if self._first is not None else end
         objects = tuple(item.copy() for item in self._objects)
-        self._memory.step(Step(first, end, final_to, objects, self._warm_start))
+        self._memory.record_window(WindowSnapshot(first, end, final_to, objects, self._warm_start))
         result = super()._solve(end, final_to)
-        self._memory.settle(first, {track.id for track in result.tracks})
+        self._memory.keep_only(first, {track.id for track in result.tracks})
         if self._solved is None or not self._foresees:
             return result
         solved = replace(
             self._solved,
             final_to=final_to,
-            trail=self._memory.trail(self._solved.known, end, max(_TRAIL, end - first + 1)),
+            recent_boxes=self._memory.boxes_of(self._solved.known_ids, end, max(_TRAIL, end - first + 1)),
         )
-        return replace(result, troubles=self._foresight.troubles(solved))
+        return replace(result, risk_events=self._foresight.predict(solved))
 
     def _assign(self, first: int, frames: Sequence[Detections]) -> tuple[npt.NDArray[np.int64], SolveReport]:
         self._network = None
         states, report = super()._assign(first, frames)
         ids = [item.id for item in self._objects]
-        self._memory.found(first, ids, states)
+        self._memory.record_states(first, ids, states)
         self._solved = None
         if self._network is not None:
             inside, network = self._network
             rows = [ids.index(number) for number in inside]
-            self._solved = Solved(
+            self._solved = SolvedWindow(
                 first,
                 tuple(inside),
                 network,
@@ -196,9 +196,9 @@ class AssistedTracker(OnlineTracker):
                 frames,
                 report,
                 final_to=first - 1,
-                known=tuple(ids),
-                trail=np.empty((len(ids), 0, BOX_SIDES)),
-                looks=np.stack([item.histogram for item in self._objects]),
+                known_ids=tuple(ids),
+                recent_boxes=np.empty((len(ids), 0, BOX_SIDES)),
+                known_histograms=np.stack([item.histogram for item in self._objects]),
             )
         return states, report
 
@@ -211,20 +211,20 @@ class AssistedTracker(OnlineTracker):
             if pointing is not None:
                 # Who is pointed at has got there, however far it is.
                 allowed = allowed or [np.zeros(len(it), dtype=np.bool_) for it in frames]
-                allowed[m] = allowed[m] | pointed_at(pointing, seen.boxes)
-            for who, place in self._memory.places.get(first + m, {}).items():
+                allowed[m] = allowed[m] | near_correction(pointing, seen.boxes)
+            for who, place in self._memory.inserted.get(first + m, {}).items():
                 if allowed and who != item.id:
                     allowed[m][place] = False
         return allowed
 
     def _weighed(self, network: Network, first: int, ids: list[int]) -> Network:
-        network = with_places(network, first, ids, self._memory.places, self._costs.change)
+        network = apply_insertions(network, first, ids, self._memory.inserted, self._costs.change)
         comeback = self._costs.change + self._costs.motion + self._costs.reappearance
-        network = with_pointings(network, first, ids, self._pointings, self._assist, comeback)
+        network = apply_corrections(network, first, ids, self._pointings, self._assist, comeback)
         self._network = ids, network
         return network
 
     def _number(self, birth: Birth, frame: int) -> int:
-        number = self._memory.number(frame, birth.box, self._next_id)
+        number = self._memory.assign_id(frame, birth.box, self._next_id)
         self._next_id = max(self._next_id, number + 1)
         return number

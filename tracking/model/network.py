@@ -161,25 +161,25 @@ def build_network(
     templates: Sequence[Template],
     frames: Sequence[Detections],
     settings: CostSettings,
-    centre: tuple[float, float] | None = None,
+    center: tuple[float, float] | None = None,
 ) -> Network:
     """Build the network of a window in which all objects share the observations of each frame.
 
     `templates` are the n objects in the frame before the window, `frames` the M frames after it.
-    `centre`, pixels, is where the layout term places an occluded object (II.D: the centre of the image);
+    `center`, pixels, is where the layout term places an occluded object (II.D: the center of the image);
     None: the middle of all observations.
 
     Raises:
         ValueError: there is no frame, or histograms differ in their number of bins.
     """
-    return _build(templates, stack_observations([frames]), settings, centre)
+    return _build(templates, stack_observations([frames]), settings, center)
 
 
 def build_network_per_object(
     templates: Sequence[Template],
     frames: Sequence[Sequence[Detections]],
     settings: CostSettings,
-    centre: tuple[float, float] | None = None,
+    center: tuple[float, float] | None = None,
 ) -> Network:
     """Build the network of a window in which each object has observations of its own (template matching).
 
@@ -190,14 +190,14 @@ def build_network_per_object(
     """
     if len(templates) != len(frames):
         raise ValueError(f"{len(templates)} templates need as many lists of frames, not {len(frames)}")
-    return _build(templates, stack_observations(frames), settings, centre)
+    return _build(templates, stack_observations(frames), settings, center)
 
 
 def _build(
     templates: Sequence[Template],
     places: ObservationArrays,
     settings: CostSettings,
-    centre: tuple[float, float] | None,
+    center: tuple[float, float] | None,
 ) -> Network:
     likeness = template_distances(templates, places, settings)
     charges = motion_costs(templates, likeness, places, settings)
@@ -210,19 +210,19 @@ def _build(
         sink=sink_costs(len(templates), places, settings),
         conflicts=conflict_relation(places, settings),
         conflict_rows=settings.conflict_rows,
-        locations=_locations(places, centre),
+        locations=_locations(places, center),
         layout=settings.layout,
     )
 
 
-def _locations(places: ObservationArrays, centre: tuple[float, float] | None) -> Floats:
-    """Return the location vectors r of II.D, (P, M, S, 4); occlusion is a box without size at `centre`."""
+def _locations(places: ObservationArrays, center: tuple[float, float] | None) -> Floats:
+    """Return the location vectors r of II.D, (P, M, S, 4); occlusion is a box without size at `center`."""
     sets, frames, width = places.present.shape
-    if centre is None:
+    if center is None:
         seen = places.boxes[places.present]
         middle = (seen.min(axis=0) + seen.max(axis=0)) / 2.0 if len(seen) else np.zeros(BOX_SIDES)
-        centre = (float(middle[[0, 2]].mean()), float(middle[[1, 3]].mean()))
+        center = (float(middle[[0, 2]].mean()), float(middle[[1, 3]].mean()))
     locations = np.empty((sets, frames, width + 1, BOX_SIDES))
-    locations[:] = (*centre, *centre)
+    locations[:] = (*center, *center)
     locations[:, :, :width][places.present] = places.boxes[places.present]
     return locations

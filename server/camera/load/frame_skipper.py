@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tracking import Detections, WindowResult, interpolate_detections, merge_results
-from tracking.baselines import Tracker
 from tracking.detectors import Image
-from tracking.interactive import AssistedTracker, Pointing
+from tracking.interactive import InteractiveTracker, PositionCorrection
+from tracking.registry import Tracker
 
 
 class Stepping:
@@ -35,9 +35,13 @@ class Stepping:
         self._before = pulse, detections
         return merge_results([it for it in results if it is not None])
 
-    def point(self, pointings: Sequence[Pointing]) -> WindowResult | None:
+    def point(self, pointings: Sequence[PositionCorrection]) -> WindowResult | None:
         """Take in where somebody points; None: that changes nothing, or the tracker takes no pointings."""
-        return self._tracker.point(pointings) if isinstance(self._tracker, AssistedTracker) else None
+        return (
+            self._tracker.apply_corrections(pointings)
+            if isinstance(self._tracker, InteractiveTracker)
+            else None
+        )
 
     def flush(self) -> WindowResult | None:
         """End the recording."""

@@ -23,7 +23,7 @@ from server.cli.evaluate.track_scores import (
 from server.cli.evaluate.view_scores import ViewEvaluation, content_of_views, evaluate_views, print_views
 from server.system.atomic_write import atomic_file, atomic_folder
 from server.system.errors import UserError
-from tracking.evaluation import Recording
+from tracking.evaluation import TruthAndTracks
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ def evaluate(asked: EvaluateOptions) -> None:
             content |= content_of(scores)
         else:
             files = files_by_camera("--gt", asked.truth, "gt")
-            recordings = {camera: Recording(rows_of(path), []) for camera, path in files.items()}
+            recordings = {camera: TruthAndTracks(rows_of(path), []) for camera, path in files.items()}
         judged = None
         if asked.views is not None:
             judged, content["views"] = _judge(asked, asked.views, recordings, plots)
@@ -79,7 +79,7 @@ def _check(asked: EvaluateOptions) -> None:
 
 
 def _judge(
-    asked: EvaluateOptions, choices_file: Path, recordings: dict[str, Recording], plots: Path | None
+    asked: EvaluateOptions, choices_file: Path, recordings: dict[str, TruthAndTracks], plots: Path | None
 ) -> tuple[ViewEvaluation, dict[str, Any]]:
     cameras = tuple(recordings)
     choices = read_choices(choices_file)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from bestview import NO_PERSON, ViewGroundTruth, match_objects_to_people, view_ground_truth
 from server.cli.render.video_info import Size
 from server.system.errors import UserError
-from tracking.evaluation import Recording
-from tracking.evaluation.frames import line_up
+from tracking.evaluation import TruthAndTracks
+from tracking.evaluation.frame_matching import align_frames
 from tracking.motchallenge import MotRow
 
 LEAST_SHOWN = 0.25
@@ -65,7 +65,7 @@ def build_truth(
 
 
 def people_of_objects(
-    people: Sequence[int], recordings: Mapping[str, Recording], least_iou: float
+    people: Sequence[int], recordings: Mapping[str, TruthAndTracks], least_iou: float
 ) -> dict[int, int]:
     """Give the person that each object stands for, for objects that stand for somebody.
 
@@ -78,7 +78,7 @@ def people_of_objects(
     matches = np.zeros((len(people), len(objects)), dtype=np.int64)
     for camera, it in recordings.items():
         try:
-            frames = line_up(it.truth, it.tracks, least_iou)
+            frames = align_frames(it.truth, it.tracks, least_iou)
         except ValueError as error:
             raise ValueError(f"{camera}: {error}") from None
         for frame in frames:

@@ -12,11 +12,11 @@ from rich.table import Table
 
 from server.cli.evaluate.file_pairing import pair_files
 from server.system.errors import UserError
-from tracking.evaluation import HEADINGS, CameraScores, Recording, cells, evaluate_cameras
+from tracking.evaluation import HEADINGS, MultiCameraScores, TruthAndTracks, evaluate_cameras, format_scores
 from tracking.motchallenge import MotRow, read_rows
 
 
-def read_recordings(tracks: Sequence[Path], truth: Sequence[Path]) -> dict[str, Recording]:
+def read_recordings(tracks: Sequence[Path], truth: Sequence[Path]) -> dict[str, TruthAndTracks]:
     """Read files, or those of folders, in the pairs that :func:`pair_files` makes of them; by camera.
 
     Raises:
@@ -24,13 +24,13 @@ def read_recordings(tracks: Sequence[Path], truth: Sequence[Path]) -> dict[str, 
     """
     recordings = {}
     for pair in pair_files(tracks, truth):
-        recording = Recording(truth=rows_of(pair.truth), tracks=rows_of(pair.tracks))
+        recording = TruthAndTracks(truth=rows_of(pair.truth), tracks=rows_of(pair.tracks))
         _check(recording, pair.tracks, pair.truth)
         recordings[pair.camera] = recording
     return recordings
 
 
-def evaluate_recordings(recordings: Mapping[str, Recording], least_iou: float) -> CameraScores:
+def evaluate_recordings(recordings: Mapping[str, TruthAndTracks], least_iou: float) -> MultiCameraScores:
     """Score them.
 
     Raises:
@@ -42,22 +42,22 @@ def evaluate_recordings(recordings: Mapping[str, Recording], least_iou: float) -
         raise UserError(str(error)) from error
 
 
-def print_table(scores: CameraScores) -> None:
+def print_table(scores: MultiCameraScores) -> None:
     """Print a row for each camera and, where there are several, one for their mean and one for all as one."""
     # Without frame and colour, so that eighty columns are enough and a script can split it.
     table = Table("camera", box=None, padding=(0, 1, 0, 0))
     for heading in HEADINGS.values():
         table.add_column(heading, justify="right", no_wrap=True)
     for camera, found in scores.cameras.items():
-        table.add_row(camera, *cells(found, HEADINGS))
+        table.add_row(camera, *format_scores(found, HEADINGS))
     if len(scores.cameras) > 1:
-        table.add_row("mean, total", *cells(scores.mean, HEADINGS))
-        table.add_row("joint", *cells(scores.joint, HEADINGS))
+        table.add_row("mean, total", *format_scores(scores.mean, HEADINGS))
+        table.add_row("joint", *format_scores(scores.joint, HEADINGS))
     console = Console(highlight=False)
     console.print(table, width=max(console.width, console.measure(table).maximum))
 
 
-def content_of(scores: CameraScores) -> dict[str, Any]:
+def content_of(scores: MultiCameraScores) -> dict[str, Any]:
     """Give all scores for a file; shares are in [0, 1]."""
     return {
         "cameras": {camera: asdict(found) for camera, found in scores.cameras.items()},
@@ -80,7 +80,7 @@ def rows_of(path: Path) -> list[MotRow]:
         raise UserError(str(error)) from error
 
 
-def _check(recording: Recording, tracks: Path, truth: Path) -> None:
+def _check(recording: TruthAndTracks, tracks: Path, truth: Path) -> None:
     """Refuse truth that says nothing, and files of different frames."""
     there = {row.frame for row in recording.truth if row.confidence != 0.0}
     found = {row.frame for row in recording.tracks}

@@ -20,9 +20,9 @@ from server.media.letterbox import Letterbox
 from server.system.atomic_write import atomic_file
 from server.system.errors import UserError
 from tracking import Detections, Solver, WindowResult, create_solver, solver_names
-from tracking.baselines import Tracker, needs_pictures, tracker_names
 from tracking.detectors import MotFileDetector
 from tracking.motchallenge import MotRow, write_rows
+from tracking.registry import Tracker, needs_images, tracker_names
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
@@ -75,7 +75,7 @@ def _tracker_for(config: Config, name: str | None, video: Path | None) -> str:
     if name is not None and name not in tracker_names():
         raise UserError(f"--tracker: no tracker is called {name!r}; there are {', '.join(tracker_names())}")
     chosen = name or config.track.tracker
-    if video is None and needs_pictures(chosen):
+    if video is None and needs_images(chosen):
         raise UserError(f"--tracker: {chosen} follows what pictures show: name a video, too")
     return chosen
 
@@ -83,7 +83,7 @@ def _tracker_for(config: Config, name: str | None, video: Path | None) -> str:
 def _follower(config: Config, name: str, solver: Callable[[], Solver]) -> Tracker:
     """Give the tracker, which has looked ahead where it goes by pictures."""
     camera = config.cameras[0]
-    if not needs_pictures(name):
+    if not needs_images(name):
         return ready_tracker(config, name, camera, None, solver)
     with closing(open_source(camera, config.site)) as source:
         return ready_tracker(config, name, camera, source, solver)
@@ -143,7 +143,7 @@ def _from_detections(path: Path) -> Iterator[DetectedFrame]:
         raise UserError(f"--det: {path}: {error.strerror}") from error
     except ValueError as error:
         raise UserError(f"--det: {error}") from error
-    for number in range(detector.last + 1):
+    for number in range(detector.last_frame + 1):
         yield DetectedFrame(number, detector.detect(_NO_PICTURE, number), None)
 
 

@@ -12,9 +12,9 @@ from server.config.dataclass_section import validated
 from server.config.ground_unit import check_unit
 from server.config.sections.base import Identifier, Polygon, Section
 from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, create_solver
-from tracking.baselines import DEFAULT_TRACKER, TEMPORAL, tracker_names
 from tracking.baselines.temporal_consistency import TemporalSettings
-from tracking.interactive import AssistSettings
+from tracking.interactive import InteractiveSettings
+from tracking.registry import DEFAULT_TRACKER, TEMPORAL_TRACKER, tracker_names
 
 
 class CameraSettings(Section):
@@ -75,7 +75,7 @@ class TrackSettings(Section):
     costs: Annotated[CostSettings, validated(CostSettings)] = CostSettings()
     temporal: Annotated[TemporalSettings, validated(TemporalSettings)] = TemporalSettings()
     """The tracker of that name: person-to-blob matching over some seconds."""
-    assist: Annotated[AssistSettings, validated(AssistSettings)] = AssistSettings()
+    assist: Annotated[InteractiveSettings, validated(InteractiveSettings)] = InteractiveSettings()
     """What is foreseen for an operator to look at, and what their pointing weighs."""
     cross_view: Annotated[CrossViewSettings, validated(CrossViewSettings)] = CrossViewSettings()
     """How a camera goes by what others find that look at the same ground."""
@@ -84,7 +84,7 @@ class TrackSettings(Section):
 
     def lag(self, fps: float) -> int:
         """Give the frames that follow a final frame at most when a window ends."""
-        return self.temporal.lag(fps) if self.tracker == TEMPORAL else self.window.lag
+        return self.temporal.lag(fps) if self.tracker == TEMPORAL_TRACKER else self.window.lag
 
     @field_validator("tracker")
     @classmethod

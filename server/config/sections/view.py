@@ -58,7 +58,7 @@ class FlagSettings(Section):
     reasons: list[RiskReason] = ["alike", "exchange", "fading", "gap"]
     """For which of the troubles that are foreseen one is raised."""
     answer_s: Annotated[float, Field(gt=0, le=600)] = 8.0
-    """Seconds after what was expected in which a flag can be answered; cameras keep `track.assist.memory`."""
+    """Seconds after the expected moment in which a flag can be answered; see `track.assist.memory_frames`."""
 
 
 class ViewSettings(Section):

@@ -91,5 +91,5 @@ def _cannot(service: BestViewService) -> str:
 
 
 def _told(service: BestViewService, taken: int, left_out: int, flags: list[int]) -> Pointing:
-    memory = service.config.track.assist.memory
+    memory = service.config.track.assist.memory_frames
     return Pointing(memory, OPERATOR_POINTS_MAX, _cannot(service), taken, left_out, flags)

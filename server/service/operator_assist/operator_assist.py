@@ -28,7 +28,7 @@ class OperatorAssist:
     def step(self, epoch: Epoch, config: Config) -> None:
         """Take in what the cameras said of an epoch."""
         people, assist = self._people, config.track.assist
-        people.told.frames = assist.memory if assist.enabled else 0
+        people.told.frames = assist.memory_frames if assist.enabled else 0
         self.flags.step(epoch.last, self._foreseen(epoch), people.roll.whose)
 
     def point(self, number: int, camera: str, places: Sequence[PointedPosition]) -> tuple[int, list[int]]:

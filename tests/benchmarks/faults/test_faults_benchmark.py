@@ -137,7 +137,7 @@ def test_the_reader_finds_people_where_they_are_in_the_picture_that_it_is_given(
     pytest.importorskip("onnx")
     pytest.importorskip("onnxruntime")
     model = write_reader(VIEWS, "c0", tmp_path / "reader.onnx")
-    detector = OnnxDetector(OnnxSettings(model=model, apart=1.0))
+    detector = OnnxDetector(OnnxSettings(model=model, nms_iou=1.0))
     noise = np.random.default_rng(1).integers(0, 255, (HEIGHT, WIDTH, 3), dtype=np.uint8)
     for frame in (0, 517, 999):
         (box,) = detector.detect(stamped(noise, 2, frame)).boxes.tolist()

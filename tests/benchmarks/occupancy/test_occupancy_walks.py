@@ -11,10 +11,10 @@ from benchmarks.occupancy.level import levelled
 from benchmarks.occupancy.paths import Path
 from benchmarks.occupancy.walks import WalkSettings, rows_of_walks, smoothed, walk_of
 from bestview import to_ground
-from tracking.detectors.background.height_model import HeightLine
+from tracking.detectors.background.height_model import HeightModel
 from tracking.motchallenge import MotRow
 
-LINE = HeightLine(slope=0.5, offset=20.0, smallest=10.0)
+LINE = HeightModel(slope=0.5, offset=20.0, min_height=10.0)
 """In a picture of 200 by 100 pixels people are 20 rows tall at its upper edge and 70 at its lower one."""
 
 

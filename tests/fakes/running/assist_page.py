@@ -40,7 +40,10 @@ async def helped(
         "sync": {"port": free_port(), "start_timeout_s": 60},
         "zenoh": {"connect": bus, "listen": bus},
         "http": {"port": free_port()},
-        "track": {"assist": {"enabled": True, "alike": 1000.0, "margin": 100.0, **assist}, **PATIENT_CAMERAS},
+        "track": {
+            "assist": {"enabled": True, "crossing_margin": 1000.0, "swap_margin": 100.0, **assist},
+            **PATIENT_CAMERAS,
+        },
         "view": {"late_after_s": 60, "flags": {"per_minute": 60, "risk": 0.0}},
     }
     path = folder / "demo.yaml"

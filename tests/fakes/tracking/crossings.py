@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tracking.baselines.prediction_method import Method
+from tracking.baselines.stepwise import PredictionMethod
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
 
@@ -85,15 +85,15 @@ def _dress(image: Image, left: int, top: int, clothes: Floats, texture: Floats) 
     image[top : top + _TALL, left : left + _WIDE] = np.clip(colours + texture, 0, 255)
 
 
-def followed(method: Method[Any], scene: Crossing) -> list[bool]:
+def followed(method: PredictionMethod[Any], scene: Crossing) -> list[bool]:
     """Follow all from the first picture to the last; say of each whether they are found there."""
     image = scene.picture(0)
-    people = [method.begin(image, scene.where(person, 0)) for person in range(len(scene.clothes))]
+    people = [method.initialize(image, scene.where(person, 0)) for person in range(len(scene.clothes))]
     for frame in range(1, FRAMES):
-        method.move(scene.picture(frame), people)
+        method.predict(scene.picture(frame), people)
     return [float(iou(it.box, scene.where(person, FRAMES - 1))) > 0.4 for person, it in enumerate(people)]
 
 
-def times_kept(methods: Sequence[Method[Any]], scenes: Sequence[Crossing]) -> int:
+def times_kept(methods: Sequence[PredictionMethod[Any]], scenes: Sequence[Crossing]) -> int:
     """Count the scenes after which all are found, each by a method of its own."""
     return sum(all(followed(method, scene)) for method, scene in zip(methods, scenes, strict=True))

@@ -25,7 +25,7 @@ from synthetic import Scene, write_recording
 
 FRAMES = 48
 STRIDE = 5
-LIVE = {"ahead_frames": 0}
+LIVE = {"prescan_frames": 0}
 """The scene is learned as it goes."""
 
 

@@ -13,7 +13,7 @@ from server.camera.detector_setup import make_detector
 from server.config.loader import build_config
 from server.media.letterbox import Letterbox
 from server.system.errors import UserError
-from tracking.detectors import PAPER_BOXES, BackgroundDetector, HogDetector, MotFileDetector
+from tracking.detectors import PAPER_DETECTOR, BackgroundDetector, HogDetector, MotFileDetector
 
 SIZE = (64, 48)
 
@@ -29,16 +29,19 @@ def observer(folder: Path, detect: dict[str, Any], **camera: Any) -> Any:
 
 def test_the_kind_says_which_detector(tmp_path: Path) -> None:
     assert isinstance(observer(tmp_path, {}), BackgroundDetector)
-    hog = observer(tmp_path, {"kind": "hog", "hog": {"most": 3}, "looks": {"colour": False}, "bins": 16})
+    hog = observer(
+        tmp_path,
+        {"kind": "hog", "hog": {"max_detections": 3}, "appearance": {"color": False}, "gray_bins": 16},
+    )
     assert isinstance(hog, HogDetector)
-    assert (hog.settings.most, hog.bins) == (3, 16)
+    assert (hog.settings.max_detections, hog.bins) == (3, 16)
 
 
 def test_boxes_are_the_papers_whatever_else_is_set(tmp_path: Path) -> None:
-    boxes = observer(tmp_path, {"kind": "boxes", "heights": {"use": True}})
+    boxes = observer(tmp_path, {"kind": "boxes", "height_model": {"enabled": True}})
     assert isinstance(boxes, BackgroundDetector)
-    for part in ("looks", "shadows", "boxes", "heights", "hypotheses"):
-        assert getattr(boxes.settings, part) == getattr(PAPER_BOXES, part)
+    for part in ("appearance", "shadows", "box_filter", "height_model", "foreground_fit"):
+        assert getattr(boxes.settings, part) == getattr(PAPER_DETECTOR, part)
 
 
 @pytest.mark.parametrize(
@@ -52,10 +55,10 @@ def test_metres_of_ground_that_ends_above_the_middle_say_how_tall_people_are(
     ground = [[high, 0.0, -high * SIZE[0] / 2.0], [0.0, 0.0, 60.0 * high], [0.0, 1.0, -row]]
     detector = observer(tmp_path, {}, ground=ground, ground_unit=unit)
     detector.detect(np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8))
-    line = detector.height_line
+    line = detector.height_model
     assert (line is not None) == (slope is not None)
     if line is not None:
-        assert line.at(np.array([row, row + 20.0])) == pytest.approx([0.0, 20.0 * slope])
+        assert line.expected_height(np.array([row, row + 20.0])) == pytest.approx([0.0, 20.0 * slope])
 
 
 def test_the_unit_of_the_file_is_that_of_its_homographies(tmp_path: Path) -> None:
@@ -88,7 +91,7 @@ def test_a_detection_file_goes_before_the_kind(tmp_path: Path) -> None:
         ({"kind": "onnx"}, {}, "detect: onnx.model: kind onnx needs the path"),
         ({"kind": "onnx", "onnx": {"model": "none.onnx"}}, {}, "camera c0: detect: "),
         ({"kind": "nobody"}, {}, "detect.kind: "),
-        ({"hog": {"step": 0.5}}, {}, "detect.hog: step must be above 1"),
+        ({"hog": {"scale_step": 0.5}}, {}, "detect.hog: scale_step must be above 1"),
         ({"onnx": {"modle": "x"}}, {}, "did you mean 'model'?"),
         ({}, {"detections": "none.txt"}, "camera c0: detections: "),
     ],

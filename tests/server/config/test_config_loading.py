@@ -40,9 +40,9 @@ def test_unknown_key_in_a_librarys_settings_is_refused_at_any_depth() -> None:
     assert "unknown key" in complaint(site(detect={"median": {"no_such": 5}}))
 
 
-@pytest.mark.parametrize("detect", [{"ahead_every": 0}, {"ahead_frames": -1}])
+@pytest.mark.parametrize("detect", [{"prescan_every": 0}, {"prescan_frames": -1}])
 def test_a_recording_cannot_be_looked_at_ahead_in_no_steps(detect: dict[str, Any]) -> None:
-    assert "detect: ahead_frames must be at least 0, and ahead_every at least 1" in complaint(
+    assert "detect: prescan_frames must be at least 0, and prescan_every at least 1" in complaint(
         site(detect=detect)
     )
 
@@ -50,12 +50,12 @@ def test_a_recording_cannot_be_looked_at_ahead_in_no_steps(detect: dict[str, Any
 @pytest.mark.parametrize(
     ("detect", "said"),
     [
-        ({"bins": 0}, "bins must be 1 to 256, not 0"),
+        ({"gray_bins": 0}, "gray_bins must be 1 to 256, not 0"),
         ({"work_width": 0}, "work_width must be at least 1, not 0"),
         ({"median": {"samples": 0}}, "samples must be at least 1, not 0"),
         ({"median": {"learn_every": 0}}, "learn_every must be at least 1, not 0"),
         ({"median": {"bootstrap_frames": 0}}, "bootstrap_frames must be at least 1, not 0"),
-        ({"ghosts": {"check_every": 0}}, "check_every must be at least 1, not 0"),
+        ({"static_foreground": {"check_every": 0}}, "check_every must be at least 1, not 0"),
     ],
 )
 def test_counts_of_nothing_are_refused(detect: dict[str, Any], said: str) -> None:
@@ -123,7 +123,7 @@ def test_a_floor_that_one_camera_has_mirrored_is_refused_with_its_camera() -> No
 
 
 def test_with_temporal_consistency_the_lookahead_covers_its_stages() -> None:
-    track = {"tracker": "temporal", "temporal": {"stages": 2, "stage_s": 0.4}}
+    track = {"tracker": "temporal", "temporal": {"window_stages": 2, "stage_s": 0.4}}
     wrong = complaint(site(view={"lookahead": 28}, track=track))
     assert "must be at least 29 (encode.gop + the frames of all stages of track.temporal, less one)" in wrong
     enough = build_config(site(view={"lookahead": 29}, track=track), where="", folder=Path())
@@ -132,7 +132,7 @@ def test_with_temporal_consistency_the_lookahead_covers_its_stages() -> None:
 
 def test_stages_without_end_are_refused_before_anybody_counts_their_frames() -> None:
     track = {"tracker": "temporal", "temporal": {"stage_s": float("inf")}}
-    assert "track.temporal: stages must be 1 to 1000, and stage_s" in complaint(site(track=track))
+    assert "track.temporal: window_stages must be 1 to 1000, and stage_s" in complaint(site(track=track))
 
 
 def test_lookahead_shorter_than_the_trackers_lag_is_refused_with_the_least_that_would_do() -> None:

@@ -49,7 +49,7 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "cameras.c1.offset": (CAMERA, 3),
     "cameras.c1.options": (CAMERA, {"rtsp_transport": "tcp"}),
     "cameras.c1.ground": (SITE, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
-    "detect.boxes.least_height": (ALL_CAMERAS, 0.3),
+    "detect.box_filter.min_height": (ALL_CAMERAS, 0.3),
     "track.costs.occlusion": (ALL_CAMERAS, 0.9),
     "track.window.birth_max_cost": (ALL_CAMERAS, 0.6),
     "track.backlog_s": (SITE, 3.0),
@@ -252,7 +252,7 @@ async def test_a_process_says_what_waits_and_what_is_wrong_and_ends_with_its_ter
 
 def test_a_tracker_by_which_frames_are_final_later_waits_for_a_restart() -> None:
     running = small_config(view={"lookahead": 200})
-    for track in ({"tracker": "temporal"}, {"tracker": "temporal", "temporal": {"stages": 2}}):
+    for track in ({"tracker": "temporal"}, {"tracker": "temporal", "temporal": {"window_stages": 2}}):
         reload = plan_reload(running, small_config(view={"lookahead": 200}, track=track))
         assert reload.now.track == running.track
         assert "track.tracker" in reload.site

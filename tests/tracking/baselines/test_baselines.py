@@ -11,20 +11,20 @@ from hypothesis import strategies as st
 
 from fakes.tracking.strolls import Stroll, final_boxes, seen_at
 from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
-from tracking.baselines import (
-    TEMPORAL,
-    StepwiseSettings,
-    Tracker,
-    needs_pictures,
-    tracker_named,
-    tracker_names,
-)
-from tracking.baselines.color_histograms import BINS, ColourField
+from tracking.baselines import StepwiseSettings
+from tracking.baselines.color_integral import BINS, ColorIntegralImage
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
+from tracking.registry import (
+    TEMPORAL_TRACKER,
+    Tracker,
+    create_tracker,
+    needs_images,
+    tracker_names,
+)
 
 WINDOW = WindowSettings(window=6, stride=3, birth_window=6)
-BY_DETECTIONS = [it for it in tracker_names() if it != TEMPORAL]
+BY_DETECTIONS = [it for it in tracker_names() if it != TEMPORAL_TRACKER]
 """Temporal consistency goes by blobs alone, and learns the room first: it has tests of its own."""
 SIZE = (120, 200)
 _TALL, _WIDE = 40, 18
@@ -32,7 +32,7 @@ _COLOURS = ((40, 40, 220), (220, 60, 30))
 
 
 def _tracker(name: str) -> Tracker:
-    return tracker_named(name, WINDOW, CostSettings(), lambda: create_solver("columns"))
+    return create_tracker(name, WINDOW, CostSettings(), lambda: create_solver("columns"))
 
 
 def _where(person: int, frame: int) -> Floats:
@@ -81,7 +81,7 @@ def test_two_people_who_pass_each_other_apart_keep_their_numbers(name: str) -> N
     assert sum(len(row) for row in boxes.values()) > 2 * 45 - 12
 
 
-@pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if it != "lp" and needs_pictures(it)])
+@pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if it != "lp" and needs_images(it)])
 def test_who_looks_at_the_picture_follows_where_nothing_was_detected(name: str) -> None:
     blind = range(20, 24)
     boxes = final_boxes(_follow(_tracker(name), 45, 1, blind))
@@ -97,7 +97,7 @@ def test_the_filter_goes_on_as_it_went_and_says_nothing_meanwhile() -> None:
     assert set(boxes[30]) == {1}, "found again where it was expected"
 
 
-@pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if needs_pictures(it)])
+@pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if needs_images(it)])
 def test_a_frame_without_a_picture_begins_nobody_and_ends_nobody(name: str) -> None:
     tracker = _tracker(name)
     told = []
@@ -119,11 +119,18 @@ def test_the_same_pictures_give_the_same_tracks(name: str) -> None:
 
 def test_a_name_that_no_tracker_has_is_told_with_those_that_there_are() -> None:
     with pytest.raises(ValueError, match=r"'sort'.*kalman.*lp|'sort'.*lp.*kalman"):
-        tracker_named("sort", WINDOW, CostSettings(), lambda: create_solver("columns"))
+        create_tracker("sort", WINDOW, CostSettings(), lambda: create_solver("columns"))
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"match": 1.5}, {"birth_score": -0.1}, {"confirm": 0}, {"patience": 0}, {"unseen": -1}]
+    "wrong",
+    [
+        {"min_match_iou": 1.5},
+        {"min_birth_score": -0.1},
+        {"confirm_frames": 0},
+        {"max_missed_frames": 0},
+        {"max_unmatched_frames": -1},
+    ],
 )
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must be|between 0 and 1"):
@@ -163,7 +170,7 @@ def test_every_frame_is_told_once_and_no_number_is_used_twice(stream: list[tuple
             assert not np.isnan(track.boxes).all()
             shown = result.first + np.flatnonzero(~np.isnan(track.boxes[:, 0]))
             assert shown[0] > ends.get(track.id, -1)
-            assert shown[0] - ends.get(track.id, shown[0]) <= StepwiseSettings().patience
+            assert shown[0] - ends.get(track.id, shown[0]) <= StepwiseSettings().max_missed_frames
             begins.setdefault(track.id, int(shown[0]))
             ends[track.id] = int(shown[-1])
     assert sorted(begins) == list(range(1, len(begins) + 1))
@@ -197,7 +204,7 @@ def test_colours_of_boxes_are_those_that_are_counted(
     image = np.random.default_rng(seed).integers(0, 256, (30, 40, 3)).astype(np.uint8)
     boxes = np.array([[min(a, c), min(b, d), max(a, c), max(b, d)] for a, b, c, d in corners], dtype=float)
     codes = (image // 64).astype(int) @ np.array([16, 4, 1])
-    for box, found in zip(boxes, ColourField(image).histograms(boxes), strict=True):
+    for box, found in zip(boxes, ColorIntegralImage(image).histograms(boxes), strict=True):
         left, top, right, bottom = np.clip(box, 0, [40, 30, 40, 30]).astype(int)
         inside = codes[top:bottom, left:right].ravel()
         expected = np.bincount(inside, minlength=BINS) / max(inside.size, 1)

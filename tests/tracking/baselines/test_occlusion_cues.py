@@ -18,10 +18,15 @@ from fakes.tracking.crossings import (
     WalkTogether,
     times_kept,
 )
-from tracking.baselines.center_surround import RING, WindowSums, ringed
-from tracking.baselines.color_mixture import COLOURS, MIDDLES, codes, fitted, posterior
-from tracking.baselines.occluder_particles import Shares
-from tracking.baselines.occlusion_cues import CueSettings, OcclusionCues
+from tracking.baselines.color_mixture import CODE_COLORS, COLOR_CODES, color_codes, fit_mixture, posterior
+from tracking.baselines.occluder_particles import OccluderParticles
+from tracking.baselines.occlusion_cues import (
+    RING_AREA_RATIO,
+    CenterSurroundIntegral,
+    OcclusionCues,
+    OcclusionCueSettings,
+    add_ring,
+)
 from tracking.baselines.particle_filter import ParticleFilters, ParticleSettings
 
 SEEDS = range(4)
@@ -30,19 +35,19 @@ SEEDS = range(4)
 def test_a_mixture_finds_the_two_colours_that_pixels_were_drawn_from() -> None:
     rng = np.random.default_rng(3)
     drawn = np.concatenate([rng.normal([200, 40, 60], 6, (900, 3)), rng.normal([30, 90, 180], 12, (300, 3))])
-    found = fitted(np.clip(drawn, 0, 255).astype(np.uint8), parts=2)
-    order = np.argsort(-found.shares)
-    assert found.shares[order] == pytest.approx([0.75, 0.25], abs=0.01)
+    found = fit_mixture(np.clip(drawn, 0, 255).astype(np.uint8), parts=2)
+    order = np.argsort(-found.weights)
+    assert found.weights[order] == pytest.approx([0.75, 0.25], abs=0.01)
     assert found.means[order] == pytest.approx(np.array([[200, 40, 60], [30, 90, 180]]), abs=2.5)
 
 
 def test_densities_are_the_formula() -> None:
     rng = np.random.default_rng(4)
-    found = fitted(rng.integers(0, 256, (400, 3)).astype(np.uint8), parts=3)
+    found = fit_mixture(rng.integers(0, 256, (400, 3)).astype(np.uint8), parts=3)
     colours = rng.uniform(0, 255, (20, 3))
     for colour, density in zip(colours, found.densities(colours), strict=True):
         expected = 0.0
-        for share, mean, covariance in zip(found.shares, found.means, found.covariances, strict=True):
+        for share, mean, covariance in zip(found.weights, found.means, found.covariances, strict=True):
             off = colour - mean
             exponent = -0.5 * off @ np.linalg.inv(covariance) @ off
             expected += share * np.exp(exponent) / np.sqrt((2 * np.pi) ** 3 * np.linalg.det(covariance))
@@ -52,15 +57,15 @@ def test_densities_are_the_formula() -> None:
 @pytest.mark.parametrize("pixels", [1, 5, 40])
 def test_few_pixels_or_one_colour_make_a_mixture_too(pixels: int) -> None:
     one = np.full((pixels, 3), 77, dtype=np.uint8)
-    densities = fitted(one, parts=3).densities(MIDDLES)
+    densities = fit_mixture(one, parts=3).densities(CODE_COLORS)
     assert np.isfinite(densities).all()
-    assert codes(one[None])[0, 0] == int(np.argmax(densities))
+    assert color_codes(one[None])[0, 0] == int(np.argmax(densities))
 
 
 def test_a_colour_is_looked_up_where_it_is() -> None:
     image = np.random.default_rng(5).integers(0, 256, (6, 7, 3)).astype(np.uint8)
-    assert np.abs(MIDDLES[codes(image)] - image).max() <= 4
-    assert MIDDLES.shape == (COLOURS, 3)
+    assert np.abs(CODE_COLORS[color_codes(image)] - image).max() <= 4
+    assert CODE_COLORS.shape == (COLOR_CODES, 3)
 
 
 def test_the_posterior_is_bayes_rule() -> None:
@@ -80,9 +85,9 @@ def test_contrasts_are_those_that_are_summed_pixel_by_pixel(
 ) -> None:
     values = np.random.default_rng(seed).random((24, 32, 2)).astype(np.float32)
     windows = np.array([[x, y, x + w, y + h] for x, y, w, h in places], dtype=float)
-    found = WindowSums(values, 3, 2).contrasts(windows)
+    found = CenterSurroundIntegral(values, 3, 2).contrast(windows)
     for window, contrasts in zip(windows, found, strict=True):
-        inner, outer = (np.rint(it) for it in (window, ringed(window)))
+        inner, outer = (np.rint(it) for it in (window, add_ring(window)))
         inside, ring = [], []
         for y in range(24):
             for x in range(32):
@@ -96,60 +101,62 @@ def test_contrasts_are_those_that_are_summed_pixel_by_pixel(
 
 
 def test_a_ring_has_its_share_of_the_windows_pixels() -> None:
-    wide = ringed(np.array([10.0, 20.0, 50.0, 100.0]))
-    assert (wide[2] - wide[0]) * (wide[3] - wide[1]) == pytest.approx((1 + RING) * 40 * 80)
+    wide = add_ring(np.array([10.0, 20.0, 50.0, 100.0]))
+    assert (wide[2] - wide[0]) * (wide[3] - wide[1]) == pytest.approx((1 + RING_AREA_RATIO) * 40 * 80)
     assert (wide[:2] + wide[2:]).tolist() == pytest.approx([60.0, 120.0])
 
 
 @given(st.integers(0, 500), st.lists(st.sets(st.integers(1, 6), max_size=4), min_size=1, max_size=12))
 @settings(deadline=None, max_examples=60)
 def test_shares_are_never_less_than_nothing_nor_more_than_all(seed: int, company: list[set[int]]) -> None:
-    rng, shares = np.random.default_rng(seed), Shares.none(30)
+    rng, shares = np.random.default_rng(seed), OccluderParticles.unoccluded(30)
     for near in company:
-        known = dict(zip(shares.who, shares.states.mean(axis=0), strict=True))
-        shares.go_on(rng, sorted(near), 0.3, 0.1)
-        assert shares.who == tuple(sorted(near))
-        assert shares.all.shape == (30, 1 + len(near))
-        assert (shares.all >= -1e-12).all()
-        assert np.allclose(shares.all.sum(axis=1), 1.0)
-        assert set(known) - near == set(known) - set(shares.who)
+        known = dict(zip(shares.occluder_ids, shares.states.mean(axis=0), strict=True))
+        shares.propagate(rng, sorted(near), 0.3, 0.1)
+        assert shares.occluder_ids == tuple(sorted(near))
+        assert shares.visible_and_hidden_shares.shape == (30, 1 + len(near))
+        assert (shares.visible_and_hidden_shares >= -1e-12).all()
+        assert np.allclose(shares.visible_and_hidden_shares.sum(axis=1), 1.0)
+        assert set(known) - near == set(known) - set(shares.occluder_ids)
 
 
 def test_a_share_stays_with_whom_it_is_of_when_others_come_and_go() -> None:
-    shares = Shares((4, 7), np.tile([0.1, 0.6], (10, 1)), np.full(10, 0.1))
-    shares.go_on(np.random.default_rng(1), [7, 9], 0.0)
+    shares = OccluderParticles((4, 7), np.tile([0.1, 0.6], (10, 1)), np.full(10, 0.1))
+    shares.propagate(np.random.default_rng(1), [7, 9], 0.0)
     assert np.allclose(shares.states, [0.6, 0.0])
-    assert np.allclose(shares.hidden, 0.6)
+    assert np.allclose(shares.hidden_share, 0.6)
 
 
 def test_who_looks_like_the_wall_is_found_behind_another_where_the_plain_filter_loses_them() -> None:
     scenes = [Crossing((GREY, BLUE), seed=seed) for seed in SEEDS]
-    assert times_kept([OcclusionCues(CueSettings(seed=it)) for it in SEEDS], scenes) == len(SEEDS)
+    assert times_kept([OcclusionCues(OcclusionCueSettings(seed=it)) for it in SEEDS], scenes) == len(SEEDS)
     plain = [ParticleFilters(ParticleSettings(seed=it)) for it in SEEDS]
     assert times_kept(plain, scenes) <= len(SEEDS) - 2
 
 
 def test_who_walks_hidden_by_another_goes_with_them_past_something_of_their_colours() -> None:
     scenes = [WalkTogether((RED, BLUE), seed=seed) for seed in SEEDS]
-    with_cues = times_kept([OcclusionCues(CueSettings(seed=it)) for it in SEEDS], scenes)
-    alone = [OcclusionCues(CueSettings(seed=it, noise=0.0, jumps=0.0)) for it in SEEDS]
+    with_cues = times_kept([OcclusionCues(OcclusionCueSettings(seed=it)) for it in SEEDS], scenes)
+    alone = [
+        OcclusionCues(OcclusionCueSettings(seed=it, occlusion_noise=0.0, jump_share=0.0)) for it in SEEDS
+    ]
     assert with_cues >= len(SEEDS) - 1
     assert times_kept(alone, scenes) <= 1
 
 
 def test_two_who_pass_each_other_behind_a_third_are_told_apart() -> None:
     scenes = [ThreeMeet((RED, BLUE, GREEN), seed=seed) for seed in SEEDS]
-    methods = [OcclusionCues(CueSettings(seed=it)) for it in SEEDS]
+    methods = [OcclusionCues(OcclusionCueSettings(seed=it)) for it in SEEDS]
     assert times_kept(methods, scenes) >= len(SEEDS) - 1
 
 
 def test_an_occlusion_is_there_while_somebody_is_hidden_and_only_then() -> None:
     scene, method = Crossing((RED, BLUE)), OcclusionCues()
-    people = [method.begin(scene.picture(0), scene.where(person, 0)) for person in range(2)]
+    people = [method.initialize(scene.picture(0), scene.where(person, 0)) for person in range(2)]
     hidden = []
     for frame in range(1, FRAMES):
-        method.move(scene.picture(frame), people)
-        hidden.append([float(it.shares.weights @ it.shares.hidden) for it in people])
+        method.predict(scene.picture(frame), people)
+        hidden.append([float(it.occluders.weights @ it.occluders.hidden_share) for it in people])
     behind, before = np.array(hidden).T
     assert behind[27:29].min() > 0.7
     assert max(behind[:20].max(), behind[36:].max(), before.max()) < 0.1
@@ -160,14 +167,15 @@ def test_the_same_seed_weighs_the_same() -> None:
     told = []
     for _ in range(2):
         method = OcclusionCues()
-        people = [method.begin(scene.picture(0), scene.where(person, 0)) for person in range(2)]
-        told.append([method.move(scene.picture(frame), people).tobytes() for frame in range(1, 12)])
+        people = [method.initialize(scene.picture(0), scene.where(person, 0)) for person in range(2)]
+        told.append([method.predict(scene.picture(frame), people).tobytes() for frame in range(1, 12)])
     assert told[0] == told[1]
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"particles": 0}, {"parts": 0}, {"sharpness": 0.0}, {"noise": -0.1}, {"jumps": 0.6}]
+    "wrong",
+    [{"particles": 0}, {"components": 0}, {"sharpness": 0.0}, {"occlusion_noise": -0.1}, {"jump_share": 0.6}],
 )
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must be|between"):
-        CueSettings(**wrong)  # type: ignore[arg-type]
+        OcclusionCueSettings(**wrong)  # type: ignore[arg-type]

@@ -8,10 +8,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.tracking.crossings import BLUE, RED, Clothes, Crossing, times_kept
-from tracking.baselines.part_histograms import CHANNELS, LEVELS, PartField, likeness, parts_of
+from tracking.baselines.part_histograms import (
+    CHANNELS,
+    LEVELS,
+    PartHistograms,
+    bhattacharyya_coefficient,
+    split_boxes,
+)
 from tracking.baselines.particle_filter import ParticleFilters, ParticleSettings
-from tracking.baselines.particle_overlap import overlap_factors
-from tracking.baselines.separated_particles import SeparatedParticles, SeparatedSettings
+from tracking.baselines.separated_particles import (
+    SeparatedParticles,
+    SeparatedParticleSettings,
+    overlap_factors,
+)
 
 SEEDS = range(6)
 
@@ -32,11 +41,11 @@ def test_levels_of_boxes_are_those_that_are_counted(
             for x in range(left, right):
                 for channel in range(CHANNELS):
                     expected[row, channel, image[y, x, channel] // 32] += one
-    assert np.allclose(PartField(image, around).histograms(boxes), expected)
+    assert np.allclose(PartHistograms(image, around).histograms(boxes), expected)
 
 
 def test_parts_are_cut_row_by_row() -> None:
-    parts = parts_of(np.array([10.0, 20.0, 30.0, 80.0]), rows=3, columns=2)
+    parts = split_boxes(np.array([10.0, 20.0, 30.0, 80.0]), rows=3, columns=2)
     assert parts.tolist() == [
         [10, 20, 20, 40],
         [20, 20, 30, 40],
@@ -71,13 +80,13 @@ def test_who_is_alone_is_weighed_as_before(seed: int) -> None:
 
 def test_alike_is_one_and_nothing_in_common_is_none() -> None:
     shares = np.eye(LEVELS)[[0, 3]]
-    assert likeness(shares, shares).tolist() == [1.0, 1.0]
-    assert float(likeness(shares[0], shares[1])) == 0.0
+    assert bhattacharyya_coefficient(shares, shares).tolist() == [1.0, 1.0]
+    assert float(bhattacharyya_coefficient(shares[0], shares[1])) == 0.0
 
 
 def test_two_who_look_alike_cross_where_independent_filters_are_kidnapped() -> None:
     scenes = [Crossing((RED, RED), seed=seed) for seed in SEEDS]
-    apart = times_kept([SeparatedParticles(SeparatedSettings(seed=it)) for it in SEEDS], scenes)
+    apart = times_kept([SeparatedParticles(SeparatedParticleSettings(seed=it)) for it in SEEDS], scenes)
     together = times_kept([ParticleFilters(ParticleSettings(seed=it)) for it in SEEDS], scenes)
     assert apart >= len(SEEDS) - 1
     assert together <= len(SEEDS) - 2
@@ -89,17 +98,17 @@ def test_only_who_is_dressed_otherwise_hides_somebody_without_driving_them_away(
 ) -> None:
     method = SeparatedParticles()
     apart = Crossing((RED, in_front))
-    people = [method.begin(apart.picture(0), apart.where(person, 0)) for person in range(2)]
-    for _ in range(SeparatedSettings().first + 1):
-        method.move(apart.picture(0), people)
+    people = [method.initialize(apart.picture(0), apart.where(person, 0)) for person in range(2)]
+    for _ in range(SeparatedParticleSettings().reference_frames + 1):
+        method.predict(apart.picture(0), people)
     covered = apart.picture(0)
     (left, top), (other, _) = (apart.where(person, 0)[:2].astype(int) for person in range(2))
     covered[top : top + 44, left : left + 18] = covered[top : top + 44, other : other + 18]
-    field = PartField(covered, np.array([0.0, 0.0, 200.0, 120.0]))
+    field = PartHistograms(covered, np.array([0.0, 0.0, 200.0, 120.0]))
     assert method._behind_another(field, people[0]) is behind
 
 
-@pytest.mark.parametrize("wrong", [{"particles": 0}, {"rows": 0}, {"reduced": 0}, {"sharpness": 0.0}])
+@pytest.mark.parametrize("wrong", [{"particles": 0}, {"rows": 0}, {"cell_pixels": 0}, {"sharpness": 0.0}])
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must be"):
-        SeparatedSettings(**wrong)  # type: ignore[arg-type]
+        SeparatedParticleSettings(**wrong)  # type: ignore[arg-type]

@@ -12,10 +12,19 @@ from hypothesis import strategies as st
 
 from tracking.baselines.temporal_consistency import BlobSettings, TemporalSettings
 from tracking.baselines.temporal_consistency.background import YuvBackground
-from tracking.baselines.temporal_consistency.blobs import Blob, Blobs
-from tracking.baselines.temporal_consistency.color_histogram import BINS, mismatch, uv_histogram
-from tracking.baselines.temporal_consistency.distance import distance_score, gap, penalties, penalty
-from tracking.baselines.temporal_consistency.regional_appearance import Places
+from tracking.baselines.temporal_consistency.blobs import Blob, BlobDetector
+from tracking.baselines.temporal_consistency.distance import (
+    blob_gap,
+    distance_cost,
+    distance_costs,
+    distance_score,
+)
+from tracking.baselines.temporal_consistency.regional_appearance import (
+    BINS,
+    RegionalAppearance,
+    mismatch,
+    uv_histogram,
+)
 
 METRE = 50.0
 SETTINGS = TemporalSettings()
@@ -39,7 +48,7 @@ def test_blobs_that_overlap_in_part_are_six_centimetres_apart() -> None:
 
 def test_blobs_apart_have_the_gap_between_their_edges_and_sixteen_centimetres() -> None:
     left, right = _blob(0, 0, 20, 20), _blob(70, 0, 100, 20)
-    assert gap(left, right) == pytest.approx(50.0, abs=1.5)
+    assert blob_gap(left, right) == pytest.approx(50.0, abs=1.5)
     assert distance_score(left, right, METRE, SETTINGS) == pytest.approx(0.16 + 1.0, abs=0.03)
 
 
@@ -47,27 +56,27 @@ def test_the_gap_is_between_what_is_filled_and_not_between_boxes() -> None:
     disc = np.hypot(*np.mgrid[-19.5:20:1, -19.5:20:1]) <= 20
     round_ = _blob(0, 0, 40, 40, np.where(disc, 255, 0).astype(np.uint8))
     other = _blob(60, 60, 100, 100, np.where(disc, 255, 0).astype(np.uint8))
-    assert gap(round_, other) == pytest.approx(math.hypot(60, 60) - 40, abs=2.5)
+    assert blob_gap(round_, other) == pytest.approx(math.hypot(60, 60) - 40, abs=2.5)
 
 
 def test_the_penalty_is_the_share_of_the_way_that_is_walked_and_beyond_it_a_sigmoid() -> None:
-    assert penalty(0.0) == 0.0
-    assert penalty(0.7) == 0.7
-    assert penalty(1.0) == 1.0
-    assert penalty(2.0) == pytest.approx(26.0)
-    assert penalty(1.7) == pytest.approx(50 / (math.exp(2) + 1) + 1)
-    assert penalty(5.0) == pytest.approx(51.0)
+    assert distance_cost(0.0) == 0.0
+    assert distance_cost(0.7) == 0.7
+    assert distance_cost(1.0) == 1.0
+    assert distance_cost(2.0) == pytest.approx(26.0)
+    assert distance_cost(1.7) == pytest.approx(50 / (math.exp(2) + 1) + 1)
+    assert distance_cost(5.0) == pytest.approx(51.0)
 
 
 @given(st.floats(0, 6), st.floats(0, 6))
 def test_farther_never_costs_less(one: float, other: float) -> None:
     near, far = sorted((one, other))
-    assert penalty(near) <= penalty(far)
+    assert distance_cost(near) <= distance_cost(far)
 
 
 def test_the_penalty_goes_by_the_time_between_the_samples() -> None:
     blobs = [_blob(0, 0, 20, 20)], [_blob(70, 0, 100, 20)]
-    short, long = (float(penalties(*blobs, seconds, METRE, SETTINGS)[0, 0]) for seconds in (0.5, 2.0))
+    short, long = (float(distance_costs(*blobs, seconds, METRE, SETTINGS)[0, 0]) for seconds in (0.5, 2.0))
     assert short > 1.0
     assert long == pytest.approx((0.16 + 1.0) / (1.45 * 2.0), abs=0.02)
 
@@ -102,7 +111,7 @@ def test_only_the_pixels_of_the_mask_count() -> None:
 
 
 def test_somebody_is_compared_with_how_they_looked_nearest_by() -> None:
-    places = Places(3, (300, 300))
+    places = RegionalAppearance(3, (300, 300))
     red, blue = np.eye(BINS)[0], np.eye(BINS)[1]
     here, there = np.array([[40.0, 40.0]]), np.array([[250.0, 250.0]])
     assert places.costs(here, red[None], 0.5) == [0.5]
@@ -145,7 +154,7 @@ def test_the_distance_is_that_of_mahalanobis_in_yuv() -> None:
     levels = np.stack([cv2.cvtColor(image, cv2.COLOR_BGR2YUV) for image in images]).astype(float)
     mean = levels.mean(axis=0)
     off = levels - mean
-    floors = np.diag([settings.brightness_floor, settings.colour_floor, settings.colour_floor]) ** 2
+    floors = np.diag([settings.brightness_floor, settings.chroma_floor, settings.chroma_floor]) ** 2
     covariance = np.einsum("nhwi,nhwj->hwij", off, off) / len(images) + floors
     image = images[0].copy()
     image[5:15, 5:15] = (60, 60, 170)
@@ -167,14 +176,14 @@ def test_who_walks_through_while_it_is_learned_is_no_part_of_the_room() -> None:
 
 def test_a_room_that_changes_slowly_is_learned_where_nobody_is() -> None:
     rng = np.random.default_rng(4)
-    finder = Blobs((120, 90), 6.0, BlobSettings(learn_rate=0.3))
+    finder = BlobDetector((120, 90), 6.0, BlobSettings(learn_rate=0.3))
     finder.prepare([_room(rng) for _ in range(20)])
     person = slice(30, 60), slice(40, 60)
     for step in range(40):
         image = _room(rng)
         image[:, 80:] = np.clip(image[:, 80:] + 1.5 * step, 0, 255).astype(np.uint8)
         image[person] = (60, 60, 170)
-        found = finder.find(image, learn=True)
+        found = finder.detect(image, learn=True)
         assert len(found) == 1, f"step {step}"
     box = found[0].box
     assert np.abs(box - [40, 30, 60, 60]).max() <= 3
@@ -182,14 +191,14 @@ def test_a_room_that_changes_slowly_is_learned_where_nobody_is() -> None:
 
 def test_blobs_are_whole_and_specks_are_none() -> None:
     rng = np.random.default_rng(5)
-    finder = Blobs((120, 90), 6.0, BlobSettings())
+    finder = BlobDetector((120, 90), 6.0, BlobSettings())
     finder.prepare([_room(rng) for _ in range(20)])
     image = _room(rng)
     image[20:40, 20:34] = (60, 60, 170)
     image[41:55, 20:34] = (170, 60, 60)
     image[70:72, 100:102] = 0
-    (only,) = finder.find(image, learn=False)
+    (only,) = finder.detect(image, learn=False)
     assert only.box[1] <= 20
     assert only.box[3] >= 55
-    assert only.colours.sum() == pytest.approx(1.0)
-    assert (only.colours > 0.3).sum() == 2
+    assert only.colors.sum() == pytest.approx(1.0)
+    assert (only.colors > 0.3).sum() == 2

@@ -10,49 +10,60 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracking.baselines.temporal_consistency.edge_search import cheapest_by_edges
-from tracking.baselines.temporal_consistency.graph import Graph, all_edges, edges, merge_costs, ways
-from tracking.baselines.temporal_consistency.groups import joint_path
-from tracking.baselines.temporal_consistency.per_person_search import cheapest
+from tracking.baselines.temporal_consistency.edge_search import cheapest_path_by_edges
+from tracking.baselines.temporal_consistency.graph import (
+    WindowGraph,
+    count_joint_edges,
+    count_unpruned_edges,
+    merge_costs,
+    prune_links,
+)
+from tracking.baselines.temporal_consistency.groups import solve_joint_path
+from tracking.baselines.temporal_consistency.per_person_search import cheapest_joint_path
 
 _MANY = 100_000
 
 
-def _cost(graph: Graph, path: np.ndarray) -> float:
+def _cost(graph: WindowGraph, path: np.ndarray) -> float:
     """Eq. (1) by itself, summed over the stages; infinite along a link that is pruned."""
     total = 0.0
     for before, now, step, looks, shared in zip(
-        [graph.start, *path[:-1]], path, graph.steps, graph.looks, graph.shared, strict=True
+        [graph.start, *path[:-1]],
+        path,
+        graph.distance_costs,
+        graph.appearance_costs,
+        graph.shared,
+        strict=True,
     ):
         steps = [step[a, b] for a, b in zip(before, now, strict=True)]
-        total += sum(cost if cost <= graph.longest else np.inf for cost in steps)
+        total += sum(cost if cost <= graph.max_step_cost else np.inf for cost in steps)
         total += sum(looks[person, blob] for person, blob in enumerate(now))
         here = [blob for blob in now.tolist() if shared[blob]]
-        total += graph.merge * (len(here) - len(set(here)))
+        total += graph.merge_cost * (len(here) - len(set(here)))
     return total / graph.people
 
 
-def _best(graph: Graph) -> float:
+def _best(graph: WindowGraph) -> float:
     """The cheapest of all joint paths, one after the other."""
-    nodes = [list(product(range(step.shape[1]), repeat=graph.people)) for step in graph.steps]
+    nodes = [list(product(range(step.shape[1]), repeat=graph.people)) for step in graph.distance_costs]
     return min(_cost(graph, np.array(path)) for path in product(*nodes))
 
 
 @st.composite
-def graphs(draw: st.DrawFn, most_people: int = 3, most_stages: int = 3, most_blobs: int = 3) -> Graph:
+def graphs(draw: st.DrawFn, most_people: int = 3, most_stages: int = 3, most_blobs: int = 3) -> WindowGraph:
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     people, stages = draw(st.integers(1, most_people)), draw(st.integers(1, most_stages))
     blobs = [draw(st.integers(1, most_blobs)) for _ in range(stages + 1)]
     steps = tuple(np.round(rng.exponential(0.7, pair), 2) for pair in pairwise(blobs))
     looks = tuple(np.round(rng.random((people, count)), 2) for count in blobs[1:])
     shared = tuple(rng.random(count) < 0.8 for count in blobs[1:])
-    return Graph(rng.integers(0, blobs[0], people), steps, looks, shared, 0.35, np.inf)
+    return WindowGraph(rng.integers(0, blobs[0], people), steps, looks, shared, 0.35, np.inf)
 
 
 @given(graphs(most_people=2))
 @settings(deadline=None, max_examples=80)
-def test_the_joint_path_is_the_cheapest_of_all(graph: Graph) -> None:
-    found = joint_path(graph, ways(graph), _MANY)
+def test_the_joint_path_is_the_cheapest_of_all(graph: WindowGraph) -> None:
+    found = solve_joint_path(graph, prune_links(graph), _MANY)
     assert found.exact
     assert found.cost == pytest.approx(_best(graph))
     assert _cost(graph, found.blobs) == pytest.approx(found.cost)
@@ -60,44 +71,49 @@ def test_the_joint_path_is_the_cheapest_of_all(graph: Graph) -> None:
 
 @given(graphs(most_stages=2))
 @settings(deadline=None, max_examples=30)
-def test_so_it_is_for_three_people(graph: Graph) -> None:
-    assert joint_path(graph, ways(graph), _MANY).cost == pytest.approx(_best(graph))
+def test_so_it_is_for_three_people(graph: WindowGraph) -> None:
+    assert solve_joint_path(graph, prune_links(graph), _MANY).cost == pytest.approx(_best(graph))
 
 
 @given(graphs(most_people=4, most_stages=6, most_blobs=4), st.sampled_from([0.6, 1.5, np.inf]))
 @settings(deadline=None, max_examples=60)
-def test_person_by_person_is_as_cheap_as_edge_by_edge(graph: Graph, longest: float) -> None:
-    graph = replace(graph, longest=longest)
-    left = ways(graph)
+def test_person_by_person_is_as_cheap_as_edge_by_edge(graph: WindowGraph, longest: float) -> None:
+    graph = replace(graph, max_step_cost=longest)
+    left = prune_links(graph)
     nobody = [np.zeros(len(it), dtype=np.int64) for it in graph.shared]
-    path, cost = cheapest(left, graph.shared, nobody, graph.merge)
-    by_edges, same = cheapest_by_edges(left, graph.shared, graph.merge)
+    path, cost = cheapest_joint_path(left, graph.shared, nobody, graph.merge_cost)
+    by_edges, same = cheapest_path_by_edges(left, graph.shared, graph.merge_cost)
     assert cost == pytest.approx(same)
     # People who cannot meet are decided apart, and nothing is lost by it.
-    apart = joint_path(graph, left, _MANY)
+    apart = solve_joint_path(graph, left, _MANY)
     assert apart.cost == pytest.approx(cost / graph.people)
     for found in (path, by_edges, apart.blobs):
-        unpruned = replace(graph, longest=np.inf)
+        unpruned = replace(graph, max_step_cost=np.inf)
         assert _cost(unpruned, found) == pytest.approx(cost / graph.people)
 
 
 @given(graphs(most_people=3, most_stages=4, most_blobs=4))
 @settings(deadline=None, max_examples=80)
-def test_pruning_keeps_the_best_path_where_nobody_goes_too_far_on_it(graph: Graph) -> None:
-    whole = joint_path(graph, ways(graph), _MANY)
+def test_pruning_keeps_the_best_path_where_nobody_goes_too_far_on_it(graph: WindowGraph) -> None:
+    whole = solve_joint_path(graph, prune_links(graph), _MANY)
     taken = [
         step[a, b]
-        for before, now, step in zip([graph.start, *whole.blobs[:-1]], whole.blobs, graph.steps, strict=True)
+        for before, now, step in zip(
+            [graph.start, *whole.blobs[:-1]], whole.blobs, graph.distance_costs, strict=True
+        )
         for a, b in zip(before, now, strict=True)
     ]
-    pruned = replace(graph, longest=max(taken))
-    left = ways(pruned)
-    assert joint_path(pruned, left, _MANY).cost == pytest.approx(whole.cost)
-    assert all(some <= every for some, every in zip(edges(left), all_edges(graph), strict=True))
+    pruned = replace(graph, max_step_cost=max(taken))
+    left = prune_links(pruned)
+    assert solve_joint_path(pruned, left, _MANY).cost == pytest.approx(whole.cost)
+    assert all(
+        some <= every
+        for some, every in zip(count_joint_edges(left), count_unpruned_edges(graph), strict=True)
+    )
 
 
 def test_without_pruning_there_are_as_many_edges_as_pairs_of_nodes() -> None:
-    graph = Graph(
+    graph = WindowGraph(
         np.array([0, 1, 2]),
         (np.zeros((3, 3)), np.zeros((3, 2))),
         (np.zeros((3, 3)), np.zeros((3, 2))),
@@ -106,12 +122,12 @@ def test_without_pruning_there_are_as_many_edges_as_pairs_of_nodes() -> None:
         np.inf,
     )
     # 27 nodes, then 8, as in the report's own example; the first stage is met from one node.
-    assert all_edges(graph) == [27, 27 * 8]
+    assert count_unpruned_edges(graph) == [27, 27 * 8]
 
 
 def test_pruning_leaves_a_chain_where_everybody_is_far_from_everybody() -> None:
     far = np.where(np.eye(3, dtype=bool), 0.0, 30.0)
-    graph = Graph(
+    graph = WindowGraph(
         np.arange(3),
         (far, far),
         (np.full((3, 3), 0.5),) * 2,
@@ -119,15 +135,15 @@ def test_pruning_leaves_a_chain_where_everybody_is_far_from_everybody() -> None:
         0.35,
         2.0,
     )
-    assert edges(ways(graph)) == [1, 1]
-    assert joint_path(graph, ways(graph), _MANY).blobs.tolist() == [[0, 1, 2], [0, 1, 2]]
+    assert count_joint_edges(prune_links(graph)) == [1, 1]
+    assert solve_joint_path(graph, prune_links(graph), _MANY).blobs.tolist() == [[0, 1, 2], [0, 1, 2]]
 
 
 def test_who_can_get_to_no_blob_is_somewhere_all_the_same() -> None:
-    graph = Graph(
+    graph = WindowGraph(
         np.array([0]), (np.array([[40.0, 30.0]]),), (np.zeros((1, 2)),), (np.ones(2, dtype=bool),), 0.35, 2.0
     )
-    assert joint_path(graph, ways(graph), _MANY).blobs.tolist() == [[1]]
+    assert solve_joint_path(graph, prune_links(graph), _MANY).blobs.tolist() == [[1]]
 
 
 def test_a_merge_costs_for_everybody_in_it_but_one() -> None:
@@ -144,9 +160,9 @@ def test_a_merge_costs_for_everybody_in_it_but_one() -> None:
 
 @given(graphs(most_people=4, most_stages=3, most_blobs=3))
 @settings(deadline=None, max_examples=40)
-def test_too_many_people_for_one_table_are_decided_one_after_the_other(graph: Graph) -> None:
-    found = joint_path(graph, ways(graph), 1)
-    whole = joint_path(graph, ways(graph), _MANY)
+def test_too_many_people_for_one_table_are_decided_one_after_the_other(graph: WindowGraph) -> None:
+    found = solve_joint_path(graph, prune_links(graph), 1)
+    whole = solve_joint_path(graph, prune_links(graph), _MANY)
     assert _cost(graph, found.blobs) == pytest.approx(found.cost)
     assert found.cost >= whole.cost - 1e-9
     assert not found.exact or found.cost == pytest.approx(whole.cost)
@@ -158,7 +174,7 @@ def test_evidence_that_comes_later_corrects_an_earlier_match() -> None:
     apart = np.array([[0.0, 9.0], [9.0, 0.0]])
     alone = (np.ones(2, dtype=bool),)
     wrong, right = np.array([[0.6, 0.4], [0.4, 0.6]]), np.array([[0.1, 0.9], [0.9, 0.1]])
-    at_once = Graph(np.zeros(2, dtype=np.int64), (near,), (wrong,), alone, 0.35, 2.0)
-    assert joint_path(at_once, ways(at_once), _MANY).blobs[0].tolist() == [1, 0]
-    later = replace(at_once, steps=(near, apart), looks=(wrong, right), shared=alone * 2)
-    assert joint_path(later, ways(later), _MANY).blobs.tolist() == [[0, 1], [0, 1]]
+    at_once = WindowGraph(np.zeros(2, dtype=np.int64), (near,), (wrong,), alone, 0.35, 2.0)
+    assert solve_joint_path(at_once, prune_links(at_once), _MANY).blobs[0].tolist() == [1, 0]
+    later = replace(at_once, distance_costs=(near, apart), appearance_costs=(wrong, right), shared=alone * 2)
+    assert solve_joint_path(later, prune_links(later), _MANY).blobs.tolist() == [[0, 1], [0, 1]]

@@ -9,18 +9,18 @@ import pytest
 
 from fakes.tracking.strolls import final_boxes
 from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
-from tracking.baselines import needs_pictures, tracker_named
 from tracking.baselines.temporal_consistency import BlobSettings, TemporalSettings
-from tracking.baselines.temporal_consistency.blobs import Blobs
+from tracking.baselines.temporal_consistency.blobs import BlobDetector
 from tracking.baselines.temporal_consistency.tracker import TemporalTracker
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
+from tracking.registry import create_tracker, needs_images
 
 SIZE = (150, 200)
 WINDOW = WindowSettings(window=10, stride=5, birth_window=10)
 _HALF = 11
 _COLOURS = ((40, 40, 200), (200, 70, 30), (50, 160, 50))
-SETTINGS = TemporalSettings(stages=4, stage_s=0.2, forget_s=2.0)
+SETTINGS = TemporalSettings(window_stages=4, stage_s=0.2, forget_after_s=2.0)
 FPS = 25.0
 _NOBODY: Detections = Detections.empty(0)
 
@@ -94,7 +94,7 @@ def test_in_a_closed_room_nobody_comes() -> None:
     def where(frame: int) -> dict[int, tuple[float, float]]:
         return {0: (60.0, 40.0)} | ({1: (140.0, 110.0)} if frame >= 30 else {})
 
-    tracker = _tracker(TemporalSettings(stages=4, stage_s=0.2, closed=True))
+    tracker = _tracker(TemporalSettings(window_stages=4, stage_s=0.2, closed_world=True))
     boxes = final_boxes(_follow(tracker, {frame: _picture(where(frame), frame) for frame in range(90)}))
     assert {number for row in boxes.values() for number in row} == {1}
 
@@ -143,7 +143,9 @@ def test_nobody_is_known_after_a_long_gap_and_no_result_spans_it() -> None:
 
 
 def test_without_pictures_to_prepare_by_the_room_is_learned_as_it_goes() -> None:
-    settings = TemporalSettings(stages=2, stage_s=0.2, blobs=BlobSettings(bootstrap_frames=20, samples=10))
+    settings = TemporalSettings(
+        window_stages=2, stage_s=0.2, blobs=BlobSettings(bootstrap_frames=20, samples=10)
+    )
     tracker = TemporalTracker(WINDOW, settings, FPS)
     pictures = {frame: _picture({} if frame < 20 else {0: (60.0, 40.0)}, frame) for frame in range(60)}
     boxes = final_boxes(_follow(tracker, pictures))
@@ -174,25 +176,25 @@ def test_a_frame_that_does_not_come_after_the_last_one_is_refused() -> None:
 
 
 def test_it_is_a_tracker_by_name_that_needs_pictures() -> None:
-    assert needs_pictures("temporal")
-    made = tracker_named("temporal", WINDOW, CostSettings(), lambda: create_solver("columns"), SETTINGS, FPS)
+    assert needs_images("temporal")
+    made = create_tracker("temporal", WINDOW, CostSettings(), lambda: create_solver("columns"), SETTINGS, FPS)
     assert isinstance(made, TemporalTracker)
 
 
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"stages": 0},
-        {"stages": 10**9},
+        {"window_stages": 0},
+        {"window_stages": 10**9},
         {"stage_s": 0.0},
         {"stage_s": float("inf")},
         {"stage_s": float("nan")},
-        {"places": 4},
-        {"prune": 0.5},
-        {"most_people": 0},
-        {"merge": -0.1},
-        {"vanish": float("nan")},
-        {"forget_s": -1.0},
+        {"appearance_regions": 4},
+        {"prune_factor": 0.5},
+        {"max_people": 0},
+        {"merge_cost": -0.1},
+        {"inner_exit_cost": float("nan")},
+        {"forget_after_s": -1.0},
     ],
 )
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
@@ -201,7 +203,14 @@ def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> Non
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"grow_m": -0.1}, {"grow_m": 2.0}, {"least_m2": -1.0}, {"samples": 10**9}, {"learn_rate": 1.5}]
+    "wrong",
+    [
+        {"dilation_m": -0.1},
+        {"dilation_m": 2.0},
+        {"min_area_m2": -1.0},
+        {"samples": 10**9},
+        {"learn_rate": 1.5},
+    ],
 )
 def test_settings_of_blobs_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must be|is a share"):
@@ -209,5 +218,5 @@ def test_settings_of_blobs_that_make_no_sense_are_refused(wrong: dict[str, float
 
 
 def test_however_little_floor_is_in_the_picture_foreground_grows_by_a_part_of_it() -> None:
-    blobs = Blobs((64, 48), 0.001, BlobSettings(grow_m=1.0))
+    blobs = BlobDetector((64, 48), 0.001, BlobSettings(dilation_m=1.0))
     assert blobs._grow.shape == (13, 13)

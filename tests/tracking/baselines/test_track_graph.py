@@ -13,30 +13,30 @@ from hypothesis import strategies as st
 from fakes.tracking.strolls import BINS, Stroll, final_boxes, look, seen_at
 from tracking import CostSettings, Detections, WindowSettings, create_solver
 from tracking.appearance import appearance_distance
-from tracking.baselines import Tracker, tracker_named
-from tracking.baselines.track_groups import GraphSettings
-from tracking.baselines.track_links import End, who_left
+from tracking.baselines.track_groups import TrackGraphSettings
+from tracking.baselines.track_links import TrackEnd, departed_member
 from tracking.boxes import iou
+from tracking.registry import Tracker, create_tracker
 
 CLOSE = 25
 
 
 def _tracker(name: str) -> Tracker:
     window = WindowSettings(window=6, stride=3, birth_window=6)
-    return tracker_named(name, window, CostSettings(), lambda: create_solver("columns"))
+    return create_tracker(name, window, CostSettings(), lambda: create_solver("columns"))
 
 
-def _end(rng: np.random.Generator, frame: int) -> End:
+def _end(rng: np.random.Generator, frame: int) -> TrackEnd:
     look = rng.dirichlet(np.ones(BINS))
-    return End(frame, rng.uniform(0, 100, 2), rng.uniform(-3, 3, 2), float(rng.uniform(40, 90)), look)
+    return TrackEnd(frame, rng.uniform(0, 100, 2), rng.uniform(-3, 3, 2), float(rng.uniform(40, 90)), look)
 
 
-def _unlike(before: End, after: End) -> float:
-    looks = float(appearance_distance(before.look[None], after.look[None])[0, 0])
+def _unlike(before: TrackEnd, after: TrackEnd) -> float:
+    looks = float(appearance_distance(before.histogram[None], after.histogram[None])[0, 0])
     frames = after.frame - before.frame
     if frames > CLOSE:
         return looks
-    x, y = after.place - before.place - frames * before.step
+    x, y = after.position - before.position - frames * before.velocity
     return 0.7 * looks + 0.3 * min(hypot(x, y) / before.height, 1.0)
 
 
@@ -53,14 +53,14 @@ def test_who_left_is_the_most_probable_of_all_states(seed: int, count: int) -> N
             probability *= exp(-_unlike(group[staying[0]], rest))
         probabilities[leaving] = probability
     best = max(probabilities, key=lambda it: probabilities[it])
-    assert who_left(group, out, rest, CLOSE, unlike=1.0) == best
+    assert departed_member(group, out, rest, CLOSE, unlike=1.0) == best
 
 
 def test_who_is_like_nobody_of_a_group_was_never_in_it() -> None:
     place, still = np.zeros(2), np.zeros(2)
-    group = [End(0, place, still, 80.0, look(kind)) for kind in (0, 1)]
-    stranger = End(90, place, still, 80.0, look(5))
-    assert who_left(group, stranger, group[0], CLOSE, unlike=0.5) is None
+    group = [TrackEnd(0, place, still, 80.0, look(kind)) for kind in (0, 1)]
+    stranger = TrackEnd(90, place, still, 80.0, look(5))
+    assert departed_member(group, stranger, group[0], CLOSE, unlike=0.5) is None
 
 
 def _crossing() -> tuple[list[Detections], list[Stroll]]:
@@ -134,8 +134,15 @@ def test_a_frame_shows_a_number_at_most_once_and_the_same_comes_of_the_same() ->
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"covered": 0.0}, {"beside": -1.0}, {"wait": 0}, {"remember": 0}, {"gone": 0}]
+    "wrong",
+    [
+        {"min_covered_share": 0.0},
+        {"split_margin": -1.0},
+        {"split_decision_frames": 0},
+        {"max_group_frames": 0},
+        {"merge_after_frames": 0},
+    ],
 )
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"covered|must be"):
-        GraphSettings(**wrong)  # type: ignore[arg-type]
+        TrackGraphSettings(**wrong)  # type: ignore[arg-type]

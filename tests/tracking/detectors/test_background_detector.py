@@ -9,16 +9,15 @@ from hypothesis import strategies as st
 
 from fakes.tracking.drawn_people import HEIGHT, WIDTH, Figure, picture, watched
 from tracking.boxes import iou
-from tracking.detectors import BackgroundDetector, BackgroundSettings, LooksSettings
+from tracking.detectors import AppearanceSettings, BackgroundDetector, BackgroundSettings
 from tracking.detectors.background.height_model import (
-    Floor,
-    HeightLineLearner,
-    HeightLineSettings,
-    fit_line,
-    prior_of,
+    FloorGeometry,
+    HeightModelEstimator,
+    HeightModelSettings,
+    fit_height_model,
+    height_prior,
 )
-from tracking.detectors.background.isolated_people import Alone
-from tracking.detectors.background.sample_novelty import SeenAnew
+from tracking.detectors.background.isolated_people import IsolatedPerson, SampleNoveltyFilter
 from tracking.types import Detections
 
 SURE = 0.4
@@ -68,10 +67,10 @@ def test_somebody_who_stands_still_is_not_absorbed() -> None:
 def test_who_is_in_a_recording_s_first_frame_is_found_there_and_leaves_no_ghost() -> None:
     walker = Figure(10, 200, speed=2.0, begin=0)
     detector = BackgroundDetector()
-    assert detector.blind
+    assert detector.warming_up
     detector.prepare([picture([walker], frame) for frame in range(0, 160, 20)], every=20)
     seen = watched(detector, [walker], range(100))
-    assert not detector.blind
+    assert not detector.warming_up
     assert np.mean([best_overlap(seen[frame], walker, frame) >= 0.5 for frame in range(100)]) >= 0.95
     left = [(seen[frame].scores >= SURE) & (seen[frame].boxes[:, 2] < 40.0) for frame in range(60, 100)]
     assert not any(ghosts.any() for ghosts in left)
@@ -104,7 +103,7 @@ def test_what_is_ignored_is_not_found() -> None:
 @pytest.mark.parametrize(("colour", "length"), [(True, 96), (False, 64)])
 def test_looks_tell_people_apart_by_colour(colour: bool, length: int) -> None:
     red, blue = Figure(40, 200, 1.0, 40), Figure(250, 200, -1.0, 40, colour=(190, 110, 35))
-    detector = BackgroundDetector(BackgroundSettings(looks=LooksSettings(colour=colour)))
+    detector = BackgroundDetector(BackgroundSettings(appearance=AppearanceSettings(color=colour)))
     seen = watched(detector, [red, blue], range(80))[-1]
     assert detector.bins == length == seen.histograms.shape[1]
     np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
@@ -134,23 +133,25 @@ def test_a_third_of_wild_samples_does_not_move_the_height_line() -> None:
     foot = rng.uniform(100, 280, 300)
     height = (0.6 * foot - 20.0) * rng.normal(1.0, 0.05, 300)
     height[::3] *= 1.6
-    line = fit_line(np.stack([foot, height], axis=1), HeightLineSettings())
+    line = fit_height_model(np.stack([foot, height], axis=1), HeightModelSettings())
     assert line is not None
-    np.testing.assert_allclose(line.at(np.array([120.0, 200.0, 280.0])), [52.0, 100.0, 148.0], rtol=0.06)
+    np.testing.assert_allclose(
+        line.expected_height(np.array([120.0, 200.0, 280.0])), [52.0, 100.0, 148.0], rtol=0.06
+    )
 
 
 def test_the_height_line_is_in_doubt_where_nobody_was_seen() -> None:
     foot = np.linspace(150, 170, 20)
-    line = fit_line(np.stack([foot, 0.6 * foot - 20.0], axis=1), HeightLineSettings())
+    line = fit_height_model(np.stack([foot, 0.6 * foot - 20.0], axis=1), HeightModelSettings())
     assert line is not None
-    near, far = line.doubt(np.array([160.0, 280.0]))
+    near, far = line.standard_deviation(np.array([160.0, 280.0]))
     assert far > 2.0 * near
 
 
 def test_people_all_of_one_height_everywhere_are_no_floor() -> None:
     foot = np.linspace(60, 280, 400)
     steep = np.stack([foot, 200.0 - 0.5 * foot], axis=1)
-    assert fit_line(steep, HeightLineSettings()) is None
+    assert fit_height_model(steep, HeightModelSettings()) is None
 
 
 @settings(deadline=None, max_examples=40)
@@ -163,71 +164,76 @@ def test_by_metres_pieces_and_pairs_of_people_do_not_lead_the_line_astray(
     height = slope * (foot - row) * rng.normal(1.0, 0.04, 60)
     height[:24] *= rng.uniform(0.2, 0.6, 24)
     height[24:32] *= rng.uniform(1.2, 1.5, 8)
-    prior = prior_of(HeightLineSettings(), Floor(row, slope), HEIGHT)
-    line = fit_line(np.stack([foot, height], axis=1), HeightLineSettings(), prior)
+    prior = height_prior(HeightModelSettings(), FloorGeometry(row, slope), HEIGHT)
+    line = fit_height_model(np.stack([foot, height], axis=1), HeightModelSettings(), prior)
     assert line is not None
     rows = np.array([130.0, 200.0, 270.0])
-    np.testing.assert_allclose(line.at(rows), slope * (rows - row), rtol=0.08)
+    np.testing.assert_allclose(line.expected_height(rows), slope * (rows - row), rtol=0.08)
 
 
 def test_by_metres_there_is_a_line_before_anybody_was_seen_and_where_nothing_agrees() -> None:
-    floor = Floor(20.0, 0.65)
-    before = HeightLineLearner(HeightLineSettings(), floor, HEIGHT).line
+    floor = FloorGeometry(20.0, 0.65)
+    before = HeightModelEstimator(HeightModelSettings(), floor, HEIGHT).model
     assert before is not None
-    assert before.at(np.array([20.0, 120.0])).tolist() == [0.0, 65.0]
-    assert HeightLineLearner(HeightLineSettings()).line is None
+    assert before.expected_height(np.array([20.0, 120.0])).tolist() == [0.0, 65.0]
+    assert HeightModelEstimator(HeightModelSettings()).model is None
     rng = np.random.default_rng(3)
     wild = np.stack([rng.uniform(100, 280, 200), rng.uniform(20, 250, 200)], axis=1)
-    assert fit_line(wild, HeightLineSettings(), prior_of(HeightLineSettings(), floor, HEIGHT)) == before
-    assert fit_line(wild, HeightLineSettings()) is None
+    assert (
+        fit_height_model(wild, HeightModelSettings(), height_prior(HeightModelSettings(), floor, HEIGHT))
+        == before
+    )
+    assert fit_height_model(wild, HeightModelSettings()) is None
 
 
 def test_children_are_learned_to_be_smaller_than_people_of_the_usual_height() -> None:
     rng = np.random.default_rng(5)
     foot = rng.uniform(100, 280, 300)
     height = 0.8 * 0.6 * (foot - 30.0) * rng.normal(1.0, 0.05, 300)
-    prior = prior_of(HeightLineSettings(), Floor(30.0, 0.6), HEIGHT)
+    prior = height_prior(HeightModelSettings(), FloorGeometry(30.0, 0.6), HEIGHT)
     samples = np.stack([foot, height], axis=1)
-    line = fit_line(samples, HeightLineSettings(), prior, people=8)
+    line = fit_height_model(samples, HeightModelSettings(), prior, people=8)
     assert line is not None
-    np.testing.assert_allclose(line.at(np.array([120.0, 200.0])), [43.2, 81.6], rtol=0.08)
-    one = fit_line(samples, HeightLineSettings(), prior, people=1)
+    np.testing.assert_allclose(line.expected_height(np.array([120.0, 200.0])), [43.2, 81.6], rtol=0.08)
+    one = fit_height_model(samples, HeightModelSettings(), prior, people=1)
     assert one is not None
-    assert line.at(np.array([200.0])) < one.at(np.array([200.0])) < 102.0, "one child is no school"
+    assert line.expected_height(np.array([200.0])) < one.expected_height(np.array([200.0])) < 102.0, (
+        "one child is no school"
+    )
 
 
 def test_the_fewer_people_were_seen_the_more_the_height_line_is_in_doubt() -> None:
     foot = np.linspace(100, 280, 900)
     samples = np.stack([foot, 0.65 * foot - 20.0], axis=1)
-    lines = [fit_line(samples, HeightLineSettings(), people=people) for people in (1, 2, 8)]
-    doubts = [float(line.doubt(np.array([200.0]))[0]) for line in lines if line is not None]
+    lines = [fit_height_model(samples, HeightModelSettings(), people=people) for people in (1, 2, 8)]
+    doubts = [float(line.standard_deviation(np.array([200.0]))[0]) for line in lines if line is not None]
     assert len(doubts) == 3
     assert doubts[0] > 1.3 * doubts[1] > 1.6 * doubts[2]
     assert doubts[0] >= 0.03 * 110.0, "however often somebody is seen, they may be tall"
 
 
 def test_who_stands_still_counts_once_and_who_walks_at_every_tenth_of_their_height() -> None:
-    anew, counted = SeenAnew(), {"stands": 0, "walks": 0}
+    anew, counted = SampleNoveltyFilter(), {"stands": 0, "walks": 0}
     for frame in range(400):
-        stands = Alone(60.0 + frame % 3, 130.0, 50.0)
-        walks = Alone(80.0 + 2.0 * frame, 200.0, 100.0)
+        stands = IsolatedPerson(60.0 + frame % 3, 130.0, 50.0)
+        walks = IsolatedPerson(80.0 + 2.0 * frame, 200.0, 100.0)
         flickers = [] if 100 <= frame < 140 else [stands]
-        for person in anew.of([*flickers, walks]):
+        for person in anew.new_samples([*flickers, walks]):
             counted["walks" if person is walks else "stands"] += 1
     assert counted["stands"] == 1
     assert 60 <= counted["walks"] <= 80
 
 
 def test_a_place_is_forgotten_when_nobody_is_there() -> None:
-    anew, person = SeenAnew(), Alone(60.0, 130.0, 50.0)
-    assert anew.of([person]) == [person]
-    assert anew.of([], frames=200) == []
-    assert anew.of([person]) == [person]
+    anew, person = SampleNoveltyFilter(), IsolatedPerson(60.0, 130.0, 50.0)
+    assert anew.new_samples([person]) == [person]
+    assert anew.new_samples([], frames=200) == []
+    assert anew.new_samples([person]) == [person]
 
 
 def test_who_stands_long_with_hidden_feet_does_not_lead_the_line_astray() -> None:
     visible = np.full((HEIGHT, WIDTH), 255, dtype=np.uint8)
-    learner = HeightLineLearner(HeightLineSettings())
+    learner = HeightModelEstimator(HeightModelSettings())
     for frame in range(600):
         foreground = np.zeros_like(visible)
         foreground[85:125, 280:296] = 255  # three quarters of somebody
@@ -236,10 +242,10 @@ def test_who_stands_long_with_hidden_feet_does_not_lead_the_line_astray() -> Non
             tall = round(0.6 * foot - 25)
             left = 20 + frame
             foreground[foot - tall : foot, left : left + round(0.36 * tall)] = 255
-        learner.watch(foreground, visible)
-    assert learner.line is not None
+        learner.observe(foreground, visible)
+    assert learner.model is not None
     rows = np.array([125.0, 180.0, 235.0])
-    np.testing.assert_allclose(learner.line.at(rows), 0.6 * rows - 25.0, rtol=0.08)
+    np.testing.assert_allclose(learner.model.expected_height(rows), 0.6 * rows - 25.0, rtol=0.08)
 
 
 def test_of_ground_without_metres_the_horizon_holds_the_line() -> None:
@@ -247,15 +253,15 @@ def test_of_ground_without_metres_the_horizon_holds_the_line() -> None:
     foot = rng.uniform(120, 150, 60)
     height = 0.8 * (foot - 20.0) * rng.normal(1.0, 0.04, 60)
     height[:20] *= 0.7
-    prior = prior_of(HeightLineSettings(), Floor(20.0, None), HEIGHT)
-    assert prior.line is None
+    prior = height_prior(HeightModelSettings(), FloorGeometry(20.0, None), HEIGHT)
+    assert prior.model is None
     samples = np.stack([foot, height], axis=1)
-    held, free = (fit_line(samples, HeightLineSettings(), it, people=4) for it in (prior, None))
+    held, free = (fit_height_model(samples, HeightModelSettings(), it, people=4) for it in (prior, None))
     assert held is not None
     assert free is not None
     near = np.array([260.0])
-    np.testing.assert_allclose(held.at(near), [192.0], rtol=0.08)
-    assert held.doubt(near) < 0.5 * free.doubt(near)
+    np.testing.assert_allclose(held.expected_height(near), [192.0], rtol=0.08)
+    assert held.standard_deviation(near) < 0.5 * free.standard_deviation(near)
 
 
 def test_more_pieces_than_people_do_not_lead_the_line_astray() -> None:
@@ -263,15 +269,17 @@ def test_more_pieces_than_people_do_not_lead_the_line_astray() -> None:
     foot = rng.uniform(110, 260, 200)
     height = (0.6 * foot - 20.0) * rng.normal(1.0, 0.04, 200)
     height[:120] *= rng.choice([0.3, 0.4], 120)
-    line = fit_line(np.stack([foot, height], axis=1), HeightLineSettings())
+    line = fit_height_model(np.stack([foot, height], axis=1), HeightModelSettings())
     assert line is not None
-    np.testing.assert_allclose(line.at(np.array([120.0, 200.0, 260.0])), [52.0, 100.0, 136.0], rtol=0.08)
+    np.testing.assert_allclose(
+        line.expected_height(np.array([120.0, 200.0, 260.0])), [52.0, 100.0, 136.0], rtol=0.08
+    )
 
 
 def test_how_tall_people_are_is_sure_by_metres_or_by_many_people() -> None:
-    alone = HeightLineLearner(HeightLineSettings())
-    assert not alone.sure
-    assert HeightLineLearner(HeightLineSettings(), Floor(57.0, 0.7), HEIGHT).sure
+    alone = HeightModelEstimator(HeightModelSettings())
+    assert not alone.is_reliable
+    assert HeightModelEstimator(HeightModelSettings(), FloorGeometry(57.0, 0.7), HEIGHT).is_reliable
     visible = np.full((HEIGHT, WIDTH), 255, dtype=np.uint8)
     surely = []
     for step in range(120):
@@ -280,8 +288,8 @@ def test_how_tall_people_are_is_sure_by_metres_or_by_many_people() -> None:
         tall = int(0.7 * foot - 40)
         left = 20 + 2 * step
         foreground[foot - tall : foot, left : left + int(0.36 * tall)] = 255
-        alone.watch(foreground, visible)
-        surely.append(alone.sure)
+        alone.observe(foreground, visible)
+        surely.append(alone.is_reliable)
     assert not surely[5]
     assert surely[-1]
 
@@ -289,8 +297,8 @@ def test_how_tall_people_are_is_sure_by_metres_or_by_many_people() -> None:
 def test_what_was_measured_of_the_floor_says_how_tall_people_are_in_every_size_of_picture() -> None:
     lines = []
     for factor in (1, 2):
-        detector = BackgroundDetector(floor=Floor(57.0 * factor, 0.7))
-        assert detector.height_line is None
+        detector = BackgroundDetector(floor=FloorGeometry(57.0 * factor, 0.7))
+        assert detector.height_model is None
         detector.detect(np.zeros((factor * HEIGHT, factor * WIDTH, 3), dtype=np.uint8))
-        lines.append(detector.height_line)
-    assert lines[0] == lines[1] == prior_of(HeightLineSettings(), Floor(57.0, 0.7), HEIGHT).line
+        lines.append(detector.height_model)
+    assert lines[0] == lines[1] == height_prior(HeightModelSettings(), FloorGeometry(57.0, 0.7), HEIGHT).model

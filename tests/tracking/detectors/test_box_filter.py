@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from tracking.detectors.background.box_filter import Band, BoxFilter, BoxFilterSettings, Peaks
-from tracking.detectors.background.foreground_fit import ExplainSettings, Search, explain
-from tracking.detectors.background.height_model import HeightLine
-from tracking.detectors.background.silhouette import BODIES, Body, corners_of
+from tracking.detectors.background.box_filter import BoxFilter, BoxFilterSettings, HeightRange, ScanPeaks
+from tracking.detectors.background.foreground_fit import ForegroundFitSettings, GreedySearch, fit_foreground
+from tracking.detectors.background.height_model import HeightModel
+from tracking.detectors.background.silhouette import BODY_PARTS, Body, part_rectangles
 
 ROWS, COLUMNS = 90, 120
 Plane = npt.NDArray[np.float32]
@@ -20,7 +20,7 @@ def body_of(box: npt.NDArray[np.float64], body: Body = "person") -> npt.NDArray[
     """Draw the body of a box, part by part."""
     inside = np.zeros((ROWS, COLUMNS), dtype=np.bool_)
     width, height = box[2] - box[0], box[3] - box[1]
-    for part in BODIES[body]:
+    for part in BODY_PARTS[body]:
         left, right = (max(round(box[0] + share * width), 0) for share in (part.left, part.right))
         top, bottom = (max(round(box[1] + share * height), 0) for share in (part.top, part.bottom))
         inside[top:bottom, left:right] = True
@@ -39,9 +39,9 @@ def scene(seed: int = 0) -> tuple[Plane, Plane, Plane]:
     return foreground * weight, cost, weight
 
 
-def found(body: Body = "person", band: Band | None = None) -> Peaks:
+def found(body: Body = "person", band: HeightRange | None = None) -> ScanPeaks:
     foreground, cost, weight = scene()
-    settings = BoxFilterSettings(body=body, least_height=0.3, most_height=0.6)
+    settings = BoxFilterSettings(body=body, min_height=0.3, max_height=0.6)
     return BoxFilter(weight, ROWS, settings).peaks(foreground - cost, band)
 
 
@@ -50,7 +50,7 @@ def test_gains_and_sizes_are_what_the_cells_add_up_to(body: Body) -> None:
     foreground, cost, weight = scene()
     peaks = found(body)
     assert len(peaks.boxes) > 3
-    for box, gain, size in zip(peaks.boxes, peaks.gains, peaks.sizes, strict=True):
+    for box, gain, size in zip(peaks.boxes, peaks.gains, peaks.areas, strict=True):
         inside = body_of(box, body)
         assert gain == pytest.approx((foreground - cost)[inside].sum(), abs=1e-3)
         assert size == pytest.approx(max(weight[inside].sum(), 1.0))
@@ -72,8 +72,8 @@ def test_moving_a_peak_by_a_cell_brings_next_to_nothing() -> None:
 
 
 def test_heights_off_the_line_are_not_found() -> None:
-    line = HeightLine(slope=0.55, offset=0.0)
-    peaks = found(band=Band(line, tolerance=0.15, doubt=1.0, least=0.08))
+    line = HeightModel(slope=0.55, offset=0.0)
+    peaks = found(band=HeightRange(line, tolerance=0.15, tolerance_std=1.0, min_height=0.08))
     heights, feet = peaks.boxes[:, 3] - peaks.boxes[:, 1], peaks.boxes[:, 3]
     assert len(heights) > 3
     assert (np.abs(heights - 0.55 * feet) <= np.maximum(0.15 * 0.55 * feet, 1.0)).all()
@@ -86,17 +86,17 @@ def test_small_people_are_sought_where_as_small_ones_were_seen() -> None:
     child = np.array([60.0, 30.0, 65.0, 42.0])
     gain[body_of(child)] = 1.0
     for smallest, sought in ((40.0, False), (11.0, True)):
-        line = HeightLine(0.3, 0.0, smallest=smallest)
-        one = BoxFilter(weight, ROWS, BoxFilterSettings(least_height=0.3))
-        boxes = one.peaks(gain, Band(line, 0.15, 1.0, least=0.08)).boxes
+        line = HeightModel(0.3, 0.0, min_height=smallest)
+        one = BoxFilter(weight, ROWS, BoxFilterSettings(min_height=0.3))
+        boxes = one.peaks(gain, HeightRange(line, 0.15, 1.0, min_height=0.08)).boxes
         assert (len(boxes) > 0) == sought
         assert not sought or np.abs(boxes[0] - child).max() <= 2.0
 
 
 def test_a_new_line_replaces_the_one_before() -> None:
     foreground, cost, weight = scene()
-    one = BoxFilter(weight, ROWS, BoxFilterSettings(least_height=0.3, most_height=0.6))
-    bands = [Band(HeightLine(slope, 0.0), 0.1, 1.0, 0.08) for slope in (0.5, 0.6)]
+    one = BoxFilter(weight, ROWS, BoxFilterSettings(min_height=0.3, max_height=0.6))
+    bands = [HeightRange(HeightModel(slope, 0.0), 0.1, 1.0, 0.08) for slope in (0.5, 0.6)]
     alternating = [one.peaks(foreground - cost, band).boxes for band in (*bands, None, bands[0])]
     np.testing.assert_array_equal(alternating[0], alternating[3])
     assert alternating[0].shape != alternating[1].shape or (alternating[0] != alternating[1]).any()
@@ -105,7 +105,7 @@ def test_a_new_line_replaces_the_one_before() -> None:
 def test_gains_beside_the_chosen_are_as_if_summed_anew() -> None:
     foreground, cost, weight = scene()
     peaks = found()
-    search = Search(peaks, foreground, cost, weight, ExplainSettings())
+    search = GreedySearch(peaks, foreground, cost, weight, ForegroundFitSettings())
     chosen: set[int] = set()
     rng = np.random.default_rng(1)
     for index in rng.integers(0, min(len(peaks.boxes), 12), 40).tolist():
@@ -123,7 +123,7 @@ def test_gains_beside_the_chosen_are_as_if_summed_anew() -> None:
 
 def test_a_small_set_explains_the_foreground_and_the_rest_scores_low() -> None:
     foreground, cost, weight = scene()
-    explained = explain(found(), foreground, cost, weight, ExplainSettings())
+    explained = fit_foreground(found(), foreground, cost, weight, ForegroundFitSettings())
     assert explained.people == 3
     assert (explained.scores[:3] > 0.6).all()
     assert (explained.scores[3:] < 0.4).all()
@@ -140,23 +140,25 @@ def test_a_crowd_is_explained_by_as_many_as_there_are() -> None:
     for box in crowd:
         foreground[body_of(np.array(box))] = 1.0
     cost = (0.35 * (1.0 - foreground)).astype(np.float32)
-    peaks = BoxFilter(weight, ROWS, BoxFilterSettings(least_height=0.3, most_height=0.4)).peaks(
+    peaks = BoxFilter(weight, ROWS, BoxFilterSettings(min_height=0.3, max_height=0.4)).peaks(
         foreground - cost, None
     )
-    settings = ExplainSettings()
-    explained = explain(peaks, foreground, cost, weight, settings)
-    assert explained.people == len(crowd) > settings.most_hypotheses
-    assert explained.people < len(explained.boxes) <= len(crowd) + settings.runners_up
-    assert explain(peaks, foreground, cost, weight, ExplainSettings(most_people=7)).people == 7
+    settings = ForegroundFitSettings()
+    explained = fit_foreground(peaks, foreground, cost, weight, settings)
+    assert explained.people == len(crowd) > settings.max_hypotheses
+    assert explained.people < len(explained.boxes) <= len(crowd) + settings.max_alternatives
+    assert fit_foreground(peaks, foreground, cost, weight, ForegroundFitSettings(max_people=7)).people == 7
 
 
 def test_without_explanation_boxes_score_by_themselves() -> None:
     foreground, cost, weight = scene()
     peaks = found()
-    explained = explain(peaks, foreground, cost, weight, ExplainSettings(use=False, most_hypotheses=5))
+    explained = fit_foreground(
+        peaks, foreground, cost, weight, ForegroundFitSettings(enabled=False, max_hypotheses=5)
+    )
     assert len(explained.boxes) == 5 == explained.people
     np.testing.assert_array_equal(explained.boxes[0], peaks.boxes[0])
-    assert explained.scores[0] == pytest.approx(peaks.gains[0] / peaks.sizes[0])
+    assert explained.scores[0] == pytest.approx(peaks.gains[0] / peaks.areas[0])
 
 
 def test_nothing_is_found_in_nothing() -> None:
@@ -164,11 +166,11 @@ def test_nothing_is_found_in_nothing() -> None:
     nothing, cost = np.zeros_like(weight), 0.35 * weight
     peaks = BoxFilter(weight, ROWS, BoxFilterSettings()).peaks(nothing - cost, None)
     assert len(peaks.boxes) == 0
-    assert len(explain(peaks, nothing, cost, weight, ExplainSettings()).boxes) == 0
+    assert len(fit_foreground(peaks, nothing, cost, weight, ForegroundFitSettings()).boxes) == 0
 
 
 def test_bodies_are_cut_at_the_borders() -> None:
     boxes = np.array([[-10.0, -10.0, 10.0, 40.0], [110.0, 60.0, 130.0, 120.0]])
-    corners = corners_of(boxes, BODIES["box"], (ROWS, COLUMNS))
+    corners = part_rectangles(boxes, BODY_PARTS["box"], (ROWS, COLUMNS))
     sums = np.arange(ROWS + 1)[:, None] * np.arange(COLUMNS + 1.0)[None]  # the integral of a plane of ones
     np.testing.assert_allclose(corners.sums(sums), [10 * 40, 10 * 30])

@@ -10,11 +10,11 @@ import pytest
 
 from synthetic import Scene
 from tracking.boxes import iou
-from tracking.detectors import HogDetector, HogSettings, Looks, LooksSettings
-from tracking.detectors.non_maximum_suppression import best_apart
+from tracking.detectors import AppearanceExtractor, AppearanceSettings, HogDetector, HogSettings
+from tracking.detectors.non_maximum_suppression import non_maximum_suppression
 from tracking.types import Detections
 
-SETTINGS = HogSettings(least_height=0.25)
+SETTINGS = HogSettings(min_height=0.25)
 WHERE_SOMEBODY_IS = 110
 
 
@@ -40,11 +40,11 @@ def test_scores_are_in_order_and_nobody_is_found_twice() -> None:
     assert (np.diff(seen.scores) <= 0.0).all()
     assert ((seen.scores >= 0.5) & (seen.scores <= 1.0)).all()
     overlaps = iou(seen.boxes[:, None], seen.boxes[None])
-    assert (overlaps[~np.eye(len(seen), dtype=np.bool_)] <= SETTINGS.apart).all()
+    assert (overlaps[~np.eye(len(seen), dtype=np.bool_)] <= SETTINGS.nms_iou).all()
 
 
 def test_looks_are_those_asked_for() -> None:
-    detector = HogDetector(SETTINGS, Looks(LooksSettings(colour=False), 32))
+    detector = HogDetector(SETTINGS, AppearanceExtractor(AppearanceSettings(color=False), 32))
     seen = detector.detect(room()[0])
     assert detector.bins == 32 == seen.histograms.shape[1]
     np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
@@ -63,14 +63,14 @@ def test_of_equal_boxes_the_first_by_place_is_kept_whatever_their_order() -> Non
     boxes = np.array([[10.0, 0, 20, 30], [11.0, 0, 21, 30], [50.0, 0, 60, 30], [9.0, 0, 19, 30]])
     scores = np.array([0.5, 0.5, 0.9, 0.5])
     for order in ([0, 1, 2, 3], [3, 2, 1, 0], [1, 3, 0, 2]):
-        kept = best_apart(boxes[order], scores[order], 0.5, 10)
+        kept = non_maximum_suppression(boxes[order], scores[order], 0.5, 10)
         np.testing.assert_array_equal(boxes[order][kept], [[50, 0, 60, 30], [9, 0, 19, 30]])
-    assert len(best_apart(boxes, scores, 0.5, 1)) == 1
-    assert len(best_apart(boxes[:0], scores[:0], 0.5, 1)) == 0
+    assert len(non_maximum_suppression(boxes, scores, 0.5, 1)) == 1
+    assert len(non_maximum_suppression(boxes[:0], scores[:0], 0.5, 1)) == 0
 
 
 def test_settings_that_make_no_sense_are_refused() -> None:
-    with pytest.raises(ValueError, match="least_height"):
-        HogSettings(least_height=0.0)
+    with pytest.raises(ValueError, match="min_height"):
+        HogSettings(min_height=0.0)
     with pytest.raises(ValueError, match="step"):
-        HogSettings(step=1.0)
+        HogSettings(scale_step=1.0)

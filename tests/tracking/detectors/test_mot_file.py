@@ -28,7 +28,7 @@ def file(tmp_path: Path) -> Path:
 def test_frames_come_in_order_and_those_without_a_row_are_empty(file: Path) -> None:
     detector = MotFileDetector(file)
     assert [len(detector.detect(NOTHING)) for _ in range(4)] == [2, 0, 1, 0]
-    assert detector.last == 2
+    assert detector.last_frame == 2
 
 
 def test_a_frame_can_be_asked_for_by_number(file: Path) -> None:
@@ -42,9 +42,9 @@ def test_confidences_are_stretched_to_scores_best_first_and_doubles_go(file: Pat
     seen = MotFileDetector(file).detect(NOTHING)
     np.testing.assert_allclose(seen.scores, [1.0, 0.0])
     np.testing.assert_array_equal(seen.boxes[:, 0], [10, 200])
-    both = MotFileDetector(file, MotFileSettings(apart=0.99)).detect(NOTHING)
+    both = MotFileDetector(file, MotFileSettings(nms_iou=0.99)).detect(NOTHING)
     np.testing.assert_allclose(both.scores, [1.0, 5 / 6, 0.0])
-    assert len(MotFileDetector(file, MotFileSettings(least_score=0.5)).detect(NOTHING)) == 1
+    assert len(MotFileDetector(file, MotFileSettings(min_score=0.5)).detect(NOTHING)) == 1
 
 
 def test_one_confidence_far_above_all_others_does_not_make_them_doubtful(tmp_path: Path) -> None:

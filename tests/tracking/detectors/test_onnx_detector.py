@@ -11,7 +11,7 @@ import pytest
 
 from fakes.tracking.tiny_networks import save, yolov5, yolov8
 from tracking.detectors import OnnxDetector, OnnxSettings
-from tracking.detectors.neural.yolo_output import decoded
+from tracking.detectors.neural.yolo_output import decode_output
 
 # The picture is twice as large as the input and has its proportions: no bars.
 WHITE = np.full((128, 192, 3), 255, dtype=np.uint8)
@@ -48,13 +48,13 @@ def test_the_classes_asked_for_are_found(tmp_path: Path) -> None:
 
 
 def test_weak_boxes_are_left_out(tmp_path: Path) -> None:
-    assert len(detector(save(tmp_path / "tiny.onnx", V8), least_score=0.8).detect(WHITE)) == 0
+    assert len(detector(save(tmp_path / "tiny.onnx", V8), min_score=0.8).detect(WHITE)) == 0
 
 
 def test_boxes_are_moved_back_from_between_the_bars(tmp_path: Path) -> None:
     path = save(tmp_path / "tiny.onnx", V8, size=(96, 96))
     wide = np.full((64, 192, 3), 255, dtype=np.uint8)  # half its size in the input, 32 rows of bar above
-    seen = detector(path, least_score=0.1).detect(wide)
+    seen = detector(path, min_score=0.1).detect(wide)
     # The bars are 114 of 255 bright, and so sure is this network.
     np.testing.assert_allclose(seen.scores, [0.72 * 114 / 255], rtol=1e-3)
     np.testing.assert_allclose(seen.boxes, [[48, 0, 72, 40]], atol=1e-4)
@@ -63,7 +63,7 @@ def test_boxes_are_moved_back_from_between_the_bars(tmp_path: Path) -> None:
 def test_a_file_that_leaves_its_size_open_gets_the_one_set(tmp_path: Path) -> None:
     path = save(tmp_path / "tiny.onnx", V8, size=("height", "width"))
     square = np.full((200, 200, 3), 255, dtype=np.uint8)
-    seen = detector(path, size=100).detect(square)
+    seen = detector(path, input_size=100).detect(square)
     np.testing.assert_allclose(seen.boxes, [BOX], atol=1e-4)
 
 
@@ -98,8 +98,8 @@ def test_without_onnxruntime_the_extra_is_named(tmp_path: Path, monkeypatch: pyt
 
 def test_a_layout_that_is_named_goes_before_the_shape() -> None:
     one_class = yolov5([(*MIDDLE, 0.9, 0.8)], boxes=300)
-    found = decoded(one_class, "yolov5", (0,))
+    found = decode_output(one_class, "yolov5", (0,))
     np.testing.assert_allclose(found.boxes[0], [24, 12, 36, 52])
     np.testing.assert_allclose(found.scores[0], 0.72)
-    by_shape = decoded(one_class, "auto", (0,))
+    by_shape = decode_output(one_class, "auto", (0,))
     np.testing.assert_allclose(by_shape.boxes[0], MIDDLE, err_msg="by its shape it is end to end")

@@ -10,7 +10,7 @@ import pytest
 from tracking.appearance import appearance_distance
 from tracking.boxes import iou
 from tracking.detectors import SubimageSettings, TemplateDetector, TemplateSettings
-from tracking.detectors.subimage_appearance import subimages
+from tracking.detectors.subimage_appearance import subimage_histograms
 
 Picture = npt.NDArray[np.uint8]
 TOY = (120, 90, 32, 40)  # left, top, width, height
@@ -50,25 +50,25 @@ def test_a_change_of_light_does_not_hide_it() -> None:
 
 def test_there_are_as_many_peaks_as_are_asked_for_and_no_two_at_one_place() -> None:
     image = clutter()
-    seen = TemplateDetector(cut(image), TemplateSettings(most_peaks=80)).detect(image)
+    seen = TemplateDetector(cut(image), TemplateSettings(max_peaks=80)).detect(image)
     assert len(seen) == 80
     apart = np.abs(seen.boxes[:, None, :2] - seen.boxes[None, :, :2])
     near = (apart[..., 0] <= 2) & (apart[..., 1] <= 2)
     assert near.sum() == 80, "only every peak with itself"
-    assert len(TemplateDetector(cut(image), TemplateSettings(most_peaks=7)).detect(image)) == 7
+    assert len(TemplateDetector(cut(image), TemplateSettings(max_peaks=7)).detect(image)) == 7
 
 
 def test_least_score_leaves_out_weak_peaks() -> None:
     image = clutter()
-    seen = TemplateDetector(cut(image), TemplateSettings(least_score=0.5)).detect(image)
+    seen = TemplateDetector(cut(image), TemplateSettings(min_score=0.5)).detect(image)
     assert 1 <= len(seen) < 80
     assert (seen.scores >= 0.5).all()
 
 
-@pytest.mark.parametrize("looks", ["subimage", "grey", "colour"])
+@pytest.mark.parametrize("looks", ["subimage", "gray", "color"])
 def test_the_object_looks_most_like_its_template(looks: str) -> None:
     image = clutter()
-    detector = TemplateDetector(cut(image), TemplateSettings(looks=looks))  # type: ignore[arg-type]
+    detector = TemplateDetector(cut(image), TemplateSettings(appearance=looks))  # type: ignore[arg-type]
     seen = detector.detect(moved(image, 5, 5))
     assert seen.histograms.shape[1] == detector.bins
     np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
@@ -80,15 +80,15 @@ def test_the_object_looks_most_like_its_template(looks: str) -> None:
 def test_the_intersection_of_sub_images_is_their_mean_absolute_difference() -> None:
     image, settings = clutter(), SubimageSettings(columns=32, rows=40)
     boxes = np.array([[120.0, 90, 152, 130], [10, 20, 42, 60]])
-    rows = subimages(image, boxes, settings)
+    rows = subimage_histograms(image, boxes, settings)
     first, second = (cut(image, box).astype(np.float64) / 255.0 for box in (TOY, (10, 20, 32, 40)))
     distance = appearance_distance(rows[:1], rows[1:], "intersection")[0, 0]
     assert distance == pytest.approx(np.abs(first - second).mean())
 
 
 def test_a_box_outside_the_picture_looks_like_nothing_in_particular() -> None:
-    (row,) = subimages(clutter(), np.array([[400.0, 0, 420, 20]]), SubimageSettings(colour=False))
-    assert len(row) == SubimageSettings(colour=False).row == 288
+    (row,) = subimage_histograms(clutter(), np.array([[400.0, 0, 420, 20]]), SubimageSettings(color=False))
+    assert len(row) == SubimageSettings(color=False).length == 288
     assert np.ptp(row) == 0.0
 
 
@@ -113,5 +113,5 @@ def test_what_cannot_be_searched_for_is_refused() -> None:
         TemplateDetector(image[:200]).detect(image[:100])
     with pytest.raises(ValueError, match="uint8"):
         TemplateDetector(image[..., 0])
-    with pytest.raises(ValueError, match="most_peaks"):
-        TemplateSettings(most_peaks=0)
+    with pytest.raises(ValueError, match="max_peaks"):
+        TemplateSettings(max_peaks=0)

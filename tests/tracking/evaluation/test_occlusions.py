@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tracking.evaluation import Occlusion, occlusions, survived
+from tracking.evaluation import Occlusion, find_occlusions, identities_kept
 from tracking.motchallenge import MotRow
 
 
@@ -16,12 +16,12 @@ HIDDEN = seen(1, range(1, 11)) + seen(1, range(11, 16), 0.2) + seen(1, range(16,
 
 
 def test_who_shows_less_than_a_quarter_between_two_sights_is_hidden() -> None:
-    assert occlusions(HIDDEN, around=10) == [Occlusion(1, 11, 15)]
+    assert find_occlusions(HIDDEN, around=10) == [Occlusion(1, 11, 15)]
 
 
 def test_who_never_comes_back_or_was_never_there_is_no_occlusion() -> None:
-    assert occlusions([row for row in HIDDEN if row.frame < 16], around=10) == []
-    assert occlusions([row for row in HIDDEN if row.frame > 10], around=10) == []
+    assert find_occlusions([row for row in HIDDEN if row.frame < 16], around=10) == []
+    assert find_occlusions([row for row in HIDDEN if row.frame > 10], around=10) == []
 
 
 def test_a_glimpse_of_two_frames_does_not_end_an_occlusion() -> None:
@@ -31,24 +31,24 @@ def test_a_glimpse_of_two_frames_does_not_end_an_occlusion() -> None:
         else row
         for row in HIDDEN
     ]
-    assert occlusions(rows, around=10) == [Occlusion(1, 11, 15)]
+    assert find_occlusions(rows, around=10) == [Occlusion(1, 11, 15)]
 
 
 def test_without_shares_whoever_ends_lower_hides_the_other() -> None:
     passer_by = [MotRow(frame, 2, 10.0 * frame, 55.0, 20.0, 60.0) for frame in range(1, 25)]
-    found = occlusions(seen(1, range(1, 25), -1.0) + passer_by, around=10)
+    found = find_occlusions(seen(1, range(1, 25), -1.0) + passer_by, around=10)
     # The box at 10 f covers more than half of the 20 pixels from 100 on at f = 10 alone.
     assert found == [Occlusion(1, 10, 10)]
 
 
 def test_an_annotators_word_counts_beside_the_boxes() -> None:
     rows = seen(1, range(1, 11)) + seen(1, range(11, 16), 0.0) + seen(1, range(16, 30))
-    assert occlusions(rows, around=10) == [Occlusion(1, 11, 15)]
+    assert find_occlusions(rows, around=10) == [Occlusion(1, 11, 15)]
 
 
 def test_truth_that_does_not_count_hides_nobody() -> None:
     ghost = [MotRow(frame, 2, 100.0, 55.0, 20.0, 60.0, confidence=0.0) for frame in range(8, 12)]
-    assert occlusions(seen(1, range(1, 25), -1.0) + ghost, around=10) == []
+    assert find_occlusions(seen(1, range(1, 25), -1.0) + ghost, around=10) == []
 
 
 @pytest.mark.parametrize(
@@ -60,10 +60,10 @@ def test_a_number_is_kept_when_it_is_the_same_on_both_sides(
 ) -> None:
     tracks = [] if before is None else seen(before, range(3, 11))
     tracks += [] if after is None else seen(after, range(18, 30))
-    found = occlusions(HIDDEN, around=10)
-    assert survived(found, HIDDEN, tracks, around=10) == [kept]
+    found = find_occlusions(HIDDEN, around=10)
+    assert identities_kept(found, HIDDEN, tracks, around=10) == [kept]
 
 
 def test_a_number_that_is_found_again_late_but_mostly_counts() -> None:
     tracks = seen(7, range(1, 11)) + seen(8, range(16, 18)) + seen(7, range(18, 30))
-    assert survived(occlusions(HIDDEN, around=10), HIDDEN, tracks, around=10) == [True]
+    assert identities_kept(find_occlusions(HIDDEN, around=10), HIDDEN, tracks, around=10) == [True]

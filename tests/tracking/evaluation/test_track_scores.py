@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tracking.evaluation import Recording, Scores, evaluate, evaluate_cameras, perfect_association
+from tracking.evaluation import Scores, TruthAndTracks, evaluate, evaluate_cameras, oracle_association
 from tracking.motchallenge import MotRow, read_rows
 
 NEAR, FAR = 0.0, 500.0
@@ -101,8 +101,8 @@ def test_detections_are_not_taken_for_tracks() -> None:
 def test_other_numbers_in_another_camera_are_wrong_only_jointly() -> None:
     there = stay(1, NEAR, 1, 2, 3, 4)
     cameras = {
-        "c0": Recording(there, stay(10, NEAR, 1, 2, 3, 4)),
-        "c1": Recording(there, stay(20, NEAR, 1, 2, 3, 4)),
+        "c0": TruthAndTracks(there, stay(10, NEAR, 1, 2, 3, 4)),
+        "c1": TruthAndTracks(there, stay(20, NEAR, 1, 2, 3, 4)),
     }
     scores = evaluate_cameras(cameras)
     assert [it.idf1 for it in scores.cameras.values()] == [1.0, 1.0]
@@ -111,30 +111,30 @@ def test_other_numbers_in_another_camera_are_wrong_only_jointly() -> None:
 
 
 def test_the_same_number_in_every_camera_is_right_jointly() -> None:
-    cameras = {name: Recording(TWO_PEOPLE, TWO_PEOPLE) for name in ("c0", "c1", "c2")}
+    cameras = {name: TruthAndTracks(TWO_PEOPLE, TWO_PEOPLE) for name in ("c0", "c1", "c2")}
     assert evaluate_cameras(cameras).joint == Scores(1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 2, 2)
 
 
 def test_shares_are_averaged_over_cameras_and_counts_added_up() -> None:
-    cameras = {"c0": Recording(TWO_PEOPLE, TWO_PEOPLE), "c1": Recording(TWO_PEOPLE, [])}
+    cameras = {"c0": TruthAndTracks(TWO_PEOPLE, TWO_PEOPLE), "c1": TruthAndTracks(TWO_PEOPLE, [])}
     mean = evaluate_cameras(cameras).mean
     assert (mean.idf1, mean.recall, mean.misses, mean.objects) == (0.5, 0.5, 8, 4)
 
 
 def test_a_camera_with_an_id_twice_is_named() -> None:
     with pytest.raises(ValueError, match=r"^c1: tracks: frame 1 has id 5 twice"):
-        evaluate_cameras({"c1": Recording(TWO_PEOPLE, stay(5, NEAR, 1) * 2)})
+        evaluate_cameras({"c1": TruthAndTracks(TWO_PEOPLE, stay(5, NEAR, 1) * 2)})
 
 
 def test_perfect_association_has_no_switches_and_nothing_false() -> None:
     detections = [replace(row, id=-1) for row in TWO_PEOPLE[:-1] + stay(0, 250.0, 1, 2)]
-    scores = evaluate(TWO_PEOPLE, perfect_association(detections, TWO_PEOPLE))
+    scores = evaluate(TWO_PEOPLE, oracle_association(detections, TWO_PEOPLE))
     assert (scores.switches, scores.false_positives, scores.misses) == (0, 0, 1)
 
 
 def test_perfect_association_of_public_detections(shared_data: Path) -> None:
     folder = shared_data / "mot15" / "TUD-Campus"
     truth = read_rows(folder / "gt.txt")
-    scores = evaluate(truth, perfect_association(read_rows(folder / "det.txt"), truth))
+    scores = evaluate(truth, oracle_association(read_rows(folder / "det.txt"), truth))
     shares = [round(100 * share, 1) for share in (scores.hota, scores.mota, scores.idf1)]
     assert (shares, scores.switches) == ([56.4, 73.5, 84.8], 0)

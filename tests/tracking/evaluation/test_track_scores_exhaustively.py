@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tracking.evaluation import evaluate
-from tracking.evaluation.frames import Frame, line_up
+from tracking.evaluation.frame_matching import FrameSimilarity, align_frames
 from tracking.motchallenge import MotRow
 
 CASES = 60
@@ -28,7 +28,7 @@ def random_rows(rng: np.random.Generator, objects: int) -> list[MotRow]:
     ]
 
 
-def matchings(frame: Frame) -> Iterator[Pairs]:
+def matchings(frame: FrameSimilarity) -> Iterator[Pairs]:
     """Give all ways to match as many as there are."""
     people, tracks = frame.similarity.shape
     if people <= tracks:
@@ -39,11 +39,11 @@ def matchings(frame: Frame) -> Iterator[Pairs]:
             yield list(zip(rows, range(tracks), strict=True))
 
 
-def ids(frame: Frame, pairs: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+def ids(frame: FrameSimilarity, pairs: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
     return [(int(frame.truth[row]), int(frame.tracks[column])) for row, column in pairs]
 
 
-def boxes_of(frames: list[Frame]) -> tuple[dict[int, int], dict[int, int]]:
+def boxes_of(frames: list[FrameSimilarity]) -> tuple[dict[int, int], dict[int, int]]:
     """Count each person's and each track's boxes."""
     people: dict[int, int] = {}
     tracks: dict[int, int] = {}
@@ -55,7 +55,7 @@ def boxes_of(frames: list[Frame]) -> tuple[dict[int, int], dict[int, int]]:
     return people, tracks
 
 
-def clear(frames: list[Frame]) -> tuple[int, int]:
+def clear(frames: list[FrameSimilarity]) -> tuple[int, int]:
     """Give matches and switches: pairs stay where they can, then the overlap is largest."""
     matches = switches = 0
     before: dict[int, int] = {}
@@ -78,7 +78,7 @@ def clear(frames: list[Frame]) -> tuple[int, int]:
     return matches, switches
 
 
-def identity_f1(frames: list[Frame]) -> float:
+def identity_f1(frames: list[FrameSimilarity]) -> float:
     """Give IDF1: the best way to say which track stands for which person."""
     people, tracks = boxes_of(frames)
     together = {
@@ -99,7 +99,7 @@ def identity_f1(frames: list[Frame]) -> float:
     return float(2 * best / (sum(people.values()) + sum(tracks.values())))
 
 
-def hota(frames: list[Frame]) -> float:
+def hota(frames: list[FrameSimilarity]) -> float:
     """Give HOTA as its paper defines it: matched for the best alignment over the whole recording."""
     people, tracks = boxes_of(frames)
     shared = dict.fromkeys(((person, track) for person in people for track in tracks), 0.0)
@@ -124,7 +124,11 @@ def hota(frames: list[Frame]) -> float:
 
 
 def _hota_at(
-    alpha: float, frames: list[Frame], chosen: list[Pairs], people: dict[int, int], tracks: dict[int, int]
+    alpha: float,
+    frames: list[FrameSimilarity],
+    chosen: list[Pairs],
+    people: dict[int, int],
+    tracks: dict[int, int],
 ) -> float:
     found = [
         pair
@@ -143,7 +147,7 @@ def _hota_at(
 def test_the_scores_are_those_of_trying_everything(seed: int) -> None:
     rng = np.random.default_rng(seed)
     truth, tracks = random_rows(rng, 3), random_rows(rng, int(rng.integers(1, 5)))
-    frames = line_up(truth, tracks, LEAST)
+    frames = align_frames(truth, tracks, LEAST)
     scores = evaluate(truth, tracks)
     matches, switches = clear(frames)
     assert (scores.misses, scores.false_positives) == (len(truth) - matches, len(tracks) - matches)

@@ -10,24 +10,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.tracking.random_networks import SETTINGS, Case, cases, network_of
-from tracking.interactive import AssistSettings, Pointing
-from tracking.interactive.corrections import farness, with_pointings
+from tracking.interactive import InteractiveSettings, PositionCorrection
+from tracking.interactive.corrections import apply_corrections, normalized_offset
 from tracking.solvers.base import create_solver
 
-ASSIST = AssistSettings(enabled=True)
+ASSIST = InteractiveSettings(enabled=True)
 
 
 def test_the_middle_of_a_box_is_not_far_and_nothing_is_farther_than_twice_the_reach() -> None:
     boxes = np.array(
         [[0.0, 0.0, 20.0, 40.0], [20.0, 0.0, 40.0, 40.0], [40.0, 0.0, 60.0, 40.0], [400.0, 0, 420, 40]]
     )
-    np.testing.assert_allclose(farness(Pointing(0, 1, 10.0, 20.0, 20.0), boxes), [0.0, 0.25, 1.0, 1.0])
+    np.testing.assert_allclose(
+        normalized_offset(PositionCorrection(0, 1, 10.0, 20.0, 20.0), boxes), [0.0, 0.25, 1.0, 1.0]
+    )
 
 
 @pytest.mark.parametrize("wrong", [(np.nan, 0.0, 1.0), (0.0, np.inf, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)])
 def test_a_pointing_without_a_place_or_a_reach_is_refused(wrong: tuple[float, float, float]) -> None:
-    with pytest.raises(ValueError, match="a place and a positive reach"):
-        Pointing(0, 1, *wrong)
+    with pytest.raises(ValueError, match="finite coordinates and a positive tolerance"):
+        PositionCorrection(0, 1, *wrong)
 
 
 @given(cases(objects=3, frames=4, places=4), st.integers(0, 3), st.floats(-20, 140), st.floats(-20, 140))
@@ -36,15 +38,15 @@ def test_only_the_nodes_of_who_is_pointed_at_cost_more_in_that_frame_and_by_the_
     case: Case, frame: int, x: float, y: float
 ) -> None:
     network = network_of(replace(case, shared=True))
-    pointing = Pointing(100 + frame, 7, x, y, 25.0)
+    pointing = PositionCorrection(100 + frame, 7, x, y, 25.0)
     ids = [7, *range(10, 9 + network.objects)]
-    changed = with_pointings(network, 100, ids, {pointing.frame: {7: pointing}}, ASSIST, 1.5)
+    changed = apply_corrections(network, 100, ids, {pointing.frame: {7: pointing}}, ASSIST, 1.5)
     if frame >= network.frames:
         assert changed is network
         return
     more = network.node.copy()
-    more[0, frame, :-1] += ASSIST.weight * farness(pointing, network.boxes[0, frame])
-    more[0, frame, -1] += ASSIST.weight * ASSIST.hidden
+    more[0, frame, :-1] += ASSIST.correction_weight * normalized_offset(pointing, network.boxes[0, frame])
+    more[0, frame, -1] += ASSIST.correction_weight * ASSIST.hidden_share
     np.testing.assert_array_equal(changed.node, more)
     for before, after in ((network.source, changed.source), (network.pair, changed.pair)):
         assert ((before == after) | (np.isinf(before) & (after == 1.5))).all()
@@ -59,7 +61,7 @@ def test_a_pointing_exchanges_two_who_could_be_either() -> None:
     assert all(len(it) == 2 for it in places)
     for owner in (0, 1):
         left, top, right, bottom = network.boxes[0, 2, 0].tolist()
-        said = Pointing(2, owner, (left + right) / 2.0, (top + bottom) / 2.0, 1.0)
-        pointed = with_pointings(even, 0, [0, 1], {2: {owner: said}}, ASSIST, 1.0)
+        said = PositionCorrection(2, owner, (left + right) / 2.0, (top + bottom) / 2.0, 1.0)
+        pointed = apply_corrections(even, 0, [0, 1], {2: {owner: said}}, ASSIST, 1.0)
         states = create_solver("exact").solve(pointed).states
         assert states[owner, 2] == 0

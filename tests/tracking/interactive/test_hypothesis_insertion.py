@@ -7,8 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from fakes.tracking.random_networks import SETTINGS, Case, network_of
-from tracking.interactive import Pointing
-from tracking.interactive.hypothesis_insertion import is_found, place_of, with_place, with_places
+from tracking.interactive import PositionCorrection
+from tracking.interactive.hypothesis_insertion import (
+    apply_insertions,
+    box_around,
+    has_hypothesis,
+    insert_hypothesis,
+)
 from tracking.solvers.base import OCCLUDED, create_solver
 from tracking.types import Detections
 
@@ -16,21 +21,21 @@ SIZE = np.array([20.0, 40.0])
 
 
 def test_a_place_has_the_size_of_who_is_pointed_at_around_the_point() -> None:
-    box = place_of(Pointing(0, 1, 100.0, 50.0, 8.0), SIZE)
+    box = box_around(PositionCorrection(0, 1, 100.0, 50.0, 8.0), SIZE)
     np.testing.assert_allclose(box, [90.0, 30.0, 110.0, 70.0])
 
 
 def test_found_is_who_has_a_box_of_their_size_near_the_point_and_not_who_is_one_with_somebody() -> None:
-    pointing = Pointing(0, 1, 100.0, 50.0, 8.0)
+    pointing = PositionCorrection(0, 1, 100.0, 50.0, 8.0)
     own, both, far = [92.0, 30.0, 112.0, 70.0], [85.0, 30.0, 125.0, 70.0], [150.0, 30.0, 170.0, 70.0]
-    assert is_found(pointing, SIZE, np.array([far, own]))
-    assert not is_found(pointing, SIZE, np.array([far, both]))
-    assert not is_found(pointing, SIZE, np.empty((0, 4)))
+    assert has_hypothesis(pointing, SIZE, np.array([far, own]))
+    assert not has_hypothesis(pointing, SIZE, np.array([far, both]))
+    assert not has_hypothesis(pointing, SIZE, np.empty((0, 4)))
 
 
 def test_what_is_added_comes_last_and_nobody_new_can_begin_with_it() -> None:
     seen = Detections(np.array([[0.0, 0, 9, 9]]), np.array([0.9]), np.array([[0.5, 0.5]]))
-    more = with_place(seen, np.array([1.0, 2, 3, 4]), np.array([1.0, 0.0]))
+    more = insert_hypothesis(seen, np.array([1.0, 2, 3, 4]), np.array([1.0, 0.0]))
     assert more.boxes.tolist() == [[0.0, 0, 9, 9], [1.0, 2, 3, 4]]
     assert more.scores.tolist() == [0.9, 0.0]
     assert more.histograms.tolist() == [[0.5, 0.5], [1.0, 0.0]]
@@ -44,10 +49,10 @@ def test_a_place_that_was_made_for_one_is_none_for_others_and_in_nobodys_way() -
     conflicts = network.conflicts.copy()
     conflicts[1] = True
     network = replace(network, conflicts=conflicts)
-    made = with_places(network, 10, [7, 8], {11: {8: 1}}, change=0.3)
+    made = apply_insertions(network, 10, [7, 8], {11: {8: 1}}, change=0.3)
     assert np.isinf(made.node[0, 1, 1])
     np.testing.assert_array_equal(made.node[1], network.node[1])
     assert made.conflicts[1].tolist() == [[True, False], [False, True]]
     states = create_solver("exact").solve(made).states
     assert states[0, 1] in {0, OCCLUDED}
-    assert with_places(network, 10, [7, 8], {20: {8: 1}}, change=0.3) is network
+    assert apply_insertions(network, 10, [7, 8], {20: {8: 1}}, change=0.3) is network

@@ -10,18 +10,18 @@ import pytest
 
 from fakes.tracking.strolls import TEST_COSTS, WIDTH, Stroll, final_boxes, follow, seen_at
 from tracking import Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
-from tracking.baselines import tracker_named
 from tracking.boxes import iou
-from tracking.interactive import AssistedTracker, AssistSettings, Pointing
-from tracking.interactive.late_correction import carried
+from tracking.interactive import InteractiveSettings, InteractiveTracker, PositionCorrection
+from tracking.interactive.late_correction import backdate_correction
+from tracking.registry import create_tracker
 
 ALIKE = [Stroll(0, 50, 4.0, 1), Stroll(300, 50, -4.0, 1)]
 """Two who look alike and cross in frame 37; nothing tells who is who after it but how they went."""
 
 
-def _helped(memory: int = 250) -> AssistedTracker:
-    assist = AssistSettings(enabled=True, memory=memory)
-    return AssistedTracker(WindowSettings(), TEST_COSTS, create_solver("columns"), assist)
+def _helped(memory: int = 250) -> InteractiveTracker:
+    assist = InteractiveSettings(enabled=True, memory_frames=memory)
+    return InteractiveTracker(WindowSettings(), TEST_COSTS, create_solver("columns"), assist)
 
 
 def _plain() -> OnlineTracker:
@@ -37,9 +37,9 @@ def _crossing(people: Sequence[Stroll] = ALIKE, frames: int = 80) -> list[Detect
     return stream
 
 
-def _at(person: Stroll, frame: int, number: int) -> Pointing:
+def _at(person: Stroll, frame: int, number: int) -> PositionCorrection:
     left, top, right, bottom = person.box(frame)
-    return Pointing(frame, number, (left + right) / 2, (top + bottom) / 2, WIDTH / 2)
+    return PositionCorrection(frame, number, (left + right) / 2, (top + bottom) / 2, WIDTH / 2)
 
 
 def _boxes(result: WindowResult, number: int) -> np.ndarray:
@@ -67,14 +67,17 @@ def test_without_a_pointing_its_tracks_are_those_of_the_plain_tracker() -> None:
     helped = follow(stream, _helped())
     assert _shown(helped) == _shown(follow(stream, _plain()))
     assert all(it.revised_from is None for it in helped)
-    assert not any(it.troubles for it in follow(stream, _plain()))
+    assert not any(it.risk_events for it in follow(stream, _plain()))
 
 
 def test_two_alike_who_are_about_to_cross_are_foreseen_and_two_others_are_not() -> None:
     def foreseen(people: Sequence[Stroll]) -> list[tuple[int, int]]:
         results = follow(_crossing(people), _helped())
         return [
-            (it.last, trouble.frame) for it in results for trouble in it.troubles if trouble.reason == "alike"
+            (it.last, trouble.frame)
+            for it in results
+            for trouble in it.risk_events
+            if trouble.reason == "alike"
         ]
 
     warned = foreseen(ALIKE)
@@ -88,7 +91,7 @@ def test_two_alike_who_are_about_to_cross_are_foreseen_and_two_others_are_not() 
 def test_who_vanishes_with_nobody_near_is_foreseen_to_be_lost() -> None:
     gone = Stroll(200, 50, 1.0, 2, seen=range(40))
     results = follow([seen_at([ALIKE[0], gone], n, 0.5) for n in range(60)], _helped())
-    fading = [trouble for it in results for trouble in it.troubles if trouble.reason == "fading"]
+    fading = [trouble for it in results for trouble in it.risk_events if trouble.reason == "fading"]
     assert fading
     assert {trouble.objects for trouble in fading} == {(2,)}
     assert all(40 <= trouble.frame < 60 for trouble in fading)
@@ -102,7 +105,7 @@ def test_a_pointing_mends_the_past_back_to_where_the_two_met(frames: range) -> N
     tracked = _helped()
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
-    mended = tracked.point([_at(ALIKE[1], n, 1) for n in frames])
+    mended = tracked.apply_corrections([_at(ALIKE[1], n, 1) for n in frames])
     assert mended is not None
     assert mended.last == 79
     assert mended.first <= 33
@@ -121,7 +124,7 @@ def test_what_comes_after_a_mended_past_goes_on_from_it() -> None:
     tracked, stream = _helped(), _crossing(frames=100)
     for n, seen in enumerate(stream[:60]):
         tracked.push(n, seen)
-    tracked.point([_at(ALIKE[1], n, 1) for n in range(42, 58)])
+    tracked.apply_corrections([_at(ALIKE[1], n, 1) for n in range(42, 58)])
     later = [it for n, seen in enumerate(stream[60:], 60) if (it := tracked.push(n, seen)) is not None]
     for frame, tracks in final_boxes(later).items():
         assert {number: _whom(box, frame) for number, box in tracks.items()} == {1: 1, 2: 0}
@@ -131,7 +134,7 @@ def test_a_pointing_that_the_tracks_follow_already_changes_nothing() -> None:
     tracked = _helped()
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
-    assert tracked.point([_at(ALIKE[0], n, 1) for n in range(45, 79)]) is None
+    assert tracked.apply_corrections([_at(ALIKE[0], n, 1) for n in range(45, 79)]) is None
 
 
 def test_who_was_lost_and_got_another_number_gets_the_old_one_back_when_pointed_at() -> None:
@@ -140,7 +143,7 @@ def test_who_was_lost_and_got_another_number_gets_the_old_one_back_when_pointed_
     tracked = _helped()
     for n in range(140):
         tracked.push(n, seen_at(away, n, 0.5))
-    mended = tracked.point([_at(away[1], 120, 1)])
+    mended = tracked.apply_corrections([_at(away[1], 120, 1)])
     assert mended is not None
     assert {track.id for track in mended.tracks if not np.isnan(track.boxes[-1, 0])} == {1}
     assert mended.revised_from == pytest.approx(80, abs=2)
@@ -152,7 +155,7 @@ def test_a_pointing_before_the_memory_is_not_taken() -> None:
         tracked.push(n, seen)
     assert not tracked.remembers(40)
     assert tracked.remembers(49)
-    assert tracked.point([_at(ALIKE[1], 40, 1)]) is None
+    assert tracked.apply_corrections([_at(ALIKE[1], 40, 1)]) is None
 
 
 def test_a_small_doubt_that_is_forgotten_keeps_no_later_pointing_from_mending() -> None:
@@ -161,9 +164,9 @@ def test_a_small_doubt_that_is_forgotten_keeps_no_later_pointing_from_mending() 
         tracked.push(n, seen)
         if n == 20:
             beside = _at(ALIKE[0], 15, 1)
-            assert tracked.point([replace(beside, x=beside.x + 0.3**0.5 * WIDTH)]) is None
+            assert tracked.apply_corrections([replace(beside, x=beside.x + 0.3**0.5 * WIDTH)]) is None
             assert tracked._doubtful == [15]
-    mended = tracked.point([_at(ALIKE[1], n, 1) for n in range(60, 70)])
+    mended = tracked.apply_corrections([_at(ALIKE[1], n, 1) for n in range(60, 70)])
     assert mended is not None
     assert mended.revised_from is not None
 
@@ -172,11 +175,11 @@ def test_the_memory_is_bounded() -> None:
     tracked = _helped(memory=40)
     for n in range(300):
         tracked.push(n, seen_at(ALIKE, n % 60, 0.5))
-        tracked.point([_at(ALIKE[0], n % 60, 1)])
+        tracked.apply_corrections([_at(ALIKE[0], n % 60, 1)])
     memory = tracked._memory
-    assert len(memory.seen) <= 40 + WindowSettings().window + 1
-    assert len(memory.where) <= len(memory.seen)
-    assert len(memory.steps) <= 40 // WindowSettings().stride + 2
+    assert len(memory.detections) <= 40 + WindowSettings().window + 1
+    assert len(memory.assignments) <= len(memory.detections)
+    assert len(memory.snapshots) <= 40 // WindowSettings().stride + 2
     assert len(tracked._pointings) <= 41
 
 
@@ -187,14 +190,14 @@ def test_after_a_long_gap_nothing_before_it_is_remembered() -> None:
     tracked.push(5000, stream[0])
     assert not tracked.remembers(50)
     assert tracked.remembers(5000)
-    assert tracked.point([_at(ALIKE[1], 50, 1)]) is None
+    assert tracked.apply_corrections([_at(ALIKE[1], 50, 1)]) is None
 
 
 def test_the_same_pointings_give_the_same_answer() -> None:
     def mended() -> list[object]:
         tracked = _helped()
         results = [tracked.push(n, seen) for n, seen in enumerate(_crossing())]
-        results += [tracked.point([_at(ALIKE[1], n, 1) for n in range(42, 60)]), tracked.flush()]
+        results += [tracked.apply_corrections([_at(ALIKE[1], n, 1) for n in range(42, 60)]), tracked.flush()]
         return _shown([it for it in results if it is not None])
 
     assert mended() == mended()
@@ -205,7 +208,7 @@ def test_after_the_end_of_a_recording_it_is_still_mended() -> None:
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
     tracked.flush()
-    mended = tracked.point([_at(ALIKE[1], n, 1) for n in range(42, 60)])
+    mended = tracked.apply_corrections([_at(ALIKE[1], n, 1) for n in range(42, 60)])
     assert mended is not None
     assert mended.final_to == 79
 
@@ -214,31 +217,33 @@ def test_after_the_end_of_a_recording_it_is_still_mended() -> None:
     ("assist", "kind"),
     [
         (None, OnlineTracker),
-        (AssistSettings(), OnlineTracker),
-        (AssistSettings(enabled=True), AssistedTracker),
+        (InteractiveSettings(), OnlineTracker),
+        (InteractiveSettings(enabled=True), InteractiveTracker),
     ],
 )
 def test_only_who_asks_for_help_gets_a_tracker_that_takes_it(
-    assist: AssistSettings | None, kind: Callable[..., object]
+    assist: InteractiveSettings | None, kind: Callable[..., object]
 ) -> None:
-    found = tracker_named("lp", WindowSettings(), TEST_COSTS, lambda: create_solver("columns"), assist=assist)
+    found = create_tracker(
+        "lp", WindowSettings(), TEST_COSTS, lambda: create_solver("columns"), assist=assist
+    )
     assert type(found) is kind
 
 
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"memory": 0},
-        {"memory": 10**6},
-        {"horizon": 0},
-        {"horizon": 10**12},
-        {"weight": -1.0},
-        {"hidden": 1.5},
+        {"memory_frames": 0},
+        {"memory_frames": 10**6},
+        {"horizon_frames": 0},
+        {"horizon_frames": 10**12},
+        {"correction_weight": -1.0},
+        {"hidden_share": 1.5},
     ],
 )
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must|at least|share"):
-        AssistSettings(**wrong)  # type: ignore[arg-type]
+        InteractiveSettings(**wrong)  # type: ignore[arg-type]
 
 
 def test_who_is_pointed_at_has_a_box_of_their_own_where_the_detector_finds_one_for_two() -> None:
@@ -252,7 +257,7 @@ def test_who_is_pointed_at_has_a_box_of_their_own_where_the_detector_finds_one_f
     assert not any(_own(shown[n].get(2), n) for n in merged), "one box is nobody's own"
     for n, seen in enumerate(stream):
         tracked.push(n, seen)
-    mended = tracked.point([_at(ALIKE[1], n, 2) for n in range(30, 46)])
+    mended = tracked.apply_corrections([_at(ALIKE[1], n, 2) for n in range(30, 46)])
     assert mended is not None
     boxes = _boxes(mended, 2)
     assert all(_own(boxes[n - mended.first], n) for n in merged)
@@ -271,6 +276,6 @@ def test_who_is_pointed_at_while_hidden_by_somebody_who_was_there_before_is_behi
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
     behind, open_ = _at(ALIKE[1], 38, 2), _at(ALIKE[0], 60, 2)
-    assert 2 not in tracked._memory.where[38]
-    assert carried(behind, tracked._memory, TEST_COSTS, since=0) == []
-    assert {it.object for it in carried(open_, tracked._memory, TEST_COSTS, since=0)} == {1, 2}
+    assert 2 not in tracked._memory.assignments[38]
+    assert backdate_correction(behind, tracked._memory, TEST_COSTS, since=0) == []
+    assert {it.object for it in backdate_correction(open_, tracked._memory, TEST_COSTS, since=0)} == {1, 2}

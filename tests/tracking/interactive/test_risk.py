@@ -9,20 +9,23 @@ import numpy as np
 import pytest
 
 from benchmarks.assist.risk import fitted
-from tracking.interactive import RiskReason, Signs
-from tracking.interactive.risk import WEIGHTS, risk_of
+from tracking.interactive import RiskFeatures, RiskReason
+from tracking.interactive.risk import WEIGHTS, failure_probability
 
 
 @pytest.mark.parametrize("reason", get_args(RiskReason))
 def test_a_risk_is_a_probability_and_no_larger_where_the_tracker_is_surer(reason: RiskReason) -> None:
     for lead in (-20.0, 0.0, 20.0):
-        risks = [risk_of(reason, Signs(margin, lead, 10.0)) for margin in (0.0, 0.5, 2.0, 100.0, np.inf)]
+        risks = [
+            failure_probability(reason, RiskFeatures(margin, lead, 10.0))
+            for margin in (0.0, 0.5, 2.0, 100.0, np.inf)
+        ]
         assert all(0.0 < it < 1.0 for it in risks)
         assert all(one >= other for one, other in pairwise(risks))
 
 
 def test_the_longer_somebody_is_hidden_the_likelier_they_are_lost() -> None:
-    risks = [risk_of("fading", Signs(0.0, -hidden, hidden)) for hidden in (5, 10, 20, 40)]
+    risks = [failure_probability("fading", RiskFeatures(0.0, -hidden, hidden)) for hidden in (5, 10, 20, 40)]
     assert all(one < other for one, other in pairwise(risks))
 
 

@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fakes.tracking.random_networks import SETTINGS, Case, cases, network_of
-from tracking.interactive import exchange_margins, exchanges
+from tracking.interactive import swap_margin_matrix, swap_margins
 from tracking.model.network import Network
 from tracking.solvers.base import OCCLUDED, create_solver
 from tracking.solvers.objective import conflict_count, nodes_from_states, total_cost
@@ -33,7 +33,7 @@ def _exchanged(states: np.ndarray, a: int, b: int, frame: int) -> np.ndarray:
 @settings(deadline=None, max_examples=60)
 def test_a_margin_is_what_the_cheapest_exchange_costs_of_all_tried(case: Case) -> None:
     network, states, cost = _solved(case)
-    found = exchanges(network, states)
+    found = swap_margins(network, states)
     for a, b in combinations(range(network.objects), 2):
         tried = [
             total_cost(network, nodes_from_states(network, _exchanged(states, a, b, frame))) - cost
@@ -57,7 +57,7 @@ def test_a_margin_is_no_less_than_what_the_best_answer_costs_in_which_the_two_en
     case: Case,
 ) -> None:
     network, states, cost = _solved(case)
-    margins = exchange_margins(network, states)
+    margins = swap_margin_matrix(network, states)
     assert (margins >= -1e-9).all()
     for a, b in combinations(range(network.objects), 2):
         if not np.isfinite(margins[a, b]):
@@ -77,12 +77,12 @@ def test_in_whatever_order_the_objects_come_their_margins_are_the_same(case: Cas
     assume(network.objects > 1)
     order = list(range(network.objects))
     lot.shuffle(order)  # type: ignore[attr-defined]
-    turned = exchange_margins(network.select(order), states[order])
-    np.testing.assert_allclose(turned, exchange_margins(network, states)[np.ix_(order, order)], atol=1e-9)
+    turned = swap_margin_matrix(network.select(order), states[order])
+    np.testing.assert_allclose(turned, swap_margin_matrix(network, states)[np.ix_(order, order)], atol=1e-9)
 
 
 def test_objects_with_observations_of_their_own_have_nothing_to_exchange() -> None:
     case = Case(2, 2, 2, shared=False, settings=replace(SETTINGS, layout=0.0), seed=4)
     network = network_of(case)
-    with pytest.raises(ValueError, match="of their own"):
-        exchanges(network, np.zeros((2, 2), dtype=np.int64))
+    with pytest.raises(ValueError, match="share observations"):
+        swap_margins(network, np.zeros((2, 2), dtype=np.int64))

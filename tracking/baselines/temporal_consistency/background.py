@@ -1,4 +1,4 @@
-"""The empty room as a Gaussian of each pixel's colour in YUV (section 3; Wren et al., PAMI 1997)."""
+"""The empty room as a Gaussian of each pixel's color in YUV (section 3; Wren et al., PAMI 1997)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from tracking.baselines.temporal_consistency.settings import BlobSettings
 from tracking.boxes import Floats
-from tracking.detectors.background.gain import channel_gains, scaled
+from tracking.detectors.background.color_gain import apply_gains, channel_gains
 from tracking.detectors.base import Image, Mask, Plane
 
 _INLIERS = 3.0
@@ -31,11 +31,11 @@ class YuvBackground:
             ValueError: there is no picture.
         """
         if not images:
-            raise ValueError("a background is learned from one picture at least")
+            raise ValueError("a background needs at least one image")
         self._reference = images[0]
-        levels = np.stack([_yuv(self._levelled(image)) for image in images])
+        levels = np.stack([_yuv(self._leveled(image)) for image in images])
         middle = np.median(levels, axis=0)
-        floors = np.array([settings.brightness_floor, settings.colour_floor, settings.colour_floor])
+        floors = np.array([settings.brightness_floor, settings.chroma_floor, settings.chroma_floor])
         spread = np.maximum(_MAD * np.median(np.abs(levels - middle), axis=0), floors)
         usual = (np.abs(levels - middle) <= _INLIERS * spread).all(axis=-1)
         count = np.maximum(usual.sum(axis=0), 1)[..., None]
@@ -54,18 +54,18 @@ class YuvBackground:
 
     def distance(self, image: Image) -> Plane:
         """Give the squared Mahalanobis distance of every pixel from the background, `(H, W)`."""
-        y, u, v = cv2.split(_yuv(self._levelled(image)) - self._mean)
+        y, u, v = cv2.split(_yuv(self._leveled(image)) - self._mean)
         # With the Cholesky factor L of the inverse covariance, |L' d|^2 is d' C^-1 d.
         a, b, c, d, e, f = self._whitening
         return np.asarray(np.square(a * y + b * u + c * v) + np.square(d * u + e * v) + np.square(f * v))
 
     def learn(self, image: Image, free: Mask) -> None:
         """Take a picture in where nobody is: `free` is 255 there."""
-        cv2.accumulateWeighted(_yuv(self._levelled(image)), self._mean, self._rate, mask=free)
+        cv2.accumulateWeighted(_yuv(self._leveled(image)), self._mean, self._rate, mask=free)
 
-    def _levelled(self, image: Image) -> Image:
+    def _leveled(self, image: Image) -> Image:
         """Give the picture at the exposure of the first one: cameras change theirs."""
-        return scaled(image, 1.0 / channel_gains(image, self._reference))
+        return apply_gains(image, 1.0 / channel_gains(image, self._reference))
 
 
 def _yuv(image: Image) -> Plane:

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from tracking.baselines.temporal_consistency.background import YuvBackground
-from tracking.baselines.temporal_consistency.color_histogram import uv_histogram
+from tracking.baselines.temporal_consistency.regional_appearance import uv_histogram
 from tracking.baselines.temporal_consistency.settings import BlobSettings
 from tracking.boxes import Floats
 from tracking.detectors.base import Image, Mask
@@ -26,40 +26,40 @@ class Blob:
 
     Attributes:
         box: `(4,)`, left, top, right, bottom.
-        shape: `(h, w)`, 255 where the box is filled.
+        mask: `(h, w)`, 255 where the box is filled.
         area: pixels that are.
-        colours: `(64,)`, shares of the colours of its foreground.
+        colors: `(64,)`, shares of the colors of its foreground.
     """
 
     box: Floats
-    shape: Mask
+    mask: Mask
     area: int
-    colours: Floats
+    colors: Floats
 
     @property
-    def middle(self) -> Floats:
+    def center(self) -> Floats:
         """Where it is, `(2,)`: the middle of its box."""
         return (self.box[:2] + self.box[2:]) / 2.0
 
 
-class Blobs:
+class BlobDetector:
     """Finds the blobs of one camera's pictures; they get fewer and larger the nearer people stand.
 
     Attributes:
         size: of the working picture, width and height.
-        metre: pixels of it that are a metre of floor.
+        pixels_per_meter: pixels of it that are a meter of floor.
     """
 
     def __init__(self, size: tuple[int, int], room_m: float, settings: BlobSettings) -> None:
-        """Look at pictures of a size (width, height) in pixels that show `room_m` metres of floor across."""
+        """Look at pictures of a size (width, height) in pixels that show `room_m` meters of floor across."""
         self._settings = settings
         width, height = size
         scale = min(1.0, settings.work_width / width)
         self.size = max(round(width * scale), 1), max(round(height * scale), 1)
-        self.metre = self.size[0] / room_m
-        self._least = settings.least_m2 * self.metre**2
+        self.pixels_per_meter = self.size[0] / room_m
+        self._least = settings.min_area_m2 * self.pixels_per_meter**2
         # However little floor is in the picture: more than a part of it joins nothing that belongs together.
-        grow = 2 * round(min(settings.grow_m * self.metre, self.size[0] * _MOST_GROWN)) + 1
+        grow = 2 * round(min(settings.dilation_m * self.pixels_per_meter, self.size[0] * _MOST_GROWN)) + 1
         self._grow = np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (grow, grow)), dtype=np.uint8)
         self._background: YuvBackground | None = None
 
@@ -68,7 +68,7 @@ class Blobs:
         """Whether the background is known."""
         return self._background is not None
 
-    def small(self, image: Image) -> Image:
+    def resize(self, image: Image) -> Image:
         """Give the working picture."""
         if (image.shape[1], image.shape[0]) == self.size:
             return image
@@ -82,7 +82,7 @@ class Blobs:
         """
         self._background = YuvBackground(images, self._settings)
 
-    def find(self, image: Image, *, learn: bool) -> tuple[Blob, ...]:
+    def detect(self, image: Image, *, learn: bool) -> tuple[Blob, ...]:
         """Give the blobs of a working picture, from left to right; none while the background is unknown.
 
         `learn`: what is around them goes into the background.

@@ -16,30 +16,30 @@ _HEIGHT, _MIDDLE, _WIDTH = 50.0, 2.0, 0.15
 """Of the sigmoid in g(x)."""
 
 
-def encloses(first: Floats, second: Floats) -> bool:
+def is_nested(first: Floats, second: Floats) -> bool:
     """Say whether one of two boxes `(4,)` lies within the other."""
     out = bool((first[:2] <= second[:2]).all() and (first[2:] >= second[2:]).all())
     return out or bool((second[:2] <= first[:2]).all() and (second[2:] >= first[2:]).all())
 
 
-def distance_score(before: Blob, after: Blob, metre: float, settings: TemporalSettings) -> float:
-    """Give d_s in metres, `metre` being one in pixels.
+def distance_score(before: Blob, after: Blob, meter: float, settings: TemporalSettings) -> float:
+    """Give d_s in meters, `meter` being one in pixels.
 
     0 where one box is within the other, `partly` where they overlap, else `apart` and the gap between them.
     """
-    if encloses(before.box, after.box):
+    if is_nested(before.box, after.box):
         return 0.0
     if float(intersections(before.box, after.box)) > 0.0:
-        return settings.partly
-    return settings.apart + gap(before, after) / metre
+        return settings.partial_overlap_m
+    return settings.no_overlap_m + blob_gap(before, after) / meter
 
 
-def gap(first: Blob, second: Blob) -> float:
+def blob_gap(first: Blob, second: Blob) -> float:
     """Give the pixels between two blobs on the line from middle to middle.
 
     Of edges, not of middles: who leaves a crowd moves its middle further than anybody has gone.
     """
-    start, end = first.middle, second.middle
+    start, end = first.center, second.center
     length = math.hypot(*(end - start).tolist())
     steps = max(math.ceil(length), 1)
     line = start + (end - start) * np.linspace(0.0, 1.0, steps + 1)[:, None]
@@ -53,26 +53,27 @@ def gap(first: Blob, second: Blob) -> float:
 def _inside(blob: Blob, points: Floats) -> NDArray[np.bool_]:
     """Say which points `(N, 2)` lie in a blob, `(N,)`."""
     columns, rows = np.floor(points - blob.box[:2]).astype(np.int64).T
-    high, wide = blob.shape.shape
+    high, wide = blob.mask.shape
     within = (columns >= 0) & (columns < wide) & (rows >= 0) & (rows < high)
     found = np.zeros(len(points), dtype=np.bool_)
-    found[within] = blob.shape[rows[within], columns[within]] > 0
+    found[within] = blob.mask[rows[within], columns[within]] > 0
     return found
 
 
-def penalty(share: float) -> float:
+def distance_cost(share: float) -> float:
     """Give g(x): x up to 1, the way that is walked in the time; beyond, a sigmoid that climbs to 51."""
     if share <= 1.0:
         return share
     return _HEIGHT / (math.exp(-(share - _MIDDLE) / _WIDTH) + 1.0) + 1.0
 
 
-def penalties(
-    before: Sequence[Blob], after: Sequence[Blob], seconds: float, metre: float, settings: TemporalSettings
+def distance_costs(
+    before: Sequence[Blob], after: Sequence[Blob], seconds: float, meter: float, settings: TemporalSettings
 ) -> Floats:
     """Give f_dist for going from each blob to each of `seconds` later, `(B', B)`."""
-    allowed = settings.speed * seconds
+    allowed = settings.speed_m_s * seconds
     costs = [
-        [penalty(distance_score(old, new, metre, settings) / allowed) for new in after] for old in before
+        [distance_cost(distance_score(old, new, meter, settings) / allowed) for new in after]
+        for old in before
     ]
     return np.array(costs, dtype=np.float64).reshape(len(before), len(after))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tracking.baselines.temporal_consistency.graph import Indices, Links, merge_costs
 
 
-def cheapest_by_edges(
+def cheapest_path_by_edges(
     links: Sequence[Sequence[Links]], shared: Sequence[NDArray[np.bool_]], merge: float
 ) -> tuple[Indices, float]:
     """Find the best path of k people through T stages; see `sweep.cheapest`, where nobody else is."""

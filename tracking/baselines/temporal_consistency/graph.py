@@ -3,7 +3,7 @@
 A node of a stage gives each person a blob; several may be in one. A link between nodes of adjacent stages
 costs, with N people,
 
-    c = 1/N (a M + sum over people of f_dist + sum over people of f_colour)                            eq. (1)
+    c = 1/N (a M + sum over people of f_dist + sum over people of f_color)                            eq. (1)
 
 *a* is how many people are merged less the number of merges. Each person's part of a link depends on their own
 two blobs only, so the graph is kept as one small graph a person; what ties them together is *a*.
@@ -24,24 +24,24 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Graph:
+class WindowGraph:
     """A window of T stages after the last decided one, for P people.
 
     Attributes:
         start: `(P,)`, everybody's blob in the decided stage, an index of the first of `steps`' rows.
-        steps: T tables `(B', B)` of f_dist between the blobs of a stage and the next one.
-        looks: T tables `(P, B)` of f_colour.
+        distance_costs: T tables `(B', B)` of f_dist between the blobs of a stage and the next one.
+        appearance_costs: T tables `(P, B)` of f_color.
         shared: T rows `(B,)`: whether it costs something to be several there.
-        merge: M.
-        longest: steps that cost more are no links (section 4.3); infinite: none is left out.
+        merge_cost: M.
+        max_step_cost: steps that cost more are no links (section 4.3); infinite: none is left out.
     """
 
     start: Indices
-    steps: tuple[Floats, ...]
-    looks: tuple[Floats, ...]
+    distance_costs: tuple[Floats, ...]
+    appearance_costs: tuple[Floats, ...]
     shared: tuple[NDArray[np.bool_], ...]
-    merge: float
-    longest: float
+    merge_cost: float
+    max_step_cost: float
 
     @property
     def people(self) -> int:
@@ -55,7 +55,7 @@ class Links:
 
     Attributes:
         blobs: `(r,)`, the later stage's blobs that they may be in, ascending.
-        costs: `(r', r)`, from each blob of the stage before that they may be in, f_colour included; infinite
+        costs: `(r', r)`, from each blob of the stage before that they may be in, f_color included; infinite
             where there is no link.
     """
 
@@ -68,11 +68,11 @@ class Links:
         return int(np.isfinite(self.costs).sum())
 
 
-Ways = tuple[tuple[Links, ...], ...]
+PersonLinks = tuple[tuple[Links, ...], ...]
 """For each person, their links stage by stage."""
 
 
-def ways(graph: Graph) -> Ways:
+def prune_links(graph: WindowGraph) -> PersonLinks:
     """Prune the graph: keep the links that are short enough, between blobs that can be got to.
 
     A person for whom none is left at a stage keeps all of that stage: they must be somewhere.
@@ -80,12 +80,12 @@ def ways(graph: Graph) -> Ways:
     return tuple(_ways_of(graph, person) for person in range(graph.people))
 
 
-def _ways_of(graph: Graph, person: int) -> tuple[Links, ...]:
+def _ways_of(graph: WindowGraph, person: int) -> tuple[Links, ...]:
     at: Indices = graph.start[person : person + 1]
     found = []
-    for step, looks in zip(graph.steps, graph.looks, strict=True):
+    for step, looks in zip(graph.distance_costs, graph.appearance_costs, strict=True):
         costs = step[at]
-        short = np.where(costs <= graph.longest, costs, np.inf)
+        short = np.where(costs <= graph.max_step_cost, costs, np.inf)
         if np.isinf(short).all():
             short = costs
         at = np.flatnonzero(np.isfinite(short).any(axis=0))
@@ -93,7 +93,7 @@ def _ways_of(graph: Graph, person: int) -> tuple[Links, ...]:
     return tuple(found)
 
 
-def edges(found: Sequence[Sequence[Links]]) -> list[int]:
+def count_joint_edges(found: Sequence[Sequence[Links]]) -> list[int]:
     """Count the links between joint nodes of adjacent stages, stage by stage.
 
     A joint link is one of every person's, so their numbers multiply.
@@ -101,9 +101,9 @@ def edges(found: Sequence[Sequence[Links]]) -> list[int]:
     return [prod(links.count for links in stage) for stage in zip(*found, strict=True)]
 
 
-def all_edges(graph: Graph) -> list[int]:
+def count_unpruned_edges(graph: WindowGraph) -> list[int]:
     """Count them in the graph in which nothing is pruned."""
-    return edges(ways(replace(graph, longest=np.inf)))
+    return count_joint_edges(prune_links(replace(graph, max_step_cost=np.inf)))
 
 
 def merge_costs(

@@ -7,8 +7,8 @@ from math import prod
 
 import numpy as np
 
-from tracking.baselines.temporal_consistency.graph import Graph, Indices, Ways
-from tracking.baselines.temporal_consistency.per_person_search import cheapest
+from tracking.baselines.temporal_consistency.graph import Indices, PersonLinks, WindowGraph
+from tracking.baselines.temporal_consistency.per_person_search import cheapest_joint_path
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,13 +26,13 @@ class JointPath:
     exact: bool
 
 
-def joint_path(graph: Graph, found: Ways, most_states: int) -> JointPath:
+def solve_joint_path(graph: WindowGraph, found: PersonLinks, most_states: int) -> JointPath:
     """Find everybody's best path; `found` are the graph's `ways`.
 
     Only merges tie people together, so those who share no blob they might be in at one time are apart. Of too
     many who are not, the first are decided together, and then the others beside them.
     """
-    stages, people = len(graph.steps), graph.people
+    stages, people = len(graph.distance_costs), graph.people
     blobs = np.zeros((stages, people), dtype=np.int64)
     taken = [np.zeros(len(it), dtype=np.int64) for it in graph.shared]
     cost, exact = 0.0, True
@@ -40,7 +40,9 @@ def joint_path(graph: Graph, found: Ways, most_states: int) -> JointPath:
         rest = group
         while rest:
             now = _fitting(found, rest, most_states)
-            part, spent = cheapest([found[it] for it in now], graph.shared, taken, graph.merge)
+            part, spent = cheapest_joint_path(
+                [found[it] for it in now], graph.shared, taken, graph.merge_cost
+            )
             blobs[:, now] = part
             cost += spent
             for row in range(stages):
@@ -50,7 +52,7 @@ def joint_path(graph: Graph, found: Ways, most_states: int) -> JointPath:
     return JointPath(blobs, cost / max(people, 1), exact)
 
 
-def _meeting(graph: Graph, found: Ways) -> list[list[int]]:
+def _meeting(graph: WindowGraph, found: PersonLinks) -> list[list[int]]:
     """Put the people together who may be in one blob in any stage, in the order of their first."""
     group = list(range(graph.people))
     for row, shared in enumerate(graph.shared):
@@ -67,7 +69,7 @@ def _meeting(graph: Graph, found: Ways) -> list[list[int]]:
     return [[person for person, it in enumerate(group) if it == name] for name in sorted(set(group))]
 
 
-def _fitting(found: Ways, people: list[int], most_states: int) -> list[int]:
+def _fitting(found: PersonLinks, people: list[int], most_states: int) -> list[int]:
     """Give as many of the first people as have few enough joint states together, at least one."""
     for count in range(len(people), 1, -1):
         stages = zip(*(found[it] for it in people[:count]), strict=True)

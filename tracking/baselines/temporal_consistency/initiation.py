@@ -9,56 +9,58 @@ import numpy as np
 from tracking.baselines.temporal_consistency.blobs import Blob
 from tracking.baselines.temporal_consistency.distance import distance_score
 from tracking.baselines.temporal_consistency.settings import TemporalSettings
-from tracking.baselines.temporal_consistency.window import Commitment, Stage, TemporalWindow
+from tracking.baselines.temporal_consistency.window import Stage, StageDecision, TemporalWindow
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Unclaimed:
+class _UnassignedBlob:
     """A blob that has been nobody's in so many decided stages in a row."""
 
     blob: Blob
     stages: int
 
 
-class Newcomers:
+class PersonLifecycle:
     """Says which blobs are somebody new, and who has been nowhere for too long."""
 
-    def __init__(self, settings: TemporalSettings, metre: float) -> None:
-        self._settings, self._metre = settings, metre
-        self._unclaimed: list[_Unclaimed] = []
+    def __init__(self, settings: TemporalSettings, meter: float) -> None:
+        self._settings, self._meter = settings, meter
+        self._unclaimed: list[_UnassignedBlob] = []
         self._away: dict[int, int] = {}
         """By number: since how many decided stages they have been nowhere."""
 
-    def come(self, window: TemporalWindow, done: Commitment) -> list[int]:
+    def find_new(self, window: TemporalWindow, done: StageDecision) -> list[int]:
         """Give the blobs of a stage just decided that are somebody new, the largest first.
 
         Such a blob is nobody's, as large as a person, and stays so from stage to stage for `confirm` of them;
         what the window says of the stages after it counts, too.
         """
-        claimed = set(done.blobs.values())
-        least = self._settings.person_m2 * self._metre**2
+        claimed = set(done.blob_by_id.values())
+        least = self._settings.min_person_m2 * self._meter**2
         new, unclaimed = [], []
         for at, blob in enumerate(done.stage.blobs):
             if at in claimed or blob.area < least:
                 continue
             before = max((it.stages for it in self._unclaimed if self._near(it.blob, blob)), default=0)
-            if before + 1 + self._goes_on(window, blob) >= self._settings.confirm:
+            if before + 1 + self._goes_on(window, blob) >= self._settings.confirm_stages:
                 new.append(at)
             else:
-                unclaimed.append(_Unclaimed(blob, before + 1))
+                unclaimed.append(_UnassignedBlob(blob, before + 1))
         self._unclaimed = unclaimed
-        room = max(self._settings.most_people - len(window.people), 0)
+        room = max(self._settings.max_people - len(window.people), 0)
         return sorted(new, key=lambda at: -done.stage.blobs[at].area)[:room]
 
-    def gone(self, done: Commitment, stage_s: float) -> set[int]:
+    def find_departed(self, done: StageDecision, stage_s: float) -> set[int]:
         """Give the numbers of those who have been nowhere for `forget_s`."""
         self._away = {
             number: self._away.get(number, 0) + 1
-            for number, at in done.blobs.items()
-            if at == done.stage.nowhere
+            for number, at in done.blob_by_id.items()
+            if at == done.stage.absent
         }
         gone = {
-            number for number, stages in self._away.items() if stages * stage_s >= self._settings.forget_s
+            number
+            for number, stages in self._away.items()
+            if stages * stage_s >= self._settings.forget_after_s
         }
         for number in gone:
             del self._away[number]
@@ -69,7 +71,7 @@ class Newcomers:
         if window.path is None:
             return 0
         count = 0
-        for stage, chosen in zip(window.waiting, window.path.blobs, strict=True):
+        for stage, chosen in zip(window.pending, window.path.blobs, strict=True):
             free = np.setdiff1d(np.arange(len(stage.blobs)), chosen)
             near = [stage.blobs[at] for at in free.tolist() if self._near(blob, stage.blobs[at])]
             if not near:
@@ -79,12 +81,12 @@ class Newcomers:
 
     def _near(self, before: Blob, after: Blob) -> bool:
         """Say whether somebody can have gone from one to the other in a stage."""
-        reach = self._settings.speed * self._settings.stage_s
-        return distance_score(before, after, self._metre, self._settings) <= reach
+        reach = self._settings.speed_m_s * self._settings.stage_s
+        return distance_score(before, after, self._meter, self._settings) <= reach
 
 
-def first_people(stage: Stage, settings: TemporalSettings, metre: float) -> list[tuple[int, int]]:
+def initial_people(stage: Stage, settings: TemporalSettings, meter: float) -> list[tuple[int, int]]:
     """Number the blobs of a first stage that are as large as a person: pairs of number and blob."""
-    least = settings.person_m2 * metre**2
+    least = settings.min_person_m2 * meter**2
     large = [at for at, blob in enumerate(stage.blobs) if blob.area >= least]
-    return [(number + 1, at) for number, at in enumerate(large[: settings.most_people])]
+    return [(number + 1, at) for number, at in enumerate(large[: settings.max_people])]

@@ -17,7 +17,7 @@ from tracking.baselines.temporal_consistency.graph import Indices, Links, merge_
 from tracking.boxes import Floats
 
 
-def cheapest(
+def cheapest_joint_path(
     links: Sequence[Sequence[Links]],
     shared: Sequence[NDArray[np.bool_]],
     taken: Sequence[NDArray[np.int64]],

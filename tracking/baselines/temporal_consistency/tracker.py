@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tracking.baselines.temporal_consistency.blobs import Blobs
-from tracking.baselines.temporal_consistency.initiation import Newcomers, first_people
+from tracking.appearance_samples import add_appearance_samples
+from tracking.baselines.temporal_consistency.blobs import BlobDetector
+from tracking.baselines.temporal_consistency.initiation import PersonLifecycle, initial_people
 from tracking.baselines.temporal_consistency.settings import TemporalSettings
-from tracking.baselines.temporal_consistency.trajectories import Stops, Trails
-from tracking.baselines.temporal_consistency.window import Commitment, Stage, TemporalWindow
-from tracking.baselines.temporal_consistency.window_tracks import told_tracks
-from tracking.boxes import Floats
+from tracking.baselines.temporal_consistency.trajectories import BlobBoxHistory, SampledBoxes
+from tracking.baselines.temporal_consistency.window import Stage, StageDecision, TemporalWindow
+from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
-from tracking.solvers.base import SolveReport
+from tracking.model.object_state import mean_histogram
+from tracking.solvers.base import OCCLUDED, SolveReport
 from tracking.types import Detections
-from tracking.window import WindowResult, WindowSettings
+from tracking.window import WindowResult, WindowSettings, WindowTrack
 
 
 class TemporalTracker:
@@ -31,7 +33,7 @@ class TemporalTracker:
         """Give results every `stride` frames of `window`, of a recording with `fps` frames a second."""
         self._window, self._settings, self._fps = window, settings or TemporalSettings(), fps
         self._every = self._settings.stage_frames(fps)
-        self._blobs: Blobs | None = None
+        self._blobs: BlobDetector | None = None
         self._scale = 1.0
         """Pixels of the picture in one of the working picture."""
         self._learned: list[Image] = []
@@ -44,16 +46,16 @@ class TemporalTracker:
         """The first frame that is not final."""
         self._last: int | None = None
         self._people: TemporalWindow | None = None
-        self._newcomers: Newcomers | None = None
-        self._trails = Trails()
-        self._stops: Stops = {}
+        self._newcomers: PersonLifecycle | None = None
+        self._trails = BlobBoxHistory()
+        self._stops: SampledBoxes = {}
         self._final: int | None = None
         """The last decided frame."""
         self._next_stage = 0
 
     def prepare(self, images: Iterable[Image]) -> None:
         """Learn the background from pictures of a recording, before its first frame; of none, as it goes."""
-        small = [self._blobs_of(image).small(image) for image in images]
+        small = [self._blobs_of(image).resize(image) for image in images]
         if small and self._blobs is not None:
             self._blobs.prepare(small)
 
@@ -99,21 +101,21 @@ class TemporalTracker:
     def _forget(self) -> None:
         """Forget everybody, but not the room."""
         self._people, self._newcomers = None, None
-        self._trails, self._stops = Trails(), {}
+        self._trails, self._stops = BlobBoxHistory(), {}
         self._final, self._next_stage = None, 0
 
     def _look(self, frame: int, image: Image) -> None:
         """Find the blobs of a picture, and decide what can be decided with them."""
         blobs = self._blobs_of(image)
-        small = blobs.small(image)
+        small = blobs.resize(image)
         if not blobs.ready:
             self._bootstrap(blobs, small)
             return
         due = frame >= self._next_stage
-        found = blobs.find(small, learn=due)
+        found = blobs.detect(small, learn=due)
         boxes = np.array([blob.box for blob in found]).reshape(-1, 4) * self._scale
         self._trails.add(frame, boxes)
-        if not due or (self._settings.closed and not found):
+        if not due or (self._settings.closed_world and not found):
             return  # nobody can be nowhere: the sample is taken later
         self._next_stage = (frame // self._every + 1) * self._every
         self._sample(Stage(frame, found), blobs)
@@ -128,7 +130,7 @@ class TemporalTracker:
             else:
                 self._decided(done)
 
-    def _bootstrap(self, blobs: Blobs, small: Image) -> None:
+    def _bootstrap(self, blobs: BlobDetector, small: Image) -> None:
         settings = self._settings.blobs
         taken = (self._pictures + 1) * settings.samples // settings.bootstrap_frames
         if taken > self._pictures * settings.samples // settings.bootstrap_frames:
@@ -138,35 +140,35 @@ class TemporalTracker:
             blobs.prepare(self._learned)
             self._learned = []
 
-    def _sample(self, stage: Stage, blobs: Blobs) -> None:
+    def _sample(self, stage: Stage, blobs: BlobDetector) -> None:
         if self._people is None or self._newcomers is None:
-            first = first_people(stage, self._settings, blobs.metre)
-            if self._settings.closed and not first:
+            first = initial_people(stage, self._settings, blobs.pixels_per_meter)
+            if self._settings.closed_world and not first:
                 return  # who is there is only counted once
-            self._people = TemporalWindow(self._settings, blobs.size, blobs.metre, 1.0 / self._fps)
-            self._newcomers = Newcomers(self._settings, blobs.metre)
+            self._people = TemporalWindow(self._settings, blobs.size, blobs.pixels_per_meter, 1.0 / self._fps)
+            self._newcomers = PersonLifecycle(self._settings, blobs.pixels_per_meter)
             self._people.begin(stage, [(self._numbers + number, at) for number, at in first])
             self._numbers += len(first)
-            self._decided(Commitment(stage, {it.number: it.at for it in self._people.people}))
+            self._decided(StageDecision(stage, {it.id: it.blob for it in self._people.people}))
         elif (done := self._people.push(stage)) is not None:
             self._decided(done)
 
-    def _decided(self, done: Commitment) -> None:
+    def _decided(self, done: StageDecision) -> None:
         """Keep what was decided, and see who has come and who has gone."""
-        for number, at in done.blobs.items():
+        for number, at in done.blob_by_id.items():
             self._stops.setdefault(number, []).append((done.stage.frame, self._box(done.stage, at)))
         self._final = max(done.stage.frame, -1 if self._final is None else self._final)
-        if self._settings.closed or self._people is None or self._newcomers is None:
+        if self._settings.closed_world or self._people is None or self._newcomers is None:
             return
-        self._people.remove(self._newcomers.gone(done, self._settings.stage_s))
-        for at in self._newcomers.come(self._people, done):
+        self._people.remove(self._newcomers.find_departed(done, self._settings.stage_s))
+        for at in self._newcomers.find_new(self._people, done):
             self._numbers += 1
             self._people.add(self._numbers, at)
             self._stops[self._numbers] = [(done.stage.frame, self._box(done.stage, at))]
 
     def _box(self, stage: Stage, at: int) -> Floats | None:
         """Give a blob's box in pixels of the camera's picture."""
-        return None if at == stage.nowhere else stage.blobs[at].box * self._scale
+        return None if at == stage.absent else stage.blobs[at].box * self._scale
 
     def _result(self) -> WindowResult:
         """Tell of all frames that are not final yet, or have become so just now."""
@@ -177,27 +179,27 @@ class TemporalTracker:
         # Where nobody is followed yet, nothing that comes changes what was not seen.
         final = last if self._final is None else max(min(self._final, last), first - 1)
         seen = [self._seen.get(frame, Detections.empty(self._bins)) for frame in frames]
-        tracks = told_tracks(self._all_stops(), self._trails, seen, first, final)
+        tracks = build_window_tracks(self._all_stops(), self._trails, seen, first, final)
         result = WindowResult(first, last, final, tracks, self._report())
         self._drop(final)
         return result
 
-    def _all_stops(self) -> Stops:
+    def _all_stops(self) -> SampledBoxes:
         """Give where everybody is at samples: what was decided, then the best path as it stands."""
         if self._people is None or self._people.path is None:
             return self._stops
         stops = {number: list(it) for number, it in self._stops.items()}
-        for stage, chosen in zip(self._people.waiting, self._people.path.blobs.tolist(), strict=True):
+        for stage, chosen in zip(self._people.pending, self._people.path.blobs.tolist(), strict=True):
             for person, at in zip(self._people.people, chosen, strict=True):
-                stops.setdefault(person.number, []).append((stage.frame, self._box(stage, at)))
+                stops.setdefault(person.id, []).append((stage.frame, self._box(stage, at)))
         return stops
 
     def _drop(self, final: int) -> None:
         """Forget the frames that are final, but for the last sample of everybody who is followed."""
         self._first = final + 1
         self._seen = {frame: it for frame, it in self._seen.items() if frame > final}
-        self._trails.forget_to(final)
-        here = set() if self._people is None else {it.number for it in self._people.people}
+        self._trails.forget_through(final)
+        here = set() if self._people is None else {it.id for it in self._people.people}
         self._stops = {number: stops[-1:] for number, stops in self._stops.items() if number in here}
 
     def _report(self) -> SolveReport:
@@ -206,9 +208,45 @@ class TemporalTracker:
         bound = cost if exact else 0.0
         return SolveReport("temporal", cost, bound, integral=exact, conflicts=0, rounds=0)
 
-    def _blobs_of(self, image: Image) -> Blobs:
+    def _blobs_of(self, image: Image) -> BlobDetector:
         if self._blobs is None:
             size = (int(image.shape[1]), int(image.shape[0]))
-            self._blobs = Blobs(size, self._settings.room_m, self._settings.blobs)
+            self._blobs = BlobDetector(size, self._settings.room_m, self._settings.blobs)
             self._scale = size[0] / self._blobs.size[0]
         return self._blobs
+
+
+_SAME = 0.3
+"""Overlap (IoU) from which a detection shows whoever a blob is."""
+
+
+def build_window_tracks(
+    stops: SampledBoxes, trails: BlobBoxHistory, seen: Sequence[Detections], first: int, final: int
+) -> tuple[WindowTrack, ...]:
+    """Give the tracks of the frames from `first` on, of which `seen` are the detections, by ascending number.
+
+    `final` is the last of them that never changes again.
+    """
+    tracks, states = [], []
+    for number, mine in sorted(stops.items()):
+        boxes = trails.trajectory(mine, first, first + len(seen) - 1)
+        if np.isnan(boxes).all():
+            continue
+        shown = _shown(boxes, seen)
+        looks = [it.histograms[at] for it, at in zip(seen, shown, strict=True) if at != OCCLUDED]
+        histogram = mean_histogram(np.stack(looks)) if looks else np.empty(seen[0].histograms.shape[1])
+        sure = float(np.mean(~np.isnan(boxes[:, 0])))
+        tracks.append(WindowTrack(number, boxes, boxes, histogram, sure))
+        states.append(shown)
+    return add_appearance_samples(tracks, states, first, seen[: final - first + 1])
+
+
+def _shown(boxes: Floats, seen: Sequence[Detections]) -> NDArray[np.int64]:
+    """Say which detection shows somebody in each frame, `(F,)`, -1 for none."""
+    states = np.full(len(seen), OCCLUDED, dtype=np.int64)
+    for row, found in enumerate(seen):
+        if len(found) and not np.isnan(boxes[row, 0]):
+            overlaps = iou(boxes[row][None], found.boxes)
+            best = int(overlaps.argmax())
+            states[row] = best if overlaps[best] >= _SAME else OCCLUDED
+    return states

@@ -12,11 +12,11 @@ _SAME = 0.2
 """Overlap (IoU) from which a blob of a frame between two samples is the one that is followed."""
 
 
-Stops = dict[int, list[tuple[int, Floats | None]]]
+SampledBoxes = dict[int, list[tuple[int, Floats | None]]]
 """By number: frames of samples, and the box `(4,)` there; None: nowhere."""
 
 
-class Trails:
+class BlobBoxHistory:
     """The boxes of the blobs of every frame that is not final yet."""
 
     def __init__(self) -> None:
@@ -26,11 +26,11 @@ class Trails:
         """Take the boxes `(B, 4)` of a frame in."""
         self._boxes[frame] = boxes
 
-    def forget_to(self, frame: int) -> None:
+    def forget_through(self, frame: int) -> None:
         """Forget all frames up to this one."""
         self._boxes = {it: boxes for it, boxes in self._boxes.items() if it > frame}
 
-    def along(self, stops: list[tuple[int, Floats | None]], first: int, last: int) -> Floats:
+    def trajectory(self, stops: list[tuple[int, Floats | None]], first: int, last: int) -> Floats:
         """Give somebody's boxes in the frames `first`..`last`, `(F, 4)`, NaN where they are nowhere.
 
         Args:

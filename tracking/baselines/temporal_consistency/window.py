@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.baselines.temporal_consistency.blobs import Blob
-from tracking.baselines.temporal_consistency.distance import penalties, penalty
-from tracking.baselines.temporal_consistency.graph import Graph, Ways, ways
-from tracking.baselines.temporal_consistency.groups import JointPath, joint_path
-from tracking.baselines.temporal_consistency.regional_appearance import Places
+from tracking.baselines.temporal_consistency.distance import distance_cost, distance_costs
+from tracking.baselines.temporal_consistency.graph import PersonLinks, WindowGraph, prune_links
+from tracking.baselines.temporal_consistency.groups import JointPath, solve_joint_path
+from tracking.baselines.temporal_consistency.regional_appearance import RegionalAppearance
 from tracking.baselines.temporal_consistency.settings import TemporalSettings
 from tracking.boxes import Floats, intersections
 
@@ -25,31 +25,31 @@ class Stage:
     blobs: tuple[Blob, ...]
 
     @property
-    def nowhere(self) -> int:
+    def absent(self) -> int:
         """The index that stands for no blob at all."""
         return len(self.blobs)
 
 
 @dataclass(slots=True, eq=False)
-class Person:
+class TrackedPerson:
     """Somebody who is followed: their number, looks, and the index of their blob in the decided stage."""
 
-    number: int
-    looks: Places
-    at: int
+    id: int
+    appearance: RegionalAppearance
+    blob: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Commitment:
+class StageDecision:
     """What was decided of a stage.
 
     Attributes:
         stage: which one.
-        blobs: by person's number, the index of the blob, or `stage.nowhere`.
+        blob_by_id: by person's number, the index of the blob, or `stage.nowhere`.
     """
 
     stage: Stage
-    blobs: dict[int, int]
+    blob_by_id: dict[int, int]
 
 
 class TemporalWindow:
@@ -58,61 +58,61 @@ class TemporalWindow:
     Attributes:
         people: who is followed, by ascending number.
         decided: the last decided stage.
-        waiting: the stages after it.
+        pending: the stages after it.
         path: everybody's best path through these, as it stands; None before the first of them.
     """
 
     def __init__(
-        self, settings: TemporalSettings, size: tuple[int, int], metre: float, frame_s: float
+        self, settings: TemporalSettings, size: tuple[int, int], meter: float, frame_s: float
     ) -> None:
-        """Look at pictures of a size (width, height), `metre` pixels a metre, a frame each `frame_s`."""
-        self._settings, self._size, self._metre, self._frame_s = settings, size, metre, frame_s
-        self.people: list[Person] = []
+        """Look at pictures of a size (width, height), `meter` pixels a meter, a frame each `frame_s`."""
+        self._settings, self._size, self._meter, self._frame_s = settings, size, meter, frame_s
+        self.people: list[TrackedPerson] = []
         self.decided: Stage | None = None
-        self.waiting: deque[Stage] = deque()
+        self.pending: deque[Stage] = deque()
         self.path: JointPath | None = None
-        self.graph: Graph | None = None
+        self.graph: WindowGraph | None = None
         """The graph that `path` goes through, and what pruning has left of it."""
-        self.ways: Ways = ()
+        self.links: PersonLinks = ()
         self._steps: deque[Floats] = deque()
 
     def begin(self, stage: Stage, people: Sequence[tuple[int, int]]) -> None:
         """Start from a stage in which it is known who is where: pairs of number and blob."""
         self.decided, self.path = stage, None
-        self.waiting.clear()
+        self.pending.clear()
         self._steps.clear()
         self.people = [self._person(number, at) for number, at in people]
         self._learn(stage)
 
-    def push(self, stage: Stage) -> Commitment | None:
+    def push(self, stage: Stage) -> StageDecision | None:
         """Take a sample; decide the oldest that waits if as many as the window has stages do.
 
         Raises:
             ValueError: it is not known yet who is where, or the frame is not after the last one.
         """
-        before = self.waiting[-1] if self.waiting else self.decided
+        before = self.pending[-1] if self.pending else self.decided
         if before is None:
-            raise ValueError("a window begins with a stage in which it is known who is where")
+            raise ValueError("begin() must be called with a first stage before push()")
         if stage.frame <= before.frame:
             raise ValueError(f"the stage of frame {stage.frame} came after that of frame {before.frame}")
-        self.waiting.append(stage)
+        self.pending.append(stage)
         self._steps.append(self._between(before, stage))
         self._solve()
-        return self.commit() if len(self.waiting) >= self._settings.stages else None
+        return self.commit() if len(self.pending) >= self._settings.window_stages else None
 
-    def commit(self) -> Commitment | None:
+    def commit(self) -> StageDecision | None:
         """Decide the oldest stage that waits; None: none does."""
-        if not self.waiting or self.path is None:
+        if not self.pending or self.path is None:
             return None
-        stage, chosen = self.waiting.popleft(), self.path.blobs[0]
+        stage, chosen = self.pending.popleft(), self.path.blobs[0]
         self._steps.popleft()
         for person, at in zip(self.people, chosen.tolist(), strict=True):
-            person.at = at
+            person.blob = at
         rest = self.path.blobs[1:]
-        self.path = JointPath(rest, self.path.cost, self.path.exact) if self.waiting else None
+        self.path = JointPath(rest, self.path.cost, self.path.exact) if self.pending else None
         self.decided = stage
         self._learn(stage)
-        return Commitment(stage, {person.number: person.at for person in self.people})
+        return StageDecision(stage, {person.id: person.blob for person in self.people})
 
     def add(self, number: int, at: int) -> None:
         """Take somebody in who is in a blob of the decided stage."""
@@ -122,47 +122,47 @@ class TemporalWindow:
 
     def remove(self, numbers: set[int]) -> None:
         """Forget people."""
-        kept = [row for row, person in enumerate(self.people) if person.number not in numbers]
+        kept = [row for row, person in enumerate(self.people) if person.id not in numbers]
         self.people = [self.people[row] for row in kept]
         if self.path is not None:
             self.path = JointPath(self.path.blobs[:, kept], self.path.cost, self.path.exact)
 
-    def _person(self, number: int, at: int) -> Person:
-        return Person(number, Places(self._settings.places, self._size), at)
+    def _person(self, number: int, at: int) -> TrackedPerson:
+        return TrackedPerson(number, RegionalAppearance(self._settings.appearance_regions, self._size), at)
 
     def _solve(self) -> None:
         """Find the best path through all stages that wait."""
-        if not self.waiting:
+        if not self.pending:
             return
         settings = self._settings
-        longest = penalty(settings.prune) if settings.prune else np.inf
-        self.graph = Graph(
-            np.array([person.at for person in self.people], dtype=np.int64),
+        longest = distance_cost(settings.prune_factor) if settings.prune_factor else np.inf
+        self.graph = WindowGraph(
+            np.array([person.blob for person in self.people], dtype=np.int64),
             tuple(self._steps),
-            tuple(self._looks(stage) for stage in self.waiting),
-            tuple(np.arange(len(stage.blobs) + 1) < stage.nowhere for stage in self.waiting),
-            settings.merge,
+            tuple(self._looks(stage) for stage in self.pending),
+            tuple(np.arange(len(stage.blobs) + 1) < stage.absent for stage in self.pending),
+            settings.merge_cost,
             longest,
         )
-        self.ways = ways(self.graph)
-        self.path = joint_path(self.graph, self.ways, settings.most_states)
+        self.links = prune_links(self.graph)
+        self.path = solve_joint_path(self.graph, self.links, settings.max_joint_states)
 
     def _looks(self, stage: Stage) -> Floats:
-        """Give f_colour of everybody in every blob, and of being nowhere: `(P, B + 1)`."""
-        costs = np.full((len(self.people), len(stage.blobs) + 1), self._settings.outside)
+        """Give f_color of everybody in every blob, and of being nowhere: `(P, B + 1)`."""
+        costs = np.full((len(self.people), len(stage.blobs) + 1), self._settings.absence_cost)
         if stage.blobs:
-            middles = np.stack([blob.middle for blob in stage.blobs])
-            colours = np.stack([blob.colours for blob in stage.blobs])
+            middles = np.stack([blob.center for blob in stage.blobs])
+            colors = np.stack([blob.colors for blob in stage.blobs])
             for row, person in enumerate(self.people):
-                costs[row, :-1] = person.looks.costs(middles, colours, self._settings.unknown)
+                costs[row, :-1] = person.appearance.costs(middles, colors, self._settings.unknown_appearance)
         return costs
 
     def _between(self, before: Stage, after: Stage) -> Floats:
         """Give f_dist between two stages, nowhere included: `(B' + 1, B + 1)`."""
         seconds = (after.frame - before.frame) * self._frame_s
         costs = np.full((len(before.blobs) + 1, len(after.blobs) + 1), np.inf)
-        costs[:-1, :-1] = penalties(before.blobs, after.blobs, seconds, self._metre, self._settings)
-        if not self._settings.closed:
+        costs[:-1, :-1] = distance_costs(before.blobs, after.blobs, seconds, self._meter, self._settings)
+        if not self._settings.closed_world:
             costs[:-1, -1] = [self._way_out(blob) for blob in before.blobs]
             costs[-1, :-1] = [self._way_out(blob) for blob in after.blobs]
             costs[-1, -1] = 0.0
@@ -172,23 +172,23 @@ class TemporalWindow:
         """Give what it costs to leave the picture from a blob, or to come in there."""
         left, top, right, bottom = blob.box.tolist()
         room = min(left, top, self._size[0] - right, self._size[1] - bottom)
-        at_edge = room < self._settings.apart * self._metre
-        return self._settings.leave if at_edge else self._settings.vanish
+        at_edge = room < self._settings.no_overlap_m * self._meter
+        return self._settings.border_exit_cost if at_edge else self._settings.inner_exit_cost
 
     def _learn(self, stage: Stage) -> None:
         """Learn how everybody looks who is by themselves in a stage that is decided (section 2.2)."""
         for person in self.people:
-            if person.at < stage.nowhere:
+            if person.blob < stage.absent:
                 self._learn_of(person)
 
-    def _learn_of(self, person: Person) -> None:
+    def _learn_of(self, person: TrackedPerson) -> None:
         stage = self.decided
-        if stage is None or person.at >= stage.nowhere:
+        if stage is None or person.blob >= stage.absent:
             return
-        others = [it.at for it in self.people if it is not person and it.at < stage.nowhere]
-        if person.at in others:
+        others = [it.blob for it in self.people if it is not person and it.blob < stage.absent]
+        if person.blob in others:
             return
-        blob, reach = stage.blobs[person.at], self._settings.isolated_m * self._metre
+        blob, reach = stage.blobs[person.blob], self._settings.isolated_m * self._meter
         around = blob.box + reach * np.array([-1.0, -1.0, 1.0, 1.0])
         if not any(float(intersections(around, stage.blobs[it].box)) > 0.0 for it in others):
-            person.looks.learn(blob.middle, blob.colours)
+            person.appearance.learn(blob.center, blob.colors)

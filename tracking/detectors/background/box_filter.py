@@ -8,9 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import Floats
-from tracking.detectors.background.height_model import HeightLine
+from tracking.detectors.background.height_model import HeightModel
 from tracking.detectors.background.scan_plan import STEPS_A_HEIGHT, HeightPlan, plan_height
-from tracking.detectors.background.silhouette import BODIES, Body, Corners, corners_of, integral
+from tracking.detectors.background.silhouette import (
+    BODY_PARTS,
+    Body,
+    PartRectangles,
+    integral_image,
+    part_rectangles,
+)
 from tracking.detectors.base import Plane
 
 
@@ -19,51 +25,53 @@ class BoxFilterSettings:
     """The scan for standing people."""
 
     body: Body = "person"  # person: head, trunk and legs inside the box; box: all of it (the paper)
-    aspect: float = 0.38  # width of a person's box over its height
-    least_height: float = 0.14  # smallest person, in picture heights; see also `HeightLineSettings`
-    most_height: float = 0.95  # tallest person, in picture heights
+    aspect_ratio: float = 0.38  # width of a person's box over its height
+    min_height: float = 0.14  # smallest person, in picture heights; see also `HeightLineSettings`
+    max_height: float = 0.95  # tallest person, in picture heights
     height_step: float = 1.08  # each height of the scan is this factor above the one before
     background_cost: float = 0.35  # what a background pixel inside the body costs, a foreground one brings 1
-    least_gain: float = 0.3  # least gain of a hypothesis, in areas of its body
-    least_seen: float = 0.45  # least share of a box that is inside the picture and not ignored
-    most_peaks: int = 240  # local maxima kept for what follows, best first
+    min_gain: float = 0.3  # least gain of a hypothesis, in areas of its body
+    min_visible: float = 0.45  # least share of a box that is inside the picture and not ignored
+    max_peaks: int = 240  # local maxima kept for what follows, best first
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Peaks:
+class ScanPeaks:
     """Local maxima of the scan over x, y and scale, best first.
 
     Attributes:
         boxes: `(P, 4)` in cells.
         gains: `(P,)`, what the cells of the body add up to.
-        sizes: `(P,)`, how many cells of the body count, at least 1.
+        areas: `(P,)`, how many cells of the body count, at least 1.
         priors: `(P,)`, the factor by which the height lessens a gain, 1 where it is the expected one.
-        corners: the bodies' parts.
+        parts: the bodies' parts.
     """
 
     boxes: Floats
     gains: Floats
-    sizes: Floats
+    areas: Floats
     priors: Floats
-    corners: Corners
+    parts: PartRectangles
 
 
 @dataclass(frozen=True, slots=True)
-class Band:
+class HeightRange:
     """Heights near the height line, both in cells."""
 
-    line: HeightLine
+    model: HeightModel
     tolerance: float  # share by which a height may differ from the line
-    doubt: float  # standard deviations of the line by which it may differ besides
-    least: float  # smallest person, in picture heights
+    tolerance_std: float  # standard deviations of the line by which it may differ besides
+    min_height: float  # smallest person, in picture heights
 
     def priors(self, feet: Floats, height: float | Floats) -> Floats:
         """Give the factor on the gain at each foot row: 1 on the line, 0 where the height is impossible.
 
         A height at the edge of what is possible counts for `1 - _EDGE` of one on the line.
         """
-        expected = self.line.at(feet)
-        allowed = np.maximum(self.tolerance * expected + self.doubt * self.line.doubt(feet), 1.0)
+        expected = self.model.expected_height(feet)
+        allowed = np.maximum(
+            self.tolerance * expected + self.tolerance_std * self.model.standard_deviation(feet), 1.0
+        )
         away = np.abs(height - expected) / allowed
         return np.where((away <= 1.0) & (expected > 0.0), 1.0 - _EDGE * away**2, 0.0)
 
@@ -83,14 +91,14 @@ class BoxFilter:
     def __init__(self, weight: Plane, rows: int, settings: BoxFilterSettings) -> None:
         """Prepare for planes like `weight` `(H, W)`, 1 where the picture counts, itself `rows` cells high."""
         self._settings = settings
-        self._parts = BODIES[settings.body]
-        self._weights = integral(weight)
+        self._parts = BODY_PARTS[settings.body]
+        self._weights = integral_image(weight)
         self._shape = (weight.shape[0], weight.shape[1])
         self._rows = rows
-        self._band: Band | None = None
+        self._band: HeightRange | None = None
         self._plans: list[HeightPlan] | None = None
 
-    def peaks(self, gain: Plane, band: Band | None) -> Peaks:
+    def peaks(self, gain: Plane, band: HeightRange | None) -> ScanPeaks:
         """Scan all places and heights and give the local maxima, best first.
 
         Args:
@@ -99,28 +107,28 @@ class BoxFilter:
         """
         if self._plans is None or band is not self._band:
             self._band, self._plans = band, self._planned(band)
-        sums = integral(gain)
+        sums = integral_image(gain)
         found = [plan.peaks(sums) for plan in self._plans]
         boxes = np.concatenate([np.empty((0, 4)), *(places for places, _ in found)])
         gains = np.concatenate([np.empty(0), *(values for _, values in found)])
-        order = _best_first(boxes, gains)[: self._settings.most_peaks]
+        order = _best_first(boxes, gains)[: self._settings.max_peaks]
         return self._refined(boxes[order], sums)
 
-    def _planned(self, band: Band | None) -> list[HeightPlan]:
+    def _planned(self, band: HeightRange | None) -> list[HeightPlan]:
         feet = np.arange(self._shape[0] + 1, dtype=np.float64)
         plans: list[HeightPlan] = []
-        least = self._settings.least_height * self._rows
+        least = self._settings.min_height * self._rows
         if band is not None:
-            least = min(least, max(band.least * self._rows, band.line.smallest))
+            least = min(least, max(band.min_height * self._rows, band.model.min_height))
         for height in scan_heights(self._rows, least, self._settings).astype(np.int64).tolist():
-            size = max(round(self._settings.aspect * height), 2), height
+            size = max(round(self._settings.aspect_ratio * height), 2), height
             priors = np.ones(len(feet)) if band is None else band.priors(feet, float(height))
-            plan = plan_height(self._shape, size, self._parts, priors, self._settings.least_gain)
+            plan = plan_height(self._shape, size, self._parts, priors, self._settings.min_gain)
             if plan is not None:
                 plans.append(plan)
         return plans
 
-    def _refined(self, boxes: Floats, sums: Floats) -> Peaks:
+    def _refined(self, boxes: Floats, sums: Floats) -> ScanPeaks:
         """Move each box to the best place between those of the scan, by half a step and half again."""
         step = np.maximum((boxes[:, 3] - boxes[:, 1]) // STEPS_A_HEIGHT, 1.0)
         while (step := step // 2).any():
@@ -129,16 +137,16 @@ class BoxFilter:
             best = np.argmax((gains * priors).reshape(len(boxes), len(_MOVES)), axis=1)
             boxes = moved[np.arange(len(boxes)), best]
         gains, priors, corners = self._measured(boxes, sums)
-        whole = corners_of(boxes, BODIES["box"], self._shape).sums(self._weights)
+        whole = part_rectangles(boxes, BODY_PARTS["box"], self._shape).sums(self._weights)
         extent = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
         order = _best_first(boxes, gains * priors)
-        order = order[(whole >= self._settings.least_seen * extent)[order]]
+        order = order[(whole >= self._settings.min_visible * extent)[order]]
         sizes = np.maximum(corners.sums(self._weights), 1.0)
-        return Peaks(boxes[order], gains[order], sizes[order], priors[order], corners.only(order))
+        return ScanPeaks(boxes[order], gains[order], sizes[order], priors[order], corners.select(order))
 
-    def _measured(self, boxes: Floats, sums: Floats) -> tuple[Floats, Floats, Corners]:
+    def _measured(self, boxes: Floats, sums: Floats) -> tuple[Floats, Floats, PartRectangles]:
         """Give the gains, priors and parts of boxes."""
-        corners = corners_of(boxes, self._parts, self._shape)
+        corners = part_rectangles(boxes, self._parts, self._shape)
         gains = corners.sums(sums)
         if self._band is None:
             return gains, np.ones(len(boxes)), corners
@@ -152,6 +160,6 @@ def _best_first(boxes: Floats, gains: Floats) -> npt.NDArray[np.int64]:
 
 def scan_heights(rows: int, least: float, settings: BoxFilterSettings) -> Floats:
     """Give the heights from `least` on to try in a picture of so many rows, in cells, `(S,)`, ascending."""
-    most = settings.most_height * rows
+    most = settings.max_height * rows
     steps = int(np.floor(np.log(most / least) / np.log(settings.height_step))) + 1
     return np.unique(np.rint(least * settings.height_step ** np.arange(steps)))

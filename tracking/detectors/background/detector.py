@@ -10,25 +10,29 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tracking.appearance import GREY_LEVELS
-from tracking.detectors.background.box_filter import Band, BoxFilter, BoxFilterSettings
-from tracking.detectors.background.box_shrinking import shrink
-from tracking.detectors.background.foreground_fit import ExplainSettings, Explanation, explain
-from tracking.detectors.background.grid import Grid
+from tracking.appearance import GRAY_LEVELS
+from tracking.detectors.background.box_filter import BoxFilter, BoxFilterSettings, HeightRange
+from tracking.detectors.background.cell_grid import CellGrid
+from tracking.detectors.background.foreground_fit import (
+    ForegroundFit,
+    ForegroundFitSettings,
+    fit_foreground,
+    shrink_to_foreground,
+)
 from tracking.detectors.background.height_model import (
-    Floor,
-    HeightLine,
-    HeightLineLearner,
-    HeightLineSettings,
+    FloorGeometry,
+    HeightModel,
+    HeightModelEstimator,
+    HeightModelSettings,
 )
 from tracking.detectors.background.median import MedianBackground, MedianSettings
 from tracking.detectors.background.mog2 import Mog2Background, Mog2Settings
-from tracking.detectors.background.segmentation import Split
+from tracking.detectors.background.segmentation import Segmentation
 from tracking.detectors.background.shadow import ShadowSettings
-from tracking.detectors.background.static_foreground import GhostSettings
+from tracking.detectors.background.static_foreground import StaticForegroundSettings
 from tracking.detectors.base import Image, Mask
-from tracking.detectors.color_histogram import Looks, LooksSettings
-from tracking.detectors.validation import at_least_one, checked_image
+from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSettings
+from tracking.detectors.validation import require_at_least_one, validate_image
 from tracking.types import Detections
 
 # Pixels of the working picture per cell of the box filter, on each axis.
@@ -45,40 +49,40 @@ class BackgroundSettings:
 
     model: Literal["median", "mog2"] = "median"  # how the background is learned
     work_width: int = 360  # pixels; wider pictures are made smaller first
-    bins: int = 64  # bins of the grey histograms
-    ahead_frames: int = 500  # of a recording, seen before the first is searched; 0: none
-    ahead_every: int = 20  # of these, one in so many is looked at
+    gray_bins: int = 64  # bins of the gray histograms
+    prescan_frames: int = 500  # of a recording, seen before the first is searched; 0: none
+    prescan_every: int = 20  # of these, one in so many is looked at
     ignore: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons of (x, y) in pixels to ignore
-    outside: float = 0.25  # people may be out of the picture by this share of the picture's height
-    looks: LooksSettings = field(default_factory=LooksSettings)
+    border_margin: float = 0.25  # people may be out of the picture by this share of the picture's height
+    appearance: AppearanceSettings = field(default_factory=AppearanceSettings)
     median: MedianSettings = field(default_factory=MedianSettings)
     shadows: ShadowSettings = field(default_factory=ShadowSettings)
     mog2: Mog2Settings = field(default_factory=Mog2Settings)
-    ghosts: GhostSettings = field(default_factory=GhostSettings)
-    boxes: BoxFilterSettings = field(default_factory=BoxFilterSettings)
-    heights: HeightLineSettings = field(default_factory=HeightLineSettings)
-    hypotheses: ExplainSettings = field(default_factory=ExplainSettings)
+    static_foreground: StaticForegroundSettings = field(default_factory=StaticForegroundSettings)
+    box_filter: BoxFilterSettings = field(default_factory=BoxFilterSettings)
+    height_model: HeightModelSettings = field(default_factory=HeightModelSettings)
+    foreground_fit: ForegroundFitSettings = field(default_factory=ForegroundFitSettings)
 
     def __post_init__(self) -> None:
-        if self.ahead_frames < 0 or self.ahead_every < 1:
-            raise ValueError("ahead_frames must be at least 0, and ahead_every at least 1")
-        at_least_one(self, "work_width")
-        if not 1 <= self.bins <= GREY_LEVELS:
-            raise ValueError(f"bins must be 1 to {GREY_LEVELS}, not {self.bins}")
+        if self.prescan_frames < 0 or self.prescan_every < 1:
+            raise ValueError("prescan_frames must be at least 0, and prescan_every at least 1")
+        require_at_least_one(self, "work_width")
+        if not 1 <= self.gray_bins <= GRAY_LEVELS:
+            raise ValueError(f"gray_bins must be 1 to {GRAY_LEVELS}, not {self.gray_bins}")
 
 
-def paper_boxes(settings: BackgroundSettings) -> BackgroundSettings:
+def paper_settings(settings: BackgroundSettings) -> BackgroundSettings:
     """Give the settings with all off that is not in the paper (IV.A.2).
 
-    What is left are full boxes over place and height, each by itself, and grey histograms.
+    What is left are full boxes over place and height, each by itself, and gray histograms.
     """
     return replace(
         settings,
-        looks=replace(settings.looks, colour=False),
-        shadows=replace(settings.shadows, use=False),
-        boxes=replace(settings.boxes, body="box"),
-        heights=replace(settings.heights, use=False),
-        hypotheses=replace(settings.hypotheses, use=False),
+        appearance=replace(settings.appearance, color=False),
+        shadows=replace(settings.shadows, enabled=False),
+        box_filter=replace(settings.box_filter, body="box"),
+        height_model=replace(settings.height_model, enabled=False),
+        foreground_fit=replace(settings.foreground_fit, enabled=False),
     )
 
 
@@ -89,21 +93,23 @@ _SPAN = 0.5
 S = TypeVar("S", bound=BackgroundSettings)
 
 
-def seen_from_above(settings: S) -> S:
+def overhead_settings(settings: S) -> S:
     """Give the settings for a camera that looks straight down: people are as wide as long, and have no line.
 
     Their least size is half of what they are tall where they stand upright.
     """
-    boxes = replace(settings.boxes, body="box", aspect=1.0, least_height=_SPAN * settings.boxes.least_height)
-    return replace(settings, boxes=boxes, heights=replace(settings.heights, use=False))
+    boxes = replace(
+        settings.box_filter, body="box", aspect_ratio=1.0, min_height=_SPAN * settings.box_filter.min_height
+    )
+    return replace(settings, box_filter=boxes, height_model=replace(settings.height_model, enabled=False))
 
 
-PAPER_BOXES = paper_boxes(BackgroundSettings())
+PAPER_DETECTOR = paper_settings(BackgroundSettings())
 """The paper's box filters, as `PAPER_COSTS` are its costs."""
 
 
 class _Background(Protocol):
-    def split(self, image: Image) -> Split | None: ...
+    def segment(self, image: Image) -> Segmentation | None: ...
 
     def learn(self, foreground: Mask, occupied: Mask) -> None: ...
 
@@ -111,23 +117,25 @@ class _Background(Protocol):
 class BackgroundDetector:
     """Finds standing people in the foreground of one camera. Deterministic, about a second to warm up."""
 
-    def __init__(self, settings: BackgroundSettings | None = None, floor: Floor | None = None) -> None:
+    def __init__(
+        self, settings: BackgroundSettings | None = None, floor: FloorGeometry | None = None
+    ) -> None:
         """Begin with an empty memory; `floor` is what was measured of it in the pictures."""
         self.settings = settings or BackgroundSettings()
-        self._looks = Looks(self.settings.looks, self.settings.bins)
+        self._looks = AppearanceExtractor(self.settings.appearance, self.settings.gray_bins)
         self._floor = floor
-        self._learner = HeightLineLearner(self.settings.heights)
+        self._learner = HeightModelEstimator(self.settings.height_model)
         self._background: _Background = (
-            MedianBackground(self.settings.median, self.settings.ghosts, self.settings.shadows)
+            MedianBackground(self.settings.median, self.settings.static_foreground, self.settings.shadows)
             if self.settings.model == "median"
             else Mog2Background(self.settings.mog2)
         )
         self._shape: tuple[int, ...] | None = None
-        self._grid: Grid | None = None
+        self._grid: CellGrid | None = None
         self._filter: BoxFilter | None = None
-        self._line: HeightLine | None = None
-        self._band: Band | None = None
-        self.blind = True
+        self._line: HeightModel | None = None
+        self._band: HeightRange | None = None
+        self.warming_up = True
         """Whether the last frame could not be searched, since the background was not known."""
 
     def prepare(self, images: Iterable[Image], every: int) -> None:
@@ -143,12 +151,12 @@ class BackgroundDetector:
         background = self._background
         if not isinstance(background, MedianBackground):
             return
-        small = [self._grid_of(image).shrunk(image) for image in images]
+        small = [self._grid_of(image).resize(image) for image in images]
         background.prepare(small)
         for image in small:
-            split = background.glance(image)
+            split = background.segment_still(image)
             if split is not None and self._grid is not None:
-                self._learner.watch(
+                self._learner.observe(
                     _cleaned(split.foreground & self._grid.visible), self._grid.visible, every
                 )
 
@@ -159,17 +167,17 @@ class BackgroundDetector:
             ValueError: not an `(H, W, 3)` uint8 picture, or another size than before.
         """
         grid = self._grid_of(image)
-        small = grid.shrunk(image)
-        split = self._background.split(small)
-        self.blind = split is None
+        small = grid.resize(image)
+        split = self._background.segment(small)
+        self.warming_up = split is None
         if split is None:
             return Detections.empty(self.bins)
         mask = _cleaned(split.foreground & grid.visible)
-        self._learner.watch(mask, grid.visible)
+        self._learner.observe(mask, grid.visible)
         found = self._hypotheses(mask, split.shadow & grid.visible & ~mask, grid)
-        boxes = grid.to_work(found.boxes)
+        boxes = grid.cells_to_work(found.boxes)
         self._background.learn(mask, _occupied(boxes[: found.people], mask.shape))
-        return Detections(grid.to_picture(boxes), found.scores, self._looks.rows(small, boxes, mask))
+        return Detections(grid.work_to_image(boxes), found.scores, self._looks.histograms(small, boxes, mask))
 
     @property
     def bins(self) -> int:
@@ -177,47 +185,56 @@ class BackgroundDetector:
         return self._looks.bins
 
     @property
-    def height_line(self) -> HeightLine | None:
+    def height_model(self) -> HeightModel | None:
         """How tall people are where, in pixels of the working picture; None: not known yet."""
-        return self._learner.line
+        return self._learner.model
 
-    def _hypotheses(self, mask: Mask, shadow: Mask, grid: Grid) -> Explanation:
+    def _hypotheses(self, mask: Mask, shadow: Mask, grid: CellGrid) -> ForegroundFit:
         settings = self.settings
-        foreground = grid.cells(mask)
-        empty = np.maximum(grid.weight - foreground - grid.cells(shadow), 0.0)
-        cost = np.asarray(settings.boxes.background_cost * empty, dtype=np.float32)
+        foreground = grid.cell_shares(mask)
+        empty = np.maximum(grid.weight - foreground - grid.cell_shares(shadow), 0.0)
+        cost = np.asarray(settings.box_filter.background_cost * empty, dtype=np.float32)
         if self._filter is None:
-            self._filter = BoxFilter(grid.weight, mask.shape[0] // CELL, settings.boxes)
+            self._filter = BoxFilter(grid.weight, mask.shape[0] // CELL, settings.box_filter)
         peaks = self._filter.peaks(foreground - cost, self._heights(grid))
-        explaining = settings.hypotheses
-        if not self._learner.sure:
-            fewer = min(explaining.most_people, explaining.most_unsure)
-            explaining = replace(explaining, most_people=fewer)
-        found = explain(peaks, foreground, cost, grid.weight, explaining)
-        return Explanation(shrink(found.boxes, foreground, grid.weight), found.scores, found.people)
+        explaining = settings.foreground_fit
+        if not self._learner.is_reliable:
+            fewer = min(explaining.max_people, explaining.max_people_uncalibrated)
+            explaining = replace(explaining, max_people=fewer)
+        found = fit_foreground(peaks, foreground, cost, grid.weight, explaining)
+        return ForegroundFit(
+            shrink_to_foreground(found.boxes, foreground, grid.weight), found.scores, found.people
+        )
 
-    def _heights(self, grid: Grid) -> Band | None:
+    def _heights(self, grid: CellGrid) -> HeightRange | None:
         """Give the heights that are possible, in cells; the same object for as long as the line stays."""
-        line, heights = self._learner.line, self.settings.heights
+        line, heights = self._learner.model, self.settings.height_model
         if line is not self._line:
             self._line = line
             self._band = None
             if line is not None:
-                self._band = Band(
-                    line.in_cells(CELL, grid.margin), heights.tolerance, heights.doubt, heights.least_height
+                self._band = HeightRange(
+                    line.in_cells(CELL, grid.margin),
+                    heights.tolerance,
+                    heights.tolerance_std,
+                    heights.min_height,
                 )
         return self._band
 
-    def _grid_of(self, image: Image) -> Grid:
-        checked_image(image)
+    def _grid_of(self, image: Image) -> CellGrid:
+        validate_image(image)
         if self._grid is None:
             self._shape = image.shape
-            self._grid = Grid(
-                image.shape[:2], self.settings.work_width, CELL, self.settings.outside, self.settings.ignore
+            self._grid = CellGrid(
+                image.shape[:2],
+                self.settings.work_width,
+                CELL,
+                self.settings.border_margin,
+                self.settings.ignore,
             )
             if self._floor is not None:
-                floor = self._floor.in_rows(self._grid.scale)
-                self._learner = HeightLineLearner(self.settings.heights, floor, self._grid.rows)
+                floor = self._floor.scaled_by(self._grid.scale)
+                self._learner = HeightModelEstimator(self.settings.height_model, floor, self._grid.rows)
         if image.shape != self._shape:
             raise ValueError(f"the frames' size changed from {self._shape} to {image.shape}")
         return self._grid

@@ -8,30 +8,30 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import iou
-from tracking.detectors.background.box_filter import Peaks
-from tracking.detectors.background.silhouette import integral
+from tracking.detectors.background.box_filter import ScanPeaks
+from tracking.detectors.background.silhouette import integral_image
 from tracking.detectors.base import Plane
 
 
 @dataclass(frozen=True, slots=True)
-class ExplainSettings:
+class ForegroundFitSettings:
     """Which hypotheses of a frame are handed on."""
 
-    use: bool = True  # false: the boxes as the scan found them, each by itself (the paper)
-    most_people: int = 40  # people that a frame's foreground is explained by at most
-    most_unsure: int = (
+    enabled: bool = True  # false: the boxes as the scan found them, each by itself (the paper)
+    max_people: int = 40  # people that a frame's foreground is explained by at most
+    max_people_uncalibrated: int = (
         10  # and while it is not known well how tall people are: many small ones explain anything
     )
-    least_share: float = (
+    min_gain: float = (
         0.3  # least gain of a further person, in areas of the part of the body that nobody covers
     )
-    most_hypotheses: int = 16  # K: hypotheses handed on, people and runners-up, where people are few
-    runners_up: int = 8  # handed on beside the people however many these are
-    apart: float = 0.55  # runners-up overlap (IoU) what is handed on already by less than this
+    max_hypotheses: int = 16  # K: hypotheses handed on, people and runners-up, where people are few
+    max_alternatives: int = 8  # handed on beside the people however many these are
+    max_iou: float = 0.55  # runners-up overlap (IoU) what is handed on already by less than this
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Explanation:
+class ForegroundFit:
     """Hypotheses `(K, 4)` in cells; scores `(K,)` in [0, 1]; the first `people` explain the foreground.
 
     Where nothing was explained, all of them may be people, and `people` is at least as many as there are.
@@ -42,9 +42,9 @@ class Explanation:
     people: int
 
 
-def explain(
-    peaks: Peaks, foreground: Plane, cost: Plane, weight: Plane, settings: ExplainSettings
-) -> Explanation:
+def fit_foreground(
+    peaks: ScanPeaks, foreground: Plane, cost: Plane, weight: Plane, settings: ForegroundFitSettings
+) -> ForegroundFit:
     """Choose the people who explain most, one after the other, move each of them, then add runners-up.
 
     The gain of a body is the foreground inside that nobody explains yet, less the background inside (a
@@ -59,19 +59,19 @@ def explain(
         weight: 1 where the picture counts, `(H, W)`.
         settings: how many.
     """
-    search = Search(peaks, foreground, cost, weight, settings)
-    chosen = search.people() if settings.use else []
-    shares = search.shares()
+    search = GreedySearch(peaks, foreground, cost, weight, settings)
+    chosen = search.select_people() if settings.enabled else []
+    shares = search.gain_per_area()
     scores = []
     for index in chosen:
         search.remove(index)
-        scores.append(float(search.shares()[index]))
+        scores.append(float(search.gain_per_area()[index]))
         search.add(index)
-    people = len(chosen) if settings.use else settings.most_hypotheses
+    people = len(chosen) if settings.enabled else settings.max_hypotheses
     for index in _runners_up(peaks.boxes, chosen, settings):
         chosen.append(index)
         scores.append(float(shares[index]))
-    return Explanation(peaks.boxes[chosen].reshape(-1, 4), np.clip(scores, 0.0, 1.0), people)
+    return ForegroundFit(peaks.boxes[chosen].reshape(-1, 4), np.clip(scores, 0.0, 1.0), people)
 
 
 # How often each person is looked for again, given the others: the first choice was made without them.
@@ -82,7 +82,7 @@ _MOVES = 2
 _LEAST_VISIBLE = 0.6
 
 
-class Search:
+class GreedySearch:
     """Greedy choice, then moves and removals.
 
     Attributes:
@@ -91,21 +91,21 @@ class Search:
     """
 
     def __init__(
-        self, peaks: Peaks, foreground: Plane, cost: Plane, weight: Plane, settings: ExplainSettings
+        self, peaks: ScanPeaks, foreground: Plane, cost: Plane, weight: Plane, settings: ForegroundFitSettings
     ) -> None:
         self._peaks = peaks
         self._settings = settings
         self.gains = peaks.gains.copy()
-        self.visible = peaks.sizes.copy()
+        self.visible = peaks.areas.copy()
         # What a covered cell no longer adds to the gain of the others, and to what is visible of them.
         self._lost = np.stack([np.maximum(foreground - cost, 0.0), weight], axis=-1)
         self._covers = np.zeros(weight.shape, dtype=np.int32)
-        self._extent = peaks.corners.extent
+        self._extent = peaks.parts.extent
 
-    def people(self) -> list[int]:
+    def select_people(self) -> list[int]:
         """Give the indices of the chosen, in the order in which they were first chosen."""
         chosen: list[int] = []
-        while len(chosen) < self._settings.most_people:
+        while len(chosen) < self._settings.max_people:
             best = self._best(chosen)
             if best is None:
                 break
@@ -124,30 +124,30 @@ class Search:
                 break
         return chosen
 
-    def shares(self) -> npt.NDArray[np.float64]:
+    def gain_per_area(self) -> npt.NDArray[np.float64]:
         """Give each candidate's gain beside the chosen, in areas of what is visible of its body, `(P,)`."""
-        least = _LEAST_VISIBLE * self._peaks.sizes
+        least = _LEAST_VISIBLE * self._peaks.areas
         return np.asarray(self._peaks.priors * self.gains / np.maximum(self.visible, least))
 
     def add(self, index: int) -> None:
         """Let a candidate cover its cells."""
-        place, inside = self._peaks.corners.around(index), self._peaks.corners.covered(index)
+        place, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
         self._lose(place, inside & (self._covers[place] == 0), -1.0)
         self._covers[place] += inside
 
     def remove(self, index: int) -> None:
         """Let it no longer do so."""
-        place, inside = self._peaks.corners.around(index), self._peaks.corners.covered(index)
+        place, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
         self._covers[place] -= inside
         self._lose(place, inside & (self._covers[place] == 0), 1.0)
 
     def _lose(self, place: tuple[slice, slice], cells: npt.NDArray[np.bool_], sign: float) -> None:
         """Change gains and visible parts by what the cells are worth, of the bodies on this piece."""
-        lost = integral(self._lost[place] * cells[..., None].astype(np.float32))
+        lost = integral_image(self._lost[place] * cells[..., None].astype(np.float32))
         (top, bottom), (left, right) = ((it.start, it.stop) for it in place)
         lefts, tops, rights, bottoms = self._extent
         near = np.flatnonzero((lefts < right) & (rights > left) & (tops < bottom) & (bottoms > top))
-        change = self._peaks.corners.only(near).within(place).sums(lost)
+        change = self._peaks.parts.select(near).clip_to(place).sums(lost)
         self.gains[near] += sign * change[:, 0]
         self.visible[near] += sign * change[:, 1]
 
@@ -155,14 +155,16 @@ class Search:
         """Give the candidate that gains most beside the chosen; `None` where none gains enough."""
         if not len(self.gains):
             return None
-        shares = self.shares()
-        gains = np.where(shares >= self._settings.least_share, shares * self._peaks.sizes, -np.inf)
+        shares = self.gain_per_area()
+        gains = np.where(shares >= self._settings.min_gain, shares * self._peaks.areas, -np.inf)
         gains[chosen] = -np.inf
         best = int(np.argmax(gains))
         return best if np.isfinite(gains[best]) else None
 
 
-def _runners_up(boxes: npt.NDArray[np.float64], chosen: list[int], settings: ExplainSettings) -> list[int]:
+def _runners_up(
+    boxes: npt.NDArray[np.float64], chosen: list[int], settings: ForegroundFitSettings
+) -> list[int]:
     """Give the next best candidates that differ enough from each other and from the chosen."""
     if not len(boxes):
         return []
@@ -170,13 +172,46 @@ def _runners_up(boxes: npt.NDArray[np.float64], chosen: list[int], settings: Exp
     nearest = overlaps[chosen].max(axis=0, initial=0.0)
     nearest[chosen] = np.inf
     extra: list[int] = []
-    most = settings.most_hypotheses
-    if settings.use:
-        most = max(most, len(chosen) + settings.runners_up)
+    most = settings.max_hypotheses
+    if settings.enabled:
+        most = max(most, len(chosen) + settings.max_alternatives)
     for index in range(len(boxes)):
         if len(chosen) + len(extra) >= most:
             break
-        if nearest[index] < settings.apart:
+        if nearest[index] < settings.max_iou:
             extra.append(index)
             nearest = np.maximum(nearest, overlaps[index])
     return extra
+
+
+# A box loses at most this share of its width or height on each side: in a group there is always
+# somebody's foreground at the border, and alone the scan is never that far off.
+_MOST_TRIM = 0.12
+# A row or column with less than this share of foreground is outside.
+_LEAST_FILL = 0.04
+
+
+def shrink_to_foreground(
+    boxes: npt.NDArray[np.float64], foreground: Plane, weight: Plane
+) -> npt.NDArray[np.float64]:
+    """Move each side of each box `(K, 4)` in cells inwards to where the foreground begins.
+
+    Sides that lie in ignored cells (`weight` 0) stay.
+    """
+    fitted = boxes.copy()
+    filled = np.where(weight > 0, foreground, 1.0)
+    for row, box in enumerate(boxes):
+        left, top, right, bottom = (round(edge) for edge in box)
+        inside = filled[top:bottom, left:right]
+        if inside.size == 0:
+            continue
+        across, down = inside.mean(axis=0), inside.mean(axis=1)
+        fitted[row] += (_trim(across), _trim(down), -_trim(across[::-1]), -_trim(down[::-1]))
+    return fitted
+
+
+def _trim(profile: npt.NDArray[np.float32]) -> int:
+    """Give by how many cells the near end of a profile can be cut."""
+    most = int(_MOST_TRIM * len(profile))
+    full = np.flatnonzero(profile[: most + 1] >= _LEAST_FILL)
+    return int(full[0]) if full.size else 0

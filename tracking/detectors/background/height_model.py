@@ -3,7 +3,7 @@
 A pinhole camera `c` above a flat floor sees a person of height `p` as `h = p / c (y - horizon)` rows
 tall: one slope for the whole picture. So the slope is about known before anybody is seen (people are
 some 1.7 m, cameras hang at 1.5 to 6 m), and a few people who stand alone fix the rest. Where the floor was
-measured in metres there is a line before anybody is seen, and people in a crowd, of whom the foreground
+measured in meters there is a line before anybody is seen, and people in a crowd, of whom the foreground
 shows pieces and pairs, hardly lead it astray.
 """
 
@@ -15,128 +15,129 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.detectors.background.isolated_people import isolated_people
-from tracking.detectors.background.sample_novelty import SeenAnew
+from tracking.detectors.background.isolated_people import SampleNoveltyFilter, find_isolated_people
 from tracking.detectors.base import Mask
 
 
 @dataclass(frozen=True, slots=True)
-class HeightLineSettings:
+class HeightModelSettings:
     """Learning the height line `h = slope * y + offset` from people who stand alone."""
 
-    use: bool = True  # off: every height everywhere (the paper's box filters)
-    least_samples: int = 3  # times that somebody is seen alone in a new place before the line is trusted
-    most_samples: int = 1000  # the newest that are kept
+    enabled: bool = True  # off: every height everywhere (the paper's box filters)
+    min_samples: int = 3  # times that somebody is seen alone in a new place before the line is trusted
+    max_samples: int = 1000  # the newest that are kept
     sample_every: int = 1  # frames between two looks for isolated people
-    usual_slope: float = 0.65  # person's height over the camera's: what the slope is without evidence
-    slope_spread: float = 0.18  # standard deviation of that
-    least_height: float = 0.08  # smallest person, in picture heights, where people as small were seen alone
+    prior_slope: float = 0.65  # person's height over the camera's: what the slope is without evidence
+    prior_slope_std: float = 0.18  # standard deviation of that
+    min_height: float = 0.08  # smallest person, in picture heights, where people as small were seen alone
     tolerance: float = 0.15  # a hypothesis may be this share taller or smaller than the line says
-    doubt: float = 1.0  # standard deviations of the line by which it may be taller or smaller besides
-    most_scatter: float = 0.13  # median deviation, in heights, above which there is no line (stairs)
+    tolerance_std: float = 1.0  # standard deviations of the line by which it may be taller or smaller besides
+    max_scatter: float = 0.13  # median deviation, in heights, above which there is no line (stairs)
 
 
 @dataclass(frozen=True, slots=True)
-class Floor:
+class FloorGeometry:
     """What measuring the floor says of people's heights.
 
     Attributes:
         horizon: the row of the picture in which the floor ends: people there would be without height.
         slope: rows of a person's height for each row that their feet are below; None: it was not measured in
-            metres.
+            meters.
     """
 
     horizon: float
     slope: float | None
 
-    def in_rows(self, scale: float) -> Floor:
+    def scaled_by(self, scale: float) -> FloorGeometry:
         """Give the same in a picture that is so many times as large."""
-        return Floor(self.horizon * scale, self.slope)
+        return FloorGeometry(self.horizon * scale, self.slope)
 
 
 @dataclass(frozen=True, slots=True)
-class HeightLine:
+class HeightModel:
     """The expected box height `slope * y + offset` of a person whose foot is at row y.
 
-    Its standard deviation is `sqrt(spread^2 + (slope_spread (y - centre))^2)`: the line is known best
+    Its standard deviation is `sqrt(spread^2 + (slope_spread (y - center))^2)`: the line is known best
     where people were seen.
     """
 
     slope: float
     offset: float
-    centre: float = 0.0
-    spread: float = 0.0
-    slope_spread: float = 0.0
-    smallest: float = 0.0
+    center: float = 0.0
+    level_std: float = 0.0
+    slope_std: float = 0.0
+    min_height: float = 0.0
     """Nobody much smaller was seen: far beyond the people seen, the line says nothing."""
 
-    def at(self, foot: Floats) -> Floats:
+    def expected_height(self, foot: Floats) -> Floats:
         """Give the expected heights, in the unit of `foot`."""
         return self.slope * foot + self.offset
 
-    def doubt(self, foot: Floats) -> Floats:
+    def standard_deviation(self, foot: Floats) -> Floats:
         """Give the standard deviations of the expected heights, in the unit of `foot`."""
-        return np.hypot(self.spread, self.slope_spread * (foot - self.centre))
+        return np.hypot(self.level_std, self.slope_std * (foot - self.center))
 
-    def in_cells(self, cell: float, margin: float) -> HeightLine:
+    def in_cells(self, cell: float, margin: float) -> HeightModel:
         """Give the same line in cells of `cell` pixels, in a plane with `margin` cells added above."""
-        return HeightLine(
+        return HeightModel(
             self.slope,
             self.offset / cell - self.slope * margin,
-            self.centre / cell + margin,
-            self.spread / cell,
-            self.slope_spread,
-            self.smallest / cell,
+            self.center / cell + margin,
+            self.level_std / cell,
+            self.slope_std,
+            self.min_height / cell,
         )
 
 
-class HeightLineLearner:
+class HeightModelEstimator:
     """Collects isolated standing blobs as it goes and fits the line to them.
 
     Where people's heights follow from the floor there is a line from the beginning.
     """
 
-    def __init__(self, settings: HeightLineSettings, floor: Floor | None = None, rows: float = 0.0) -> None:
+    def __init__(
+        self, settings: HeightModelSettings, floor: FloorGeometry | None = None, rows: float = 0.0
+    ) -> None:
         """Begin without samples; `rows` is the height of the picture that the `floor` is seen in."""
         self._settings = settings
-        self._prior = prior_of(settings, floor, rows)
-        self._samples: deque[tuple[float, float]] = deque(maxlen=settings.most_samples)
-        self._anew = SeenAnew()
+        self._prior = height_prior(settings, floor, rows)
+        self._samples: deque[tuple[float, float]] = deque(maxlen=settings.max_samples)
+        self._anew = SampleNoveltyFilter()
         self._frames = 0
         self._fitted_on = 0
         self._seen = 0
         self._together = 1
-        self.line: HeightLine | None = None
-        if settings.use:
-            self.line = self._prior.line
+        self.model: HeightModel | None = None
+        if settings.enabled:
+            self.model = self._prior.model
 
     @property
-    def sure(self) -> bool:
-        """Whether it is known how tall people are: by metres of floor, or by many who were seen alone."""
-        line = self.line
-        if line is None or self._prior.line is not None:
+    def is_reliable(self) -> bool:
+        """Whether it is known how tall people are: by meters of floor, or by many who were seen alone."""
+        line = self.model
+        if line is None or self._prior.model is not None:
             return line is not None
-        return line.spread <= _SURE * (line.slope * line.centre + line.offset)
+        return line.level_std <= _SURE * (line.slope * line.center + line.offset)
 
-    def watch(self, foreground: Mask, visible: Mask, frames: int = 1) -> None:
+    def observe(self, foreground: Mask, visible: Mask, frames: int = 1) -> None:
         """Look at one frame's foreground `(H, W)`; `visible` is 0 where the picture is ignored.
 
         It stands for so many `frames` in a row.
         """
         self._frames += 1
-        if not self._settings.use or self._frames % self._settings.sample_every:
+        if not self._settings.enabled or self._frames % self._settings.sample_every:
             return
-        people = isolated_people(foreground, visible)
+        people = find_isolated_people(foreground, visible)
         self._together = max(self._together, len(people))
         worth = max(round(frames / _FRAMES), 1)
-        for person in self._anew.of(people, frames * self._settings.sample_every):
+        for person in self._anew.new_samples(people, frames * self._settings.sample_every):
             self._samples.extend([(person.foot, person.height)] * worth)
             self._seen += worth
         # Refit when the samples have grown by a tenth: early often, later seldom.
-        if len(self._samples) >= self._settings.least_samples and self._seen >= 1.1 * self._fitted_on:
+        if len(self._samples) >= self._settings.min_samples and self._seen >= 1.1 * self._fitted_on:
             self._fitted_on = self._seen
             samples = np.asarray(self._samples, dtype=np.float64)
-            self.line = fit_line(samples, self._settings, self._prior, self._together)
+            self.model = fit_height_model(samples, self._settings, self._prior, self._together)
 
 
 # Who walks gives a sample in so many frames, and so many samples are worth one independent one.
@@ -163,35 +164,37 @@ _MEASURED = 0.06
 
 
 @dataclass(frozen=True, slots=True)
-class Prior:
+class HeightPrior:
     """What is known of the line before anybody was seen.
 
     The slope is `N(slope, slope_spread^2)`, and the line `N(0, spread^2)` at the horizon where there is one.
     """
 
     slope: float
-    slope_spread: float
+    slope_std: float
     horizon: float | None = None
-    spread: float = 0.0
-    line: HeightLine | None = None
+    horizon_std: float = 0.0
+    model: HeightModel | None = None
     """The line to go by while samples tell none."""
 
 
-def prior_of(settings: HeightLineSettings, floor: Floor | None = None, rows: float = 0.0) -> Prior:
+def height_prior(
+    settings: HeightModelSettings, floor: FloorGeometry | None = None, rows: float = 0.0
+) -> HeightPrior:
     """Give what is known before anybody was seen in a picture of so many rows."""
     if floor is None:
-        return Prior(settings.usual_slope, settings.slope_spread)
+        return HeightPrior(settings.prior_slope, settings.prior_slope_std)
     off = _HORIZON * rows
     if floor.slope is None:
-        return Prior(settings.usual_slope, settings.slope_spread, floor.horizon, off)
+        return HeightPrior(settings.prior_slope, settings.prior_slope_std, floor.horizon, off)
     spread = _MEASURED * floor.slope
-    line = HeightLine(floor.slope, -floor.slope * floor.horizon, floor.horizon, off, spread)
-    return Prior(floor.slope, spread, floor.horizon, off, line)
+    line = HeightModel(floor.slope, -floor.slope * floor.horizon, floor.horizon, off, spread)
+    return HeightPrior(floor.slope, spread, floor.horizon, off, line)
 
 
-def fit_line(
-    samples: Floats, settings: HeightLineSettings, prior: Prior | None = None, people: int = 1
-) -> HeightLine | None:
+def fit_height_model(
+    samples: Floats, settings: HeightModelSettings, prior: HeightPrior | None = None, people: int = 1
+) -> HeightModel | None:
     """Fit the line to samples `(N, 2)` of foot and height; where they fit none, give what is known before.
 
     They are of at least so many different `people`: all of them may be tall by a share that is found along
@@ -200,37 +203,37 @@ def fit_line(
     The most likely line under Tukey's biweight and the prior: the best of a grid of slopes first, so that
     no share of wild samples below a half leads astray, then a few rounds of reweighted least squares.
     """
-    prior = prior or prior_of(settings)
+    prior = prior or height_prior(settings)
     foot, height = samples.T
     slope, offset = _best_of_grid(foot, height, prior)
-    precision = np.diag([1e-9, prior.slope_spread**-2, people / _STATURE**2])
-    centre, taller = float(foot.mean()), 0.0
+    precision = np.diag([1e-9, prior.slope_std**-2, people / _STATURE**2])
+    center, taller = float(foot.mean()), 0.0
     for _ in range(_ROUNDS):
         expected = slope * foot + offset
         deviation = (height - (1.0 + taller) * expected) / height
         weight = np.maximum(1.0 - (deviation / _WILD) ** 2, 0.0) ** 2
         if not weight.any():
-            return prior.line
-        centre = float(np.average(foot, weights=weight))
+            return prior.model
+        center = float(np.average(foot, weights=weight))
         weight = weight / (_ALIKE * (_NOISE * height) ** 2)
-        terms = np.stack([np.ones_like(foot), foot - centre, expected])
+        terms = np.stack([np.ones_like(foot), foot - center, expected])
         evidence = (terms * weight) @ terms.T + precision
         pull = (terms * weight) @ height + precision @ [0.0, prior.slope, 0.0]
         if prior.horizon is not None:
-            there = np.array([1.0, prior.horizon - centre, 0.0])
-            evidence += np.outer(there, there) / prior.spread**2
+            there = np.array([1.0, prior.horizon - center, 0.0])
+            evidence += np.outer(there, there) / prior.horizon_std**2
         level, slope, taller = (float(value) for value in np.linalg.solve(evidence, pull))
-        offset = level - slope * centre
+        offset = level - slope * center
     seen = (1.0 + taller) * (slope * foot + offset)
     scatter = _median(np.abs(height - seen) / height, _says(height))
     # Upright cameras see people grow towards the bottom of the picture; anything else is a misfit.
-    if slope <= 0.0 or scatter > settings.most_scatter:
-        return prior.line
+    if slope <= 0.0 or scatter > settings.max_scatter:
+        return prior.model
     (level, mixed), (_, steep) = np.linalg.inv(evidence)[:2, :2]
     smallest = _SMALLER * float(np.quantile(height[weight > 0.0], _LOW))
     # Level and slope are uncorrelated, and the line known best, a little off the mean of the feet.
     spread = float(np.sqrt(max(level - mixed**2 / steep, 0.0)))
-    return HeightLine(slope, offset, centre - float(mixed / steep), spread, float(np.sqrt(steep)), smallest)
+    return HeightModel(slope, offset, center - float(mixed / steep), spread, float(np.sqrt(steep)), smallest)
 
 
 def _says(height: Floats) -> Floats:
@@ -245,9 +248,9 @@ def _median(values: Floats, weights: Floats) -> float:
     return float(values[order][np.searchsorted(total, total[-1] / 2.0)])
 
 
-def _best_of_grid(foot: Floats, height: Floats, prior: Prior) -> tuple[float, float]:
+def _best_of_grid(foot: Floats, height: Floats, prior: HeightPrior) -> tuple[float, float]:
     """Give slope and offset of the line through a sample or the horizon that most samples are close to."""
-    slopes = prior.slope + prior.slope_spread * _SLOPES
+    slopes = prior.slope + prior.slope_std * _SLOPES
     through = np.linspace(0, len(foot) - 1, min(len(foot), _SAMPLES_A_SLOPE)).astype(np.int64)
     offsets = height[through] - slopes[:, None] * foot[through]
     if prior.horizon is not None:
@@ -256,6 +259,6 @@ def _best_of_grid(foot: Floats, height: Floats, prior: Prior) -> tuple[float, fl
     loss = np.minimum((deviation / _WILD) ** 2, 1.0) @ _says(height) * (_WILD / _NOISE) ** 2 / _ALIKE
     loss += (_SLOPES**2)[:, None]
     if prior.horizon is not None:
-        loss += ((offsets + slopes[:, None] * prior.horizon) / prior.spread) ** 2
+        loss += ((offsets + slopes[:, None] * prior.horizon) / prior.horizon_std) ** 2
     row, column = divmod(int(np.argmin(loss)), offsets.shape[1])
     return float(slopes[row]), float(offsets[row, column])

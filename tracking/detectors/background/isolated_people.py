@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +22,7 @@ _MERGED_AREA = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Alone:
+class IsolatedPerson:
     """Somebody who stands alone, in pixels: the column of their middle, the row of their foot, and height."""
 
     middle: float
@@ -29,13 +30,13 @@ class Alone:
     height: float
 
 
-def isolated_people(foreground: Mask, visible: Mask) -> list[Alone]:
+def find_isolated_people(foreground: Mask, visible: Mask) -> list[IsolatedPerson]:
     """Give every blob that looks like one whole standing person alone."""
     rows, columns = foreground.shape
-    # Outlines instead of labelled pixels: a twentieth of the time.
+    # Outlines instead of labeled pixels: a twentieth of the time.
     outlines, _ = cv2.findContours(foreground, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     blobs = np.array([_blob(np.asarray(outline)) for outline in outlines], dtype=np.int64).reshape(-1, 5)
-    found: list[Alone] = []
+    found: list[IsolatedPerson] = []
     for label, (left, top, width, height, area) in enumerate(blobs.tolist()):
         upright = _THINNEST * height <= width <= _WIDEST * height and area >= _LEAST_FILL * width * height
         inside = left >= _MARGIN and left + width <= columns - _MARGIN
@@ -44,7 +45,7 @@ def isolated_people(foreground: Mask, visible: Mask) -> list[Alone]:
             continue
         around = visible[top - _MARGIN : top + height + _MARGIN, left - _MARGIN : left + width + _MARGIN]
         if around.all() and not _crowded(blobs, label):
-            found.append(Alone(left + width / 2.0, float(top + height), float(height)))
+            found.append(IsolatedPerson(left + width / 2.0, float(top + height), float(height)))
     return found
 
 
@@ -63,3 +64,34 @@ def _crowded(blobs: npt.NDArray[np.int64], label: int) -> bool:
     beside = (others[:, 0] > left + width + reach) | (others[:, 0] + others[:, 2] < left - reach)
     apart = (others[:, 1] > top + height + reach) | (others[:, 1] + others[:, 3] < top - reach)
     return bool((~(beside | apart)).any())
+
+
+# Shares of a person's height by which middle, foot or head must have moved to count once more.
+_STEP = 0.1
+# Frames after which it is forgotten that somebody was seen in a place where nobody is.
+_FORGET = 50
+
+
+class SampleNoveltyFilter:
+    """Remembers where people were seen alone, and tells who is in a place in which nobody just was."""
+
+    def __init__(self) -> None:
+        self._places = np.empty((0, 3))
+        self._since = np.empty(0)
+        """Frames since somebody was there."""
+
+    def new_samples(self, people: Sequence[IsolatedPerson], frames: int = 1) -> list[IsolatedPerson]:
+        """Give who of one frame's people counts; the look before was so many `frames` ago."""
+        self._since += frames
+        anew: list[IsolatedPerson] = []
+        for person in people:
+            place = np.array([person.middle, person.foot, person.foot - person.height])
+            same = np.abs(self._places - place).max(axis=1, initial=0.0) <= _STEP * person.height
+            self._since[same] = 0.0
+            if not same.any():
+                anew.append(person)
+                self._places = np.concatenate([self._places, place[None]])
+                self._since = np.append(self._since, 0.0)
+        kept = self._since <= _FORGET
+        self._places, self._since = self._places[kept], self._since[kept]
+        return anew

@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tracking.detectors.background.gain import channel_gains, scaled
-from tracking.detectors.background.segmentation import Split
+from tracking.detectors.background.color_gain import apply_gains, channel_gains
+from tracking.detectors.background.segmentation import Segmentation
 from tracking.detectors.background.shadow import ShadowSettings, shadow_mask
-from tracking.detectors.background.static_foreground import GhostFinder, GhostSettings
+from tracking.detectors.background.static_foreground import StaticForegroundFilter, StaticForegroundSettings
 from tracking.detectors.base import Image, Mask
-from tracking.detectors.validation import at_least_one
+from tracking.detectors.validation import require_at_least_one
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +27,14 @@ class MedianSettings:
 
     bootstrap_frames: int = 50  # frames whose median is the first background (2 s at 25 frames/s)
     samples: int = 15  # how many of the bootstrap frames enter the median; odd
-    threshold: float = 24.0  # grey levels by which the most different channel of a pixel must differ
+    threshold: float = 24.0  # gray levels by which the most different channel of a pixel must differ
     learn_every: int = 5  # frames between two updates of the background
     learn_rate: float = 0.02  # share of the new frame in each update, where nobody is
-    restart_share: float = 0.6  # share of the picture in the foreground that means: the light changed
-    restart_frames: int = 15  # frames that it must last before the background is learned anew
+    relearn_share: float = 0.6  # share of the picture in the foreground that means: the light changed
+    relearn_frames: int = 15  # frames that it must last before the background is learned anew
 
     def __post_init__(self) -> None:
-        at_least_one(self, "bootstrap_frames", "samples", "learn_every")
+        require_at_least_one(self, "bootstrap_frames", "samples", "learn_every")
 
 
 class MedianBackground:
@@ -43,9 +43,11 @@ class MedianBackground:
     Usable after half of the bootstrap; the median is taken again at its end.
     """
 
-    def __init__(self, settings: MedianSettings, ghosts: GhostSettings, shadows: ShadowSettings) -> None:
+    def __init__(
+        self, settings: MedianSettings, ghosts: StaticForegroundSettings, shadows: ShadowSettings
+    ) -> None:
         self._settings = settings
-        self._ghosts = GhostFinder(ghosts)
+        self._ghosts = StaticForegroundFilter(ghosts)
         self._shadows = shadows
         self._samples: list[Image] = []
         self._frames = 0
@@ -63,11 +65,11 @@ class MedianBackground:
             self._take_median()
             self._frames, self._samples = self._settings.bootstrap_frames, []
 
-    def glance(self, image: Image) -> Split | None:
+    def segment_still(self, image: Image) -> Segmentation | None:
         """Tell foreground from shadow and background in a picture that is not the next frame."""
         return None if self._rounded is None else self._compared(image, self._rounded)[0]
 
-    def split(self, image: Image) -> Split | None:
+    def segment(self, image: Image) -> Segmentation | None:
         """Tell foreground from shadow and background; `None` while the background is not known yet."""
         self._bootstrap(image)
         self._frames += 1
@@ -87,11 +89,11 @@ class MedianBackground:
         """
         if self._exact is None or self._rounded is None or self._last is None:
             return
-        looks, learns = self._ghosts.due(), self._frames % self._settings.learn_every == 0
+        looks, learns = self._ghosts.is_due(), self._frames % self._settings.learn_every == 0
         if not (looks or learns):
             return
         # The frame as it would look at the background's gain.
-        level = scaled(self._last[0], 1.0 / self._last[1])
+        level = apply_gains(self._last[0], 1.0 / self._last[1])
         ghosts = self._ghosts.find(level, self._rounded, foreground) if looks else None
         if ghosts is not None:
             self._exact[ghosts > 0] = level[ghosts > 0]
@@ -102,16 +104,16 @@ class MedianBackground:
             return
         self._rounded = np.rint(self._exact).astype(np.uint8)
 
-    def _compared(self, image: Image, background: Image) -> tuple[Split, npt.NDArray[np.float64]]:
+    def _compared(self, image: Image, background: Image) -> tuple[Segmentation, npt.NDArray[np.float64]]:
         """Give what differs from the background at the picture's gains, and the gains."""
         gains = channel_gains(image, background)
-        expected = scaled(background, gains)
+        expected = apply_gains(background, gains)
         blue, green, red = cv2.split(cv2.absdiff(image, expected))
         difference = cv2.max(cv2.max(blue, green), red)
         _, binary = cv2.threshold(difference, self._settings.threshold, 255, cv2.THRESH_BINARY)
         mask = np.asarray(binary, dtype=np.uint8)
         shadow = shadow_mask(image, expected, mask, self._shadows)
-        return Split(mask & ~shadow, shadow), gains
+        return Segmentation(mask & ~shadow, shadow), gains
 
     def _bootstrap(self, image: Image) -> None:
         settings = self._settings
@@ -129,7 +131,7 @@ class MedianBackground:
 
     def _sample(self, image: Image) -> None:
         first = self._samples[0] if self._samples else image
-        self._samples.append(scaled(image, 1.0 / channel_gains(image, first)))
+        self._samples.append(apply_gains(image, 1.0 / channel_gains(image, first)))
 
     def _take_median(self) -> None:
         ordered = np.sort(np.stack(self._samples), axis=0)
@@ -137,9 +139,9 @@ class MedianBackground:
         self._exact = self._rounded.astype(np.float32)
 
     def _watch_for_new_light(self, mask: Mask) -> None:
-        flooded = cv2.countNonZero(mask) > self._settings.restart_share * mask.size
+        flooded = cv2.countNonZero(mask) > self._settings.relearn_share * mask.size
         self._flooded = self._flooded + 1 if flooded else 0
-        if self._flooded >= self._settings.restart_frames:
+        if self._flooded >= self._settings.relearn_frames:
             self._frames = 0
             self._flooded = 0
             self._samples = []

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from tracking.detectors.background.segmentation import Split
+from tracking.detectors.background.segmentation import Segmentation
 from tracking.detectors.base import Image, Mask
 
 _SHADOW = 127
@@ -19,7 +19,7 @@ class Mog2Settings:
 
     history_frames: int = 500  # frames over which the background is learned
     variance_threshold: float = 25.0  # squared standard deviations that count as foreground
-    shadows: bool = True  # tell shadows from the foreground
+    detect_shadows: bool = True  # tell shadows from the foreground
     warm_up_frames: int = 25  # frames before the first foreground is given
 
 
@@ -30,17 +30,17 @@ class Mog2Background:
         self._settings = settings
         self._frames = 0
         self._model = cv2.createBackgroundSubtractorMOG2(
-            settings.history_frames, settings.variance_threshold, settings.shadows
+            settings.history_frames, settings.variance_threshold, settings.detect_shadows
         )
 
-    def split(self, image: Image) -> Split | None:
+    def segment(self, image: Image) -> Segmentation | None:
         """Tell foreground from shadow and background; `None` while the background is not known yet."""
         mask = self._model.apply(image)
         self._frames += 1
         if self._frames <= self._settings.warm_up_frames:
             return None
         full, none = np.uint8(255), np.uint8(0)
-        return Split(np.where(mask > _SHADOW, full, none), np.where(mask == _SHADOW, full, none))
+        return Segmentation(np.where(mask > _SHADOW, full, none), np.where(mask == _SHADOW, full, none))
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
         """Do nothing: the mixture has learned already."""

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import Floats
-from tracking.detectors.background.silhouette import Part
+from tracking.detectors.background.silhouette import BodyPart
 
 # Steps of the scan in a box's height: what a coarse grid misses, the moves of `find_peaks` find.
 STEPS_A_HEIGHT = 16
@@ -29,33 +29,33 @@ class HeightPlan:
         tops: `(R,)` rows of the top left corners.
         lefts: `(C,)` their columns.
         priors: `(R, 1)`, the factor on the gain in each row.
-        least: gain from which a place counts.
-        around: a peak is the best of its surroundings of this size, `(rows, columns)` of places.
-        reads: for each part, where the integral has its right lower, right upper, left lower and left upper
-            corner at every place.
+        min_gain: gain from which a place counts.
+        neighborhood: a peak is the best of its surroundings of this size, `(rows, columns)` of places.
+        corner_slices: for each part, slices of the integral image at its bottom right, top right, bottom
+            left and top left corner, over all positions.
     """
 
     size: tuple[int, int]
     tops: npt.NDArray[np.int64]
     lefts: npt.NDArray[np.int64]
     priors: Floats
-    least: float
-    around: npt.NDArray[np.uint8]
-    reads: tuple[tuple[_Read, _Read, _Read, _Read], ...]
+    min_gain: float
+    neighborhood: npt.NDArray[np.uint8]
+    corner_slices: tuple[tuple[_Read, _Read, _Read, _Read], ...]
 
     def peaks(self, sums: Floats) -> tuple[Floats, Floats]:
         """Give the local maxima of the gain, whose integral is `sums`: boxes `(P, 4)` and gains `(P,)`."""
         gains = np.zeros((len(self.tops), len(self.lefts)))
-        for right_bottom, right_top, left_bottom, left_top in self.reads:
+        for right_bottom, right_top, left_bottom, left_top in self.corner_slices:
             gains += sums[right_bottom]
             gains -= sums[right_top]
             gains -= sums[left_bottom]
             gains += sums[left_top]
         gains *= self.priors
-        if gains.max() < self.least:
+        if gains.max() < self.min_gain:
             return _NO_BOXES, _NO_GAINS
-        highest = cv2.dilate(gains, self.around, borderType=cv2.BORDER_REPLICATE)
-        found = np.flatnonzero((gains >= highest) & (gains >= self.least))
+        highest = cv2.dilate(gains, self.neighborhood, borderType=cv2.BORDER_REPLICATE)
+        found = np.flatnonzero((gains >= highest) & (gains >= self.min_gain))
         rows, columns = np.divmod(found, len(self.lefts))
         left, top = self.lefts[columns], self.tops[rows]
         boxes = np.stack([left, top, left + self.size[0], top + self.size[1]], axis=1).astype(np.float64)
@@ -66,7 +66,11 @@ _NO_BOXES, _NO_GAINS = np.empty((0, 4)), np.empty(0)
 
 
 def plan_height(
-    shape: tuple[int, int], size: tuple[int, int], parts: tuple[Part, ...], priors: Floats, least_gain: float
+    shape: tuple[int, int],
+    size: tuple[int, int],
+    parts: tuple[BodyPart, ...],
+    priors: Floats,
+    least_gain: float,
 ) -> HeightPlan | None:
     """Plan one height; `None` where no body of it is possible.
 
@@ -100,9 +104,9 @@ def plan_height(
         tops=tops,
         lefts=lefts,
         priors=priors[tops + height][:, None],
-        least=least_gain * area,
-        around=np.ones(around, dtype=np.uint8),
-        reads=tuple(
+        min_gain=least_gain * area,
+        neighborhood=np.ones(around, dtype=np.uint8),
+        corner_slices=tuple(
             (
                 read(part.right, part.bottom),
                 read(part.right, part.top),

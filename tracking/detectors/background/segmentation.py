@@ -8,7 +8,7 @@ from tracking.detectors.base import Mask
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Split:
+class Segmentation:
     """Pixels by kind, each `(H, W)`, 0 or 255; what is in neither is background.
 
     Attributes:

@@ -1,6 +1,6 @@
-"""Shadows: darker than the floor, but of the floor's colour.
+"""Shadows: darker than the floor, but of the floor's color.
 
-Grey trousers look the same, so what looks like a shadow counts neither for a person nor against one.
+Gray trousers look the same, so what looks like a shadow counts neither for a person nor against one.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from tracking.detectors.base import Image, Mask
 class ShadowSettings:
     """What looks like a shadow, by the ratio of the frame to the background in each channel."""
 
-    use: bool = True
-    darkest: float = 0.6  # least mean ratio: darker is clothing
-    lightest: float = 0.97  # largest mean ratio: lighter is no shadow
-    colour: float = 0.03  # largest spread of the ratio over the channels, in shares of their mean
+    enabled: bool = True
+    min_ratio: float = 0.6  # least mean ratio: darker is clothing
+    max_ratio: float = 0.97  # largest mean ratio: lighter is no shadow
+    max_chroma_spread: float = 0.03  # largest spread of the ratio over the channels, in shares of their mean
 
 
 def shadow_mask(image: Image, background: Image, foreground: Mask, settings: ShadowSettings) -> Mask:
@@ -33,7 +33,7 @@ def shadow_mask(image: Image, background: Image, foreground: Mask, settings: Sha
     """
     found = np.zeros_like(foreground)
     where = np.flatnonzero(foreground)
-    if not settings.use or not where.size:
+    if not settings.enabled or not where.size:
         return found
     new = image.reshape(-1, 3)[where].astype(np.float32) + 1.0
     old = background.reshape(-1, 3)[where].astype(np.float32) + 1.0
@@ -41,6 +41,6 @@ def shadow_mask(image: Image, background: Image, foreground: Mask, settings: Sha
     blue, green, red = ratio.T  # one by one: a sum over so short an axis takes three times as long
     mean = (blue + green + red) / np.float32(3.0)
     spread = np.maximum(np.maximum(blue, green), red) - np.minimum(np.minimum(blue, green), red)
-    darker = (mean >= settings.darkest) & (mean <= settings.lightest)
-    found.ravel()[where[darker & (spread <= settings.colour * mean)]] = 255
+    darker = (mean >= settings.min_ratio) & (mean <= settings.max_ratio)
+    found.ravel()[where[darker & (spread <= settings.max_chroma_spread * mean)]] = 255
     return found

@@ -13,7 +13,7 @@ from tracking.detectors.base import Plane
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class BodyPart:
     """A rectangle in shares of a person's box: 0 is its left or top, 1 its right or bottom."""
 
     left: float
@@ -23,25 +23,27 @@ class Part:
 
 
 # Where more than half of the people who stand alone are, on the mean over several recordings.
-BODY = (
-    Part(0.36, 0.0, 0.66, 0.1),  # head
-    Part(0.30, 0.1, 0.72, 0.2),  # neck and shoulders
-    Part(0.20, 0.2, 0.80, 0.5),  # trunk and arms
-    Part(0.25, 0.5, 0.75, 0.7),  # hips
-    Part(0.26, 0.7, 0.70, 1.0),  # legs
+PERSON_PARTS = (
+    BodyPart(0.36, 0.0, 0.66, 0.1),  # head
+    BodyPart(0.30, 0.1, 0.72, 0.2),  # neck and shoulders
+    BodyPart(0.20, 0.2, 0.80, 0.5),  # trunk and arms
+    BodyPart(0.25, 0.5, 0.75, 0.7),  # hips
+    BodyPart(0.26, 0.7, 0.70, 1.0),  # legs
 )
-WHOLE = (Part(0.0, 0.0, 1.0, 1.0),)
+BOX_PARTS = (BodyPart(0.0, 0.0, 1.0, 1.0),)
 
 Body = Literal["person", "box"]
-BODIES: dict[Body, tuple[Part, ...]] = {"person": BODY, "box": WHOLE}
+BODY_PARTS: dict[Body, tuple[BodyPart, ...]] = {"person": PERSON_PARTS, "box": BOX_PARTS}
 
 
-def integral(plane: Plane) -> npt.NDArray[np.float64]:
+def integral_image(plane: Plane) -> npt.NDArray[np.float64]:
     """Give the sums over all rectangles that begin in the top left corner, `(H + 1, W + 1)`."""
     return np.asarray(cv2.integral(plane, sdepth=cv2.CV_64F))
 
 
-def corners_of(boxes: npt.NDArray[np.float64], parts: tuple[Part, ...], shape: tuple[int, ...]) -> Corners:
+def part_rectangles(
+    boxes: npt.NDArray[np.float64], parts: tuple[BodyPart, ...], shape: tuple[int, ...]
+) -> PartRectangles:
     """Give the whole cells of the parts of boxes `(K, 4)` in cells, cut at the borders of a plane."""
     across = (boxes[:, 2] - boxes[:, 0])[:, None]
     down = (boxes[:, 3] - boxes[:, 1])[:, None]
@@ -51,11 +53,11 @@ def corners_of(boxes: npt.NDArray[np.float64], parts: tuple[Part, ...], shape: t
         np.clip(np.rint(begin + share * length), 0, size).astype(np.int64)
         for share, (begin, length, size) in zip(shares.T, (columns, rows, columns, rows), strict=True)
     )
-    return Corners(left, top, right, bottom)
+    return PartRectangles(left, top, right, bottom)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Corners:
+class PartRectangles:
     """The parts of K bodies in whole cells, each `(K, P)`."""
 
     left: npt.NDArray[np.int64]
@@ -74,29 +76,29 @@ class Corners:
         """Left, top, right and bottom of the bodies as wholes, each `(K,)`."""
         return self.left.min(axis=1), self.top.min(axis=1), self.right.max(axis=1), self.bottom.max(axis=1)
 
-    def only(self, chosen: npt.NDArray[np.int64]) -> Corners:
+    def select(self, chosen: npt.NDArray[np.int64]) -> PartRectangles:
         """Give those of some of the bodies."""
-        return Corners(self.left[chosen], self.top[chosen], self.right[chosen], self.bottom[chosen])
+        return PartRectangles(self.left[chosen], self.top[chosen], self.right[chosen], self.bottom[chosen])
 
-    def within(self, place: tuple[slice, slice]) -> Corners:
+    def clip_to(self, place: tuple[slice, slice]) -> PartRectangles:
         """Give the corners in a piece of the plane, cut at its borders."""
         rows, columns = place
         width, height = columns.stop - columns.start, rows.stop - rows.start
-        return Corners(
+        return PartRectangles(
             np.clip(self.left - columns.start, 0, width),
             np.clip(self.top - rows.start, 0, height),
             np.clip(self.right - columns.start, 0, width),
             np.clip(self.bottom - rows.start, 0, height),
         )
 
-    def around(self, k: int) -> tuple[slice, slice]:
+    def bounds(self, k: int) -> tuple[slice, slice]:
         """Give the rows and columns that body `k` lies in."""
         rows = slice(int(self.top[k].min()), int(self.bottom[k].max()))
         return rows, slice(int(self.left[k].min()), int(self.right[k].max()))
 
-    def covered(self, k: int) -> npt.NDArray[np.bool_]:
+    def mask(self, k: int) -> npt.NDArray[np.bool_]:
         """Give the cells inside body `k`, in the piece of the plane `around` it."""
-        rows, columns = self.around(k)
+        rows, columns = self.bounds(k)
         x, y = columns.start, rows.start
         inside = np.zeros((rows.stop - y, columns.stop - x), dtype=np.bool_)
         lefts, tops, rights, bottoms = self.left[k], self.top[k], self.right[k], self.bottom[k]

@@ -9,18 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.detectors.base import Image, Mask, Plane
-from tracking.detectors.validation import at_least_one
+from tracking.detectors.validation import require_at_least_one
 
 _RING = np.ones((5, 5), dtype=np.uint8)
 _SMALL = np.ones((3, 3), dtype=np.uint8)
 # Pixels around a part that its outline may lie in.
 _REACH = 6
-# Pixels (width, height) around a pixel of the outline over which the colours of its sides are compared.
+# Pixels (width, height) around a pixel of the outline over which the colors of its sides are compared.
 _AROUND = (9, 9)
 
 
 @dataclass(frozen=True, slots=True)
-class GhostSettings:
+class StaticForegroundSettings:
     """When a part of the foreground that never moves is taken into the background.
 
     Raises:
@@ -29,19 +29,19 @@ class GhostSettings:
 
     check_every: int = 5  # frames between two looks at what has not moved
     still_checks: int = 6  # looks in a row without motion before a part is judged
-    sure_after: int = 20  # looks that agree with the background after which it is sure, so that ...
-    sure_checks: int = 50  # ... so many looks without motion are needed: furniture, not ghosts
-    still_threshold: float = 14.0  # grey levels between two looks that count as motion
-    outline_share: float = 0.3  # share of a part's outline that must border on the background
-    edge_ratio: float = 1.3  # how much sharper an outline is in the background than in the frame
-    sharper_share: float = 0.65  # share of the outline towards the background that must be that sharp
-    least_area: int = 40  # square pixels of the working picture; smaller parts are noise
+    settled_after_checks: int = 20  # looks that agree with the background after which it is sure, so that ...
+    settled_still_checks: int = 50  # ... so many looks without motion are needed: furniture, not ghosts
+    motion_threshold: float = 14.0  # gray levels between two looks that count as motion
+    min_outline_share: float = 0.3  # share of a part's outline that must border on the background
+    min_edge_ratio: float = 1.3  # how much sharper an outline is in the background than in the frame
+    min_sharper_share: float = 0.65  # share of the outline towards the background that must be that sharp
+    min_area: int = 40  # square pixels of the working picture; smaller parts are noise
 
     def __post_init__(self) -> None:
-        at_least_one(self, "check_every")
+        require_at_least_one(self, "check_every")
 
 
-class GhostFinder:
+class StaticForegroundFilter:
     """Tells a ghost from a person who stands still, by the outline.
 
     A person's outline is an edge in the frame and not in the background; a ghost's is one in the
@@ -50,14 +50,14 @@ class GhostFinder:
     the background, so that where it was seen for a while what stands still has to do so for longer.
     """
 
-    def __init__(self, settings: GhostSettings) -> None:
+    def __init__(self, settings: StaticForegroundSettings) -> None:
         self._settings = settings
         self._frames = 0
         self._last: Mask | None = None
         self._still: Mask | None = None
         self._agreed: Mask = np.zeros((1, 1), dtype=np.uint8)
 
-    def due(self) -> bool:
+    def is_due(self) -> bool:
         """Count a frame; say whether it is one to look for ghosts in."""
         self._frames += 1
         return self._frames % self._settings.check_every == 0
@@ -70,23 +70,25 @@ class GhostFinder:
             background: `(H, W, 3)`.
             foreground: `(H, W)`, 255 where the image differs from the background.
         """
-        grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        still = self._count_still(grey, foreground)
+        gray = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        still = self._count_still(gray, foreground)
         self._agreed = np.minimum(self._agreed, np.uint8(200)) + (foreground == 0).astype(np.uint8)
-        sure = self._agreed >= self._settings.sure_after
-        waited = np.asarray(still >= np.where(sure, self._settings.sure_checks, self._settings.still_checks))
+        sure = self._agreed >= self._settings.settled_after_checks
+        waited = np.asarray(
+            still >= np.where(sure, self._settings.settled_still_checks, self._settings.still_checks)
+        )
         if not waited.any():
             return None
         return self._judge(image, background, foreground, waited)
 
-    def _count_still(self, grey: Mask, foreground: Mask) -> Mask:
+    def _count_still(self, gray: Mask, foreground: Mask) -> Mask:
         if self._last is None or self._still is None:
-            self._still = np.zeros_like(grey)
+            self._still = np.zeros_like(gray)
         else:
-            calm = (cv2.absdiff(grey, self._last) < self._settings.still_threshold) & (foreground > 0)
+            calm = (cv2.absdiff(gray, self._last) < self._settings.motion_threshold) & (foreground > 0)
             grown = np.minimum(self._still, np.uint8(200)) + np.uint8(1)
             self._still = np.where(calm, grown, np.uint8(0)).astype(np.uint8)
-        self._last = grey
+        self._last = gray
         return self._still
 
     def _judge(
@@ -99,7 +101,7 @@ class GhostFinder:
         found = np.zeros_like(foreground)
         for label in range(1, count):
             left, top, width, height, area = (int(value) for value in stats[label])
-            if area < self._settings.least_area:
+            if area < self._settings.min_area:
                 continue
             rows = slice(max(top - _REACH, 0), top + height + _REACH)
             columns = slice(max(left - _REACH, 0), left + width + _REACH)
@@ -107,28 +109,28 @@ class GhostFinder:
             grown = cv2.dilate(part, _RING)
             outline = (grown - cv2.erode(part, _RING)) > 0
             free = outline & border[rows, columns]
-            if np.count_nonzero(free) < self._settings.outline_share * np.count_nonzero(outline):
+            if np.count_nonzero(free) < self._settings.min_outline_share * np.count_nonzero(outline):
                 continue
             outside = (foreground[rows, columns] == 0).astype(np.float32)
             now = _contrast(image[rows, columns], part, outside)[free]
             then = _contrast(background[rows, columns], part, outside)[free]
-            sharper = np.count_nonzero(then > self._settings.edge_ratio * now)
-            if sharper > self._settings.sharper_share * now.size:
+            sharper = np.count_nonzero(then > self._settings.min_edge_ratio * now)
+            if sharper > self._settings.min_sharper_share * now.size:
                 found[rows, columns][grown > 0] = 255
         return found if found.any() else None
 
 
 def _contrast(image: Image, inside: Mask, outside: Plane) -> Plane:
-    """Give how much the colours on the two sides of an outline differ around each pixel, `(h, w)`."""
+    """Give how much the colors on the two sides of an outline differ around each pixel, `(h, w)`."""
     sides = []
     for side in (inside.astype(np.float32), outside):
         weight = cv2.boxFilter(side, -1, _AROUND, normalize=False, borderType=cv2.BORDER_CONSTANT)
-        colours = cv2.boxFilter(
+        colors = cv2.boxFilter(
             image.astype(np.float32) * side[..., None],
             -1,
             _AROUND,
             normalize=False,
             borderType=cv2.BORDER_CONSTANT,
         )
-        sides.append(colours / np.maximum(weight, 1.0)[..., None])
+        sides.append(colors / np.maximum(weight, 1.0)[..., None])
     return np.asarray(np.abs(sides[0] - sides[1]).max(axis=2), dtype=np.float32)

@@ -12,16 +12,16 @@ import numpy.typing as npt
 
 from tracking.boxes import Floats
 from tracking.detectors.base import Image
-from tracking.detectors.color_histogram import Looks
-from tracking.detectors.ignore_mask import Ignored, Polygons
-from tracking.detectors.neural.yolo_output import Layout, decoded
-from tracking.detectors.non_maximum_suppression import best_apart
-from tracking.detectors.validation import checked_image
+from tracking.detectors.color_histogram import AppearanceExtractor
+from tracking.detectors.ignore_mask import IgnoreFilter, Polygons
+from tracking.detectors.neural.yolo_output import Layout, decode_output
+from tracking.detectors.non_maximum_suppression import non_maximum_suppression
+from tracking.detectors.validation import validate_image
 from tracking.types import Detections
 
 _INPUTS: dict[str, type[np.floating]] = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
 _DIMENSIONS = 4
-# Grey of the bars beside the picture, as in YOLO's training.
+# Gray of the bars beside the picture, as in YOLO's training.
 _BARS = 114
 
 
@@ -34,21 +34,21 @@ class OnnxSettings:
     """
 
     model: Path | None = None  # the file
-    layout: Layout = "auto"  # how its output is written; auto: by its shape
+    output_layout: Layout = "auto"  # how its output is written; auto: by its shape
     classes: tuple[int, ...] = (0,)  # the classes that are people; 0 in COCO
-    least_score: float = 0.25  # boxes below this score are left out
-    apart: float = 0.7  # of two boxes that overlap (IoU) by more, the one of lower score is left out
-    size: int = 640  # pixels a side that pictures are fitted into, where the file leaves it open
+    min_score: float = 0.25  # boxes below this score are left out
+    nms_iou: float = 0.7  # of two boxes that overlap (IoU) by more, the one of lower score is left out
+    input_size: int = 640  # pixels a side that pictures are fitted into, where the file leaves it open
     threads: int = 1  # threads of one network; there is a process for each camera already
-    most: int = 100  # boxes handed on at most
+    max_detections: int = 100  # boxes handed on at most
 
     def __post_init__(self) -> None:
         if not self.classes or min(self.classes) < 0:
             raise ValueError(f"classes are numbers from 0, at least one, not {list(self.classes)}")
-        if not 0.0 <= self.least_score <= 1.0:
-            raise ValueError(f"least_score is a share between 0 and 1, not {self.least_score}")
-        if self.size < 1 or self.threads < 1 or self.most < 1:
-            raise ValueError("size, threads and most must be at least 1")
+        if not 0.0 <= self.min_score <= 1.0:
+            raise ValueError(f"min_score is a share between 0 and 1, not {self.min_score}")
+        if self.input_size < 1 or self.threads < 1 or self.max_detections < 1:
+            raise ValueError("input_size, threads and max_detections must be at least 1")
 
 
 class OnnxDetector:
@@ -60,12 +60,14 @@ class OnnxDetector:
         ImportError: onnxruntime is not installed.
     """
 
-    blind = False
+    warming_up = False
 
-    def __init__(self, settings: OnnxSettings, looks: Looks | None = None, ignore: Polygons = ()) -> None:
+    def __init__(
+        self, settings: OnnxSettings, looks: AppearanceExtractor | None = None, ignore: Polygons = ()
+    ) -> None:
         self.settings = settings
-        self._looks = looks or Looks()
-        self._ignored = Ignored(ignore)
+        self._looks = looks or AppearanceExtractor()
+        self._ignored = IgnoreFilter(ignore)
         if settings.model is None:
             raise ValueError("no model is named: the path of an ONNX file")
         self._session = _opened(settings.model, settings.threads)
@@ -87,15 +89,15 @@ class OnnxDetector:
         Raises:
             ValueError: not an `(H, W, 3)` uint8 picture, or the network's output is not as YOLO's.
         """
-        checked_image(image)
+        validate_image(image)
         planes, factor, bars = self._letterbox(image)
-        found = decoded(self._run(planes), self.settings.layout, self.settings.classes)
+        found = decode_output(self._run(planes), self.settings.output_layout, self.settings.classes)
         limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)
         boxes = np.clip((found.boxes - bars) / factor, 0.0, limits)
-        kept = (found.scores >= self.settings.least_score) & self._ignored.leaves(image.shape, boxes)
+        kept = (found.scores >= self.settings.min_score) & self._ignored.keep(image.shape, boxes)
         boxes, scores = boxes[kept], found.scores[kept]
-        best = best_apart(boxes, scores, self.settings.apart, self.settings.most)
-        return Detections(boxes[best], scores[best], self._looks.rows(image, boxes[best]))
+        best = non_maximum_suppression(boxes, scores, self.settings.nms_iou, self.settings.max_detections)
+        return Detections(boxes[best], scores[best], self._looks.histograms(image, boxes[best]))
 
     def _run(self, planes: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
         try:
@@ -144,7 +146,7 @@ def _input_of(session: Any, settings: OnnxSettings) -> tuple[str, tuple[int, int
         raise ValueError(
             f"{settings.model}: takes {inputs[0].type} {shape}, not a picture of floats (1, 3, height, width)"
         )
-    height, width = (side if isinstance(side, int) else settings.size for side in shape[2:])
+    height, width = (side if isinstance(side, int) else settings.input_size for side in shape[2:])
     return str(inputs[0].name), (height, width), _INPUTS[inputs[0].type]
 
 

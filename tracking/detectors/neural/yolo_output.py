@@ -20,14 +20,14 @@ _MOST_END_TO_END = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class DecodedBoxes:
     """Boxes `(N, 4)` in pixels of the network's input, scores `(N,)` in [0, 1]."""
 
     boxes: Floats
     scores: Floats
 
 
-def decoded(output: npt.NDArray[np.floating], layout: Layout, classes: Sequence[int]) -> Found:
+def decode_output(output: npt.NDArray[np.floating], layout: Layout, classes: Sequence[int]) -> DecodedBoxes:
     """Read the output of a network; a box scores what the likeliest of the classes asked for does.
 
     | layout | shape | a row |
@@ -51,7 +51,7 @@ def decoded(output: npt.NDArray[np.floating], layout: Layout, classes: Sequence[
         if table.shape[1] != _END_TO_END:
             raise ValueError(_unfit(output.shape))
         wanted = np.isin(table[:, 5].astype(np.int64), list(classes))
-        return Found(table[wanted, :_BOX], np.clip(table[wanted, _BOX], 0.0, 1.0))
+        return DecodedBoxes(table[wanted, :_BOX], np.clip(table[wanted, _BOX], 0.0, 1.0))
     first = _BOX if kind == "yolov8" else _BOX + 1
     if table.shape[1] <= first:
         raise ValueError(_unfit(output.shape))
@@ -61,7 +61,7 @@ def decoded(output: npt.NDArray[np.floating], layout: Layout, classes: Sequence[
     if kind == "yolov5":
         scores = scores * table[:, _BOX]
     middle, half = table[:, :2], table[:, 2:_BOX] / 2.0
-    return Found(np.concatenate([middle - half, middle + half], axis=1), np.clip(scores, 0.0, 1.0))
+    return DecodedBoxes(np.concatenate([middle - half, middle + half], axis=1), np.clip(scores, 0.0, 1.0))
 
 
 def _layout_of(shape: tuple[int, ...]) -> Layout:

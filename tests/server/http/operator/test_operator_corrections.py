@@ -22,7 +22,7 @@ POINTING = "/api/operator/pointing"
 @pytest.fixture
 async def helped() -> AsyncIterator[Hall]:
     """Serve a site whose cameras take pointings: object 1 in both, 2 in c0 alone."""
-    async with aclosing(opened(track={"assist": {"enabled": True, "memory": 10}})) as halls:
+    async with aclosing(opened(track={"assist": {"enabled": True, "memory_frames": 10}})) as halls:
         hall = await anext(halls)
         see(hall)
         yield hall

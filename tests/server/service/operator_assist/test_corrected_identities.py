@@ -15,11 +15,11 @@ from server.service.identity.people import People
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.operator_assist.corrections import PointedPosition, corrections_for_tracker
 from tracking import CostSettings, Detections, WindowSettings, create_solver
-from tracking.interactive import AssistedTracker, AssistSettings, Pointing
+from tracking.interactive import InteractiveSettings, InteractiveTracker, PositionCorrection
 
 WIDTH, HEIGHT = 640, 360
 WINDOW = WindowSettings()
-ASSIST = AssistSettings(enabled=True)
+ASSIST = InteractiveSettings(enabled=True)
 MET = 60
 """The frame in which two who are dressed alike meet, and turn back."""
 FRAMES = 150
@@ -45,14 +45,14 @@ class Camera:
 
     def __init__(self) -> None:
         solver = create_solver("columns")
-        self._tracker = AssistedTracker(WINDOW, CostSettings(), solver, ASSIST)
+        self._tracker = InteractiveTracker(WINDOW, CostSettings(), solver, ASSIST)
         self._reporter = Reporter("c0", 1, (WIDTH, HEIGHT), WINDOW.stride)
 
-    def take(self, frame: int, said: Sequence[Pointing] = ()) -> CameraTracks | None:
+    def take(self, frame: int, said: Sequence[PositionCorrection] = ()) -> CameraTracks | None:
         result = self._tracker.push(frame, found(frame))
         if result is None:
             return None
-        anew = self._tracker.point(said) if said else None
+        anew = self._tracker.apply_corrections(said) if said else None
         return self._reporter.regular(result if anew is None else mended(result, anew))
 
 
@@ -71,18 +71,18 @@ def played(
         Who is who, and by pulse who was shown where when that frame was told, 20 frames later.
     """
     people = People(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), WINDOW.lag)
-    people.told.frames = ASSIST.memory
+    people.told.frames = ASSIST.memory_frames
     camera, told, first = Camera(), {}, 0
     held: list[CameraTracks] = []
     for frame in range(frames):
-        said: list[Pointing] = []
+        said: list[PositionCorrection] = []
         if frame == said_at:
             [left] = [number for number, where in told[20].items() if where < 300]
             asked = corrections_for_tracker(
                 people, "c0", left, [PointedPosition(it, places(it)[0] + 20, 160, 10) for it in of]
             )
             assert asked is not None
-            said = [Pointing(it.pulse, it.track, it.x, it.y, it.reach) for it in asked.points]
+            said = [PositionCorrection(it.pulse, it.track, it.x, it.y, it.reach) for it in asked.points]
         message = camera.take(frame, said)
         if message is None:
             continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ Ids = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frame:
+class FrameSimilarity:
     """One frame of one camera.
 
     Attributes:
@@ -30,7 +30,9 @@ class Frame:
     similarity: Floats
 
 
-def line_up(truth: Iterable[MotRow], tracks: Iterable[MotRow], least_iou: float) -> list[Frame]:
+def align_frames(
+    truth: Iterable[MotRow], tracks: Iterable[MotRow], least_iou: float
+) -> list[FrameSimilarity]:
     """Give the frames in which there is anybody, in order.
 
     Truth of confidence 0 does not count: such a person need not be found, and a track that is at them
@@ -57,14 +59,14 @@ def _by_frame(rows: Iterable[MotRow], what: str) -> dict[int, list[MotRow]]:
     return {number: list(frame.values()) for number, frame in frames.items()}
 
 
-def _frame(truth: Sequence[MotRow], tracks: Sequence[MotRow], least_iou: float) -> Frame:
+def _frame(truth: Sequence[MotRow], tracks: Sequence[MotRow], least_iou: float) -> FrameSimilarity:
     counts = np.array([row.confidence != 0.0 for row in truth], dtype=bool)
     similarity = iou(_boxes(truth)[:, None], _boxes(tracks)[None])
     kept = np.ones(len(tracks), dtype=bool)
     if not counts.all():
         people, results = assign_pairs(similarity, least_iou)
         kept[results[~counts[people]]] = False
-    return Frame(_ids(truth)[counts], _ids(tracks)[kept], similarity[np.ix_(counts, kept)])
+    return FrameSimilarity(_ids(truth)[counts], _ids(tracks)[kept], similarity[np.ix_(counts, kept)])
 
 
 def _ids(rows: Sequence[MotRow]) -> Ids:
@@ -73,3 +75,22 @@ def _ids(rows: Sequence[MotRow]) -> Ids:
 
 def _boxes(rows: Sequence[MotRow]) -> Floats:
     return np.array([row.box for row in rows], dtype=np.float64).reshape(-1, BOX_SIDES)
+
+
+_STAY = 1000.0
+"""Worth more than all overlaps of a frame together."""
+
+
+def match_frames(frames: Iterable[FrameSimilarity], least_iou: float) -> Iterator[NDArray[np.bool_]]:
+    """Give for each frame which person is matched with which track, `(T, R)`."""
+    before: dict[int, int] = {}
+    for frame in frames:
+        pairs = np.zeros(frame.similarity.shape, dtype=bool)
+        if pairs.size:
+            # NaN is no track's id.
+            held = np.array([before.get(person, np.nan) for person in frame.truth.tolist()])
+            stay = _STAY * (held[:, None] == frame.tracks[None])
+            rows, columns = assign_pairs(frame.similarity, least_iou, stay)
+            pairs[rows, columns] = True
+            before = dict(zip(frame.truth[rows].tolist(), frame.tracks[columns].tolist(), strict=True))
+        yield pairs

@@ -31,6 +31,6 @@ def channel_gains(image: Image, reference: Image) -> npt.NDArray[np.float64]:
     return gains
 
 
-def scaled(image: Image, factors: npt.NDArray[np.float64]) -> Image:
+def apply_gains(image: Image, factors: npt.NDArray[np.float64]) -> Image:
     """Multiply each channel by its factor, rounded and clipped to 0..255."""
     return np.asarray(cv2.multiply(image, np.array([*factors, 1.0])), dtype=np.uint8)

@@ -21,13 +21,13 @@ _MOVES = np.diag([1.0, 1.0, 1.0, 1.0, 0.01, 0.01, 1e-4])
 _ERRS = np.diag([1.0, 1.0, 10.0, 10.0])
 
 
-class Kalman:
+class KalmanPrediction:
     """Constant velocity, corrected by the detections."""
 
     name = "kalman"
-    sees = False
+    uses_image = False
 
-    def begin(self, image: Image, box: Floats) -> cv2.KalmanFilter:  # noqa: ARG002 — the box is all
+    def initialize(self, image: Image, box: Floats) -> cv2.KalmanFilter:  # noqa: ARG002 — the box is all
         """Take somebody new in, who stands still as far as is known."""
         known = cv2.KalmanFilter(_STATES, _MEASURED, 0, cv2.CV_64F)
         flow = np.eye(_STATES)
@@ -38,13 +38,13 @@ class Kalman:
         known.statePost = np.concatenate([_measured(box), np.zeros(_STATES - _MEASURED)])[:, None]
         return known
 
-    def move(self, image: Image | None, objects: Sequence[cv2.KalmanFilter]) -> Floats:  # noqa: ARG002
+    def predict(self, image: Image | None, objects: Sequence[cv2.KalmanFilter]) -> Floats:  # noqa: ARG002
         """Say where everybody is expected: `(N, 4)`."""
         if not objects:
             return np.empty((0, BOX_SIDES))
         return np.stack([_box(np.asarray(it.predict(), dtype=np.float64)[:, 0]) for it in objects])
 
-    def found(self, known: cv2.KalmanFilter, box: Floats) -> Floats:
+    def update(self, known: cv2.KalmanFilter, box: Floats) -> Floats:
         """Correct by a detection; give the box in which both are."""
         return _box(np.asarray(known.correct(_measured(box)[:, None]), dtype=np.float64)[:, 0])
 

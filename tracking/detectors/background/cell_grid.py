@@ -12,7 +12,7 @@ from tracking.detectors.base import Image, Mask, Plane
 from tracking.detectors.ignore_mask import Polygon, visible_mask
 
 
-class Grid:
+class CellGrid:
     """Sizes and conversions of one camera's pictures.
 
     Attributes:
@@ -31,22 +31,22 @@ class Grid:
         self._cell = cell
         self.margin = round(outside * self._work[0] / cell)
         self.visible = visible_mask(*self._work, ignore, scale)
-        self.weight: Plane = (self.cells(self.visible) > 0.5).astype(np.float32)  # noqa: PLR2004 — half
+        self.weight: Plane = (self.cell_shares(self.visible) > 0.5).astype(np.float32)  # noqa: PLR2004 — half
 
-    def shrunk(self, image: Image) -> Image:
+    def resize(self, image: Image) -> Image:
         """Give the working picture `(h, w, 3)`."""
         if image.shape[:2] == self._work:
             return image
         size = (self._work[1], self._work[0])
         return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
-    def cells(self, mask: Mask) -> Plane:
+    def cell_shares(self, mask: Mask) -> Plane:
         """Give the share of the mask in each cell, 0 to 1, with the margin around (0)."""
         size = (self._work[1] // self._cell, self._work[0] // self._cell)
         shares = cv2.resize(mask, size, interpolation=cv2.INTER_AREA).astype(np.float32) / 255.0
         return np.pad(shares, self.margin)
 
-    def to_work(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def cells_to_work(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Turn boxes in cells into boxes in pixels of the working picture, cut at its borders."""
         height, width = self._work
         per_cell = np.array([width / (width // self._cell), height / (height // self._cell)] * 2)
@@ -63,7 +63,7 @@ class Grid:
         """How many times as large as the camera's the working picture is."""
         return self._work[0] / self._size[0]
 
-    def to_picture(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def work_to_image(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Turn boxes in pixels of the working picture into boxes in pixels of the camera's picture."""
         per_pixel = np.array([self._size[1] / self._work[1], self._size[0] / self._work[0]] * 2)
         return np.asarray(boxes * per_pixel)

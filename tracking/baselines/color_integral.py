@@ -1,4 +1,4 @@
-"""The colours in many boxes of one picture at once, by integral images (Porikli, CVPR 2005)."""
+"""The colors in many boxes of one picture at once, by integral images (Porikli, CVPR 2005)."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from tracking.boxes import Floats
 from tracking.detectors.base import Image
 
 _SPLIT = 4
-"""Levels of each of the three colour channels: 64 bins."""
+"""Levels of each of the three color channels: 64 bins."""
 BINS = _SPLIT**3
 
 
-class ColourField:
-    """One picture's colours. A histogram of any box costs as much as of any other."""
+class ColorIntegralImage:
+    """One picture's colors. A histogram of any box costs as much as of any other."""
 
     def __init__(self, image: Image) -> None:
         levels = (image // (256 // _SPLIT)).astype(np.int32)
@@ -28,7 +28,7 @@ class ColourField:
         self._limits = np.array([wide, high, wide, high])
 
     def histograms(self, boxes: Floats) -> Floats:
-        """Give the colours' shares in boxes `(..., 4)`, `(..., 64)`; zeros for a box beside the picture."""
+        """Give the colors' shares in boxes `(..., 4)`, `(..., 64)`; zeros for a box beside the picture."""
         whole = np.clip(np.rint(boxes), 0, self._limits).astype(np.int64)
         left, top, right, bottom = np.moveaxis(whole, -1, 0)
         sums = self._sums
@@ -39,20 +39,20 @@ class ColourField:
         return shares
 
 
-class ColourFields:
-    """Gives pictures' colours; those of the picture that was asked for last are summed once."""
+class ColorIntegralCache:
+    """Gives pictures' colors; those of the picture that was asked for last are summed once."""
 
     def __init__(self) -> None:
-        self._last: tuple[Image, ColourField] | None = None
+        self._last: tuple[Image, ColorIntegralImage] | None = None
 
-    def of(self, image: Image) -> ColourField:
-        """Give a picture's colours."""
+    def get(self, image: Image) -> ColorIntegralImage:
+        """Give a picture's colors."""
         if self._last is None or self._last[0] is not image:
-            self._last = image, ColourField(image)
+            self._last = image, ColorIntegralImage(image)
         return self._last[1]
 
 
-def halves(boxes: Floats) -> Floats:
+def upper_and_lower_halves(boxes: Floats) -> Floats:
     """Give the upper and the lower half of boxes `(..., 4)`: `(..., 2, 4)`."""
     middle = (boxes[..., 1] + boxes[..., 3]) / 2
     upper, lower = boxes.copy(), boxes.copy()
@@ -60,11 +60,11 @@ def halves(boxes: Floats) -> Floats:
     return np.stack([upper, lower], axis=-2)
 
 
-def unlike(field: ColourField, boxes: Floats, colours: Floats) -> Floats:
-    """Compare boxes `(..., 4)` with somebody's colours `(2, 64)`, half by half.
+def color_distance(field: ColorIntegralImage, boxes: Floats, colors: Floats) -> Floats:
+    """Compare boxes `(..., 4)` with somebody's colors `(2, 64)`, half by half.
 
     Returns:
         `(...)`, the mean of the halves' squared Bhattacharyya distances: 0 for alike to 1.
     """
-    found = field.histograms(halves(boxes))
-    return np.asarray(1.0 - np.sqrt(found * colours).sum(axis=-1).mean(axis=-1))
+    found = field.histograms(upper_and_lower_halves(boxes))
+    return np.asarray(1.0 - np.sqrt(found * colors).sum(axis=-1).mean(axis=-1))
