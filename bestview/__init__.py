@@ -1,10 +1,10 @@
 """View qualities in, view choices out: the sliding-window DP, identity across cameras, view quality."""
 
-from bestview.association.keys import EpisodeKey, TrackKey
+from bestview.association.keys import TrackKey, TrackletKey
 from bestview.association.registry.corrections import Merge, Split
 from bestview.association.registry.identity_registry import IdentityRegistry, IdentityUpdate
 from bestview.association.settings import IdentitySettings
-from bestview.association.sightings import Glimpse, LocalTrack
+from bestview.association.sightings import AppearanceSample, TrackUpdate
 from bestview.evaluation.object_matching import NO_PERSON, match_objects_to_people
 from bestview.evaluation.true_views import ViewGroundTruth, optimal_views, view_ground_truth
 from bestview.evaluation.view_scores import ViewScore, cut_frames, score_views
@@ -47,23 +47,23 @@ __all__ = [
     "NO_CAMERA",
     "NO_PERSON",
     "NO_VIEW_COST",
+    "AppearanceSample",
     "BodyEstimates",
     "CameraDetections",
     "CameraGeometry",
     "CrossViewSettings",
     "DetectionProbabilityMap",
-    "EpisodeKey",
-    "Glimpse",
     "GopCosts",
     "IdentityRegistry",
     "IdentitySettings",
     "IdentityUpdate",
     "LastDetections",
-    "LocalTrack",
     "Merge",
     "QualitySettings",
     "Split",
     "TrackKey",
+    "TrackUpdate",
+    "TrackletKey",
     "ViewGroundTruth",
     "ViewScore",
     "ViewSelection",

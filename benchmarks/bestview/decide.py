@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.bestview.watch import Messages, Rows
-from bestview import NO_CAMERA, EpisodeKey, IdentityUpdate, LocalTrack, size_quality
+from bestview import NO_CAMERA, IdentityUpdate, TrackletKey, TrackUpdate, size_quality
 from server.cli.evaluate.choices_file import Choice, read_choices
 from server.config.site_config import Config
 from server.messaging.epochs import closing_epoch
@@ -43,11 +43,11 @@ class GivenNumbers:
         self._people = people
 
     def update(
-        self, tracks: Sequence[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+        self, tracks: Sequence[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
         """Return everybody their number."""
         del last_frame, pictures
-        numbers = {EpisodeKey(*it.key, 0): self._people[it.key.local - 1] for it in tracks}
+        numbers = {TrackletKey(*it.key, 0): self._people[it.key.local_id - 1] for it in tracks}
         return IdentityUpdate(numbers, **_NOTHING_NEW)
 
 

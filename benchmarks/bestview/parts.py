@@ -7,8 +7,8 @@ from itertools import chain, zip_longest
 import numpy as np
 
 from benchmarks.bestview.watch import Messages
-from bestview.association.sightings import FootError, line_up
-from bestview.association.tracklet_splitter import Episodes
+from bestview.association.sightings import FootPointError, align_tracks
+from bestview.association.tracklet_splitter import TrackletSplitter
 from server.config.site_config import Config
 from server.service.identity.camera_window import Reader
 from server.service.ingest.epoch_aligner import Aligner
@@ -19,8 +19,8 @@ from tracking.motchallenge import MotRow
 def own_parts(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
     """Return each camera's final boxes, numbered by part of track as the service cuts them."""
     settings = config.view.identity
-    episodes, reader = Episodes(settings), Reader((config.site.width, config.site.height))
-    ground, error = homographies(config), FootError(settings.foot_sideways, settings.foot_upwards)
+    tracklets, reader = TrackletSplitter(settings), Reader((config.site.width, config.site.height))
+    ground, error = homographies(config), FootPointError(settings.foot_sideways, settings.foot_upwards)
     aligner = Aligner(config.camera_ids, config.track.window.stride, grace=0)
     for camera in config.camera_ids:
         aligner.come(camera)
@@ -31,14 +31,14 @@ def own_parts(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
             aligner.tracks(message)
         for epoch in aligner.ready(now=-1):
             tracks = [it for window in reader.read(epoch) for it in window.local_tracks()]
-            seen = line_up(tracks, ground, error, config.overhead)
+            seen = align_tracks(tracks, ground, error, config.overhead)
             # None is ever settled here, so that a row is one part for good.
-            rows, _ = episodes.take(seen, {it.key: it.looks for it in tracks})
+            rows, _ = tracklets.update(seen, {it.key: it.appearance for it in tracks})
             for track, column in zip(*np.nonzero(rows >= 0), strict=True):
                 camera = seen.keys[track].camera
                 left, top, right, bottom = (
                     reader.fits[camera].boxes_to_site(seen.boxes[track, column]).tolist()
                 )
-                frame, number = seen.first + int(column) + 1, int(rows[track, column]) + 1
+                frame, number = seen.first_frame + int(column) + 1, int(rows[track, column]) + 1
                 parts[camera].append(MotRow(frame, number, left, top, right - left, bottom - top))
     return parts

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.stopwatch import Stopwatch, Watched
-from bestview import EpisodeKey, IdentityUpdate, LocalTrack, QualitySettings
+from bestview import IdentityUpdate, QualitySettings, TrackletKey, TrackUpdate
 from server.config.loader import build_config
 from server.config.site_config import Config
 from server.messaging.epochs import end_of_epoch
@@ -102,12 +102,12 @@ class _Given:
     """A registry that reads people's numbers off their looks."""
 
     def update(
-        self, tracks: Sequence[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+        self, tracks: Sequence[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
         """Return everybody their number."""
         del last_frame, pictures
-        numbers = {EpisodeKey(*it.key, 0): int(it.looks[0].histogram[0]) for it in tracks}
-        return IdentityUpdate(numbers, born=(), returned=(), gone=(), merged=(), split=())
+        numbers = {TrackletKey(*it.key, 0): int(it.appearance[0].histogram[0]) for it in tracks}
+        return IdentityUpdate(numbers, created=(), returned=(), departed=(), merged=(), split=())
 
 
 def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> Spent:

@@ -1,4 +1,4 @@
-"""Rows into people: the pair with the most evidence first, as long as evidence speaks for one person."""
+"""Agglomerative clustering of tracklets and known people into persons, with cannot-link constraints."""
 
 from __future__ import annotations
 
@@ -7,145 +7,159 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.appearance.likelihood import CameraLooks, LookWeights, distance_of
+from bestview.association.appearance.likelihood import (
+    AppearanceWeights,
+    CameraAppearances,
+    bhattacharyya_distance,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _SOME = 10_000
-"""Pairs whose looks are compared at once: all those of a crowd would be hundreds of megabytes."""
+"""Pairs whose appearance is compared at once: all pairs of a crowd would take hundreds of megabytes."""
 
 
 def cluster(
     evidence: Floats,
-    apart: NDArray[np.bool_],
-    past: NDArray[np.bool_],
+    cannot_link: NDArray[np.bool_],
+    unseen: NDArray[np.bool_],
     linked: NDArray[np.bool_],
-    looks: Sequence[CameraLooks],
-    weights: LookWeights,
-    join: float,
+    appearances: Sequence[CameraAppearances],
+    weights: AppearanceWeights,
+    threshold: float,
 ) -> Ints:
-    """Group N rows into people: (N,) the lowest row of each row's group.
+    """Cluster N rows (tracklets and known people) into persons.
 
-    The evidence between two groups is the sum over their pairs of rows, plus that of their looks, which are
-    compared as wholes in every camera that has seen both: means of many frames tell more than the sum of
-    what single glimpses tell. The two groups with the most evidence become one, until no two reach `join`.
-    Groups of which any two rows are `apart` never do, nor those of which no two are `linked`, nor two that
-    are `past` only: where nothing is seen nothing changes. So rows between which no chain of links leads have
-    no say in each other's groups. Deterministic; ties go to the lowest rows.
+    The affinity of two clusters is the sum of the evidence between their rows, plus the evidence of their
+    appearance, which is compared as the mean histograms of whole clusters in every camera that has seen both:
+    the mean of many frames says more than the sum of single comparisons. The two clusters with the highest
+    affinity are merged until no two reach `threshold`. Never merged are clusters with a cannot-link between
+    any two of their rows, clusters without any link between them, and two clusters that are both `unseen`:
+    where nothing is observed nothing changes. Rows that no chain of links connects therefore do not influence
+    each other. Deterministic; ties go to the lowest rows.
 
     Args:
-        evidence: (N, N) symmetric, for (above 0) and against two rows being one person.
-        apart: (N, N) symmetric, surely two people.
-        past: (N,) not seen lately.
-        linked: (N, N) symmetric, something speaks for their being one person.
-        looks: how rows look, camera by camera.
-        weights: of looks.
-        join: the least evidence that joins.
+        evidence: (N, N) symmetric log-likelihood ratios, above 0 for and below 0 against one person.
+        cannot_link: (N, N) symmetric, certainly two people.
+        unseen: (N,) not seen lately.
+        linked: (N, N) symmetric, pairs with positive evidence.
+        appearances: of rows, one entry a camera.
+        weights: of appearance.
+        threshold: the least affinity that merges.
+
+    Returns:
+        (N,) the lowest row of each row's cluster.
     """
-    groups = _Groups(evidence, apart, past, linked, looks, weights)
-    while (pair := groups.best_pair(join)) is not None:
+    groups = _Clusters(evidence, cannot_link, unseen, linked, appearances, weights)
+    while (pair := groups.best_pair(threshold)) is not None:
         groups.merge(*pair)
     return groups.labels()
 
 
-class _Looks:
-    """All cameras' looks, L of them, by group.
+class _ClusterAppearances:
+    """Appearance of all clusters in all cameras, L mean histograms.
 
     Args:
-        looks: camera by camera.
+        appearances: one entry a camera.
         rows: N.
-        weights: of looks.
+        weights: of appearance.
     """
 
-    def __init__(self, looks: Sequence[CameraLooks], rows: int, weights: LookWeights) -> None:
+    def __init__(
+        self, appearances: Sequence[CameraAppearances], rows: int, weights: AppearanceWeights
+    ) -> None:
         self._weights = weights
-        bins = max((camera.total.shape[1] for camera in looks), default=0)
-        size = [camera.rows.size for camera in looks]
+        bins = max((camera.histogram_sum.shape[1] for camera in appearances), default=0)
+        size = [camera.rows.size for camera in appearances]
         self._total = np.concatenate(
-            [np.zeros((0, bins)), *(_padded(camera.total, bins) for camera in looks)]
+            [np.zeros((0, bins)), *(_pad_bins(camera.histogram_sum, bins) for camera in appearances)]
         )
-        self._count = np.concatenate([np.zeros(0), *(camera.count for camera in looks)]).astype(np.float64)
+        self._count = np.concatenate([np.zeros(0), *(camera.frame_count for camera in appearances)]).astype(
+            np.float64
+        )
         self._root = np.sqrt(self._total / self._count[:, None])
         """Square roots of the mean histograms, whose products are how alike two are."""
-        self._known = weights.known(self._count)
-        self._slope = np.repeat([camera.scale.slope(weights) for camera in looks], size)
-        self._middle = np.repeat([camera.scale.middle for camera in looks], size)
-        self._at = np.full((len(looks), rows), -1)
+        self._known = weights.confidence(self._count)
+        self._slope = np.repeat([camera.scale.slope(weights) for camera in appearances], size)
+        self._middle = np.repeat([camera.scale.neutral_distance for camera in appearances], size)
+        self._at = np.full((len(appearances), rows), -1)
         """(C, N) of each camera and group: which look, -1: none."""
         self._of: list[dict[int, int]] = [{} for _ in range(rows)]
         """Of each group, the look by camera."""
         start = np.cumsum([0, *size]).tolist()
-        for number, (camera, first) in enumerate(zip(looks, start, strict=False)):
+        for number, (camera, first) in enumerate(zip(appearances, start, strict=False)):
             self._at[number, camera.rows] = np.arange(first, first + camera.rows.size)
             for at, row in enumerate(camera.rows.tolist(), first):
                 self._of[row][number] = at
 
-    def of_pairs(self, one: Ints, two: Ints) -> Floats:
-        """Say what looks say about (P,) pairs of groups: (P,)."""
-        told = np.zeros(one.size)
+    def of_pairs(self, first: Ints, second: Ints) -> Floats:
+        """Return the appearance evidence of (P,) pairs of clusters: (P,)."""
+        evidence = np.zeros(first.size)
         for camera in self._at:
-            a, b = camera[one], camera[two]
+            a, b = camera[first], camera[second]
             both = np.flatnonzero((a >= 0) & (b >= 0))
-            for some in (both[start : start + _SOME] for start in range(0, both.size, _SOME)):
-                told[some] += self._evidence(a[some], b[some])
-        return told
+            for chunk in (both[start : start + _SOME] for start in range(0, both.size, _SOME)):
+                evidence[chunk] += self._evidence(a[chunk], b[chunk])
+        return evidence
 
-    def _evidence(self, one: Ints, two: Ints) -> Floats:
-        """Evidence of (P,) pairs of looks, each in one camera."""
-        distance = distance_of(np.einsum("ij,ij->i", self._root[one], self._root[two]))
-        told = self._weights.told(distance, self._slope[one], self._middle[one])
-        return told * (self._known[one] * self._known[two])
+    def _evidence(self, first: Ints, second: Ints) -> Floats:
+        """Compute the evidence of (P,) pairs of histograms, each of one camera."""
+        distance = bhattacharyya_distance(np.einsum("ij,ij->i", self._root[first], self._root[second]))
+        evidence = self._weights.evidence(distance, self._slope[first], self._middle[first])
+        return evidence * (self._known[first] * self._known[second])
 
     def of_group(self, row: int, others: Ints) -> Floats:
-        """Say what looks say about a group and (K,) others: (K,)."""
-        mine = self._of[row]
-        theirs = self._at[np.array(list(mine), dtype=np.int64)[:, None], others]
-        camera, other = np.nonzero(theirs >= 0)
+        """Return the appearance evidence between one cluster and (K,) others: (K,)."""
+        own_histograms = self._of[row]
+        other_histograms = self._at[np.array(list(own_histograms), dtype=np.int64)[:, None], others]
+        camera, other = np.nonzero(other_histograms >= 0)
         if not other.size:
             return np.zeros(others.size)
-        own = np.array(list(mine.values()), dtype=np.int64)[camera]
-        return np.asarray(np.bincount(other, self._evidence(theirs[camera, other], own), others.size))
+        own = np.array(list(own_histograms.values()), dtype=np.int64)[camera]
+        return np.asarray(
+            np.bincount(other, self._evidence(other_histograms[camera, other], own), others.size)
+        )
 
     def merge(self, keep: int, lose: int) -> None:
-        """Give one group's looks to another."""
-        mine = self._of[keep]
-        for number, two in self._of[lose].items():
-            one = mine.setdefault(number, two)
+        """Add one cluster's histograms to another's."""
+        histograms = self._of[keep]
+        for number, lost in self._of[lose].items():
+            kept = histograms.setdefault(number, lost)
             self._at[number, lose] = -1
-            self._at[number, keep] = one
-            if one != two:
-                self._total[one] += self._total[two]
-                self._count[one] += self._count[two]
-                self._root[one] = np.sqrt(self._total[one] / self._count[one])
-                self._known[one] = self._weights.known(self._count[one])
+            self._at[number, keep] = kept
+            if kept != lost:
+                self._total[kept] += self._total[lost]
+                self._count[kept] += self._count[lost]
+                self._root[kept] = np.sqrt(self._total[kept] / self._count[kept])
+                self._known[kept] = self._weights.confidence(self._count[kept])
         self._of[lose] = {}
 
 
-def _padded(table: Floats, columns: int) -> Floats:
+def _pad_bins(table: Floats, columns: int) -> Floats:
     if table.shape[1] == columns:
         return table
     return np.pad(table, ((0, 0), (0, columns - table.shape[1])))
 
 
-class _Groups:
-    """Groups of rows, named by their lowest, with what the best partner of each is worth at hand."""
+class _Clusters:
+    """Clusters of rows, named by their lowest row, with a cached best partner of each."""
 
     def __init__(
         self,
         evidence: Floats,
-        apart: NDArray[np.bool_],
-        past: NDArray[np.bool_],
+        cannot_link: NDArray[np.bool_],
+        unseen: NDArray[np.bool_],
         linked: NDArray[np.bool_],
-        looks: Sequence[CameraLooks],
-        weights: LookWeights,
+        appearances: Sequence[CameraAppearances],
+        weights: AppearanceWeights,
     ) -> None:
         count = len(evidence)
         # Sums keep it: whoever was apart from one of a group is apart from the group.
-        self._evidence = np.where(apart, -np.inf, evidence)
-        self._past, self._linked = past.copy(), linked.copy()
+        self._evidence = np.where(cannot_link, -np.inf, evidence)
+        self._past, self._linked = unseen.copy(), linked.copy()
         np.fill_diagonal(self._linked, val=False)
-        self._looks = _Looks(looks, count, weights)
+        self._looks = _ClusterAppearances(appearances, count, weights)
         self._kept = np.arange(count)
         """(N,) the group that each row was made part of, its own where of none."""
         one, two = np.nonzero(np.triu(self._linked, 1))
@@ -161,18 +175,18 @@ class _Groups:
         """(N,) that one has changed or gone: no other one is worth more than `_best`, but maybe less."""
 
     def labels(self) -> Ints:
-        """Give each row's group: (N,)."""
+        """Return each row's cluster: (N,)."""
         label = self._kept.copy()
         # A row is only ever made part of a lower one, whose group is known by then.
         for row in np.flatnonzero(label != np.arange(label.size)).tolist():
             label[row] = label[label[row]]
         return label
 
-    def best_pair(self, least: float) -> tuple[int, int] | None:
-        """Give the two groups with the most evidence, the lower first; None: none has `least`."""
+    def best_pair(self, threshold: float) -> tuple[int, int] | None:
+        """Return the two clusters with the highest affinity, the lower first; None: below `threshold`."""
         while self._best.size:
             one = int(self._best.argmax())
-            if not self._best[one] >= least:
+            if not self._best[one] >= threshold:
                 break
             if not self._stale[one]:
                 two = int(self._at[one])
@@ -183,7 +197,7 @@ class _Groups:
         return None
 
     def merge(self, keep: int, lose: int) -> None:
-        """Make two groups one."""
+        """Merge cluster `lose` into cluster `keep`."""
         self._kept[lose] = keep
         evidence, linked = self._evidence[keep], self._linked[keep]
         evidence += self._evidence[lose]
@@ -206,7 +220,7 @@ class _Groups:
         self._find_best(keep, lose, others, value)
 
     def _find_best(self, keep: int, lose: int, others: Ints, value: Floats) -> None:
-        """Note what is known now of the best partner of a new group, and of those with a link to it."""
+        """Update the cached best partners of a merged cluster and of the clusters linked to it."""
         best, at = self._best[others], self._at[others]
         stale = self._stale[others] | (at == keep) | (at == lose)
         better = value > best

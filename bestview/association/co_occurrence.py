@@ -1,4 +1,4 @@
-"""Which tracks of an update were seen at once, and how near to each other they stood."""
+"""Which tracks of an update were seen simultaneously, and how close they stood on the ground."""
 
 from __future__ import annotations
 
@@ -7,140 +7,147 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.index_ranges import distinct, pairs_within, written_out
-from bestview.association.sightings import Sightings
+from bestview.association.index_ranges import expand_counts, pairs_of_equal_label, sorted_unique
+from bestview.association.sightings import TrackObservations
 from bestview.geometry.rectangle_overlap import overlapping
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-WORST = -2.0
-"""Least score of a frame: feet 1.7 gates apart or 17 say the same."""
-_SLACK = 1.0 + 1e-6
-"""What rounding may make of a reach."""
+MINIMUM_FRAME_SCORE = -2.0
+"""Least score of a frame: foot points 1.7 gates apart or 17 say the same."""
+_ROUNDING_MARGIN = 1.0 + 1e-6
+"""Factor on the search radius, against rounding."""
 
 
-def at_once(rows: Ints, camera: Ints) -> tuple[Ints, Ints]:
-    """Give the pairs of rows that were seen in one frame of one camera, each at least once: (P,) and (P,).
+def simultaneous_pairs(rows: Ints, camera: Ints) -> tuple[Ints, Ints]:
+    """Return the pairs of rows that were seen in one frame of one camera, each at least once: (P,) and (P,).
 
     Args:
-        rows: (T, W) of each track's sightings by frame, -1: hidden.
+        rows: (T, W) row of each track's sighting by frame, -1: hidden.
         camera: (T,) number of each track's camera.
     """
-    one, two = pairs_within(camera)
-    a, b = rows[one], rows[two]
-    both = (a >= 0) & (b >= 0) & (a != b)
+    first, second = pairs_of_equal_label(camera)
+    first_row, second_row = rows[first], rows[second]
+    both = (first_row >= 0) & (second_row >= 0) & (first_row != second_row)
     # Mostly a pair is the same in every frame: the first one will do.
-    both[:, 1:] &= ~both[:, :-1] | (a[:, 1:] != a[:, :-1]) | (b[:, 1:] != b[:, :-1])
-    return a[both], b[both]
+    both[:, 1:] &= (
+        ~both[:, :-1] | (first_row[:, 1:] != first_row[:, :-1]) | (second_row[:, 1:] != second_row[:, :-1])
+    )
+    return first_row[both], second_row[both]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Nearness:
-    """What an update says about P pairs of rows of different cameras that stood somewhere at once.
+class GroundProximity:
+    """Ground scores of P pairs of rows of different cameras that were localized in the same frames.
 
     Attributes:
-        one: (P,) rows.
-        two: (P,) rows, above `one`; a pair is there once, or once for each track of somebody settled.
+        first: (P,) rows.
+        second: (P,) rows, above `first`; a pair occurs once, or once for each track of a settled person.
         score: (P,) sums over frames.
-        frames: (P,) how many.
+        frame_count: (P,) frames.
     """
 
-    one: Ints
-    two: Ints
+    first: Ints
+    second: Ints
     score: Floats
-    frames: Ints
+    frame_count: Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Standing:
-    """Where L lines stand on the ground: a line for each track and row of the update, in the order of rows.
+class GroundTrajectories:
+    """Ground positions of L trajectories, one for each pair of track and row of the update, ordered by row.
 
-    A track that is cut within the update has two lines, and a row whose tracks are settled one for each.
+    A track that is split within the update has two trajectories, and a row with several settled tracks has
+    one for each.
 
     Attributes:
         row: (L,) rising.
         camera: (L,) number of the track's camera.
-        where: (5, L, W) place x, y and its covariance xx, xy, yy, ground units; NaN where it stands nowhere.
-        rows: (S,) of each sighting.
-        frames: (S,) likewise, the number of the frame.
+        positions: (5, L, W) x, y and the covariances xx, xy, yy in ground units; NaN where not localized.
+        rows: (S,) row of each sighting.
+        frames: (S,) frame of each sighting.
     """
 
     row: Ints
     camera: Ints
-    where: Floats
+    positions: Floats
     rows: Ints
     frames: Ints
 
     @classmethod
-    def of(cls, seen: Sightings, rows: Ints, camera: Ints) -> Standing:
-        """Collect them: (T, W) `rows` of the sightings, -1: hidden, and (T,) `camera` of the tracks."""
-        known = np.isfinite(seen.ground[..., 0]) & np.isfinite(seen.spread[..., 0, 0])
+    def of(cls, seen: TrackObservations, rows: Ints, camera: Ints) -> GroundTrajectories:
+        """Build them from (T, W) `rows` of the observations, -1: hidden, and the tracks' cameras (T,)."""
+        known = np.isfinite(seen.ground_point[..., 0]) & np.isfinite(seen.ground_covariance[..., 0, 0])
         track, frame = np.nonzero(known & (rows >= 0))
         code = rows[track, frame] * max(len(rows), 1) + track
         code, first, line = np.unique(code, return_index=True, return_inverse=True)
         where = np.full((5, code.size, rows.shape[1]), np.nan)
-        where[:2, line, frame] = seen.ground[track, frame].T
-        where[2:, line, frame] = seen.spread[track, frame][:, [0, 0, 1], [0, 1, 1]].T
+        where[:2, line, frame] = seen.ground_point[track, frame].T
+        where[2:, line, frame] = seen.ground_covariance[track, frame][:, [0, 0, 1], [0, 1, 1]].T
         row = rows[track, frame]
-        return cls(row[first], camera[track[first]], where, row, seen.first + frame)
+        return cls(row[first], camera[track[first]], where, row, seen.first_frame + frame)
 
-    def scores(self, one: Ints, two: Ints, gate: float) -> Floats:
-        """Score (P,) pairs of lines in each frame: (P, W); NaN where not both stand somewhere."""
-        x, y = self.where[:2, one] - self.where[:2, two]
-        xx, xy, yy = self.where[2:, one] + self.where[2:, two]
+    def scores(self, first: Ints, second: Ints, gate: float) -> Floats:
+        """Compute the score of (P,) pairs of trajectories in each frame: (P, W); NaN: not localized."""
+        x, y = self.positions[:2, first] - self.positions[:2, second]
+        xx, xy, yy = self.positions[2:, first] + self.positions[2:, second]
         xx, yy = xx + gate**2, yy + gate**2
         # Squared length of (x, y) in the metric of the inverse covariance, the 2x2 inverse written out.
         squared = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy)
-        return np.asarray(np.maximum(1.0 - squared, WORST))
+        return np.asarray(np.maximum(1.0 - squared, MINIMUM_FRAME_SCORE))
 
-    def close(self, gate: float) -> tuple[Ints, Ints]:
-        """Give the pairs of lines that might score more than the least: (P,) and (P,), the lower first."""
-        xx, xy, yy = self.where[2:]
+    def candidate_pairs(self, gate: float) -> tuple[Ints, Ints]:
+        """Return pairs of trajectories that may score above the minimum, lower first: (P,) and (P,)."""
+        xx, xy, yy = self.positions[2:]
         longest = (xx + yy) / 2.0 + np.hypot((xx - yy) / 2.0, xy)
         # D^2 is at least the squared distance over gate^2 and both longest variances together.
-        reach = np.sqrt((1.0 - WORST) * (longest + gate**2 / 2.0) * _SLACK)
-        low = np.fmin.reduce(self.where[:2] - reach, axis=-1, initial=np.nan)
-        high = np.fmax.reduce(self.where[:2] + reach, axis=-1, initial=np.nan)
-        return overlapping(low.T, high.T)
+        reach = np.sqrt((1.0 - MINIMUM_FRAME_SCORE) * (longest + gate**2 / 2.0) * _ROUNDING_MARGIN)
+        lower = np.fmin.reduce(self.positions[:2] - reach, axis=-1, initial=np.nan)
+        upper = np.fmax.reduce(self.positions[:2] + reach, axis=-1, initial=np.nan)
+        return overlapping(lower.T, upper.T)
 
 
-def near(stands: Standing, gate: float, open_rows: int, met: tuple[Ints, Ints], rows: int) -> Nearness:
-    """Score how near to each other different cameras' tracks stand.
+def score_ground_proximity(
+    trajectories: GroundTrajectories, gate: float, open_rows: int, known_pairs: tuple[Ints, Ints], rows: int
+) -> GroundProximity:
+    """Score how close to each other the trajectories of different cameras are.
 
-    The score of a frame is ``1 - D^2``, at least -2, with D the distance of the feet in gates: 1 for the
-    very same place, 0 a gate apart. Where feet are uncertain, which is along the lines of sight, the gate
-    is stretched by their covariance. Pairs that have never scored more than -2, now or before, are left out.
+    The score of a frame is ``1 - D^2``, at least -2, where D is the distance of the foot points in gates: 1
+    at the same place, 0 one gate apart. Where foot points are uncertain, which is along the line of sight,
+    the gate is stretched by their covariance. Pairs that have never scored above -2, now or before, are left
+    out.
 
     Args:
-        stands: who stands where.
-        gate: distance at which feet are as likely one person's as two's, ground units.
-        open_rows: rows from this one on are settled: two of them are not compared.
-        met: pairs of rows that have met before, (P,) and (P,), the lower row first.
+        trajectories: ground positions.
+        gate: distance at which two foot points are as likely of one person as of two, ground units.
+        open_rows: rows from this one on are settled people: two of them are not compared.
+        known_pairs: pairs of rows that were scored before, (P,) and (P,), the lower row first.
         rows: how many there are.
     """
-    one, two = stands.close(gate)
-    asked = (stands.row[one] < open_rows) & (stands.camera[one] != stands.camera[two])
-    one, two = one[asked], two[asked]
-    meet = (stands.scores(one, two, gate) > WORST).any(axis=1)
-    first, last = (np.searchsorted(stands.row, np.arange(rows), side=side) for side in ("left", "right"))
-    again = (met[0] < open_rows) & (last[met[0]] > first[met[0]]) & (last[met[1]] > first[met[1]])
-    pair = np.concatenate(
-        [stands.row[one[meet]] * rows + stands.row[two[meet]], met[0][again] * rows + met[1][again]]
+    one, two = trajectories.candidate_pairs(gate)
+    compared = (trajectories.row[one] < open_rows) & (trajectories.camera[one] != trajectories.camera[two])
+    one, two = one[compared], two[compared]
+    above_minimum = (trajectories.scores(one, two, gate) > MINIMUM_FRAME_SCORE).any(axis=1)
+    start, stop = (
+        np.searchsorted(trajectories.row, np.arange(rows), side=side) for side in ("left", "right")
     )
-    pair = distinct(pair)
-    # All lines of both: an open row has one, unless its track is cut and begins anew within the update.
-    a, b = pair // max(rows, 1), pair % max(rows, 1)
-    of, which = written_out((last[a] - first[a]) * (last[b] - first[b]))
-    a, b, wide = a[of], b[of], (last[b] - first[b])[of]
-    one, two = first[a] + which // wide, first[b] + which % wide
-    different = stands.camera[one] != stands.camera[two]
-    a, b, one, two = a[different], b[different], one[different], two[different]
-    score = stands.scores(one, two, gate)
-    there = ~np.isnan(score)
-    total, frames = np.zeros(one.size), there.sum(axis=1)
-    # One after the other, in the order of the frames, whatever NumPy would do.
+    lower, higher = known_pairs
+    present = (lower < open_rows) & (stop[lower] > start[lower]) & (stop[higher] > start[higher])
+    new_pairs = trajectories.row[one[above_minimum]] * rows + trajectories.row[two[above_minimum]]
+    pair = sorted_unique(np.concatenate([new_pairs, lower[present] * rows + higher[present]]))
+    # All trajectories of both: an active row has one, unless its track is split within the update.
+    first, second = pair // max(rows, 1), pair % max(rows, 1)
+    of, which = expand_counts((stop[first] - start[first]) * (stop[second] - start[second]))
+    first, second, width = first[of], second[of], (stop[second] - start[second])[of]
+    one, two = start[first] + which // width, start[second] + which % width
+    different = trajectories.camera[one] != trajectories.camera[two]
+    first, second, one, two = first[different], second[different], one[different], two[different]
+    score = trajectories.scores(one, two, gate)
+    localized = ~np.isnan(score)
+    total, frames = np.zeros(one.size), localized.sum(axis=1)
+    # In the order of the frames, so that sums do not depend on how NumPy adds.
     for column in range(score.shape[1]):
-        total += np.where(there[:, column], score[:, column], 0.0)
-    stood = frames > 0
-    return Nearness(a[stood], b[stood], total[stood], frames[stood])
+        total += np.where(localized[:, column], score[:, column], 0.0)
+    scored = frames > 0
+    return GroundProximity(first[scored], second[scored], total[scored], frames[scored])

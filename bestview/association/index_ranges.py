@@ -1,4 +1,4 @@
-"""Pairs and runs written out as index arrays: loops that NumPy can walk."""
+"""Index arrays for pairs and ranges: nested loops as NumPy operations."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from numpy.typing import NDArray
 Ints = NDArray[np.int64]
 
 
-def written_out(counts: Ints) -> tuple[Ints, Ints]:
-    """Give for (N,) counts, one after the other, whose each is and which of theirs: (sum,) and (sum,)."""
+def expand_counts(counts: Ints) -> tuple[Ints, Ints]:
+    """Return for (N,) counts the owner and the running index of each element: (sum,) and (sum,)."""
     owner = np.repeat(np.arange(counts.size), counts)
     return owner, np.arange(owner.size) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def pairs_within(label: Ints) -> tuple[Ints, Ints]:
-    """Give the pairs of (N,) things that have the same label, each once: (P,) and (P,), the lower one first.
+def pairs_of_equal_label(label: Ints) -> tuple[Ints, Ints]:
+    """Return the pairs of (N,) elements with the same label, each once: (P,) and (P,), the lower index first.
 
-    A label below 0 is nobody's.
+    Elements with a negative label have no partner.
     """
     order = np.argsort(label, kind="stable")
     order = order[int(np.searchsorted(label[order], 0)) :]
     # Each is paired with those after it in its run.
     end = np.searchsorted(label[order], label[order], side="right")
-    owner, which = written_out(end - np.arange(order.size) - 1)
+    owner, which = expand_counts(end - np.arange(order.size) - 1)
     return order[owner], order[owner + 1 + which]
 
 
-def distinct(values: Ints) -> Ints:
-    """Give the values that occur, each once, rising."""
+def sorted_unique(values: Ints) -> Ints:
+    """Return the distinct values in rising order."""
     # numpy.unique hashes first: for mostly different values sorting alone is much faster.
     values = np.sort(values)
     return np.asarray(values[np.diff(values, prepend=values[:1] - 1) != 0])

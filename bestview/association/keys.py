@@ -1,4 +1,4 @@
-"""What cameras' tracks, and the parts of tracks that are surely one person, are called."""
+"""Keys of tracks and tracklets."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from typing import NamedTuple
 
 
 class TrackKey(NamedTuple):
-    """A camera's own track.
+    """A track of one camera.
 
     A named tuple, since thousands are hashed and compared in every update.
     """
 
     camera: str
-    local: int
+    local_id: int
 
 
-class EpisodeKey(NamedTuple):
-    """The part of a camera's track that begins with the frame `first`."""
+class TrackletKey(NamedTuple):
+    """The tracklet of a camera's track that starts with `first_frame`."""
 
     camera: str
-    local: int
-    first: int
+    local_id: int
+    first_frame: int
 
     @property
     def track(self) -> TrackKey:
-        """The whole track."""
-        return TrackKey(self.camera, self.local)
+        """The key of the whole track."""
+        return TrackKey(self.camera, self.local_id)

@@ -1,4 +1,4 @@
-"""In which of the last frames each row stood somewhere: who was about at the same time."""
+"""Bitmap of the frames in which each row was localized, to count frames that two rows have in common."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ _WORD = 64
 """Frames in a word."""
 
 
-class Presence:
-    """A bit for each row and frame, of the newest frames.
+class PresenceBitmap:
+    """One bit for each row and frame, over the newest frames.
 
     Args:
-        frames: that are remembered, at least.
+        frames: least number of frames that are kept.
     """
 
     def __init__(self, frames: int) -> None:
@@ -24,14 +24,14 @@ class Presence:
         # Word `n` of the frames is column `n` modulo their number.
         self._bits = np.zeros((0, self._words), dtype=np.uint64)
 
-    def arrange(self, old: Ints) -> None:
-        """Go over to rows of which `i` is what `old[i]` was; -1: a new one."""
+    def set_rows(self, old: Ints) -> None:
+        """Replace the rows: row `i` continues what was row `old[i]`; -1: a new row."""
         bits = np.zeros((old.size, self._words), dtype=np.uint64)
         bits[old >= 0] = self._bits[old[old >= 0]]
         self._bits = bits
 
-    def stand(self, row: Ints, frame: Ints) -> None:
-        """Note that (P,) rows stood somewhere in (P,) frames."""
+    def add_presence(self, row: Ints, frame: Ints) -> None:
+        """Mark (P,) rows as localized in (P,) frames."""
         if not row.size:
             return
         word = frame // _WORD
@@ -43,29 +43,29 @@ class Presence:
         bit = np.left_shift(np.uint64(1), (frame[new] % _WORD).astype(np.uint64))
         np.bitwise_or.at(self._bits, (row[new], word[new] % self._words), bit)
 
-    def absorb(self, kept: Ints, lost: Ints) -> None:
-        """Count the frames of (P,) rows as others' as well."""
+    def merge(self, kept: Ints, lost: Ints) -> None:
+        """Add the frames of (P,) rows to those of others."""
         np.bitwise_or.at(self._bits, kept, self._bits[lost])
 
-    def common(self, one: Ints, two: Ints, enough: int) -> Ints:
-        """In how many frames both of (P,) pairs of rows stood somewhere; `enough`: so many or more."""
+    def common(self, first: Ints, second: Ints, enough: int) -> Ints:
+        """Count the frames in which both rows of (P,) pairs were localized, at most `enough`."""
         newest_first = (self._newest - np.arange(self._words)) % self._words
         bits = np.ascontiguousarray(self._bits[:, newest_first].T)
         # Of each row, how many words there are up to the last one that has anything.
         words = (np.arange(1, self._words + 1)[:, None] * (bits != 0)).max(axis=0, initial=0)
-        total = np.zeros(one.size, dtype=np.int64)
-        until = np.minimum(words[one], words[two])
-        left = np.flatnonzero(until > 0)
-        one, two, until, count = one[left], two[left], until[left], total[left]
+        total = np.zeros(first.size, dtype=np.int64)
+        until = np.minimum(words[first], words[second])
+        undecided = np.flatnonzero(until > 0)
+        first, second, until, count = first[undecided], second[undecided], until[undecided], total[undecided]
         for word, row in enumerate(bits, start=1):
-            if not left.size:
+            if not undecided.size:
                 break
-            count += np.bitwise_count(row[one] & row[two])
+            count += np.bitwise_count(row[first] & row[second])
             # Nearly all are told apart, or were not there at all, within a few words.
             goes_on = (count < enough) & (until > word)
             if not goes_on.all():
                 done = ~goes_on
-                total[left[done]] = np.minimum(count[done], enough)
-                left, one, two = left[goes_on], one[goes_on], two[goes_on]
+                total[undecided[done]] = np.minimum(count[done], enough)
+                undecided, first, second = undecided[goes_on], first[goes_on], second[goes_on]
                 until, count = until[goes_on], count[goes_on]
         return total

@@ -1,4 +1,4 @@
-"""Sightings run by run: consecutive frames of a track that are alike."""
+"""Runs of consecutive observations of a track with the same crowding."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Run(NamedTuple):
-    """Consecutive sightings of a track, from column `start` on, all in a crowd or none."""
+class ObservationRun(NamedTuple):
+    """Consecutive observations of a track from column `start` on, all crowded or all uncrowded."""
 
     track: int
     start: int
@@ -18,10 +18,12 @@ class Run(NamedTuple):
     crowded: bool
 
 
-def runs_of(visible: NDArray[np.bool_], crowded: NDArray[np.bool_], *, whole: bool) -> Iterator[Run]:
-    """Part the sightings, (T, W) which and whether in a crowd: only the first of a run can begin an episode.
+def observation_runs(
+    visible: NDArray[np.bool_], crowded: NDArray[np.bool_], *, whole: bool
+) -> Iterator[ObservationRun]:
+    """Yield runs of observations, (T, W) visible and crowded: only the first frame can start a tracklet.
 
-    `whole`: runs are as long as can be; else each is one frame.
+    `whole`: runs are as long as possible; else each is one frame.
     """
     kind = np.where(visible, 1 + crowded, 0)
     kind = np.pad(kind, ((0, 0), (1, 1)))
@@ -32,4 +34,4 @@ def runs_of(visible: NDArray[np.bool_], crowded: NDArray[np.bool_], *, whole: bo
     for run in zip(
         track.tolist(), start.tolist(), (stop + 1).tolist(), crowded[track, start].tolist(), strict=True
     ):
-        yield Run(*run)
+        yield ObservationRun(*run)

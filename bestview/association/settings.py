@@ -1,4 +1,4 @@
-"""The settings of identity across cameras."""
+"""Settings of the association of tracklets to persons across cameras (`view.identity`)."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass, fields
 
 @dataclass(frozen=True, slots=True)
 class IdentitySettings:
-    """What makes two parts of tracks one person, and for how long a person is remembered.
+    """When two tracklets are one person, and for how long a person is remembered.
 
-    Evidence is the logarithm of how many times likelier what was seen is of one person than of two, by
-    round numbers rather than by fitted distributions.
+    Evidence is a log-likelihood ratio: the logarithm of how many times likelier the observations are if they
+    are of one person than if they are of two. The values are round numbers, not fitted distributions.
 
     Raises:
         ValueError: a setting outside its range.

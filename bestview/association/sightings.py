@@ -1,4 +1,4 @@
-"""One update of all cameras' tracks, lined up frame by frame, on the ground where that is known."""
+"""One update of all cameras' tracks, aligned frame by frame and projected to the ground plane."""
 
 from __future__ import annotations
 
@@ -21,99 +21,99 @@ from bestview.geometry.ground_plane import (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Glimpse:
-    """How a track looks in consecutive frames in which nobody else is in the box.
+class AppearanceSample:
+    """Mean color histogram of a track over consecutive frames in which nobody else is in its box.
 
     Attributes:
-        first: the first of these frames.
-        last: the last one.
+        first_frame: the first of these frames.
+        last_frame: the last one.
         histogram: (B,) the mean of these frames' histograms.
     """
 
-    first: int
-    last: int
+    first_frame: int
+    last_frame: int
     histogram: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class LocalTrack:
-    """What is new and final of one track of one camera.
+class TrackUpdate:
+    """New final frames of one track of one camera.
 
     Attributes:
         camera: name of the camera.
-        local: number of the track, unique in its camera for the camera's lifetime.
-        first: frame of row 0.
+        local_id: the camera's id of the track, unique in the camera's lifetime.
+        first_frame: frame of row 0.
         boxes: (M, 4) left, top, right, bottom in pixels per frame; NaN rows where hidden.
-        looks: where nobody else was in the box.
-        picture_height: of the camera, pixels; lets feet cut off by the lower edge be told.
+        appearance: samples where nobody else was in the box.
+        picture_height: of the camera, pixels; tells feet that the lower edge cuts off.
     """
 
     camera: str
-    local: int
-    first: int
+    local_id: int
+    first_frame: int
     boxes: NDArray[np.float64]
-    looks: tuple[Glimpse, ...] = ()
+    appearance: tuple[AppearanceSample, ...] = ()
     picture_height: float = float("inf")
 
     @property
     def key(self) -> TrackKey:
-        """Which track it is."""
-        return TrackKey(self.camera, self.local)
+        """The track's key."""
+        return TrackKey(self.camera, self.local_id)
 
 
 @dataclass(frozen=True, slots=True)
-class FootError:
-    """How well boxes find the feet: standard deviations in shares of the box height."""
+class FootPointError:
+    """Localization error of foot points: standard deviations as shares of the box height."""
 
     sideways: float
     upwards: float
 
 
 @dataclass(frozen=True, slots=True)
-class Sightings:
-    """T tracks over the W frames of an update.
+class TrackObservations:
+    """Observations of T tracks over the W frames of an update.
 
     Attributes:
         keys: the tracks, sorted.
-        first: frame of column 0.
+        first_frame: frame of column 0.
         boxes: (T, W, 4) pixels, NaN where hidden.
-        ground: (T, W, 2) ground units, NaN where hidden or without homography.
-        spread: (T, W, 2, 2) covariance of `ground`, ground units squared, NaN likewise.
-        heights: (T, W) guessed person heights in ground units, NaN likewise.
+        ground_point: (T, W, 2) ground units, NaN where hidden or without homography.
+        ground_covariance: (T, W, 2, 2) of `ground_point`, ground units squared, NaN likewise.
+        person_heights: (T, W) estimated person heights in ground units, NaN likewise.
     """
 
     keys: tuple[TrackKey, ...]
-    first: int
+    first_frame: int
     boxes: NDArray[np.float64]
-    ground: NDArray[np.float64]
-    spread: NDArray[np.float64]
-    heights: NDArray[np.float64]
+    ground_point: NDArray[np.float64]
+    ground_covariance: NDArray[np.float64]
+    person_heights: NDArray[np.float64]
 
     @property
     def visible(self) -> NDArray[np.bool_]:
-        """(T, W): seen in that frame."""
+        """(T, W) frames with a box."""
         return np.asarray(~np.isnan(self.boxes[..., 3]))
 
     def crowded(self, over: float) -> NDArray[np.bool_]:
-        """(T, W): somebody else of the same camera is in the box, by an overlap (IoU) above `over`."""
+        """Return where another track of the same camera overlaps by an IoU above `over`: (T, W)."""
         most = np.zeros(self.boxes.shape[:2])
         for rows in self.cameras():
-            most[rows] = _largest_overlap(self.boxes[rows])
+            most[rows] = _largest_iou(self.boxes[rows])
         return np.asarray(most > over)
 
     def cameras(self) -> list[slice]:
-        """Rows of each camera, in order."""
+        """Return the rows of each camera, in order."""
         names = [key.camera for key in self.keys]
         starts = [i for i, name in enumerate(names) if i == 0 or names[i - 1] != name]
         return [slice(start, end) for start, end in pairwise([*starts, len(names)])]
 
 
-def _largest_overlap(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Largest IoU of each of (N, W, 4) boxes with another one of the same frame: (N, W)."""
-    one, two = boxes[:, None], boxes[None, :]
-    wide = np.minimum(one[..., 2], two[..., 2]) - np.maximum(one[..., 0], two[..., 0])
-    high = np.minimum(one[..., 3], two[..., 3]) - np.maximum(one[..., 1], two[..., 1])
-    both = np.maximum(wide, 0.0) * np.maximum(high, 0.0)
+def _largest_iou(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Compute the largest IoU of each of (N, W, 4) boxes with another one of the same frame: (N, W)."""
+    first, second = boxes[:, None], boxes[None, :]
+    width = np.minimum(first[..., 2], second[..., 2]) - np.maximum(first[..., 0], second[..., 0])
+    height = np.minimum(first[..., 3], second[..., 3]) - np.maximum(first[..., 1], second[..., 1])
+    both = np.maximum(width, 0.0) * np.maximum(height, 0.0)
     area = (boxes[..., 2] - boxes[..., 0]) * (boxes[..., 3] - boxes[..., 1])
     either = area[:, None] + area[None, :] - both
     share = np.divide(both, either, out=np.zeros(both.shape), where=(both > 0) & (either > 0))
@@ -121,16 +121,16 @@ def _largest_overlap(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(share.max(axis=1, initial=0.0))
 
 
-def line_up(
-    tracks: Sequence[LocalTrack],
+def align_tracks(
+    tracks: Sequence[TrackUpdate],
     homographies: Mapping[str, NDArray[np.float64] | None],
-    foot_error: FootError,
+    foot_error: FootPointError,
     overhead: Collection[str] = (),
-) -> Sightings:
-    """Put the tracks of one update on one time axis.
+) -> TrackObservations:
+    """Align the tracks of one update on one time axis and project their foot points to the ground.
 
-    Feet on the lower edge of the picture are not the person's, and stand nowhere that is known. In the boxes
-    of cameras that look straight down, `overhead`, people stand in the middle.
+    Foot points at the lower edge of the picture are cut off and have no ground point. In the boxes of cameras
+    that look straight down, `overhead`, people stand in the middle.
 
     Raises:
         ValueError: a track given twice, boxes that are not (M, 4), a camera without an entry in
@@ -144,11 +144,11 @@ def line_up(
         raise ValueError("one track is given twice in one update")
     keys = tuple(sorted(by_key))
     ordered = [by_key[key] for key in keys]
-    first = min((track.first for track in ordered), default=0)
-    width = max((track.first + len(track.boxes) for track in ordered), default=0) - first
+    first = min((track.first_frame for track in ordered), default=0)
+    width = max((track.first_frame + len(track.boxes) for track in ordered), default=0) - first
     boxes = np.full((len(keys), width, 4), np.nan)
     for i, track in enumerate(ordered):
-        boxes[i, track.first - first :][: len(track.boxes)] = track.boxes
+        boxes[i, track.first_frame - first :][: len(track.boxes)] = track.boxes
     ground = np.full((len(keys), width, 2), np.nan)
     spread = np.full((len(keys), width, 2, 2), np.nan)
     heights = np.full((len(keys), width), np.nan)
@@ -164,17 +164,24 @@ def line_up(
         ground[rows] = to_ground(homography, foot_points(whole))
         spread[rows] = foot_covariance(homography, whole, foot_error.sideways, foot_error.upwards)
         heights[rows] = person_heights(homography, whole)
-    return Sightings(keys, first, boxes, ground, spread, heights)
+    return TrackObservations(keys, first, boxes, ground, spread, heights)
 
 
-def _check(track: LocalTrack, homographies: Mapping[str, NDArray[np.float64] | None]) -> None:
-    name = f"track {track.local} of camera {track.camera}"
+def _check(track: TrackUpdate, homographies: Mapping[str, NDArray[np.float64] | None]) -> None:
+    name = f"track {track.local_id} of camera {track.camera}"
     if track.camera not in homographies:
         raise ValueError(f"{name}: the camera is not known here")
     if track.boxes.ndim != 2 or track.boxes.shape[1] != 4:  # noqa: PLR2004 — left, top, right, bottom
         raise ValueError(f"{name}: boxes have shape {track.boxes.shape}, not (M, 4)")
-    for look in track.looks:
+    for look in track.appearance:
         if look.histogram.ndim != 1:
             raise ValueError(f"{name}: a histogram has shape {look.histogram.shape}, not (B,)")
-        if not track.first <= look.first <= look.last < track.first + len(track.boxes):
-            raise ValueError(f"{name}: a look of frames {look.first} to {look.last} is not of its frames")
+        if (
+            not track.first_frame
+            <= look.first_frame
+            <= look.last_frame
+            < track.first_frame + len(track.boxes)
+        ):
+            raise ValueError(
+                f"{name}: a look of frames {look.first_frame} to {look.last_frame} is not of its frames"
+            )

@@ -1,4 +1,4 @@
-"""The part of a camera's track that is surely one person."""
+"""Tracklets: parts of a camera's track that are certainly one person."""
 
 from __future__ import annotations
 
@@ -7,96 +7,96 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.appearance.mean_histograms import Looks
-from bestview.association.keys import EpisodeKey
+from bestview.association.appearance.mean_histograms import PersonAppearance
+from bestview.association.keys import TrackletKey
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class End:
-    """Where an episode begins or ends: frame, (4,) box in pixels, (2,) ground point (NaN: unknown)."""
+class TrackletEndpoint:
+    """Where a tracklet starts or ends: frame, (4,) box in pixels, (2,) ground point (NaN: unknown)."""
 
     frame: int
     box: Floats
-    ground: Floats
+    ground_point: Floats
 
 
 @dataclass(slots=True, eq=False)
-class Episode:
+class Tracklet:
     """Part of one camera's track.
 
     Attributes:
-        key: camera, the camera's number for the track, and the first frame.
-        begin: first sighting.
-        end: last sighting.
-        before: the episode of the same track before this one.
-        crowded: frames of crowd between the two.
-        frames: sightings.
-        free: those outside crowds.
-        crowd: of the newest sightings, how many in a row are in a crowd.
-        looks: where nobody else was in the box.
-        untold: frames whose number has not been told yet.
-        told: frames by number told.
-        number: the person's; 0: nobody's yet.
-        firm: the person's number, if that was settled though the episode goes on; 0: it was not.
-        sure: somebody said that it is the same person as the episode before it.
+        key: camera, the camera's track id, and the first frame.
+        start: first observation.
+        end: last observation.
+        predecessor: the tracklet of the same track before this one.
+        crowd_frames_before: frames of crowd between the two.
+        frame_count: observations.
+        uncrowded_frames: those outside crowds.
+        crowd_frames_at_end: how many of the newest observations in a row are in a crowd.
+        appearance: mean histograms where nobody else was in the box.
+        unpublished_frames: frames whose person id has not been published yet.
+        published_frames: number of frames by published person id.
+        person_id: the assigned person; 0: none yet.
+        settled_id: the person, if that was settled while the tracklet goes on; 0: it was not.
+        confirmed_continuation: an operator said that it is the same person as the predecessor.
     """
 
-    key: EpisodeKey
-    begin: End
-    end: End
-    before: Episode | None = None
-    crowded: int = 0
-    frames: int = 0
-    free: int = 0
-    crowd: int = 0
-    looks: Looks = field(default_factory=Looks)
-    untold: list[int] = field(default_factory=list)
-    told: dict[int, int] = field(default_factory=dict)
-    number: int = 0
-    firm: int = 0
-    sure: bool = False
+    key: TrackletKey
+    start: TrackletEndpoint
+    end: TrackletEndpoint
+    predecessor: Tracklet | None = None
+    crowd_frames_before: int = 0
+    frame_count: int = 0
+    uncrowded_frames: int = 0
+    crowd_frames_at_end: int = 0
+    appearance: PersonAppearance = field(default_factory=PersonAppearance)
+    unpublished_frames: list[int] = field(default_factory=list)
+    published_frames: dict[int, int] = field(default_factory=dict)
+    person_id: int = 0
+    settled_id: int = 0
+    confirmed_continuation: bool = False
 
     @property
     def gap(self) -> int:
-        """Frames from the end of the episode before; 0: there was none."""
-        return self.begin.frame - self.before.end.frame if self.before is not None else 0
+        """Frames from the end of the predecessor; 0: there is none."""
+        return self.start.frame - self.predecessor.end.frame if self.predecessor is not None else 0
 
     @property
-    def mostly(self) -> int:
-        """The number it was told most often, 0 before the first; of equals the lowest."""
-        return max(sorted(self.told), key=self.told.__getitem__, default=0)
+    def main_id(self) -> int:
+        """The person id published for most frames, 0 before the first; of equals the lowest."""
+        return max(sorted(self.published_frames), key=self.published_frames.__getitem__, default=0)
 
-    def sight(self, frames: range, *, crowded: bool) -> None:
-        """Count sightings one after the other, all in a crowd or none."""
-        self.frames += len(frames)
-        self.free += 0 if crowded else len(frames)
-        self.crowd = self.crowd + len(frames) if crowded else 0
-        if not self.firm:
-            self.untold.extend(frames)
+    def add_frames(self, frames: range, *, crowded: bool) -> None:
+        """Count observations in consecutive frames, all in a crowd or none."""
+        self.frame_count += len(frames)
+        self.uncrowded_frames += 0 if crowded else len(frames)
+        self.crowd_frames_at_end = self.crowd_frames_at_end + len(frames) if crowded else 0
+        if not self.settled_id:
+            self.unpublished_frames.extend(frames)
 
-    def tell(self, upto: int) -> bool:
-        """Count the frames up to `upto` as told by today's number; say whether any was."""
-        told = [frame for frame in self.untold if frame <= upto]
-        if told and self.number:
-            self.told[self.number] = self.told.get(self.number, 0) + len(told)
-        self.untold = self.untold[len(told) :]
-        return bool(told and self.number)
+    def publish(self, last_frame: int) -> bool:
+        """Count frames up to `last_frame` as published with the present id; return whether there were any."""
+        frames = [frame for frame in self.unpublished_frames if frame <= last_frame]
+        if frames and self.person_id:
+            self.published_frames[self.person_id] = self.published_frames.get(self.person_id, 0) + len(frames)
+        self.unpublished_frames = self.unpublished_frames[len(frames) :]
+        return bool(frames and self.person_id)
 
-    def become(self, number: int) -> None:
-        """Count all that was told as told to be this person."""
-        self.told = {number: max(1, sum(self.told.values()))}
-        self.number = number
-        self.firm = number if self.firm else 0
+    def assign_id(self, person_id: int) -> None:
+        """Replace everything published so far by this person id."""
+        self.published_frames = {person_id: max(1, sum(self.published_frames.values()))}
+        self.person_id = person_id
+        self.settled_id = person_id if self.settled_id else 0
 
-    def goes_on_as(self, number: int, before: Episode) -> None:
-        """Take over that somebody said whose it is, and what was before it."""
-        self.become(number)
-        self.before, self.crowded, self.sure = before, 0, True
+    def continue_as(self, person_id: int, predecessor: Tracklet) -> None:
+        """Take over an operator's correction: the person, and the tracklet that this one continues."""
+        self.assign_id(person_id)
+        self.predecessor, self.crowd_frames_before, self.confirmed_continuation = predecessor, 0, True
 
-    def told_anew(self, lost: int, kept: int) -> None:
-        """Count what was told to be one person as told to be another: the two turned out to be one."""
-        frames = self.told.pop(lost, 0)
+    def merge_ids(self, lost: int, kept: int) -> None:
+        """Count what was published as one person id as another: the two turned out to be one person."""
+        frames = self.published_frames.pop(lost, 0)
         if frames:
-            self.told[kept] = self.told.get(kept, 0) + frames
+            self.published_frames[kept] = self.published_frames.get(kept, 0) + frames

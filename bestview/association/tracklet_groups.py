@@ -1,4 +1,4 @@
-"""Groups of episodes that are one person, with what the person was before."""
+"""Clusters of tracklets that are one person, with the known people that they continue."""
 
 from __future__ import annotations
 
@@ -9,78 +9,81 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.appearance.mean_histograms import Looks
+from bestview.association.appearance.mean_histograms import PersonAppearance
 from bestview.association.registry.person import Person
-from bestview.association.tracklet import Episode
+from bestview.association.tracklet import Tracklet
 
 
 @dataclass(eq=False)
-class Group:
-    """One person, as far as can be told now; complete before it is asked anything.
+class TrackletCluster:
+    """One person, as far as is known now. Complete before it is queried.
 
     Attributes:
-        rows: of the tables.
-        episodes: open ones.
-        past: people whom the group was before.
-        number: the person's; 0: nobody's yet.
+        rows: of the affinity matrix.
+        tracklets: active ones.
+        people: known people in the cluster.
+        person_id: the assigned id; 0: none yet.
     """
 
     rows: list[int] = field(default_factory=list)
-    episodes: list[Episode] = field(default_factory=list)
-    past: list[Person] = field(default_factory=list)
-    number: int = 0
+    tracklets: list[Tracklet] = field(default_factory=list)
+    people: list[Person] = field(default_factory=list)
+    person_id: int = 0
 
     @property
-    def frames(self) -> int:
-        """Sightings in all cameras."""
-        return sum(episode.frames for episode in self.episodes)
+    def frame_count(self) -> int:
+        """Observations in all cameras."""
+        return sum(tracklet.frame_count for tracklet in self.tracklets)
 
     @property
-    def first(self) -> int:
-        """Frame of the first sighting that is not settled; only if there is any."""
-        return min(episode.begin.frame for episode in self.episodes)
+    def first_frame(self) -> int:
+        """First frame of the active tracklets; only if there are any."""
+        return min(tracklet.start.frame for tracklet in self.tracklets)
 
     @property
-    def last(self) -> int:
-        """Frame of the last one."""
-        return max([*(it.end.frame for it in self.episodes), *(it.last for it in self.past)])
+    def last_frame(self) -> int:
+        """Last frame in which the person was seen."""
+        return max([*(it.end.frame for it in self.tracklets), *(it.last_frame for it in self.people)])
 
     @cached_property
     def cameras(self) -> set[str]:
-        """Those that see the person, or have."""
-        seen = {episode.key.camera for episode in self.episodes}
-        return seen.union(
-            *(it.looks.by_camera for it in self.episodes), *(it.looks.by_camera for it in self.past)
+        """Cameras that see the person or have seen them."""
+        current_cameras = {tracklet.key.camera for tracklet in self.tracklets}
+        return current_cameras.union(
+            *(it.appearance.by_camera for it in self.tracklets),
+            *(it.appearance.by_camera for it in self.people),
         )
 
     @cached_property
-    def looks(self) -> Looks:
-        """Of all that is in the group."""
-        looks = Looks()
-        for mine in [it.looks for it in self.past] + [it.looks for it in self.episodes]:
-            looks.add_all(mine)
-        return looks
+    def appearance(self) -> PersonAppearance:
+        """Mean histograms of everything in the cluster."""
+        appearance = PersonAppearance()
+        for part in [it.appearance for it in self.people] + [it.appearance for it in self.tracklets]:
+            appearance.add_all(part)
+        return appearance
 
     @property
-    def told(self) -> dict[int, int]:
-        """Frames by the number that they were told to be; what is about to be told counts as one."""
-        told = {person.number: person.settled for person in self.past}
-        for episode in self.episodes:
-            if episode.number:
-                told[episode.number] = told.get(episode.number, 0) + 1
-            for number, frames in episode.told.items():
-                told[number] = told.get(number, 0) + frames
-        return told
+    def published_frames(self) -> dict[int, int]:
+        """Frames by published person id; an id that is about to be published counts as one frame."""
+        frames_by_id = {person.person_id: person.settled_frames for person in self.people}
+        for tracklet in self.tracklets:
+            if tracklet.person_id:
+                frames_by_id[tracklet.person_id] = frames_by_id.get(tracklet.person_id, 0) + 1
+            for number, frames in tracklet.published_frames.items():
+                frames_by_id[number] = frames_by_id.get(number, 0) + frames
+        return frames_by_id
 
 
-def groups_of(episodes: Sequence[Episode], past: Sequence[Person], group: NDArray[np.int64]) -> list[Group]:
-    """Collect the rows of each group: (N,) group of each row, episodes first; in the order of the rows."""
-    found: dict[int, Group] = {}
-    for row, name in enumerate(group.tolist()):
-        mine = found.setdefault(name, Group())
-        mine.rows.append(row)
-        if row < len(episodes):
-            mine.episodes.append(episodes[row])
+def collect_clusters(
+    tracklets: Sequence[Tracklet], people: Sequence[Person], labels: NDArray[np.int64]
+) -> list[TrackletCluster]:
+    """Collect the rows of each cluster from (N,) labels, tracklets first; in the order of the rows."""
+    clusters: dict[int, TrackletCluster] = {}
+    for row, label in enumerate(labels.tolist()):
+        cluster = clusters.setdefault(label, TrackletCluster())
+        cluster.rows.append(row)
+        if row < len(tracklets):
+            cluster.tracklets.append(tracklets[row])
         else:
-            mine.past.append(past[row - len(episodes)])
-    return list(found.values())
+            cluster.people.append(people[row - len(tracklets)])
+    return list(clusters.values())

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class HeightScale:
+class PersonHeightEstimate:
     """How long a person's height is in units of the ground plane, from the boxes seen so far."""
 
     _REMEMBERED = 200

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.index_ranges import written_out
+from bestview.association.index_ranges import expand_counts
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -29,7 +29,7 @@ def overlapping(low: Floats, high: Floats) -> tuple[Ints, Ints]:
     bands = max(1, int(_BANDS * np.sqrt(count)))
     edges = middle[np.arange(1, bands) * count // bands]
     first, last = (np.searchsorted(edges, side[:, 1], side="right") for side in (low, high))
-    item, which = written_out(last - first + 1)
+    item, which = expand_counts(last - first + 1)
     band = first[item] + which
     # Places along the sweep instead of coordinates, so that a band and a place make one number to sort by.
     along = np.argsort(low[:, 0], kind="stable")
@@ -40,7 +40,7 @@ def overlapping(low: Floats, high: Floats) -> tuple[Ints, Ints]:
     order = np.argsort(key)
     item, band, key = item[order], band[order], key[order]
     reach = np.searchsorted(key, band * (count + 1) + stop[item])
-    at, which = written_out(reach - np.arange(key.size) - 1)
+    at, which = expand_counts(reach - np.arange(key.size) - 1)
     one, two = item[at], item[at + 1 + which]
     beside = (low[one, 1] <= high[two, 1]) & (low[two, 1] <= high[one, 1])
     # Two that share several bands are taken in the first of them.

@@ -50,7 +50,7 @@ class Board:
                 if isinstance(it, Merge)
             ],
             split=[
-                PersonSplit(kept=it.kept, parted=it.parted, camera=it.camera)
+                PersonSplit(kept=it.kept, parted=it.split_off, camera=it.camera)
                 for it in decision.corrections
                 if isinstance(it, Split)
             ],

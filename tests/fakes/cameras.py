@@ -10,7 +10,7 @@ from typing import Any, Literal, cast
 import msgspec
 import numpy as np
 
-from bestview import EpisodeKey, IdentityUpdate, LocalTrack
+from bestview import IdentityUpdate, TrackletKey, TrackUpdate
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.loader import build_config
 from server.config.sections import EncodeSettings, SiteSettings
@@ -157,11 +157,11 @@ class TrackNumbers:
         """Give the tracks' numbers all the same."""
 
     def update(
-        self, tracks: Sequence[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+        self, tracks: Sequence[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
         """Return everybody their number."""
         del last_frame, pictures
-        return IdentityUpdate({EpisodeKey(*it.key, 0): it.local for it in tracks}, (), (), (), (), ())
+        return IdentityUpdate({TrackletKey(*it.key, 0): it.local_id for it in tracks}, (), (), (), (), ())
 
 
 class FedService(BestViewService):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bestview import EpisodeKey, IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split
+from bestview import IdentitySettings, IdentityUpdate, Merge, Split, TrackletKey, TrackUpdate
 from fakes.cameras import CAMERAS, HEIGHT, WIDTH
 from server.messaging.messages import Box
 from server.service.identity.people import People
 
 
 def people(**settings: int) -> People:
-    identity = IdentitySettings(**{"confirm": 1, "regroup": 1, **settings})
+    identity = IdentitySettings(**{"confirmation_frames": 1, "clustering_interval": 1, **settings})
     return People(identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
 
 
@@ -22,7 +22,7 @@ class Dictated:
         self._updates = list(updates)
 
     def update(
-        self, tracks: list[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+        self, tracks: list[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
         del tracks, last_frame, pictures
         return self._updates.pop(0)
@@ -37,7 +37,7 @@ def boxes(it: People, camera: str, pulse: int) -> dict[int, Box]:
 
 
 def said(numbers: dict[tuple[str, int], int], *corrections: Merge | Split) -> IdentityUpdate:
-    keys = {EpisodeKey(*key, 0): number for key, number in numbers.items()}
+    keys = {TrackletKey(*key, 0): number for key, number in numbers.items()}
     merged = tuple(it for it in corrections if isinstance(it, Merge))
     split = tuple(it for it in corrections if isinstance(it, Split))
-    return IdentityUpdate(numbers=keys, born=(), returned=(), gone=(), merged=merged, split=split)
+    return IdentityUpdate(person_ids=keys, created=(), returned=(), departed=(), merged=merged, split=split)

@@ -1,4 +1,4 @@
-"""All that is known about who is one person, added up: for grouping everybody anew."""
+"""Affinity fusion: all evidence about pairs of tracklets and people added up, and clustered."""
 
 from __future__ import annotations
 
@@ -7,66 +7,73 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.affinity.affinity_matrix import PairTables
-from bestview.association.affinity.candidate_links import Links, batches
-from bestview.association.affinity.evidence import Evidence
-from bestview.association.appearance.distance_scales import LookScales
-from bestview.association.appearance.likelihood import CameraLooks, LookWeights
-from bestview.association.appearance.mean_histograms import Look
+from bestview.association.affinity.affinity_matrix import AffinityMatrix
+from bestview.association.affinity.candidate_links import CandidateLinks, split_into_batches
+from bestview.association.affinity.evidence import PairEvidence
+from bestview.association.appearance.distance_scales import DistanceScales
+from bestview.association.appearance.likelihood import AppearanceWeights, CameraAppearances
+from bestview.association.appearance.mean_histograms import MeanHistogram
 from bestview.association.clustering import cluster
 from bestview.association.registry.person import Person
 from bestview.association.settings import IdentitySettings
-from bestview.association.tracklet import Episode
+from bestview.association.tracklet import Tracklet
 
 Ints = NDArray[np.int64]
 
 
-class Weighing:
-    """Groups the open episodes, and the people as they were before, into people.
+class AffinityFusion:
+    """Clusters the active tracklets and the known people into persons.
 
     Args:
         settings: of identity.
-        calibrated: by camera, whether it has a ground.
-        pace: how far somebody can walk in a frame, in person heights.
+        calibrated: by camera, whether it has a homography.
+        walking_speed: the farthest that somebody walks in a frame, in person heights.
     """
 
-    def __init__(self, settings: IdentitySettings, calibrated: Mapping[str, bool], pace: float) -> None:
-        self._settings, self._calibrated, self._pace = settings, calibrated, pace
-        self._scales = LookScales(settings.appearance_frames)
-        self._weights = LookWeights(
+    def __init__(
+        self, settings: IdentitySettings, calibrated: Mapping[str, bool], walking_speed: float
+    ) -> None:
+        self._settings, self._calibrated, self._pace = settings, calibrated, walking_speed
+        self._scales = DistanceScales(settings.appearance_frames)
+        self._weights = AppearanceWeights(
             settings.appearance_evidence, settings.maximum_appearance_evidence, settings.appearance_frames
         )
 
-    def grouped(
+    def cluster(
         self,
-        episodes: Sequence[Episode],
-        past: Sequence[Person],
-        here: NDArray[np.bool_],
-        tables: PairTables,
+        tracklets: Sequence[Tracklet],
+        people: Sequence[Person],
+        visible: NDArray[np.bool_],
+        affinity: AffinityMatrix,
         height: float,
     ) -> Ints:
-        """Give the group of each row, episodes first, then people: (N,) the lowest row of the group.
+        """Cluster all rows, tracklets first, then people.
 
         Args:
-            episodes: open ones.
-            past: people as they were before.
-            here: (P,) of these, who is seen by tracks that are settled though they go on.
-            tables: of pairs of both.
+            tracklets: active ones.
+            people: known people with settled tracklets.
+            visible: (P,) people who are seen by settled tracklets that go on.
+            affinity: of all pairs of both.
             height: of a person in ground units.
+
+        Returns:
+            (N,) the lowest row of each row's cluster.
         """
-        count = len(episodes) + len(past)
-        evidence = Evidence(episodes, past, tables, self._calibrated, self._settings, height, self._pace)
-        looks = self._looks(episodes, past, tables)
-        links = Links.found(evidence, looks, self._weights, len(episodes), count)
-        gone = np.concatenate([np.zeros(len(episodes), dtype=np.bool_), ~here])
+        count = len(tracklets) + len(people)
+        evidence = PairEvidence(
+            tracklets, people, affinity, self._calibrated, self._settings, height, self._pace
+        )
+        appearances = self._looks(tracklets, people, affinity)
+        links = CandidateLinks.find(evidence, appearances, self._weights, len(tracklets), count)
+        unseen = np.concatenate([np.zeros(len(tracklets), dtype=np.bool_), ~visible])
         group = np.arange(count)
-        for batch in batches(links, evidence, looks):
+        for batch in split_into_batches(links, evidence, appearances):
             label = cluster(
                 batch.evidence,
-                batch.apart,
-                gone[batch.rows],
+                batch.cannot_link,
+                unseen[batch.rows],
                 batch.linked,
-                batch.looks,
+                batch.appearance,
                 self._weights,
                 self._settings.merge_threshold,
             )
@@ -74,33 +81,45 @@ class Weighing:
         return group
 
     def _looks(
-        self, episodes: Sequence[Episode], past: Sequence[Person], tables: PairTables
-    ) -> list[CameraLooks]:
-        """Collect how everybody looks, camera by camera."""
-        by_camera: dict[str, list[tuple[int, Look]]] = {camera: [] for camera in self._calibrated}
+        self, tracklets: Sequence[Tracklet], people: Sequence[Person], affinity: AffinityMatrix
+    ) -> list[CameraAppearances]:
+        """Collect the mean histograms of all rows, camera by camera."""
+        by_camera: dict[str, list[tuple[int, MeanHistogram]]] = {camera: [] for camera in self._calibrated}
         open_rows: dict[str, list[int]] = {camera: [] for camera in self._calibrated}
-        for row, episode in enumerate(episodes):
-            open_rows[episode.key.camera].append(row)
-        for row, looks in enumerate([it.looks for it in episodes] + [it.looks for it in past]):
-            for name, look in looks.by_camera.items():
-                by_camera[name].append((row, look))
-        found = []
+        for row, tracklet in enumerate(tracklets):
+            open_rows[tracklet.key.camera].append(row)
+        for row, appearance in enumerate(
+            [it.appearance for it in tracklets] + [it.appearance for it in people]
+        ):
+            for name, histogram in appearance.by_camera.items():
+                by_camera[name].append((row, histogram))
+        appearances = []
         for camera, seen in by_camera.items():
-            alike = comparable(seen, len(episodes))
-            if len(alike) > 1:
-                rows = np.array([row for row, _ in alike], dtype=np.int64)
-                total = np.array([look.total for _, look in alike])
-                count = np.array([look.count for _, look in alike], dtype=np.float64)
-                scale = self._scales.of(camera, open_rows[camera], episodes, tables)
-                found.append(CameraLooks(rows, total, count, scale))
-        return found
+            comparable = comparable_histograms(seen, len(tracklets))
+            if len(comparable) > 1:
+                rows = np.array([row for row, _ in comparable], dtype=np.int64)
+                total = np.array([histogram.histogram_sum for _, histogram in comparable])
+                count = np.array([histogram.frame_count for _, histogram in comparable], dtype=np.float64)
+                scale = self._scales.of(camera, open_rows[camera], tracklets, affinity)
+                appearances.append(CameraAppearances(rows, total, count, scale))
+        return appearances
 
-    def remember(self, old: Collection[int], episodes: Sequence[Episode], tables: PairTables) -> None:
-        """Keep what episodes that are about to be settled teach about looks, by their rows."""
-        self._scales.remember(old, episodes, tables)
+    def remember_distances(
+        self, old: Collection[int], tracklets: Sequence[Tracklet], affinity: AffinityMatrix
+    ) -> None:
+        """Keep the appearance distances of tracklets that are about to be settled, given by their rows."""
+        self._scales.remember_distances(old, tracklets, affinity)
 
 
-def comparable(looks: Sequence[tuple[int, Look]], there: int) -> list[tuple[int, Look]]:
-    """Give those of rows' looks with as many bins as the newest: of rows below `there`, if any."""
-    newest = [look for row, look in looks if row < there] or [look for _, look in looks]
-    return [(row, look) for row, look in looks if look.total.size == newest[-1].total.size]
+def comparable_histograms(
+    histograms: Sequence[tuple[int, MeanHistogram]], active_rows: int
+) -> list[tuple[int, MeanHistogram]]:
+    """Return the histograms with as many bins as the newest of rows below `active_rows`, or of any."""
+    newest = [histogram for row, histogram in histograms if row < active_rows] or [
+        histogram for _, histogram in histograms
+    ]
+    return [
+        (row, histogram)
+        for row, histogram in histograms
+        if histogram.histogram_sum.size == newest[-1].histogram_sum.size
+    ]

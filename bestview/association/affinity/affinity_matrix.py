@@ -1,8 +1,8 @@
-"""What is known about pairs of episodes and people: tables that follow who is in play.
+"""Affinity matrix: evidence about pairs of tracklets and people, sparse, in rows that come and go.
 
-The rows are the open episodes, then the people who have settled ones, in the order in which others list
-them. Evidence is summed up as it comes in: a pair is never looked at again. Only pairs of which there is
-more to say than that they are elsewhere have an entry, so that a site of many cameras is no square.
+The rows are the active tracklets, then the people with settled tracklets. Evidence is summed up update by
+update and never recomputed. Only pairs with more evidence than having been at different places at the same
+time have an entry, so memory grows with encounters instead of with the square of the site's people.
 """
 
 from __future__ import annotations
@@ -13,27 +13,27 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.affinity.pair_table import PairTable, once
-from bestview.association.co_occurrence import WORST
-from bestview.association.index_ranges import written_out
-from bestview.association.keys import EpisodeKey
-from bestview.association.presence import Presence
+from bestview.association.affinity.pair_table import SparsePairTable, unique_pairs
+from bestview.association.co_occurrence import MINIMUM_FRAME_SCORE
+from bestview.association.index_ranges import expand_counts
+from bestview.association.keys import TrackletKey
+from bestview.association.presence import PresenceBitmap
 from bestview.association.settings import IdentitySettings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_LEAST_COMMON = 3
-"""Frames in which two must both be seen before their places say anything."""
-_BEFORE = 256
-"""Frames before the last sighting of somebody recent in which it counts who else was about."""
+_MINIMUM_COMMON_FRAMES = 3
+"""Frames in which both must be seen before their positions count."""
+_EXTRA_PRESENCE_FRAMES = 256
+"""Frames before the last sighting of a comparable person over which presence is kept."""
 
-Row = EpisodeKey | int
-"""An open episode, or the number of a person who has settled ones."""
+RowKey = TrackletKey | int
+"""An active tracklet, or the id of a person with settled tracklets."""
 
 
-class PairTables:
-    """Symmetric tables over N rows.
+class AffinityMatrix:
+    """Symmetric tables of evidence and constraints over N rows.
 
     Args:
         settings: of identity.
@@ -46,188 +46,196 @@ class PairTables:
             settings.maximum_cross_camera_evidence,
         )
         self._frames = settings.ground_correlation_frames
-        self._place: dict[Row, int] = {}
+        self._row_of: dict[RowKey, int] = {}
         # What the tables call each row, and no other one later.
-        self._name: Ints = np.zeros(0, dtype=np.int64)
-        self._names = 0
-        self._presence = Presence(settings.comparable_frames + _BEFORE)
+        self._row_names: Ints = np.zeros(0, dtype=np.int64)
+        self._name_count = 0
+        self._presence = PresenceBitmap(settings.comparable_frames + _EXTRA_PRESENCE_FRAMES)
         # Frames of being elsewhere after which more of them say nothing more.
         self._enough = max(
-            _LEAST_COMMON,
-            math.ceil(settings.maximum_ground_evidence * settings.ground_correlation_frames / -WORST),
+            _MINIMUM_COMMON_FRAMES,
+            math.ceil(
+                settings.maximum_ground_evidence * settings.ground_correlation_frames / -MINIMUM_FRAME_SCORE
+            ),
         )
-        self._apart = PairTable()
-        self._alike = PairTable()
+        self._cannot_link = SparsePairTable()
+        self._appearance = SparsePairTable()
         # Evidence of standing on the same ground, and in how many frames; no more than says anything.
-        self._near = PairTable(2)
+        self._ground = SparsePairTable(2)
 
     def __len__(self) -> int:
-        """Count the rows."""
-        return len(self._place)
+        """Return the number of rows."""
+        return len(self._row_of)
 
     @property
-    def entries(self) -> int:
-        """How many pairs have an entry in some table."""
-        return len(self._apart) + len(self._alike) + len(self._near)
+    def entry_count(self) -> int:
+        """Number of pairs with an entry in some table."""
+        return len(self._cannot_link) + len(self._appearance) + len(self._ground)
 
-    def arrange(self, rows: Sequence[Row]) -> None:
-        """Go over to these rows: those that were here keep what is known about them."""
-        if rows == list(self._place):
+    def set_rows(self, rows: Sequence[RowKey]) -> None:
+        """Replace the rows; those that were present keep their entries."""
+        if rows == list(self._row_of):
             return
-        old = np.array([self._place.get(row, -1) for row in rows], dtype=np.int64)
-        self._presence.arrange(old)
+        old = np.array([self._row_of.get(row, -1) for row in rows], dtype=np.int64)
+        self._presence.set_rows(old)
         new = old < 0
-        name = np.where(new, 0, self._name[old] if self._name.size else 0)
-        name[new] = self._names + np.arange(int(new.sum()))
-        self._names += int(new.sum())
-        gone = np.setdiff1d(self._name, name)
-        self._name = name
-        self._place = {row: i for i, row in enumerate(rows)}
-        if gone.size:
-            for table in (self._apart, self._alike, self._near):
-                table.keep(~(np.isin(table.one, gone) | np.isin(table.two, gone)))
+        name = np.where(new, 0, self._row_names[old] if self._row_names.size else 0)
+        name[new] = self._name_count + np.arange(int(new.sum()))
+        self._name_count += int(new.sum())
+        removed = np.setdiff1d(self._row_names, name)
+        self._row_names = name
+        self._row_of = {row: i for i, row in enumerate(rows)}
+        if removed.size:
+            for table in (self._cannot_link, self._appearance, self._ground):
+                table.keep(~(np.isin(table.first, removed) | np.isin(table.second, removed)))
 
-    def make_room(self, rows: Iterable[Row]) -> None:
-        """Add those of these rows that are not here yet; nothing is known about them."""
-        new = [row for row in dict.fromkeys(rows) if row not in self._place]
-        self.arrange([*self._place, *new])
+    def add_rows(self, rows: Iterable[RowKey]) -> None:
+        """Append those of these rows that are missing, without evidence."""
+        new = [row for row in dict.fromkeys(rows) if row not in self._row_of]
+        self.set_rows([*self._row_of, *new])
 
-    def add_apart(self, one: Ints, two: Ints) -> None:
-        """Note (P,) pairs of rows that were seen at once in one camera."""
-        one, two = self._names_of(one, two)
-        new = self._apart.find(one, two) < 0
-        one, two = once(one[new], two[new])
-        self._apart.put(one, two, np.ones((one.size, 1)))
+    def add_cannot_links(self, first: Ints, second: Ints) -> None:
+        """Add a cannot-link between (P,) pairs of rows that were seen simultaneously in one camera."""
+        first, second = self._names_of(first, second)
+        new = self._cannot_link.find(first, second) < 0
+        first, second = unique_pairs(first[new], second[new])
+        self._cannot_link.set(first, second, np.ones((first.size, 1)))
 
-    def set_apart(self, one: Sequence[Row], two: Sequence[Row]) -> None:
-        """Note that each of some rows is another person than each of some others, as if seen at once."""
-        rows = [[self._place[it] for it in side if it in self._place] for side in (one, two)]
-        first, second = np.meshgrid(*(np.array(side, dtype=np.int64) for side in rows))
-        self.add_apart(first.ravel(), second.ravel())
+    def forbid_merging(self, first: Sequence[RowKey], second: Sequence[RowKey]) -> None:
+        """Add cannot-links between each of some rows and each of some others."""
+        rows = [[self._row_of[it] for it in side if it in self._row_of] for side in (first, second)]
+        first_rows, second_rows = np.meshgrid(*(np.array(side, dtype=np.int64) for side in rows))
+        self.add_cannot_links(first_rows.ravel(), second_rows.ravel())
 
-    def apart(self, one: Ints, two: Ints) -> NDArray[np.bool_]:
-        """Say of (P,) pairs of rows whether they were seen at once in one camera: two people."""
-        return self._apart.find(*self._names_of(one, two)) >= 0
+    def cannot_link(self, first: Ints, second: Ints) -> NDArray[np.bool_]:
+        """Return for (P,) pairs of rows whether they have a cannot-link."""
+        return self._cannot_link.find(*self._names_of(first, second)) >= 0
 
-    def any_apart(self, one: Sequence[int], two: Sequence[int]) -> bool:
-        """Say whether any of some rows was seen at once in one camera with any of some others."""
-        first, second = np.meshgrid(np.array(one, dtype=np.int64), np.array(two, dtype=np.int64))
-        return bool(self.apart(first.ravel(), second.ravel()).any())
+    def any_cannot_link(self, first: Sequence[int], second: Sequence[int]) -> bool:
+        """Return whether there is a cannot-link between any of some rows and any of some others."""
+        first_rows, second_rows = np.meshgrid(
+            np.array(first, dtype=np.int64), np.array(second, dtype=np.int64)
+        )
+        return bool(self.cannot_link(first_rows.ravel(), second_rows.ravel()).any())
 
-    def met(self) -> tuple[Ints, Ints]:
-        """Give the pairs of rows that have an entry of nearness, the lower row first: (P,) and (P,)."""
-        one, two = self._rows_of(self._near.one), self._rows_of(self._near.two)
-        return np.minimum(one, two), np.maximum(one, two)
+    def proximity_pairs(self) -> tuple[Ints, Ints]:
+        """Return the pairs of rows with ground evidence, the lower row first: (P,) and (P,)."""
+        first, second = self._rows_of(self._ground.first), self._rows_of(self._ground.second)
+        return np.minimum(first, second), np.maximum(first, second)
 
-    def near(self, one: Ints, two: Ints) -> Floats:
-        """Evidence of (P,) pairs of rows of standing on the same ground: (P,)."""
-        evidence, common = self._nearness(*self._names_of(one, two), one, two).T
-        return np.asarray(np.where(common >= _LEAST_COMMON, evidence, 0.0))
+    def ground_evidence(self, first: Ints, second: Ints) -> Floats:
+        """Return the evidence of (P,) pairs of rows from their ground positions: (P,)."""
+        evidence, common = self._ground_entries(*self._names_of(first, second), first, second).T
+        return np.asarray(np.where(common >= _MINIMUM_COMMON_FRAMES, evidence, 0.0))
 
-    def add_near(self, one: Ints, two: Ints, score: Floats, frames: Ints) -> None:
-        """Add what some frames say about how near (P,) pairs of rows stand; whom both `stand` notes later.
+    def add_ground_evidence(self, first: Ints, second: Ints, score: Floats, frames: Ints) -> None:
+        """Add ground scores of some frames to (P,) pairs of rows; `add_presence` follows for the frames.
 
-        The sum stays within the cap: what was said long ago can be taken back.
+        The sum stays within the cap, so that later frames can reverse earlier ones.
         """
-        pair, where = np.unique(np.minimum(one, two) * len(self) + np.maximum(one, two), return_inverse=True)
-        one, two = pair // max(len(self), 1), pair % max(len(self), 1)
-        a, b = self._names_of(one, two)
-        known = self._nearness(a, b, one, two)
-        np.add.at(known[:, 0], where, score / self._frames)
-        np.add.at(known[:, 1], where, frames)
+        pair, index = np.unique(
+            np.minimum(first, second) * len(self) + np.maximum(first, second), return_inverse=True
+        )
+        first, second = pair // max(len(self), 1), pair % max(len(self), 1)
+        first_name, second_name = self._names_of(first, second)
+        known = self._ground_entries(first_name, second_name, first, second)
+        np.add.at(known[:, 0], index, score / self._frames)
+        np.add.at(known[:, 1], index, frames)
         known[:, 0] = np.clip(known[:, 0], -self._cap, self._cap)
-        known[:, 1] = np.minimum(known[:, 1], _LEAST_COMMON)
-        self._near.put(a, b, known)
+        known[:, 1] = np.minimum(known[:, 1], _MINIMUM_COMMON_FRAMES)
+        self._ground.set(first_name, second_name, known)
 
-    def stand(self, row: Ints, frame: Ints) -> None:
-        """Note that (P,) rows stood somewhere on the ground in (P,) frames.
+    def add_presence(self, row: Ints, frame: Ints) -> None:
+        """Mark (P,) rows as localized in (P,) frames.
 
-        Whom they have not met was elsewhere.
+        Rows without ground evidence were at different places in common frames.
         """
-        self._presence.stand(row, frame)
+        self._presence.add_presence(row, frame)
         # Who went their ways for good is elsewhere like anybody else.
-        at = np.flatnonzero(self._near.value[:, 0] <= -self._cap)
-        one, two = self._rows_of(self._near.one[at]), self._rows_of(self._near.two[at])
-        keep = np.ones(len(self._near), dtype=np.bool_)
-        keep[at] = self._elsewhere(one, two)[:, 0] > -self._cap
-        self._near.keep(keep)
+        capped = np.flatnonzero(self._ground.values[:, 0] <= -self._cap)
+        first, second = self._rows_of(self._ground.first[capped]), self._rows_of(self._ground.second[capped])
+        keep = np.ones(len(self._ground), dtype=np.bool_)
+        keep[capped] = self._default_ground_entries(first, second)[:, 0] > -self._cap
+        self._ground.keep(keep)
 
-    def alike(self, one: Ints, two: Ints) -> Floats:
-        """Evidence of looks of (P,) pairs of rows between cameras without a common ground: (P,)."""
-        return self._alike.get(*self._names_of(one, two))[:, 0]
+    def appearance_evidence(self, first: Ints, second: Ints) -> Floats:
+        """Return the cross-camera appearance evidence of (P,) pairs of rows: (P,)."""
+        return self._appearance.get(*self._names_of(first, second))[:, 0]
 
-    def all_alike(self) -> tuple[Ints, Ints]:
-        """Give the pairs of rows that have an entry of looks: (P,) and (P,), the lower row first."""
-        one, two = self._rows_of(self._alike.one), self._rows_of(self._alike.two)
-        return np.minimum(one, two), np.maximum(one, two)
+    def appearance_pairs(self) -> tuple[Ints, Ints]:
+        """Return pairs of rows with cross-camera appearance evidence, lower first: (P,) and (P,)."""
+        first, second = self._rows_of(self._appearance.first), self._rows_of(self._appearance.second)
+        return np.minimum(first, second), np.maximum(first, second)
 
-    def add_alike(self, one: Ints, two: Ints, score: Floats) -> None:
-        """Add what an update says about the looks of (P,) pairs of rows, each pair once."""
-        one, two = self._names_of(one, two)
-        known = self._alike.get(one, two)[:, 0]
+    def add_appearance_evidence(self, first: Ints, second: Ints, score: Floats) -> None:
+        """Add an update's appearance scores of (P,) pairs of rows, each pair once."""
+        first, second = self._names_of(first, second)
+        known = self._appearance.get(first, second)[:, 0]
         value = np.clip(self._memory * known + score, -self._cap_alike, self._cap_alike)
-        self._alike.put(one, two, value[:, None])
-        self._alike.keep(self._alike.value[:, 0] != 0)
+        self._appearance.set(first, second, value[:, None])
+        self._appearance.keep(self._appearance.values[:, 0] != 0)
 
-    def absorb(self, pairs: Sequence[tuple[Row, Row]]) -> None:
-        """Add what is known about rows to others: the two are one.
+    def merge(self, pairs: Sequence[tuple[RowKey, RowKey]]) -> None:
+        """Add the evidence of rows to others: both are one person.
 
         Args:
-            pairs: who is kept, who is lost; nobody is both.
+            pairs: kept and lost row; no row is both.
         """
-        pairs = [(kept, lost) for kept, lost in pairs if lost in self._place]
+        pairs = [(kept, lost) for kept, lost in pairs if lost in self._row_of]
         if not pairs:
             return
-        kept, lost = (np.array([self._place[it[side]] for it in pairs], dtype=np.int64) for side in (0, 1))
+        kept, lost = (np.array([self._row_of[it[side]] for it in pairs], dtype=np.int64) for side in (0, 1))
         into = np.arange(len(self))
         into[lost] = kept
-        self._absorb_near(into)
-        self._presence.absorb(kept, lost)
-        self._apart, self._alike = (
-            table.renamed(*(self._name[into[self._rows_of(side)]] for side in (table.one, table.two)))
-            for table in (self._apart, self._alike)
+        self._merge_ground_evidence(into)
+        self._presence.merge(kept, lost)
+        self._cannot_link, self._appearance = (
+            table.relabeled(
+                *(self._row_names[into[self._rows_of(side)]] for side in (table.first, table.second))
+            )
+            for table in (self._cannot_link, self._appearance)
         )
 
-    def _absorb_near(self, into: Ints) -> None:
-        """Sum up nearness: (N,) `into` which row each one goes."""
+    def _merge_ground_evidence(self, into: Ints) -> None:
+        """Sum the ground evidence of merged rows; `into` (N,) is the row that each goes into."""
         # Of each row all that go there, itself too.
         order = np.argsort(into, kind="stable")
         begin, end = (np.searchsorted(into[order], np.arange(into.size), side=it) for it in ("left", "right"))
         size = end - begin
-        one, two = into[self._rows_of(self._near.one)], into[self._rows_of(self._near.two)]
-        touched = (size[one] > 1) | (size[two] > 1)
-        one, two = once(one[touched], two[touched])
-        different = one != two
-        one, two = one[different], two[different]
+        first, second = into[self._rows_of(self._ground.first)], into[self._rows_of(self._ground.second)]
+        touched = (size[first] > 1) | (size[second] > 1)
+        first, second = unique_pairs(first[touched], second[touched])
+        different = first != second
+        first, second = first[different], second[different]
         # Whoever of one side has no entry with somebody of the other was elsewhere.
-        pair, which = written_out(size[one] * size[two])
-        a = order[begin[one][pair] + which // size[two][pair]]
-        b = order[begin[two][pair] + which % size[two][pair]]
-        known = self._nearness(*self._names_of(a, b), a, b)
-        total = np.bincount(pair, known[:, 0], one.size)
-        common = np.zeros(one.size)
+        pair, which = expand_counts(size[first] * size[second])
+        first_row = order[begin[first][pair] + which // size[second][pair]]
+        second_row = order[begin[second][pair] + which % size[second][pair]]
+        known = self._ground_entries(*self._names_of(first_row, second_row), first_row, second_row)
+        total = np.bincount(pair, known[:, 0], first.size)
+        common = np.zeros(first.size)
         np.maximum.at(common, pair, known[:, 1])
-        self._near.keep(~touched)
-        self._near.put(*self._names_of(one, two), np.stack([total, common], axis=1))
+        self._ground.keep(~touched)
+        self._ground.set(*self._names_of(first, second), np.stack([total, common], axis=1))
 
-    def _nearness(self, a: Ints, b: Ints, one: Ints, two: Ints) -> Floats:
-        """Evidence and frames of (P,) pairs, by names and by rows: (P, 2)."""
-        at = self._near.find(a, b)
-        known = np.empty((at.size, 2))
-        there = at >= 0
-        known[there] = self._near.value[at[there]]
-        known[~there] = self._elsewhere(one[~there], two[~there])
+    def _ground_entries(self, first_name: Ints, second_name: Ints, first: Ints, second: Ints) -> Floats:
+        """Return ground evidence and common frames of (P,) pairs, given by names and by rows: (P, 2)."""
+        index = self._ground.find(first_name, second_name)
+        known = np.empty((index.size, 2))
+        present = index >= 0
+        known[present] = self._ground.values[index[present]]
+        known[~present] = self._default_ground_entries(first[~present], second[~present])
         return known
 
-    def _elsewhere(self, one: Ints, two: Ints) -> Floats:
-        """Evidence and frames of (P,) pairs of rows that never met: (P, 2)."""
-        common = self._presence.common(one, two, self._enough).astype(np.float64)
-        evidence = np.maximum(WORST * common / self._frames, -self._cap)
-        return np.stack([evidence, np.minimum(common, _LEAST_COMMON)], axis=1)
+    def _default_ground_entries(self, first: Ints, second: Ints) -> Floats:
+        """Return ground evidence and common frames of (P,) pairs of rows that never came close: (P, 2)."""
+        common = self._presence.common(first, second, self._enough).astype(np.float64)
+        evidence = np.maximum(MINIMUM_FRAME_SCORE * common / self._frames, -self._cap)
+        return np.stack([evidence, np.minimum(common, _MINIMUM_COMMON_FRAMES)], axis=1)
 
     def _names_of(self, one: Ints, two: Ints) -> tuple[Ints, Ints]:
-        return self._name[one], self._name[two]
+        return self._row_names[one], self._row_names[two]
 
     def _rows_of(self, names: Ints) -> Ints:
-        order = np.argsort(self._name)
-        return order[np.searchsorted(self._name, names, sorter=order)]
+        order = np.argsort(self._row_names)
+        return order[np.searchsorted(self._row_names, names, sorter=order)]

@@ -1,4 +1,4 @@
-"""Who is asked about together: rows between which something speaks for one person, and chains of these."""
+"""Candidate links: pairs of rows with positive evidence, and the independent batches that they form."""
 
 from __future__ import annotations
 
@@ -10,53 +10,58 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from bestview.association.affinity.evidence import Evidence
-from bestview.association.appearance.likelihood import CameraLooks, LookWeights
-from bestview.association.index_ranges import pairs_within
+from bestview.association.affinity.evidence import PairEvidence
+from bestview.association.appearance.likelihood import AppearanceWeights, CameraAppearances
+from bestview.association.index_ranges import pairs_of_equal_label
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_BATCH = 64
-"""Rows that are worth grouping at once: fewer cost as much."""
+_MINIMUM_BATCH_ROWS = 64
+"""Rows that are worth a batch: fewer cost as much."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Links:
-    """P pairs of N rows for whose being one person something speaks, the lower row first, rising.
+class CandidateLinks:
+    """P pairs of N rows with positive evidence and no cannot-link, the lower row first, rising.
 
     Attributes:
-        one: (P,) open episodes.
-        two: (P,) episodes or people.
+        first: (P,) active tracklets.
+        second: (P,) tracklets or people.
         rows: N.
     """
 
-    one: Ints
-    two: Ints
+    first: Ints
+    second: Ints
     rows: int
 
     @classmethod
-    def found(
-        cls, evidence: Evidence, looks: Sequence[CameraLooks], weights: LookWeights, episodes: int, rows: int
-    ) -> Links:
-        """Find the pairs with evidence above 0, one of which at least is among the first `episodes` rows.
+    def find(
+        cls,
+        evidence: PairEvidence,
+        appearances: Sequence[CameraAppearances],
+        weights: AppearanceWeights,
+        tracklets: int,
+        rows: int,
+    ) -> CandidateLinks:
+        """Find the pairs with evidence above 0 of which at least one is among the first `tracklets` rows.
 
         Args:
-            evidence: of everything but looks.
-            looks: camera by camera; an episode has them in one only.
-            weights: of looks.
-            episodes: how many rows are open.
+            evidence: without appearance within a camera.
+            appearances: one entry a camera; a tracklet is in one only.
+            weights: of appearance.
+            tracklets: how many rows are active tracklets.
             rows: how many there are.
         """
-        one, two = evidence.spoken_for()
-        value = np.zeros(one.size)
-        more = [one * rows + two]
+        first, second = evidence.positive_pairs()
+        value = np.zeros(first.size)
+        more = [first * rows + second]
         worth = [value]
         place = np.full(rows, -1)
-        for camera in looks:
+        for camera in appearances:
             place[camera.rows] = np.arange(camera.rows.size)
-            alike = np.triu(camera.every(weights, int(np.searchsorted(camera.rows, episodes))), 1)
-            a, b = place[one], place[two]
+            alike = np.triu(camera.evidence_matrix(weights, int(np.searchsorted(camera.rows, tracklets))), 1)
+            a, b = place[first], place[second]
             known = (a >= 0) & (b >= 0)
             value[known] = alike[a[known], b[known]]
             a, b = np.nonzero(alike > 0)
@@ -64,99 +69,106 @@ class Links:
             worth.append(alike[a, b])
             place[camera.rows] = -1
         pairs, at = np.unique(np.concatenate(more), return_index=True)
-        one, two = pairs // max(rows, 1), pairs % max(rows, 1)
-        rest, apart = evidence.of(one, two)
+        first, second = pairs // max(rows, 1), pairs % max(rows, 1)
+        rest, apart = evidence.of(first, second)
         linked = (np.concatenate(worth)[at] + rest > 0) & ~apart
-        return cls(one[linked], two[linked], rows)
+        return cls(first[linked], second[linked], rows)
 
-    def chained(self) -> Ints:
-        """Give which rows chains of links lead to each other: (N,) the number of the chain, -1: no link."""
+    def components(self) -> Ints:
+        """Return the connected component of each row: (N,) its number, -1: the row has no link."""
         graph = scipy.sparse.coo_array(
-            (np.ones(self.one.size), (self.one, self.two)), shape=(self.rows, self.rows)
+            (np.ones(self.first.size), (self.first, self.second)), shape=(self.rows, self.rows)
         )
         _, chain = scipy.sparse.csgraph.connected_components(graph, directed=False)
         chain = chain.astype(np.int64)
         linked = np.zeros(self.rows, dtype=np.bool_)
-        linked[self.one] = linked[self.two] = True
+        linked[self.first] = linked[self.second] = True
         return np.where(linked, chain, -1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Batch:
-    """What is known of N rows between which and all others there is no link.
+class ClusteringBatch:
+    """Everything known about N rows that have no link to any other row.
 
     Attributes:
         rows: (N,) rising.
-        evidence: (N, N) symmetric, of everything but looks; 0 between rows that no chain of links joins.
-        apart: (N, N) likewise, surely two people.
+        evidence: (N, N) symmetric, without appearance; 0 between rows of different components.
+        cannot_link: (N, N) symmetric, certainly two people.
         linked: (N, N) symmetric.
-        looks: camera by camera; their rows are places in `rows`.
+        appearance: one entry a camera; their rows are positions in `rows`.
     """
 
     rows: Ints
     evidence: Floats
-    apart: NDArray[np.bool_]
+    cannot_link: NDArray[np.bool_]
     linked: NDArray[np.bool_]
-    looks: list[CameraLooks]
+    appearance: list[CameraAppearances]
 
 
-def batches(
-    links: Links, evidence: Evidence, looks: Sequence[CameraLooks], least: int = _BATCH
-) -> list[Batch]:
-    """Part the rows that have links, such that no link is lost; whole chains of them go together.
+def split_into_batches(
+    links: CandidateLinks,
+    evidence: PairEvidence,
+    appearances: Sequence[CameraAppearances],
+    minimum_rows: int = _MINIMUM_BATCH_ROWS,
+) -> list[ClusteringBatch]:
+    """Split the linked rows into batches of whole connected components.
 
     Args:
         links: between rows.
-        evidence: of everything but looks.
-        looks: camera by camera.
-        least: rows to put together, as long as there are so many.
+        evidence: without appearance within a camera.
+        appearances: one entry a camera.
+        minimum_rows: of a batch, as long as there are so many.
     """
-    chain = links.chained()
-    parts = _packed(chain, least)
+    chain = links.components()
+    parts = _pack_components(chain, minimum_rows)
     # Of each row, which of the parts it is in and where.
     part, place = np.full(links.rows, -1), np.zeros(links.rows, dtype=np.int64)
     for number, rows in enumerate(parts):
         part[rows], place[rows] = number, np.arange(rows.size)
-    found = [
-        Batch(rows, np.zeros(shape), np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_), [])
+    batches = [
+        ClusteringBatch(
+            rows, np.zeros(shape), np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_), []
+        )
         for rows in parts
         for shape in [(rows.size, rows.size)]
     ]
-    one, two = pairs_within(chain)
+    one, two = pairs_of_equal_label(chain)
     value, apart = evidence.of(one, two)
-    for number, mine in _by_label(part[one], len(parts)):
-        a, b = place[one[mine]], place[two[mine]]
-        found[number].evidence[a, b] = found[number].evidence[b, a] = value[mine]
-        found[number].apart[a, b] = found[number].apart[b, a] = apart[mine]
-    for number, mine in _by_label(part[links.one], len(parts)):
-        a, b = place[links.one[mine]], place[links.two[mine]]
-        found[number].linked[a, b] = found[number].linked[b, a] = True
-    for camera in looks:
+    for number, own_pairs in _indices_by_label(part[one], len(parts)):
+        a, b = place[one[own_pairs]], place[two[own_pairs]]
+        batches[number].evidence[a, b] = batches[number].evidence[b, a] = value[own_pairs]
+        batches[number].cannot_link[a, b] = batches[number].cannot_link[b, a] = apart[own_pairs]
+    for number, own_pairs in _indices_by_label(part[links.first], len(parts)):
+        a, b = place[links.first[own_pairs]], place[links.second[own_pairs]]
+        batches[number].linked[a, b] = batches[number].linked[b, a] = True
+    for camera in appearances:
         # Looks say something only where others of the same chain were seen in this camera as well.
         several = np.bincount(chain[camera.rows] + 1, minlength=int(chain.max(initial=-1)) + 2) > 1
         at = np.flatnonzero(several[chain[camera.rows] + 1] & (chain[camera.rows] >= 0))
-        for number, mine in _by_label(part[camera.rows[at]], len(parts)):
-            own = at[mine]
-            found[number].looks.append(
-                CameraLooks(place[camera.rows[own]], camera.total[own], camera.count[own], camera.scale)
+        for number, own_pairs in _indices_by_label(part[camera.rows[at]], len(parts)):
+            own = at[own_pairs]
+            batches[number].appearance.append(
+                CameraAppearances(
+                    place[camera.rows[own]], camera.histogram_sum[own], camera.frame_count[own], camera.scale
+                )
             )
-    return found
+    return batches
 
 
-def _packed(chain: Ints, least: int) -> list[Ints]:
-    """Put chains together into parts that are worth grouping at once: the rows of each, rising."""
+def _pack_components(chain: Ints, minimum_rows: int) -> list[Ints]:
+    """Group components into batches of at least `minimum_rows` rows: the rows of each, rising."""
     order = np.argsort(chain, kind="stable")
     order = order[int(np.searchsorted(chain[order], 0)) :]
-    found, start = [], 0
+    batches, start = [], 0
     for end in (np.flatnonzero(np.diff(chain[order], append=-1)) + 1).tolist():
-        if end - start >= least or end == order.size:
-            found.append(np.sort(order[start:end]))
+        if end - start >= minimum_rows or end == order.size:
+            batches.append(np.sort(order[start:end]))
             start = end
-    return found
+    return batches
 
 
-def _by_label(label: Ints, labels: int) -> Iterator[tuple[int, Ints]]:
-    """Give those labels from 0 that (P,) things have, and which have them, in order."""
+def _indices_by_label(label: Ints, labels: int) -> Iterator[tuple[int, Ints]]:
+    """Yield each label from 0 that occurs in (P,) labels, with its indices in order."""
     order = np.argsort(label, kind="stable")
     bounds = np.searchsorted(label[order], np.arange(labels + 1))
     for number, (start, end) in enumerate(pairwise(bounds.tolist())):

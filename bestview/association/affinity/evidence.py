@@ -1,4 +1,4 @@
-"""What is known of pairs of rows besides their looks in one camera, pair by pair."""
+"""Pairwise evidence from ground, continuity, cross-camera appearance and published ids."""
 
 from __future__ import annotations
 
@@ -7,104 +7,119 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.affinity.affinity_matrix import PairTables
-from bestview.association.affinity.continuity import Places, goes_on, lost_and_found
-from bestview.association.affinity.pair_table import PairTable
-from bestview.association.index_ranges import distinct, pairs_within
+from bestview.association.affinity.affinity_matrix import AffinityMatrix
+from bestview.association.affinity.continuity import (
+    EndpointArrays,
+    continuation_evidence,
+    reappearance_evidence,
+)
+from bestview.association.affinity.pair_table import SparsePairTable
+from bestview.association.index_ranges import pairs_of_equal_label, sorted_unique
 from bestview.association.registry.person import Person
 from bestview.association.settings import IdentitySettings
-from bestview.association.tracklet import Episode
+from bestview.association.tracklet import Tracklet
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 
-class Evidence:
-    """Evidence about N rows: the open episodes, then people as they were before.
+class PairEvidence:
+    """Evidence about N rows: the active tracklets, then the known people.
 
     Args:
-        episodes: open ones.
-        past: people as they were before.
-        tables: of pairs of both.
-        calibrated: by camera, whether it has a ground.
+        tracklets: active ones.
+        people: known people with settled tracklets.
+        affinity: evidence summed up so far.
+        calibrated: by camera, whether it has a homography.
         settings: of identity.
         height: of a person in ground units.
-        pace: how far somebody can walk in a frame, in heights.
+        walking_speed: the farthest that somebody walks in a frame, in person heights.
     """
 
     def __init__(
         self,
-        episodes: Sequence[Episode],
-        past: Sequence[Person],
-        tables: PairTables,
+        tracklets: Sequence[Tracklet],
+        people: Sequence[Person],
+        affinity: AffinityMatrix,
         calibrated: Mapping[str, bool],
         settings: IdentitySettings,
         height: float,
-        pace: float,
+        walking_speed: float,
     ) -> None:
-        self._tables, self._settings, self._height, self._pace = tables, settings, height, pace
+        self._affinity, self._settings, self._height, self._pace = affinity, settings, height, walking_speed
         number_of = {camera: i for i, camera in enumerate(calibrated)}
-        self._camera = np.array([number_of[it.key.camera] for it in episodes], dtype=np.int64)
-        ground = np.array([calibrated[it.key.camera] for it in episodes], dtype=np.bool_)
-        self._places = Places.of(episodes, self._camera, ground)
-        self._number = np.array([it.mostly for it in episodes] + [it.number for it in past], dtype=np.int64)
-        self._goes_on = self._going_on(episodes, past)
+        self._camera = np.array([number_of[it.key.camera] for it in tracklets], dtype=np.int64)
+        ground = np.array([calibrated[it.key.camera] for it in tracklets], dtype=np.bool_)
+        self._places = EndpointArrays.of(tracklets, self._camera, ground)
+        self._number = np.array(
+            [it.main_id for it in tracklets] + [it.person_id for it in people], dtype=np.int64
+        )
+        self._continuation = self._continuations(tracklets, people)
 
-    def _going_on(self, episodes: Sequence[Episode], past: Sequence[Person]) -> PairTable:
-        """Evidence that tracks go on, of episodes and what was before them."""
-        row_of = {id(episode): row for row, episode in enumerate(episodes)}
-        row_of_past = {person.number: len(episodes) + i for i, person in enumerate(past)}
-        found: dict[tuple[int, int], float] = {}
-        for row, episode in enumerate(episodes):
-            before = episode.before
-            if before is None:
+    def _continuations(self, tracklets: Sequence[Tracklet], people: Sequence[Person]) -> SparsePairTable:
+        """Compute the continuation evidence between tracklets and their predecessors."""
+        row_of = {id(tracklet): row for row, tracklet in enumerate(tracklets)}
+        row_of_past = {person.person_id: len(tracklets) + i for i, person in enumerate(people)}
+        evidence: dict[tuple[int, int], float] = {}
+        for row, tracklet in enumerate(tracklets):
+            predecessor = tracklet.predecessor
+            if predecessor is None:
                 continue
-            other = row_of.get(id(before), row_of_past.get(before.mostly, -1))
+            other = row_of.get(id(predecessor), row_of_past.get(predecessor.main_id, -1))
             if other >= 0:
-                found[row, other] = goes_on(episode, self._settings)
-        table = PairTable()
-        pairs = np.array(list(found), dtype=np.int64).reshape(-1, 2)
-        table.put(pairs[:, 0], pairs[:, 1], np.array(list(found.values()), dtype=np.float64)[:, None])
+                evidence[row, other] = continuation_evidence(tracklet, self._settings)
+        table = SparsePairTable()
+        pairs = np.array(list(evidence), dtype=np.int64).reshape(-1, 2)
+        table.set(pairs[:, 0], pairs[:, 1], np.array(list(evidence.values()), dtype=np.float64)[:, None])
         return table
 
-    def spoken_for(self) -> tuple[Ints, Ints]:
-        """Give the pairs of rows for whose being one person something speaks: (P,) and (P,), each once.
+    def positive_pairs(self) -> tuple[Ints, Ints]:
+        """Return the pairs of rows with some positive evidence: (P,) and (P,), each once.
 
-        The lower row comes first, and is an open episode.
+        The lower row comes first and is an active tracklet.
         """
-        same_camera = pairs_within(self._camera)
-        found, _ = lost_and_found(self._places, *same_camera, self._settings, self._height, self._pace)
-        one, two = self._tables.met()
-        near = self._tables.near(one, two) > 0
-        alike = self._tables.all_alike()
-        told = pairs_within(np.where(self._number > 0, self._number, -1))
-        parts = [
-            (same_camera[0][found > 0], same_camera[1][found > 0]),
-            (one[near], two[near]),
-            tuple(side[self._tables.alike(*alike) > 0] for side in alike),
-            told,
-            (self._goes_on.one, self._goes_on.two),
+        same_camera = pairs_of_equal_label(self._camera)
+        reappeared, _ = reappearance_evidence(
+            self._places, *same_camera, self._settings, self._height, self._pace
+        )
+        first, second = self._affinity.proximity_pairs()
+        near = self._affinity.ground_evidence(first, second) > 0
+        alike = self._affinity.appearance_pairs()
+        same_published_id = pairs_of_equal_label(np.where(self._number > 0, self._number, -1))
+        sources = [
+            (same_camera[0][reappeared > 0], same_camera[1][reappeared > 0]),
+            (first[near], second[near]),
+            tuple(side[self._affinity.appearance_evidence(*alike) > 0] for side in alike),
+            same_published_id,
+            (self._continuation.first, self._continuation.second),
         ]
         size = self._number.size
-        pairs = distinct(np.concatenate([a * size + b for a, b in parts]))
+        pairs = sorted_unique(
+            np.concatenate([first_rows * size + second_rows for first_rows, second_rows in sources])
+        )
         pairs = pairs[pairs < self._camera.size * size]
         return pairs // max(size, 1), pairs % max(size, 1)
 
-    def of(self, one: Ints, two: Ints) -> tuple[Floats, Bools]:
-        """Give the evidence of (P,) pairs of rows, the lower row first; and whether they are surely two."""
+    def of(self, first: Ints, second: Ints) -> tuple[Floats, Bools]:
+        """Return the evidence of (P,) pairs of rows, lower first, and whether they cannot be linked."""
         count = self._camera.size
-        order, too_far = np.zeros(one.size), np.zeros(one.size, dtype=np.bool_)
-        both = np.flatnonzero(two < count)
-        order[both], too_far[both] = lost_and_found(
-            self._places, one[both], two[both], self._settings, self._height, self._pace
+        temporal, too_far = np.zeros(first.size), np.zeros(first.size, dtype=np.bool_)
+        both = np.flatnonzero(second < count)
+        temporal[both], too_far[both] = reappearance_evidence(
+            self._places, first[both], second[both], self._settings, self._height, self._pace
         )
-        follows = self._goes_on.find(one, two)
-        goes_on_ = follows >= 0
+        follows = self._continuation.find(first, second)
+        continued = follows >= 0
         # That the track goes on says it better than the place does.
-        order[goes_on_] = self._goes_on.value[follows[goes_on_], 0]
-        too_far[goes_on_] = False
-        same = (self._number[one] == self._number[two]) & (self._number[one] > 0)
-        near, alike = self._tables.near(one, two), self._tables.alike(one, two)
-        evidence = order + (near + alike + self._settings.id_persistence_evidence * same)
-        return evidence, self._tables.apart(one, two) | too_far
+        temporal[continued] = self._continuation.values[follows[continued], 0]
+        too_far[continued] = False
+        same_published_id = (self._number[first] == self._number[second]) & (self._number[first] > 0)
+        ground, appearance = (
+            self._affinity.ground_evidence(first, second),
+            self._affinity.appearance_evidence(first, second),
+        )
+        evidence = temporal + (
+            ground + appearance + self._settings.id_persistence_evidence * same_published_id
+        )
+        return evidence, self._affinity.cannot_link(first, second) | too_far

@@ -1,11 +1,11 @@
-"""A symmetric table in which only few pairs have an entry."""
+"""Sparse symmetric table with an entry for few pairs."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.index_ranges import distinct
+from bestview.association.index_ranges import sorted_unique
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -14,73 +14,73 @@ _SHIFT = 32
 _LOW = (1 << _SHIFT) - 1
 
 
-class PairTable:
-    """Numbers of pairs of things that are called by whole numbers from 0.
+class SparsePairTable:
+    """Values of pairs of non-negative integers ("names").
 
     Args:
-        columns: numbers of each pair.
+        columns: values of each pair.
 
     Attributes:
-        value: (P, C) of the pairs that have an entry.
+        values: (P, C) of the pairs that have an entry.
     """
 
     def __init__(self, columns: int = 1) -> None:
         # Both names in one number, the lower one in front; rising.
         self._code: Ints = np.zeros(0, dtype=np.int64)
-        self.value: Floats = np.zeros((0, columns))
+        self.values: Floats = np.zeros((0, columns))
 
     def __len__(self) -> int:
-        """Count the pairs that have an entry."""
+        """Return the number of pairs with an entry."""
         return self._code.size
 
     @property
-    def one(self) -> Ints:
-        """(P,) the lower name of each pair that has an entry."""
+    def first(self) -> Ints:
+        """(P,) the lower name of each pair with an entry."""
         return self._code >> _SHIFT
 
     @property
-    def two(self) -> Ints:
-        """(P,) the higher one."""
+    def second(self) -> Ints:
+        """(P,) the higher name."""
         return self._code & _LOW
 
-    def find(self, one: Ints, two: Ints) -> Ints:
-        """Give the entry of each of (P,) pairs, -1: it has none."""
-        return self._at(_codes(one, two))
+    def find(self, first: Ints, second: Ints) -> Ints:
+        """Return the index of the entry of each of (P,) pairs, -1: none."""
+        return self._at(_codes(first, second))
 
-    def get(self, one: Ints, two: Ints) -> Floats:
-        """Give what (P,) pairs have, (P, C); zeros where nothing."""
-        at = self.find(one, two)
-        found = np.zeros((at.size, self.value.shape[1]))
-        found[at >= 0] = self.value[at[at >= 0]]
-        return found
+    def get(self, first: Ints, second: Ints) -> Floats:
+        """Return the values of (P,) pairs, (P, C); zeros where there is no entry."""
+        index = self.find(first, second)
+        values = np.zeros((index.size, self.values.shape[1]))
+        values[index >= 0] = self.values[index[index >= 0]]
+        return values
 
-    def put(self, one: Ints, two: Ints, value: Floats) -> None:
-        """Write what (P,) pairs have from now on, (P, C); each pair once."""
-        code = _codes(one, two)
+    def set(self, first: Ints, second: Ints, value: Floats) -> None:
+        """Set the values of (P,) pairs, (P, C); each pair once."""
+        code = _codes(first, second)
         order = np.argsort(code)
         code, value = code[order], value[order]
         at = self._at(code)
         new = at < 0
-        self.value[at[~new]] = value[~new]
+        self.values[at[~new]] = value[~new]
         places = np.searchsorted(self._code, code[new])
         self._code = np.insert(self._code, places, code[new])
-        self.value = np.insert(self.value, places, value[new], axis=0)
+        self.values = np.insert(self.values, places, value[new], axis=0)
 
     def keep(self, which: NDArray[np.bool_]) -> None:
-        """Keep only some entries, (P,)."""
+        """Keep the entries of the mask (P,)."""
         if not which.all():
-            self._code, self.value = self._code[which], self.value[which]
+            self._code, self.values = self._code[which], self.values[which]
 
-    def renamed(self, one: Ints, two: Ints) -> PairTable:
-        """Give the table with other names, (P,) and (P,), and the sums of what is one pair then.
+    def relabeled(self, first: Ints, second: Ints) -> SparsePairTable:
+        """Return the table under other names, (P,) and (P,), with the sums of pairs that become one.
 
-        A thing has no entry with itself.
+        Entries of a name with itself are dropped.
         """
-        total = PairTable(self.value.shape[1])
-        a, b = once(one, two)
-        total.put(a, b, np.zeros((a.size, self.value.shape[1])))
-        np.add.at(total.value, total.find(one, two), self.value)
-        total.keep(total.one != total.two)
+        total = SparsePairTable(self.values.shape[1])
+        first_names, second_names = unique_pairs(first, second)
+        total.set(first_names, second_names, np.zeros((first_names.size, self.values.shape[1])))
+        np.add.at(total.values, total.find(first, second), self.values)
+        total.keep(total.first != total.second)
         return total
 
     def _at(self, code: Ints) -> Ints:
@@ -96,7 +96,7 @@ def _codes(one: Ints, two: Ints) -> Ints:
     return np.asarray((np.minimum(one, two) << _SHIFT) | np.maximum(one, two))
 
 
-def once(one: Ints, two: Ints) -> tuple[Ints, Ints]:
-    """Give each of (P,) pairs once, the lower name first, rising."""
-    pairs = distinct(_codes(one, two))
+def unique_pairs(first: Ints, second: Ints) -> tuple[Ints, Ints]:
+    """Return each of (P,) pairs once, the lower name first, rising."""
+    pairs = sorted_unique(_codes(first, second))
     return pairs >> _SHIFT, pairs & _LOW

@@ -1,4 +1,4 @@
-"""How long people take from a camera that loses them to one that finds them, learned from who surely did."""
+"""Travel times between cameras, learned from people who were re-identified by appearance."""
 
 from __future__ import annotations
 
@@ -12,98 +12,110 @@ from bestview.association.settings import IdentitySettings
 
 Floats = NDArray[np.float64]
 
-_STEP = 2.0
-"""From one bin of times to the next: finer ones take longer to fill, and differ by chance."""
-_ASIDE = 0.25
-"""Share of a way that teaches each of the bins beside its own: nobody takes the same time twice."""
-_PRIOR = 1.0
-"""Ways that nobody has walked yet count as much as so many: into any camera, and after any time, alike."""
-_REMEMBERED = 64
-"""Ways out of a camera beyond which all that is known of them is halved: habits change."""
+_BIN_RATIO = 2.0
+"""Ratio of successive time bins: finer ones take longer to fill and differ by chance."""
+_NEIGHBOR_BIN_SHARE = 0.25
+"""Share of a transition that goes into each of the neighboring bins: times vary."""
+_PRIOR_COUNT = 1.0
+"""Weight of the uniform prior over cameras and times, in transitions."""
+_HISTORY_LIMIT = 64
+"""Transitions out of a camera beyond which all its counts are halved: habits change."""
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
-    """Where and when somebody was seen last, or first: the camera's name, and the frame."""
+class CameraSighting:
+    """Where and when somebody was seen last, or first: the camera's name and the frame."""
 
     camera: str
     frame: int
 
 
 @dataclass(slots=True, eq=False)
-class _Exits:
-    """The ways out of one camera: their number, and by the next camera (B,) the number of each time."""
+class _DepartureCounts:
+    """Transitions out of one camera: their number, and by the next camera (B,) counts for each time bin."""
 
-    count: float = 0.0
-    into: dict[str, Floats] = field(default_factory=dict)
+    transitions: float = 0.0
+    arrivals: dict[str, Floats] = field(default_factory=dict)
 
 
-class TravelTimes:
-    """Learns the ways from camera to camera, and says what time tells about who has arrived.
+class TravelTimeModel:
+    """Learns transitions between cameras, and scores how plausible an arrival is.
 
     Args:
-        settings: `travel_frames` and what belongs to it.
+        settings: `travel_frames` and related ones.
         cameras: how many there are.
     """
 
     def __init__(self, settings: IdentitySettings, cameras: int) -> None:
         self._settings, self._cameras = settings, max(cameras, 1)
-        self.edges = time_bins(settings.travel_frames)
-        self._exits: dict[str, _Exits] = {}
+        self.bin_edges = travel_time_bins(settings.travel_frames)
+        self._departures: dict[str, _DepartureCounts] = {}
 
-    def learn(self, lost: Sight, found: Sight) -> None:
-        """Take in a way that somebody surely went; one that took too long teaches nothing."""
-        place = self._bin(found.frame - lost.frame)
-        if place < 0:
+    def learn(self, departure: CameraSighting, arrival: CameraSighting) -> None:
+        """Count a transition of a re-identified person; one that took too long is ignored."""
+        bin_index = self._bin(arrival.frame - departure.frame)
+        if bin_index < 0:
             return
-        exits = self._exits.setdefault(lost.camera, _Exits())
-        times = exits.into.setdefault(found.camera, np.zeros(self.edges.size - 1))
-        for beside, share in ((-1, _ASIDE), (0, 1.0 - 2.0 * _ASIDE), (1, _ASIDE)):
-            times[min(max(place + beside, 0), times.size - 1)] += share
-        exits.count += 1.0
-        if exits.count > _REMEMBERED:
-            exits.count /= 2.0
-            exits.into = {camera: known / 2.0 for camera, known in exits.into.items()}
+        exits = self._departures.setdefault(departure.camera, _DepartureCounts())
+        times = exits.arrivals.setdefault(arrival.camera, np.zeros(self.bin_edges.size - 1))
+        for offset, share in (
+            (-1, _NEIGHBOR_BIN_SHARE),
+            (0, 1.0 - 2.0 * _NEIGHBOR_BIN_SHARE),
+            (1, _NEIGHBOR_BIN_SHARE),
+        ):
+            times[min(max(bin_index + offset, 0), times.size - 1)] += share
+        exits.transitions += 1.0
+        if exits.transitions > _HISTORY_LIMIT:
+            exits.transitions /= 2.0
+            exits.arrivals = {camera: known / 2.0 for camera, known in exits.arrivals.items()}
 
-    def evidence(self, found: Sequence[Sight], lost: Sequence[Sight]) -> Floats:
-        """Say how much likelier people come from where somebody was lost, in that time, than by chance.
+    def evidence(self, arrivals: Sequence[CameraSighting], departures: Sequence[CameraSighting]) -> Floats:
+        """Compute the log-likelihood ratio of arriving from a camera in that time, against chance.
 
-        By chance they come into any camera, at any time up to `travel_frames`.
+        By chance people arrive at any camera, at any time up to `travel_frames`.
 
         Args:
-            found: N first sightings.
-            lost: L last sightings.
+            arrivals: N first sightings.
+            departures: L last sightings.
 
         Returns:
-            (N, L); 0 where nothing is known, or the way would take no time, or too long.
+            (N, L); 0 where nothing is known, or the transition would take no time or too long.
         """
-        said = [self._of(new, old) for new in found for old in lost]
-        return np.array(said, dtype=np.float64).reshape(len(found), len(lost))
+        values = [self._of(arrival, departure) for arrival in arrivals for departure in departures]
+        return np.array(values, dtype=np.float64).reshape(len(arrivals), len(departures))
 
-    def _of(self, found: Sight, lost: Sight) -> float:
-        place, exits = self._bin(found.frame - lost.frame), self._exits.get(lost.camera)
-        if place < 0 or exits is None:
+    def _of(self, arrival: CameraSighting, departure: CameraSighting) -> float:
+        bin_index, counts = self._bin(arrival.frame - departure.frame), self._departures.get(departure.camera)
+        if bin_index < 0 or counts is None:
             return 0.0
-        times = exits.into.get(found.camera)
-        ways, here = (0.0, 0.0) if times is None else (float(times.sum()), float(times[place]))
+        times = counts.arrivals.get(arrival.camera)
+        transitions, in_bin = (0.0, 0.0) if times is None else (float(times.sum()), float(times[bin_index]))
         # Both against what chance has: one of all cameras, and the bin's part of all times.
-        goes_there = self._cameras * (ways + _PRIOR / self._cameras) / (exits.count + _PRIOR)
-        width = float(self.edges[place + 1] - self.edges[place]) / float(self.edges[-1] - self.edges[0])
-        in_that_time = (here / width + _PRIOR) / (ways + _PRIOR)
-        known = exits.count / (exits.count + self._settings.travel_half_weight_count) if exits.count else 0.0
+        goes_there = (
+            self._cameras * (transitions + _PRIOR_COUNT / self._cameras) / (counts.transitions + _PRIOR_COUNT)
+        )
+        width = float(self.bin_edges[bin_index + 1] - self.bin_edges[bin_index]) / float(
+            self.bin_edges[-1] - self.bin_edges[0]
+        )
+        in_that_time = (in_bin / width + _PRIOR_COUNT) / (transitions + _PRIOR_COUNT)
+        reliability = (
+            counts.transitions / (counts.transitions + self._settings.travel_half_weight_count)
+            if counts.transitions
+            else 0.0
+        )
         cap = self._settings.maximum_travel_evidence
-        return float(known * np.clip(np.log(goes_there * in_that_time), -cap, cap))
+        return float(reliability * np.clip(np.log(goes_there * in_that_time), -cap, cap))
 
     def _bin(self, frames: int) -> int:
-        """Give the bin of a time; -1: none."""
-        if not 1 <= frames < self.edges[-1]:
+        """Return the index of a time's bin; -1: none."""
+        if not 1 <= frames < self.bin_edges[-1]:
             return -1
-        return int(np.searchsorted(self.edges, frames, side="right")) - 1
+        return int(np.searchsorted(self.bin_edges, frames, side="right")) - 1
 
 
-def time_bins(longest: int) -> Floats:
-    """Give the edges of bins of times from 1 to `longest` frames, each twice as long as the one before."""
+def travel_time_bins(longest: int) -> Floats:
+    """Return the edges of time bins from 1 to `longest` frames, each twice as long as the one before."""
     edges = [1.0]
-    while edges[-1] * _STEP < longest:
-        edges.append(edges[-1] * _STEP)
+    while edges[-1] * _BIN_RATIO < longest:
+        edges.append(edges[-1] * _BIN_RATIO)
     return np.array([*edges, longest + 1.0])

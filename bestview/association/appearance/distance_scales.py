@@ -1,4 +1,4 @@
-"""What distances between looks mean in each camera, learned from who is surely one or surely two."""
+"""What appearance distances mean in each camera, learned from pairs that are certainly one or two people."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.affinity.affinity_matrix import PairTables
-from bestview.association.appearance.likelihood import LookScale, look_distances
-from bestview.association.appearance.mean_histograms import Look
-from bestview.association.tracklet import Episode
+from bestview.association.affinity.affinity_matrix import AffinityMatrix
+from bestview.association.appearance.likelihood import DistanceScale, bhattacharyya_distances
+from bestview.association.appearance.mean_histograms import MeanHistogram
+from bestview.association.tracklet import Tracklet
 
 Floats = NDArray[np.float64]
 
-_UNBROKEN = 3
-"""Frames unseen within which a track that goes on teaches how much one person's looks differ."""
-_REMEMBERED = 500
-"""Distances remembered of each kind and camera."""
+_CONTINUOUS_GAP = 3
+"""Gap in frames within which a continued track teaches how much one person's appearance varies."""
+_HISTORY_LIMIT = 500
+"""Distances kept of each kind and camera."""
 
 
-class LookScales:
-    """Learns from open episodes, and remembers what settled ones taught.
+class DistanceScales:
+    """Learns from active tracklets, and keeps the distances of settled ones.
 
     Args:
-        frames: alone, that a look needs to teach anything.
+        frames: that a histogram needs to teach anything.
     """
 
     def __init__(self, frames: int) -> None:
@@ -33,65 +33,75 @@ class LookScales:
         self._others: dict[str, Floats] = {}
 
     def of(
-        self, camera: str, rows: Sequence[int], episodes: Sequence[Episode], tables: PairTables
-    ) -> LookScale:
-        """Give the scale of a camera, with what the open episodes teach.
+        self, camera: str, rows: Sequence[int], tracklets: Sequence[Tracklet], affinity: AffinityMatrix
+    ) -> DistanceScale:
+        """Return the scale of a camera, including the distances of its active tracklets.
 
         Args:
             camera: its name.
-            rows: of its episodes.
-            episodes: of all cameras.
-            tables: who of them was seen at once.
+            rows: of its tracklets.
+            tracklets: of all cameras.
+            affinity: cannot-links between them.
         """
-        own, others = self._distances(camera, rows, episodes, tables, rows)
-        return LookScale.learned(_with(self._own, camera, own), _with(self._others, camera, others))
+        same_person, different_people = self._distances(camera, rows, tracklets, affinity, rows)
+        return DistanceScale.learned(
+            _extended(self._own, camera, same_person), _extended(self._others, camera, different_people)
+        )
 
-    def remember(self, old: Collection[int], episodes: Sequence[Episode], tables: PairTables) -> None:
-        """Keep what episodes that are about to be settled teach, by their rows among all open ones."""
-        rows_of: dict[str, list[int]] = {episodes[row].key.camera: [] for row in old}
-        for row, episode in enumerate(episodes):
-            if episode.key.camera in rows_of:
-                rows_of[episode.key.camera].append(row)
+    def remember_distances(
+        self, settled_rows: Collection[int], tracklets: Sequence[Tracklet], affinity: AffinityMatrix
+    ) -> None:
+        """Keep the distances of tracklets that are about to be settled, given by their rows."""
+        rows_of: dict[str, list[int]] = {tracklets[row].key.camera: [] for row in settled_rows}
+        for row, tracklet in enumerate(tracklets):
+            if tracklet.key.camera in rows_of:
+                rows_of[tracklet.key.camera].append(row)
         for camera, rows in sorted(rows_of.items()):
-            own, others = self._distances(camera, rows, episodes, tables, old)
-            self._own[camera] = _with(self._own, camera, own)[-_REMEMBERED:]
-            self._others[camera] = _with(self._others, camera, others)[-_REMEMBERED:]
+            same_person, different_people = self._distances(camera, rows, tracklets, affinity, settled_rows)
+            self._own[camera] = _extended(self._own, camera, same_person)[-_HISTORY_LIMIT:]
+            self._others[camera] = _extended(self._others, camera, different_people)[-_HISTORY_LIMIT:]
 
     def _distances(
         self,
         camera: str,
         rows: Sequence[int],
-        episodes: Sequence[Episode],
-        tables: PairTables,
+        tracklets: Sequence[Tracklet],
+        affinity: AffinityMatrix,
         of: Collection[int],
     ) -> tuple[Floats, Floats]:
-        """Distances of some episodes to the one before each, and to all that are apart from them."""
-        looks = {row: look for row in rows if (look := self._look(episodes[row], camera)) is not None}
-        if not looks:
+        """Return the distances of tracklets `of` to their predecessors, and to all that are other people."""
+        histograms = {
+            row: histogram for row in rows if (histogram := self._look(tracklets[row], camera)) is not None
+        }
+        if not histograms:
             return np.zeros(0), np.zeros(0)
-        bins = next(reversed(looks.values())).total.size
-        rows = [row for row, look in looks.items() if look.total.size == bins]
-        place = {id(episodes[row]): i for i, row in enumerate(rows)}
-        mean = np.array([looks[row].mean for row in rows])
-        distance = look_distances(mean, mean)
+        bins = next(reversed(histograms.values())).histogram_sum.size
+        rows = [row for row, histogram in histograms.items() if histogram.histogram_sum.size == bins]
+        place = {id(tracklets[row]): i for i, row in enumerate(rows)}
+        mean = np.array([histograms[row].mean for row in rows])
+        distance = bhattacharyya_distances(mean, mean)
         row_of = np.array(rows, dtype=np.int64)
-        mine = np.isin(row_of, np.array(list(of), dtype=np.int64))
-        own: list[float] = []
-        for i in np.flatnonzero(mine).tolist():
-            episode = episodes[rows[i]]
-            if episode.before is not None and id(episode.before) in place and episode.gap <= _UNBROKEN:
-                own.append(float(distance[i, place[id(episode.before)]]))
-        one, two = np.triu_indices(len(rows), 1)
-        asked = mine[one] | mine[two]
-        one, two = one[asked], two[asked]
-        rivals = tables.apart(row_of[one], row_of[two])
-        return np.array(own, dtype=np.float64), distance[one[rivals], two[rivals]]
+        selected = np.isin(row_of, np.array(list(of), dtype=np.int64))
+        same_person: list[float] = []
+        for i in np.flatnonzero(selected).tolist():
+            tracklet = tracklets[rows[i]]
+            if (
+                tracklet.predecessor is not None
+                and id(tracklet.predecessor) in place
+                and tracklet.gap <= _CONTINUOUS_GAP
+            ):
+                same_person.append(float(distance[i, place[id(tracklet.predecessor)]]))
+        first, second = np.triu_indices(len(rows), 1)
+        relevant = selected[first] | selected[second]
+        first, second = first[relevant], second[relevant]
+        rivals = affinity.cannot_link(row_of[first], row_of[second])
+        return np.array(same_person, dtype=np.float64), distance[first[rivals], second[rivals]]
 
-    def _look(self, episode: Episode, camera: str) -> Look | None:
-        look = episode.looks.by_camera.get(camera)
-        return look if look is not None and look.count >= self._frames else None
+    def _look(self, tracklet: Tracklet, camera: str) -> MeanHistogram | None:
+        look = tracklet.appearance.by_camera.get(camera)
+        return look if look is not None and look.frame_count >= self._frames else None
 
 
-def _with(known: dict[str, Floats], camera: str, more: Floats) -> Floats:
-    """Distances known of a camera, and more."""
+def _extended(known: dict[str, Floats], camera: str, more: Floats) -> Floats:
+    """Return the known distances of a camera, extended by more."""
     return np.concatenate([known[camera], more]) if camera in known else more

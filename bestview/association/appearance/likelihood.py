@@ -1,4 +1,4 @@
-"""How much likelier two looks in one camera are one person's than two people's."""
+"""Log-likelihood ratio of one person against two, from the distance between two histograms in one camera."""
 
 from __future__ import annotations
 
@@ -10,100 +10,114 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_FEW = 3
-"""Distances without which a camera's own are not yet known."""
-_OTHERS, _OWN_SHARE, _MOST_SHARE = 0.2, 0.4, 0.6
+_MINIMUM_DISTANCES = 3
+"""Distances below which a camera's own statistics are not used."""
+_DEFAULT_DIFFERENT, _DEFAULT_SAME_SHARE, _MAXIMUM_SAME_SHARE = 0.2, 0.4, 0.6
 """Between different people where nothing is known yet; of that, between the same person's; and at most."""
 
 
 @dataclass(frozen=True, slots=True)
-class LookScale:
-    """What distances between looks mean in a camera.
+class DistanceScale:
+    """What distances between histograms mean in a camera.
 
     Attributes:
-        own: the usual distance between one person's looks.
-        others: how near different people often come: the lower quartile of their distances.
+        same_person: the typical distance between histograms of one person.
+        different_people: the lower quartile of the distances between different people.
     """
 
-    own: float
-    others: float
+    same_person: float
+    different_people: float
 
     @classmethod
-    def learned(cls, own: Floats, others: Floats) -> LookScale:
-        """Learn from (N,) distances of the same people, and (M,) of different ones."""
-        between = float(np.quantile(others, 0.25)) if others.size >= _FEW else _OTHERS
-        within = float(np.median(own)) if own.size >= _FEW else _OWN_SHARE * between
-        return cls(min(within, _MOST_SHARE * between), between)
+    def learned(cls, same_person: Floats, different_people: Floats) -> DistanceScale:
+        """Learn from (N,) distances of same people, and (M,) of different ones."""
+        different = (
+            float(np.quantile(different_people, 0.25))
+            if different_people.size >= _MINIMUM_DISTANCES
+            else _DEFAULT_DIFFERENT
+        )
+        same = (
+            float(np.median(same_person))
+            if same_person.size >= _MINIMUM_DISTANCES
+            else _DEFAULT_SAME_SHARE * different
+        )
+        return cls(min(same, _MAXIMUM_SAME_SHARE * different), different)
 
     @property
-    def middle(self) -> float:
-        """Distance that says nothing."""
-        return (self.own + self.others) / 2.0
+    def neutral_distance(self) -> float:
+        """Distance with evidence 0."""
+        return (self.same_person + self.different_people) / 2.0
 
-    def slope(self, weights: LookWeights) -> float:
-        """Evidence by distance."""
-        half = (self.others - self.own) / 2.0
-        return weights.look / half if half > 0 else 0.0
+    def slope(self, weights: AppearanceWeights) -> float:
+        """Return the evidence per unit of distance."""
+        half = (self.different_people - self.same_person) / 2.0
+        return weights.typical / half if half > 0 else 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class LookWeights:
-    """What looks weigh: evidence of looking like oneself, the most of it, and frames for full weight."""
+class AppearanceWeights:
+    """Weights of appearance: evidence at the typical distance, its maximum, and frames for full weight."""
 
-    look: float
-    cap: float
-    frames: int
+    typical: float
+    maximum: float
+    full_weight_frames: int
 
-    def told(self, distance: Floats, slope: Floats | float, middle: Floats | float) -> Floats:
+    def evidence(self, distance: Floats, slope: Floats | float, middle: Floats | float) -> Floats:
         """Give the evidence of distances between looks that are known well, any shape."""
         # Not np.clip, which takes longer than all the rest for the few of a group.
-        return np.asarray(np.minimum(np.maximum(slope * (middle - distance), -self.cap), self.cap))
+        return np.asarray(np.minimum(np.maximum(slope * (middle - distance), -self.maximum), self.maximum))
 
-    def known(self, count: Floats) -> Floats:
-        """Give how much looks of so many frames count, any shape: times the same of the other look."""
-        return np.asarray(np.minimum(count / self.frames, 1.0))
+    def confidence(self, count: Floats) -> Floats:
+        """Return the weight of histograms of so many frames, any shape; both weights are multiplied."""
+        return np.asarray(np.minimum(count / self.full_weight_frames, 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CameraLooks:
-    """The looks of K rows in one camera.
+class CameraAppearances:
+    """Mean histograms of K rows in one camera.
 
     Attributes:
         rows: (K,) rising.
-        total: (K, B) sums of normalised histograms.
-        count: (K,) frames in them.
+        histogram_sum: (K, B) sums of normalized histograms.
+        frame_count: (K,) frames in them.
         scale: what distances mean here.
     """
 
     rows: Ints
-    total: Floats
-    count: Floats
-    scale: LookScale
+    histogram_sum: Floats
+    frame_count: Floats
+    scale: DistanceScale
 
-    def every(self, weights: LookWeights, first: int | None = None) -> Floats:
-        """Say what looks say of the `first` rows, of all without it, and all: (K or `first`, K)."""
-        root = np.sqrt(self.total / self.count[:, None])
-        distance = distance_of(root[:first] @ root.T)
-        return look_evidence(distance, self.count[:first, None], self.count, self.scale, weights)
-
-
-def look_distances(one: Floats, two: Floats) -> Floats:
-    """Bhattacharyya distances of mean histograms: (I, B) and (J, B) -> (I, J), 0 alike to 1."""
-    return distance_of(np.sqrt(one) @ np.sqrt(two).T)
+    def evidence_matrix(self, weights: AppearanceWeights, first: int | None = None) -> Floats:
+        """Compute the evidence between the `first` rows, of all without it, and all: (K or `first`, K)."""
+        root = np.sqrt(self.histogram_sum / self.frame_count[:, None])
+        distance = bhattacharyya_distance(root[:first] @ root.T)
+        return appearance_evidence(
+            distance, self.frame_count[:first, None], self.frame_count, self.scale, weights
+        )
 
 
-def distance_of(likeness: Floats) -> Floats:
-    """Bhattacharyya distances of what histograms have in common: sums of roots of products, any shape."""
-    return np.asarray(np.sqrt(np.minimum(np.maximum(1.0 - likeness, 0.0), 1.0)))
+def bhattacharyya_distances(first: Floats, second: Floats) -> Floats:
+    """Compute Bhattacharyya distances of mean histograms: (I, B) and (J, B) -> (I, J), 0 alike to 1."""
+    return bhattacharyya_distance(np.sqrt(first) @ np.sqrt(second).T)
 
 
-def look_evidence(
-    distance: Floats, one: Floats, two: Floats, scale: LookScale, weights: LookWeights
+def bhattacharyya_distance(coefficient: Floats) -> Floats:
+    """Compute Bhattacharyya distances from Bhattacharyya coefficients, any shape."""
+    return np.asarray(np.sqrt(np.minimum(np.maximum(1.0 - coefficient, 0.0), 1.0)))
+
+
+def appearance_evidence(
+    distance: Floats,
+    first_frames: Floats,
+    second_frames: Floats,
+    scale: DistanceScale,
+    weights: AppearanceWeights,
 ) -> Floats:
-    """Evidence of looks: `look` at the usual distance of one person's, as much against at other people's.
+    """Compute appearance evidence: `typical` at one person's typical distance, minus it at others'.
 
-    In between it is a straight line, beyond it goes on up to `cap`. Who was seen alone in fewer frames, (N,)
-    `one` and `two`, than `frames` weighs less.
+    It is linear in between and beyond, up to `maximum`. Histograms of fewer frames, (N,) `first_frames` and
+    `second_frames`, than `full_weight_frames` weigh less.
     """
-    known = weights.known(one) * weights.known(two)
-    return weights.told(distance, scale.slope(weights), scale.middle) * known
+    confidence = weights.confidence(first_frames) * weights.confidence(second_frames)
+    return weights.evidence(distance, scale.slope(weights), scale.neutral_distance) * confidence

@@ -1,16 +1,16 @@
-"""What turns out about numbers already given: two were one person, or one stood for two."""
+"""Corrections of published person ids: merges and splits."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from bestview.association.keys import EpisodeKey
+from bestview.association.keys import TrackletKey
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Merge:
-    """Two numbers turned out to be one person: `lost` is never used again."""
+    """Two ids turned out to be one person: `lost` is never used again."""
 
     kept: int
     lost: int
@@ -18,48 +18,49 @@ class Merge:
 
 @dataclass(frozen=True, slots=True, order=True)
 class Split:
-    """Whom a camera showed as `kept` turned out to be `parted`, somebody else.
+    """A track that a camera showed as `kept` turned out to be `split_off`, somebody else.
 
     `kept` is not necessarily seen any more: if two people exchanged their tracks, there are two splits.
     """
 
     kept: int
-    parted: int
+    split_off: int
     camera: str
 
 
-class Corrections:
-    """Remembers the last number of every track, to tell when it stands for somebody else than before."""
+class IdCorrections:
+    """Keeps the last published id of every tracklet to detect splits."""
 
     def __init__(self) -> None:
-        self._last: dict[EpisodeKey, int] = {}
+        self._last: dict[TrackletKey, int] = {}
 
-    def update(self, numbers: Mapping[EpisodeKey, int], merged: Sequence[Merge]) -> tuple[Split, ...]:
-        """Compare the numbers of the tracks seen with their last ones; a merge is no split.
+    def update(self, person_ids: Mapping[TrackletKey, int], merged: Sequence[Merge]) -> tuple[Split, ...]:
+        """Compare the ids of the visible tracklets with their last ones; a merge is no split.
 
-        A track that has no number for a while, until its new person is confirmed, is told when it has.
+        A tracklet without an id, whose new person is not confirmed yet, is compared once it has one.
         """
         for merge in merged:
             self._last = {
-                key: merge.kept if number == merge.lost else number for key, number in self._last.items()
+                key: merge.kept if person_id == merge.lost else person_id
+                for key, person_id in self._last.items()
             }
         splits = {
-            Split(self._last[key], number, key.camera)
-            for key, number in numbers.items()
-            if self._last.get(key, number) != number
+            Split(self._last[key], person_id, key.camera)
+            for key, person_id in person_ids.items()
+            if self._last.get(key, person_id) != person_id
         }
-        self._last.update(numbers)
+        self._last.update(person_ids)
         return tuple(sorted(splits))
 
-    def part(self, keys: Iterable[EpisodeKey], number: int) -> None:
-        """Take over that tracks are said to stand for somebody else: who said so knows."""
-        self._last.update((key, number) for key in keys if key in self._last)
+    def split_off(self, keys: Iterable[TrackletKey], person_id: int) -> None:
+        """Take over ids that an operator assigned: they are no splits to report."""
+        self._last.update((key, person_id) for key in keys if key in self._last)
 
-    def part_each(self, changed: Mapping[EpisodeKey, tuple[int, int]]) -> None:
-        """Take over, with the numbers before and after, which parts are said to stand for somebody else."""
-        for key, (_, number) in changed.items():
-            self.part([key], number)
+    def reassign_each(self, changed: Mapping[TrackletKey, tuple[int, int]]) -> None:
+        """Take over ids that an operator assigned, given with the ids before and after."""
+        for key, (_, person_id) in changed.items():
+            self.split_off([key], person_id)
 
-    def keep_only(self, keys: Collection[EpisodeKey]) -> None:
-        """Forget all other tracks."""
-        self._last = {key: number for key, number in self._last.items() if key in keys}
+    def keep_only(self, keys: Collection[TrackletKey]) -> None:
+        """Forget all other tracklets."""
+        self._last = {key: person_id for key, person_id in self._last.items() if key in keys}

@@ -1,4 +1,4 @@
-"""Groups get the numbers they were told to be: one number for each, by one assignment."""
+"""Assign person ids to clusters of tracklets: one id for each, by one linear assignment."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ import numpy as np
 import scipy
 
 
-def named(told: Sequence[Mapping[int, int]]) -> list[int]:
-    """Give each of G groups a number, 0 where none is left for it.
+def assign_ids(published: Sequence[Mapping[int, int]]) -> list[int]:
+    """Assign an id to each of G clusters, 0 where none is left.
 
-    In total as many frames as can be keep the number that they were told to have.
+    The assignment maximizes the total number of frames that keep their published id.
 
     Args:
-        told: for each group, frames by the number told.
+        published: for each cluster, frames by published id.
     """
-    numbers = sorted({number for frames in told for number in frames})
-    answer = [0] * len(told)
-    if not numbers:
-        return answer
-    column = {number: i for i, number in enumerate(numbers)}
-    kept = np.zeros((len(told), len(numbers)))
-    for group, frames in enumerate(told):
-        for number, count in frames.items():
-            kept[group, column[number]] = count
-    rows, columns = scipy.optimize.linear_sum_assignment(kept, maximize=True)
+    person_ids = sorted({person_id for frames in published for person_id in frames})
+    assigned = [0] * len(published)
+    if not person_ids:
+        return assigned
+    column = {person_id: i for i, person_id in enumerate(person_ids)}
+    frames_kept = np.zeros((len(published), len(person_ids)))
+    for group, frames in enumerate(published):
+        for person_id, count in frames.items():
+            frames_kept[group, column[person_id]] = count
+    rows, columns = scipy.optimize.linear_sum_assignment(frames_kept, maximize=True)
     for group, at in zip(rows.tolist(), columns.tolist(), strict=True):
-        if kept[group, at] > 0:
-            answer[group] = numbers[at]
-    return answer
+        if frames_kept[group, at] > 0:
+            assigned[group] = person_ids[at]
+    return assigned

@@ -1,200 +1,216 @@
-"""Everybody who has a number, and how numbers are given, told, merged and taken back."""
+"""All people with an id, and how ids are assigned, published, merged and split."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-from bestview.association.affinity.affinity_matrix import PairTables
-from bestview.association.appearance.cross_camera import LooksBetween
+from bestview.association.affinity.affinity_matrix import AffinityMatrix
+from bestview.association.appearance.cross_camera import CrossCameraAppearance
 from bestview.association.registry.corrections import Merge
-from bestview.association.registry.id_assignment import named
-from bestview.association.registry.new_people import Lost, Newcomers
+from bestview.association.registry.id_assignment import assign_ids
+from bestview.association.registry.new_people import LostPerson, Reidentifier
 from bestview.association.registry.person import Person
 from bestview.association.settings import IdentitySettings
-from bestview.association.tracklet import Episode
-from bestview.association.tracklet_groups import Group
+from bestview.association.tracklet import Tracklet
+from bestview.association.tracklet_groups import TrackletCluster
 
 
-class People:
-    """The persons by number."""
+class PersonStore:
+    """The known people by id."""
 
     def __init__(self, settings: IdentitySettings, cameras: int) -> None:
         self._settings = settings
-        self._newcomers = Newcomers(settings, cameras)
-        self._persons: dict[int, Person] = {}
-        self.next_number = 1
+        self._reidentifier = Reidentifier(settings, cameras)
+        self._by_id: dict[int, Person] = {}
+        self.next_id = 1
         """The first that nobody was given yet."""
 
     def __len__(self) -> int:
-        """Count everybody remembered."""
-        return len(self._persons)
+        """Return the number of people remembered."""
+        return len(self._by_id)
 
-    def __contains__(self, number: object) -> bool:
-        """Say whether somebody of this number is remembered."""
-        return number in self._persons
+    def __contains__(self, person_id: object) -> bool:
+        """Return whether a person of this id is remembered."""
+        return person_id in self._by_id
 
-    def recent(self, frame: int) -> list[Person]:
-        """List those who are compared like everybody, by number: some episode of theirs is settled."""
-        oldest = frame - self._settings.comparable_frames
-        return [it for _, it in sorted(self._persons.items()) if it.settled and it.last >= oldest]
-
-    def name(
-        self,
-        groups: Sequence[Group],
-        tables: PairTables,
-        between: LooksBetween,
-        frame: int,
-        silent: Callable[[Group], int],
-    ) -> tuple[tuple[int, ...], tuple[Merge, ...]]:
-        """Give the groups their numbers, and those of their episodes; say who is new, and who was merged.
-
-        `silent` says how many cameras should see a group and do not.
-        """
-        told = [{it: n for it, n in group.told.items() if it in self._persons} for group in groups]
-        for group, number in zip(groups, named(told), strict=True):
-            group.number = number
-        born = self._number_new(groups, tables, between, frame, silent)
-        for group in groups:
-            for episode in group.episodes:
-                episode.number = group.number
-            if group.number:
-                person = self._persons[group.number]
-                for episode in group.episodes:
-                    person.see(episode.key.camera, episode.end.frame)
-                for before in group.past:
-                    person.see(before.camera, before.last)
-        self._newcomers.see_at_once((it for it in groups if it.number), frame)
-        return born, self._merge(groups, frame)
-
-    def _number_new(
-        self,
-        groups: Sequence[Group],
-        tables: PairTables,
-        between: LooksBetween,
-        frame: int,
-        silent: Callable[[Group], int],
-    ) -> tuple[int, ...]:
-        """Number those who were seen often enough: a new number, or that of the lost person they are."""
-        new = [it for it in groups if it.episodes and not it.number and self._is_sure(it, frame, silent)]
-        new.sort(key=lambda it: (it.first, it.rows[0]))
-        here = {it.number: it for it in groups if it.number}
-        lost = [
-            Lost(person, here.get(number))
-            for number, person in sorted(self._persons.items())
-            if number not in here or here[number].last < frame - self._settings.gap_frames
+    def comparable_people(self, frame: int) -> list[Person]:
+        """Return the people who take part in clustering, by id: seen lately, with a settled tracklet."""
+        earliest = frame - self._settings.comparable_frames
+        return [
+            it for _, it in sorted(self._by_id.items()) if it.settled_frames and it.last_frame >= earliest
         ]
-        found = self._newcomers.match(new, lost, tables, between, frame)
-        born = []
-        for group, match in zip(new, found, strict=True):
-            if match >= 0:
-                group.number = lost[match].person.number
-                continue
-            group.number = self.next_number
-            self._persons[group.number] = Person(group.number)
-            born.append(group.number)
-            self.next_number += 1
-        return tuple(born)
 
-    def _is_sure(self, new: Group, frame: int, silent: Callable[[Group], int]) -> bool:
-        """Say whether a group is seen lately, and was seen often enough to be somebody."""
+    def assign_ids(
+        self,
+        groups: Sequence[TrackletCluster],
+        affinity: AffinityMatrix,
+        cross_camera: CrossCameraAppearance,
+        frame: int,
+        count_missing_cameras: Callable[[TrackletCluster], int],
+    ) -> tuple[tuple[int, ...], tuple[Merge, ...]]:
+        """Assign ids to clusters and their tracklets; return the new ids and the merges.
+
+        `count_missing_cameras` counts the cameras that should see a cluster and do not.
+        """
+        published = [
+            {it: n for it, n in group.published_frames.items() if it in self._by_id} for group in groups
+        ]
+        for group, person_id in zip(groups, assign_ids(published), strict=True):
+            group.person_id = person_id
+        created = self._assign_new_ids(groups, affinity, cross_camera, frame, count_missing_cameras)
+        for group in groups:
+            for tracklet in group.tracklets:
+                tracklet.person_id = group.person_id
+            if group.person_id:
+                person = self._by_id[group.person_id]
+                for tracklet in group.tracklets:
+                    person.add_sighting(tracklet.key.camera, tracklet.end.frame)
+                for before in group.people:
+                    person.add_sighting(before.camera, before.last_frame)
+        self._reidentifier.learn_covisible_cameras((it for it in groups if it.person_id), frame)
+        return created, self._merge(groups, frame)
+
+    def _assign_new_ids(
+        self,
+        groups: Sequence[TrackletCluster],
+        affinity: AffinityMatrix,
+        cross_camera: CrossCameraAppearance,
+        frame: int,
+        count_missing_cameras: Callable[[TrackletCluster], int],
+    ) -> tuple[int, ...]:
+        """Assign ids to clusters that were seen often enough: a new one, or that of a lost person."""
+        new = [
+            it
+            for it in groups
+            if it.tracklets and not it.person_id and self._is_confirmed(it, frame, count_missing_cameras)
+        ]
+        new.sort(key=lambda it: (it.first_frame, it.rows[0]))
+        by_id = {it.person_id: it for it in groups if it.person_id}
+        lost = [
+            LostPerson(person, by_id.get(person_id))
+            for person_id, person in sorted(self._by_id.items())
+            if person_id not in by_id or by_id[person_id].last_frame < frame - self._settings.gap_frames
+        ]
+        matches = self._reidentifier.match(new, lost, affinity, cross_camera, frame)
+        created = []
+        for group, match in zip(new, matches, strict=True):
+            if match >= 0:
+                group.person_id = lost[match].person.person_id
+                continue
+            group.person_id = self.next_id
+            self._by_id[group.person_id] = Person(group.person_id)
+            created.append(group.person_id)
+            self.next_id += 1
+        return tuple(created)
+
+    def _is_confirmed(
+        self, new: TrackletCluster, frame: int, count_missing_cameras: Callable[[TrackletCluster], int]
+    ) -> bool:
+        """Return whether a cluster is seen lately and has been seen often enough to be a person."""
         settings = self._settings
         if (
-            new.frames < settings.confirmation_frames
-            or new.last < frame - settings.gap_frames - settings.clustering_interval
+            new.frame_count < settings.confirmation_frames
+            or new.last_frame < frame - settings.gap_frames - settings.clustering_interval
         ):
             return False
-        doubted = max(0, silent(new) - len(new.cameras) + 1) if settings.ghost_penalty else 0
-        return new.frames >= settings.confirmation_frames * (1.0 + settings.ghost_penalty * doubted)
+        unconfirmed_misses = (
+            max(0, count_missing_cameras(new) - len(new.cameras) + 1) if settings.ghost_penalty else 0
+        )
+        return new.frame_count >= settings.confirmation_frames * (
+            1.0 + settings.ghost_penalty * unconfirmed_misses
+        )
 
-    def _merge(self, groups: Sequence[Group], frame: int) -> tuple[Merge, ...]:
-        """Merge numbers that have been nobody's for long: whoever had them is in somebody else's group."""
-        into = _whose_now(groups)
+    def _merge(self, groups: Sequence[TrackletCluster], frame: int) -> tuple[Merge, ...]:
+        """Merge ids that no cluster has had for long into those of the clusters with their frames."""
+        successors = _successors(groups)
         merged = []
-        for number, person in sorted(self._persons.items()):
-            if number not in into:
-                person.nobody_since = -1
-            elif person.nobody_since < 0:
-                person.nobody_since = frame
-            elif frame - person.nobody_since >= self._settings.merge_after:
-                merged.append(Merge(into[number], number))
+        for person_id, person in sorted(self._by_id.items()):
+            if person_id not in successors:
+                person.unused_since = -1
+            elif person.unused_since < 0:
+                person.unused_since = frame
+            elif frame - person.unused_since >= self._settings.merge_after:
+                merged.append(Merge(successors[person_id], person_id))
         for merge in merged:
-            self._persons[merge.kept].absorb(self._persons.pop(merge.lost))
+            self._by_id[merge.kept].merge(self._by_id.pop(merge.lost))
         return tuple(merged)
 
-    def part(self, people: Iterable[int], cameras: Iterable[str], frame: int) -> int:
-        """Give the number of somebody new whom some cameras see, and whom these people were taken for."""
-        new = Person(self.next_number)
-        self.next_number += 1
-        self._persons[new.number] = new
+    def split_off(self, people: Iterable[int], cameras: Iterable[str], frame: int) -> int:
+        """Create a person whom some cameras see and who was taken for these people; return the id."""
+        new = Person(self.next_id)
+        self.next_id += 1
+        self._by_id[new.person_id] = new
         for camera in cameras:
-            new.see(camera, frame)
-        self.root([new.number, *people])
-        return new.number
+            new.add_sighting(camera, frame)
+        self.keep_row([new.person_id, *people])
+        return new.person_id
 
-    def begin_at(self, number: int) -> None:
-        """Give no number below this one any more."""
-        self.next_number = max(self.next_number, number)
+    def reserve_below(self, person_id: int) -> None:
+        """Assign no id below this one any more."""
+        self.next_id = max(self.next_id, person_id)
 
-    def recall(self, number: int, frame: int) -> None:
-        """Know somebody of this number, who was here before a frame."""
-        self.begin_at(number + 1)
-        self._persons.setdefault(number, Person(number, frame))
+    def recall(self, person_id: int, frame: int) -> None:
+        """Restore a person who was seen before a frame."""
+        self.reserve_below(person_id + 1)
+        self._by_id.setdefault(person_id, Person(person_id, frame))
 
-    def root(self, numbers: Iterable[int]) -> None:
-        """Let people have a row among those who are compared, by which they can be kept apart."""
-        for number in numbers:
-            self._persons[number].settled = max(1, self._persons[number].settled)
+    def keep_row(self, person_ids: Iterable[int]) -> None:
+        """Let people take part in clustering, so that they can have cannot-links."""
+        for person_id in person_ids:
+            self._by_id[person_id].settled_frames = max(1, self._by_id[person_id].settled_frames)
 
-    def settle(self, episodes: Iterable[Episode]) -> None:
-        """Take over episodes that stay whose they were told to be."""
-        for episode in episodes:
-            person = self._persons.get(episode.mostly)
+    def settle(self, tracklets: Iterable[Tracklet]) -> None:
+        """Add settled tracklets to the people whose id was published for most of their frames."""
+        for tracklet in tracklets:
+            person = self._by_id.get(tracklet.main_id)
             if person is not None:
-                person.looks.add_all(episode.looks)
-                person.settled += episode.told[person.number]
+                person.appearance.add_all(tracklet.appearance)
+                person.settled_frames += tracklet.published_frames[person.person_id]
 
-    def see(self, seen: Iterable[tuple[int, str]], frame: int) -> None:
-        """Note whom cameras see whose tracks are settled though they go on."""
-        for number, camera in seen:
-            if number in self._persons:
-                self._persons[number].see(camera, frame)
+    def add_sighting(self, seen: Iterable[tuple[int, str]], frame: int) -> None:
+        """Note the people seen by settled tracklets that go on."""
+        for person_id, camera in seen:
+            if person_id in self._by_id:
+                self._by_id[person_id].add_sighting(camera, frame)
 
-    def comings_and_goings(
-        self, episodes: Iterable[Episode], frame: int
+    def update_presence(
+        self, tracklets: Iterable[Tracklet], frame: int
     ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Say who of those who had gone is back, and whom no camera has seen for a while: their numbers."""
-        for episode in episodes:
-            person = self._persons.get(episode.number)
+        """Return the ids of people who returned, and of people whom no camera has seen for a while."""
+        for tracklet in tracklets:
+            person = self._by_id.get(tracklet.person_id)
             if person is not None:
-                person.see(episode.key.camera, episode.end.frame)
+                person.add_sighting(tracklet.key.camera, tracklet.end.frame)
         returned: list[int] = []
-        gone: list[int] = []
-        for number, person in sorted(self._persons.items()):
-            away = frame - person.last > self._settings.departed_after
-            if away != person.gone:
-                (gone if away else returned).append(number)
-                person.gone = away
-        return tuple(returned), tuple(gone)
+        departed: list[int] = []
+        for person_id, person in sorted(self._by_id.items()):
+            is_absent = frame - person.last_frame > self._settings.departed_after
+            if is_absent != person.departed:
+                (departed if is_absent else returned).append(person_id)
+                person.departed = is_absent
+        return tuple(returned), tuple(departed)
 
-    def forget(self, frame: int) -> None:
-        """Forget whoever was gone for too long."""
+    def forget_departed(self, frame: int) -> None:
+        """Forget people who departed too long ago."""
         settings = self._settings
-        settled = frame - settings.settle_after
-        gone = sorted(
-            (it.last, number) for number, it in self._persons.items() if it.gone and it.last < settled
+        settled_before = frame - settings.settle_after
+        candidates = sorted(
+            (it.last_frame, person_id)
+            for person_id, it in self._by_id.items()
+            if it.departed and it.last_frame < settled_before
         )
-        surplus = len(gone) - settings.maximum_departed_people
-        for i, (last, number) in enumerate(gone):
+        surplus = len(candidates) - settings.maximum_departed_people
+        for i, (last, person_id) in enumerate(candidates):
             if i < surplus or frame - last > settings.forget_after:
-                del self._persons[number]
+                del self._by_id[person_id]
 
 
-def _whose_now(groups: Sequence[Group]) -> dict[int, int]:
-    """Give the numbers that are no group's, though told: by number, that of most who were told so."""
-    most: dict[int, tuple[int, int]] = {}
+def _successors(groups: Sequence[TrackletCluster]) -> dict[int, int]:
+    """Return for each published id that no cluster has the id of the cluster with most of its frames."""
+    best: dict[int, tuple[int, int]] = {}
     for group in groups:
-        for number, frames in group.told.items():
-            if group.number and frames > most.get(number, (0, 0))[0]:
-                most[number] = (frames, group.number)
-    here = {group.number for group in groups}
-    return {number: other for number, (_, other) in most.items() if number not in here}
+        for number, frames in group.published_frames.items():
+            if group.person_id and frames > best.get(number, (0, 0))[0]:
+                best[number] = (frames, group.person_id)
+    assigned = {group.person_id for group in groups}
+    return {number: successor for number, (_, successor) in best.items() if number not in assigned}

@@ -1,47 +1,47 @@
-"""The people who have a number."""
+"""A person with an id."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from bestview.association.affinity.travel_times import Sight
-from bestview.association.appearance.mean_histograms import Looks
+from bestview.association.affinity.travel_times import CameraSighting
+from bestview.association.appearance.mean_histograms import PersonAppearance
 
 
 @dataclass(slots=True, eq=False)
 class Person:
-    """Somebody with a number.
+    """A person with an id.
 
     Attributes:
-        number: from 1, never used for anybody else.
-        last: frame of the last sighting.
+        person_id: from 1, never reused.
+        last_frame: frame of the last sighting.
         camera: in which that was; of several the first by name.
-        gone: said to be gone, and not back yet.
-        looks: of the settled episodes.
-        settled: their frames that were told to be this person's.
-        nobody_since: frame since which the number has been no group's, though it was told; -1: it is.
+        departed: reported as departed, and not back yet.
+        appearance: of the settled tracklets.
+        settled_frames: their frames that were published with this id.
+        unused_since: frame since which no cluster has had the id; -1: one has it.
     """
 
-    number: int
-    last: int = -1
+    person_id: int
+    last_frame: int = -1
     camera: str = ""
-    gone: bool = False
-    looks: Looks = field(default_factory=Looks)
-    settled: int = 0
-    nobody_since: int = -1
+    departed: bool = False
+    appearance: PersonAppearance = field(default_factory=PersonAppearance)
+    settled_frames: int = 0
+    unused_since: int = -1
 
     @property
-    def sight(self) -> Sight:
+    def last_sighting(self) -> CameraSighting:
         """Where they were seen last."""
-        return Sight(self.camera, self.last)
+        return CameraSighting(self.camera, self.last_frame)
 
-    def see(self, camera: str, frame: int) -> None:
+    def add_sighting(self, camera: str, frame: int) -> None:
         """Note a sighting."""
-        if frame > self.last or (frame == self.last and camera < self.camera):
-            self.last, self.camera = frame, camera
+        if frame > self.last_frame or (frame == self.last_frame and camera < self.camera):
+            self.last_frame, self.camera = frame, camera
 
-    def absorb(self, other: Person) -> None:
-        """Take over what is known of `other`: the two are one."""
-        self.looks.add_all(other.looks)
-        self.see(other.camera, other.last)
-        self.settled += other.settled
+    def merge(self, other: Person) -> None:
+        """Add everything known about `other`: the two are one person."""
+        self.appearance.add_all(other.appearance)
+        self.add_sighting(other.camera, other.last_frame)
+        self.settled_frames += other.settled_frames

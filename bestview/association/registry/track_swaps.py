@@ -1,65 +1,77 @@
-"""Somebody's word that two tracks have exchanged their people."""
+"""Operator correction: two tracks of a camera swapped their people."""
 
 from __future__ import annotations
 
 from collections.abc import Container
 
-from bestview.association.keys import EpisodeKey, TrackKey
-from bestview.association.tracklet import Episode
-from bestview.association.tracklet_splitter import Episodes
+from bestview.association.keys import TrackKey, TrackletKey
+from bestview.association.tracklet import Tracklet
+from bestview.association.tracklet_splitter import TrackletSplitter
 
 
-def exchange(
-    episodes: Episodes,
+def swap_tracks(
+    tracklets: TrackletSplitter,
     people: Container[int],
     tracks: tuple[TrackKey, TrackKey],
     frame: int,
-    numbers: tuple[int, int],
-) -> dict[EpisodeKey, tuple[int, int]]:
-    """Let each of two tracks go on, from a frame, from what the other one was before.
+    person_ids: tuple[int, int],
+) -> dict[TrackletKey, tuple[int, int]]:
+    """Let each of two tracks continue, from a frame on, what the other one was before.
 
-    The part of a track that began in that frame or later becomes that of the other's person. Where a track
-    was not cut since, the next sighting begins a part of it. Other cameras' parts that began since, and were
-    taken for one of the two by what these tracks showed, are the other one's, too.
+    The tracklet that started in that frame or later becomes the other's person. If a track was not split
+    since,
+    its next observation starts a new tracklet. Tracklets of other cameras that started since and were taken
+    for
+    one of the two are swapped as well.
 
     Args:
-        episodes: all of them; those that change are changed.
-        people: the numbers of those who are remembered.
+        tracklets: all of them; changed in place.
+        people: the ids of those who are remembered.
         tracks: of one camera.
         frame: the first in which each of the two shows the other's person.
-        numbers: of whom they showed before it, where that is settled and over.
+        person_ids: of the people before it, if that is settled and over.
 
     Returns:
-        The number of each episode that has another one now, before and after; of a track that is cut only
-        later as if an episode had begun in that frame. Nothing where one of the two was nobody.
+        The ids before and after of each tracklet that has another one now; of a track that is split only
+        later
+        as if a tracklet had started in that frame. Empty if one of the two had no id.
     """
-    one, two = (episodes.before(track, frame, number) for track, number in zip(tracks, numbers, strict=True))
-    if one is None or two is None:
+    first, second = (
+        tracklets.predecessor(track, frame, number) for track, number in zip(tracks, person_ids, strict=True)
+    )
+    if first is None or second is None:
         return {}
-    first, second = _number_of(one, people), _number_of(two, people)
-    if not first or not second or first == second:
+    first_id, second_id = _id_of(first, people), _id_of(second, people)
+    if not first_id or not second_id or first_id == second_id:
         return {}
-    changed, false = {}, 0
-    for track, own, other, number in ((tracks[0], one, two, second), (tracks[1], two, one, first)):
-        now = episodes.since(track, frame)
-        was = _number_of(own if now is None else now, people)
-        false += was == first + second - number
-        if was and was != number:
-            changed[EpisodeKey(*track, frame) if now is None else now.key] = was, number
-        if now is None:
-            episodes.cut(track, number, other)
+    changed, already_wrong = {}, 0
+    for track, own_part, other_part, number in (
+        (tracks[0], first, second, second_id),
+        (tracks[1], second, first, first_id),
+    ):
+        current = tracklets.started_since(track, frame)
+        previous_id = _id_of(own_part if current is None else current, people)
+        already_wrong += previous_id == first_id + second_id - number
+        if previous_id and previous_id != number:
+            changed[TrackletKey(*track, frame) if current is None else current.key] = previous_id, number
+        if current is None:
+            tracklets.split_next(track, number, other_part)
         else:
-            now.goes_on_as(number, other)
-    if false == len(tracks):
-        for episode in episodes.open:
-            was = episode.number
-            if episode.begin.frame >= frame and was in {first, second} and episode.key.track not in tracks:
-                episode.become(first + second - was)
-                changed[episode.key] = was, episode.number
+            current.continue_as(number, other_part)
+    if already_wrong == len(tracks):
+        for tracklet in tracklets.active:
+            previous_id = tracklet.person_id
+            if (
+                tracklet.start.frame >= frame
+                and previous_id in {first_id, second_id}
+                and tracklet.key.track not in tracks
+            ):
+                tracklet.assign_id(first_id + second_id - previous_id)
+                changed[tracklet.key] = previous_id, tracklet.person_id
     return changed
 
 
-def _number_of(episode: Episode, people: Container[int]) -> int:
-    """Give whose an episode is, settled or not; 0: nobody's who is remembered."""
-    number = episode.firm or episode.number or episode.mostly
+def _id_of(tracklet: Tracklet, people: Container[int]) -> int:
+    """Return the person of a tracklet, settled or not; 0: none who is remembered."""
+    number = tracklet.settled_id or tracklet.person_id or tracklet.main_id
     return number if number in people else 0

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import Glimpse, LocalTrack, TrackKey
+from bestview import AppearanceSample, TrackKey, TrackUpdate
 from server.media.letterbox import Letterbox
 from server.messaging import messages
 from server.messaging.messages import CameraTracks
@@ -44,19 +44,19 @@ class CameraWindow:
         """The pulse of the first frame."""
         return self.message.first
 
-    def local_tracks(self) -> list[LocalTrack]:
+    def local_tracks(self) -> list[TrackUpdate]:
         """Return what is final of the tracks, where it is anything, boxes in the camera's own picture."""
         _, height = self.message.size
         known = slice(self.fresh - self.first, max(0, self.message.final_to - self.first + 1))
         hidden = np.isnan(self.boxes[:, known, 0])
         own = self.fit.boxes_to_own(self.boxes[:, known])
         return [
-            LocalTrack(
+            TrackUpdate(
                 camera=key.camera,
-                local=key.local,
-                first=self.fresh,
+                local_id=key.local_id,
+                first_frame=self.fresh,
                 boxes=boxes,
-                looks=_glimpses(track.looks, self.fresh),
+                appearance=_glimpses(track.looks, self.fresh),
                 picture_height=float(height),
             )
             for key, track, boxes, gone in zip(self.keys, self.message.tracks, own, hidden, strict=True)
@@ -74,10 +74,10 @@ class CameraWindow:
         return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
-def _glimpses(looks: Sequence[messages.AppearanceHistogram], first: int) -> tuple[Glimpse, ...]:
+def _glimpses(looks: Sequence[messages.AppearanceHistogram], first: int) -> tuple[AppearanceSample, ...]:
     """Return the looks in the frames from `first` on."""
     return tuple(
-        Glimpse(max(it.first, first), it.last, np.array(it.histogram, dtype=np.float64))
+        AppearanceSample(max(it.first, first), it.last, np.array(it.histogram, dtype=np.float64))
         for it in looks
         if it.last >= first
     )
@@ -115,7 +115,7 @@ class Reader:
         keys = self.locals.of(message)
         frames = max(0, message.last - message.first + 1)
         boxes = boxes_array(track.boxes for track in message.tracks)
-        locals_ = np.array([key.local for key in keys], dtype=np.int64)
+        locals_ = np.array([key.local_id for key in keys], dtype=np.int64)
         fresh = message.first
         if message.mended_from is not None:
             fresh = max(fresh, min(self._final.get(message.camera, -1), message.final_to) + 1)
@@ -124,4 +124,4 @@ class Reader:
     def read_again(self, window: CameraWindow) -> CameraWindow:
         """Return a window by what its tracks are called now."""
         keys = self.locals.of(window.message)
-        return replace(window, keys=keys, locals=np.array([key.local for key in keys], dtype=np.int64))
+        return replace(window, keys=keys, locals=np.array([key.local_id for key in keys], dtype=np.int64))

@@ -41,7 +41,7 @@ class Mending:
         for one, two, frame in exchanged(window, before):
             first, second = (_whose(parts.get(it, UNKNOWN), frame - 1, asked_from) for it in (one, two))
             self._reader.locals.exchange(one, two)
-            splits += self._registry.exchange(one, two, frame, (first, second))
+            splits += self._registry.swap_tracks(one, two, frame, (first, second))
             if first and second and first != second:
                 self._said |= {one: Part(frame, second), two: Part(frame, first)}
                 self.overlay(parts)

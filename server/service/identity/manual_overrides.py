@@ -44,22 +44,24 @@ class ByHand:
         """Read an update as what was said."""
         if not self._is:
             return update
-        self._gone = ((self._gone | set(update.gone)) & self._spoken_of) - set(update.returned)
+        self._gone = ((self._gone | set(update.departed)) & self._spoken_of) - set(update.returned)
         merged = tuple(self._merged(update.merged))
         return replace(
             update,
-            numbers={key: self.now(number) for key, number in update.numbers.items()},
-            born=tuple(number for number in update.born if number not in self._is),
+            person_ids={key: self.now(number) for key, number in update.person_ids.items()},
+            created=tuple(number for number in update.created if number not in self._is),
             returned=self._people(update.returned),
-            gone=tuple(it for it in self._people(update.gone) if self._gone.issuperset(self.worked_out(it))),
+            departed=tuple(
+                it for it in self._people(update.departed) if self._gone.issuperset(self.worked_out(it))
+            ),
             merged=merged,
             split=self.read_splits(update.split),
         )
 
     def read_splits(self, splits: Iterable[Split]) -> tuple[Split, ...]:
         """Read splits as what was said: of two numbers that are said to be one person's there are none."""
-        said = {Split(self.now(it.kept), self.now(it.parted), it.camera) for it in splits}
-        return tuple(sorted(it for it in said if it.kept != it.parted))
+        said = {Split(self.now(it.kept), self.now(it.split_off), it.camera) for it in splits}
+        return tuple(sorted(it for it in said if it.kept != it.split_off))
 
     @property
     def _spoken_of(self) -> set[int]:

@@ -92,7 +92,7 @@ class People:
         pictures = self._pictures(windows, since - self._lag, epoch.last - self._lag)
         self._now = epoch.last
         update = self._by_hand.read(self._registry.update(tracks, epoch.last - self._lag, pictures))
-        for key, parts in parts_of(update.numbers).items():
+        for key, parts in parts_of(update.person_ids).items():
             self._parts[key] = with_settled(self._parts.get(key, ()), parts, self._asked_from)
         self._mending.overlay(self._parts)
         keys = chain.from_iterable(window.keys for window in windows)
@@ -100,7 +100,7 @@ class People:
         for key, (first, last) in zip(keys, seen, strict=True):
             self._heard[key] = epoch.last
             self.roll.note(self._parts.get(key, ()), first, last)
-        self.roll.left(update.gone, update.returned)
+        self.roll.left(update.departed, update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)
         self._corrections += [*update.merged, *update.split]
@@ -126,11 +126,11 @@ class People:
     @property
     def next_number(self) -> int:
         """The first number that nobody was given yet."""
-        return self._registry.next_number
+        return self._registry.next_id
 
     def begin_at(self, number: int) -> None:
         """Give no number below this one any more: an earlier run has given them."""
-        self._registry.begin_at(number)
+        self._registry.reserve_below(number)
 
     def expect(self, tracks: Mapping[Followed, int], pulse: int) -> None:
         """Take over whose tracks are that are not heard of yet, from a run that ended with a pulse."""
@@ -168,7 +168,7 @@ class People:
             for key, parts in self._parts.items()
             if key.camera in cameras and parts[-1].number == number and self._heard.get(key) == self._now
         ]
-        new = self._registry.part(tracks, self._by_hand.worked_out(number))
+        new = self._registry.split_off(tracks, self._by_hand.worked_out(number))
         if new is None:
             return None
         for key in tracks:  # those that the registry has settled it does not speak of again
@@ -191,7 +191,7 @@ class People:
     def whose(self, camera: str, boot: int, track: int, pulse: int) -> int | None:
         """Return the person's number behind a tracker's number in a frame."""
         key = self._reader.locals.known(camera, boot, track)
-        return None if key is None else self.number(key.camera, key.local, pulse)
+        return None if key is None else self.number(key.camera, key.local_id, pulse)
 
     def heard_of(self, track: Followed) -> bool:
         """Return whether a camera has spoken of this track, lately."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import EpisodeKey, TrackKey
+from bestview import TrackKey, TrackletKey
 
 NOBODY_YET = -1
 """Stands for a person's number where a track is not confirmed to be anybody."""
@@ -28,11 +28,11 @@ UNKNOWN = (Part(0, NOBODY_YET),)
 """The parts of a track that nothing was said of."""
 
 
-def parts_of(numbers: Mapping[EpisodeKey, int]) -> dict[TrackKey, list[Part]]:
+def parts_of(numbers: Mapping[TrackletKey, int]) -> dict[TrackKey, list[Part]]:
     """Sort the numbers of episodes by track, the episodes of each in order."""
     parts: dict[TrackKey, list[Part]] = {}
     for key, number in numbers.items():
-        parts.setdefault(key.track, []).append(Part(key.first, number or NOBODY_YET))
+        parts.setdefault(key.track, []).append(Part(key.first_frame, number or NOBODY_YET))
     return parts
 
 

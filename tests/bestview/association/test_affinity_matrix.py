@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import IdentitySettings
-from bestview.association.affinity.affinity_matrix import PairTables, Row
-from bestview.association.co_occurrence import Standing, at_once, near
-from bestview.association.keys import EpisodeKey, TrackKey
-from bestview.association.presence import Presence
-from bestview.association.sightings import Sightings
+from bestview.association.affinity.affinity_matrix import AffinityMatrix, RowKey
+from bestview.association.co_occurrence import GroundTrajectories, score_ground_proximity, simultaneous_pairs
+from bestview.association.keys import TrackKey, TrackletKey
+from bestview.association.presence import PresenceBitmap
+from bestview.association.sightings import TrackObservations
 
 FRAMES = 4
 SETTINGS = IdentitySettings(maximum_ground_evidence=5.0, ground_correlation_frames=2.0, comparable_frames=100)
@@ -25,99 +25,108 @@ class Plain:
     """The same by names: what is known of each pair in a dictionary."""
 
     def __init__(self) -> None:
-        self.rows: list[Row] = []
-        self.apart: set[frozenset[Row]] = set()
-        self.met: dict[frozenset[Row], tuple[float, int]] = {}
-        self.stood: dict[Row, set[int]] = {}
+        self.rows: list[RowKey] = []
+        self.cannot_link: set[frozenset[RowKey]] = set()
+        self.proximity_pairs: dict[frozenset[RowKey], tuple[float, int]] = {}
+        self.stood: dict[RowKey, set[int]] = {}
 
-    def arrange(self, rows: list[Row]) -> None:
+    def set_rows(self, rows: list[RowKey]) -> None:
         self.rows = rows
-        self.apart = {pair for pair in self.apart if pair <= set(rows)}
-        self.met = {pair: known for pair, known in self.met.items() if pair <= set(rows)}
+        self.cannot_link = {pair for pair in self.cannot_link if pair <= set(rows)}
+        self.proximity_pairs = {
+            pair: known for pair, known in self.proximity_pairs.items() if pair <= set(rows)
+        }
         self.stood = {row: self.stood.get(row, set()) for row in rows}
 
-    def elsewhere(self, one: Row, two: Row) -> tuple[float, int]:
+    def elsewhere(self, one: RowKey, two: RowKey) -> tuple[float, int]:
         """What there is to say of two who never met: they were about at once."""
         common = len(self.stood[one] & self.stood[two])
         return max(-2.0 * common / SETTINGS.ground_correlation_frames, -CAP), min(common, 3)
 
-    def near(self, one: Row, two: Row) -> tuple[float, int]:
-        return self.met.get(frozenset((one, two)), self.elsewhere(one, two))
+    def ground_evidence(self, one: RowKey, two: RowKey) -> tuple[float, int]:
+        return self.proximity_pairs.get(frozenset((one, two)), self.elsewhere(one, two))
 
-    def stand(self, row: Row, frame: int) -> None:
+    def add_presence(self, row: RowKey, frame: int) -> None:
         self.stood[row].add(frame)
 
     def let_go(self) -> None:
         """Forget that those met who are elsewhere as much as anybody."""
-        for pair, (evidence, _) in list(self.met.items()):
+        for pair, (evidence, _) in list(self.proximity_pairs.items()):
             if evidence <= -CAP and self.elsewhere(*pair)[0] <= -CAP:
-                del self.met[pair]
+                del self.proximity_pairs[pair]
 
-    def absorb(self, kept: Row, lost: Row) -> None:
+    def merge(self, kept: RowKey, lost: RowKey) -> None:
         for other in self.rows:
             one, two = frozenset((kept, other)), frozenset((lost, other))
             if other in {kept, lost}:
                 continue
-            if two in self.apart:
-                self.apart.add(one)
-            if one in self.met or two in self.met:
-                (a, b), (c, d) = self.near(kept, other), self.near(lost, other)
-                self.met[one] = a + c, max(b, d)
+            if two in self.cannot_link:
+                self.cannot_link.add(one)
+            if one in self.proximity_pairs or two in self.proximity_pairs:
+                (a, b), (c, d) = self.ground_evidence(kept, other), self.ground_evidence(lost, other)
+                self.proximity_pairs[one] = a + c, max(b, d)
         self.stood[kept] |= self.stood[lost]
-        self.arrange([row for row in self.rows if row != lost])
+        self.set_rows([row for row in self.rows if row != lost])
 
 
-def name(row: int) -> Row:
+def name(row: int) -> RowKey:
     """Give an episode for the even rows, somebody's past for the others."""
-    return EpisodeKey("c0", row, 0) if row % 2 == 0 else row
+    return TrackletKey("c0", row, 0) if row % 2 == 0 else row
 
 
 @settings(deadline=None, max_examples=150)
 @given(st.data())
 def test_tables_keep_what_is_known_of_pairs_however_rows_come_and_go(data: st.DataObject) -> None:
-    tables, plain = PairTables(SETTINGS), Plain()
+    affinity, plain = AffinityMatrix(SETTINGS), Plain()
     for time in range(data.draw(st.integers(1, 6))):
-        rows: list[Row] = [
+        rows: list[RowKey] = [
             name(row) for row in data.draw(st.lists(st.integers(0, 9), unique=True, min_size=2))
         ]
-        tables.arrange(rows)
-        plain.arrange(rows)
+        affinity.set_rows(rows)
+        plain.set_rows(rows)
         for i, j in data.draw(st.lists(PAIR, max_size=5, unique_by=frozenset)):
             one, two = i % len(rows), j % len(rows)
             pair = frozenset((rows[one], rows[two]))
             if one == two:
                 continue
             if data.draw(st.booleans()):
-                tables.add_apart(np.array([one, two]), np.array([two, one]))
-                plain.apart.add(pair)
+                affinity.add_cannot_links(np.array([one, two]), np.array([two, one]))
+                plain.cannot_link.add(pair)
                 continue
             score, frames = data.draw(st.integers(-9, 9)), data.draw(st.integers(1, 2))
-            tables.add_near(np.array([one]), np.array([two]), np.array([float(score)]), np.array([frames]))
-            evidence, common = plain.near(rows[one], rows[two])
+            affinity.add_ground_evidence(
+                np.array([one]), np.array([two]), np.array([float(score)]), np.array([frames])
+            )
+            evidence, common = plain.ground_evidence(rows[one], rows[two])
             evidence = min(max(evidence + score / SETTINGS.ground_correlation_frames, -CAP), CAP)
-            plain.met[pair] = evidence, min(common + frames, 3)
+            plain.proximity_pairs[pair] = evidence, min(common + frames, 3)
         for row in data.draw(st.lists(st.integers(0, len(rows) - 1), max_size=4, unique=True)):
             frames_of = data.draw(st.sets(st.integers(0, 9), max_size=8))
             about = np.array(sorted(frames_of), dtype=np.int64) + 10 * time
-            tables.stand(np.full(about.size, row), about)
+            affinity.add_presence(np.full(about.size, row), about)
             for frame in about.tolist():
-                plain.stand(rows[row], frame)
+                plain.add_presence(rows[row], frame)
             plain.let_go()
         if data.draw(st.booleans()):
-            tables.absorb([(rows[0], rows[1])])
-            plain.absorb(rows[0], rows[1])
-            tables.arrange(plain.rows)
+            affinity.merge([(rows[0], rows[1])])
+            plain.merge(rows[0], rows[1])
+            affinity.set_rows(plain.rows)
         size = len(plain.rows)
         one, two = (side.ravel() for side in np.indices((size, size)))
         different = one != two
         one, two = one[different], two[different]
         pairs = [(plain.rows[i], plain.rows[j]) for i, j in zip(one.tolist(), two.tolist(), strict=True)]
-        assert tables.apart(one, two).tolist() == [frozenset(pair) in plain.apart for pair in pairs]
-        known = [plain.near(*pair) for pair in pairs]
+        assert affinity.cannot_link(one, two).tolist() == [
+            frozenset(pair) in plain.cannot_link for pair in pairs
+        ]
+        known = [plain.ground_evidence(*pair) for pair in pairs]
         expected = [evidence if common >= 3 else 0.0 for evidence, common in known]
-        assert tables.near(one, two).tolist() == expected
-        met = {frozenset((plain.rows[i], plain.rows[j])) for i, j in zip(*tables.met(), strict=True)}
-        assert met == set(plain.met)
+        assert affinity.ground_evidence(one, two).tolist() == expected
+        met = {
+            frozenset((plain.rows[i], plain.rows[j]))
+            for i, j in zip(*affinity.proximity_pairs(), strict=True)
+        }
+        assert met == set(plain.proximity_pairs)
 
 
 @settings(deadline=None, max_examples=100)
@@ -125,37 +134,40 @@ def test_tables_keep_what_is_known_of_pairs_however_rows_come_and_go(data: st.Da
 def test_many_rows_absorbed_at_once_are_as_many_one_after_the_other(data: st.DataObject) -> None:
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
     into = {row: int(rng.integers(4)) for row in range(4, 10) if rng.random() < 0.7}
-    at_once, in_turn = PairTables(SETTINGS), PairTables(SETTINGS)
+    simultaneous_pairs, in_turn = AffinityMatrix(SETTINGS), AffinityMatrix(SETTINGS)
     one, two = np.triu_indices(10, 1)
     met, apart, alike = (np.flatnonzero(rng.random(one.size) < 0.4) for _ in range(3))
     # Whole numbers, so that the order of sums does not matter; those who never met were not about.
     score, worth = rng.integers(-4, 5, one.size) * 2.0, rng.integers(1, 3, one.size) * 1.0
-    for tables in (at_once, in_turn):
-        tables.arrange([name(row) for row in ROWS])
-        tables.add_near(one[met], two[met], score[met], np.full(met.size, 3))
-        tables.add_apart(one[apart], two[apart])
-        tables.add_alike(one[alike], two[alike], worth[alike])
-    at_once.absorb([(name(kept), name(lost)) for lost, kept in into.items()])
+    for affinity in (simultaneous_pairs, in_turn):
+        affinity.set_rows([name(row) for row in ROWS])
+        affinity.add_ground_evidence(one[met], two[met], score[met], np.full(met.size, 3))
+        affinity.add_cannot_links(one[apart], two[apart])
+        affinity.add_appearance_evidence(one[alike], two[alike], worth[alike])
+    simultaneous_pairs.merge([(name(kept), name(lost)) for lost, kept in into.items()])
     for lost, kept in into.items():
-        in_turn.absorb([(name(kept), name(lost))])
+        in_turn.merge([(name(kept), name(lost))])
     left = [name(row) for row in ROWS if row not in into]
     one, two = np.triu_indices(len(left), 1)
-    for tables in (at_once, in_turn):
-        tables.arrange(left)
-    for table in ("near", "apart", "alike"):
-        assert getattr(at_once, table)(one, two).tolist() == getattr(in_turn, table)(one, two).tolist()
+    for affinity in (simultaneous_pairs, in_turn):
+        affinity.set_rows(left)
+    for table in ("score_ground_proximity", "apart", "alike"):
+        assert (
+            getattr(simultaneous_pairs, table)(one, two).tolist()
+            == getattr(in_turn, table)(one, two).tolist()
+        )
 
 
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 60)), max_size=12), st.sampled_from([10, 100]))
 def test_presence_counts_the_frames_in_common_of_late(steps: list[tuple[int, int]], frames: int) -> None:
-    presence, stood, now = Presence(frames), [set[int]() for _ in range(4)], 0
-    presence.arrange(np.full(4, -1))
+    presence, stood, now = PresenceBitmap(frames), [set[int]() for _ in range(4)], 0
+    presence.set_rows(np.full(4, -1))
     for row, later in steps:
         now += later
         stood[row] |= {now, now + 1}
         stood[0] |= {now}
-        presence.stand(np.array([row, row, 0]), np.array([now, now + 1, now]))
+        presence.add_presence(np.array([row, row, 0]), np.array([now, now + 1, now]))
     one, two = np.triu_indices(4, 1)
     common = presence.common(one, two, 1000)
     for i, j, count in zip(one.tolist(), two.tolist(), common.tolist(), strict=True):
@@ -166,7 +178,7 @@ def test_presence_counts_the_frames_in_common_of_late(steps: list[tuple[int, int
 
 
 @st.composite
-def updates(draw: st.DrawFn) -> tuple[Sightings, np.ndarray, np.ndarray]:
+def updates(draw: st.DrawFn) -> tuple[TrackObservations, np.ndarray, np.ndarray]:
     """Draw tracks of three cameras that stand about, some of which are cut within the update."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     tracks = draw(st.integers(0, 6))
@@ -181,13 +193,13 @@ def updates(draw: st.DrawFn) -> tuple[Sightings, np.ndarray, np.ndarray]:
     spread[np.isnan(ground[..., 0])] = np.nan
     keys = tuple(TrackKey(f"c{camera[i]}", i) for i in range(tracks))
     boxes, heights = np.zeros((tracks, FRAMES, 4)), np.ones((tracks, FRAMES))
-    return Sightings(keys, 0, boxes, ground, spread, heights), rows, camera
+    return TrackObservations(keys, 0, boxes, ground, spread, heights), rows, camera
 
 
 @settings(deadline=None, max_examples=100)
 @given(updates(), st.floats(0.1, 3.0))
 def test_nearness_is_the_sum_over_frames_in_which_both_stand_somewhere(
-    update: tuple[Sightings, np.ndarray, np.ndarray], gate: float
+    update: tuple[TrackObservations, np.ndarray, np.ndarray], gate: float
 ) -> None:
     seen, rows, camera = update
     count = int(rows.max(initial=-1)) + 1
@@ -196,10 +208,14 @@ def test_nearness_is_the_sum_over_frames_in_which_both_stand_somewhere(
     for one in range(len(rows)):
         for two in range(one):
             for frame in range(FRAMES):
-                apart = seen.ground[one, frame] - seen.ground[two, frame]
+                apart = seen.ground_point[one, frame] - seen.ground_point[two, frame]
                 if camera[one] == camera[two] or np.isnan(apart).any():
                     continue
-                metric = seen.spread[one, frame] + seen.spread[two, frame] + gate**2 * np.eye(2)
+                metric = (
+                    seen.ground_covariance[one, frame]
+                    + seen.ground_covariance[two, frame]
+                    + gate**2 * np.eye(2)
+                )
                 score = max(1.0 - float(apart @ np.linalg.solve(metric, apart)), -2.0)
                 pair = frozenset((int(rows[one, frame]), int(rows[two, frame])))
                 expected.setdefault(pair, []).append(score)
@@ -207,17 +223,21 @@ def test_nearness_is_the_sum_over_frames_in_which_both_stand_somewhere(
     met_rows = {frozenset(pair) for pair in met_before}
     expected = {it: of for it, of in expected.items() if max(of) > -2.0 or it in met_rows}
     before = np.array(met_before, dtype=np.int64).reshape(-1, 2)
-    met = near(Standing.of(seen, rows, camera), gate, count, (before[:, 0], before[:, 1]), count)
-    pairs = [frozenset(pair) for pair in zip(met.one.tolist(), met.two.tolist(), strict=True)]
+    met = score_ground_proximity(
+        GroundTrajectories.of(seen, rows, camera), gate, count, (before[:, 0], before[:, 1]), count
+    )
+    pairs = [frozenset(pair) for pair in zip(met.first.tolist(), met.second.tolist(), strict=True)]
     assert len(set(pairs)) == len(pairs)
-    assert dict(zip(pairs, met.frames.tolist(), strict=True)) == {it: len(of) for it, of in expected.items()}
+    assert dict(zip(pairs, met.frame_count.tolist(), strict=True)) == {
+        it: len(of) for it, of in expected.items()
+    }
     np.testing.assert_allclose(met.score, [sum(expected[pair]) for pair in pairs], atol=1e-9)
 
 
 @settings(deadline=None, max_examples=100)
 @given(updates())
 def test_who_is_seen_at_once_in_one_camera_is_every_pair_of_a_frame(
-    update: tuple[Sightings, np.ndarray, np.ndarray],
+    update: tuple[TrackObservations, np.ndarray, np.ndarray],
 ) -> None:
     _, rows, camera = update
     expected = {
@@ -227,6 +247,7 @@ def test_who_is_seen_at_once_in_one_camera_is_every_pair_of_a_frame(
         for frame in range(FRAMES)
         if camera[one] == camera[two] and min(rows[one, frame], rows[two, frame]) >= 0
     }
-    assert {frozenset(it) for it in zip(*(side.tolist() for side in at_once(rows, camera)), strict=True)} == (
-        expected
-    )
+    assert {
+        frozenset(it)
+        for it in zip(*(side.tolist() for side in simultaneous_pairs(rows, camera)), strict=True)
+    } == (expected)

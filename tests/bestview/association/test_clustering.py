@@ -11,16 +11,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview.association.appearance.likelihood import (
-    CameraLooks,
-    LookScale,
-    LookWeights,
-    look_distances,
-    look_evidence,
+    AppearanceWeights,
+    CameraAppearances,
+    DistanceScale,
+    appearance_evidence,
+    bhattacharyya_distances,
 )
 from bestview.association.clustering import cluster
-from bestview.association.registry.id_assignment import named
+from bestview.association.registry.id_assignment import assign_ids
 
-WEIGHTS = LookWeights(look=3.0, cap=4.0, frames=8)
+WEIGHTS = AppearanceWeights(typical=3.0, maximum=4.0, full_weight_frames=8)
 JOIN = 0.5
 NEAR = 1e-9
 
@@ -30,18 +30,20 @@ class Case:
     """What `cluster` is given."""
 
     evidence: NDArray[np.float64]
-    apart: NDArray[np.bool_]
-    past: NDArray[np.bool_]
+    cannot_link: NDArray[np.bool_]
+    people: NDArray[np.bool_]
     linked: NDArray[np.bool_]
-    looks: list[CameraLooks]
+    appearance: list[CameraAppearances]
 
-    def grouped(self) -> list[int]:
-        found = cluster(self.evidence, self.apart, self.past, self.linked, self.looks, WEIGHTS, JOIN)
+    def cluster(self) -> list[int]:
+        found = cluster(
+            self.evidence, self.cannot_link, self.people, self.linked, self.appearance, WEIGHTS, JOIN
+        )
         return [int(label) for label in found]
 
-    def value(self, one: list[int], two: list[int]) -> float:
+    def values(self, one: list[int], two: list[int]) -> float:
         """Evidence between two groups, from the beginning."""
-        if self.apart[np.ix_(one, two)].any() or self.past[[*one, *two]].all():
+        if self.cannot_link[np.ix_(one, two)].any() or self.people[[*one, *two]].all():
             return -np.inf
         if not self.linked[np.ix_(one, two)].any():
             return -np.inf
@@ -49,17 +51,17 @@ class Case:
 
     def look_at(self, one: list[int], two: list[int]) -> float:
         """What looks say of two groups."""
-        return sum(self._look(it, one, two) for it in self.looks)
+        return sum(self._look(it, one, two) for it in self.appearance)
 
     @staticmethod
-    def _look(camera: CameraLooks, one: list[int], two: list[int]) -> float:
+    def _look(camera: CameraAppearances, one: list[int], two: list[int]) -> float:
         a, b = (np.isin(camera.rows, group) for group in (one, two))
         if not (a.any() and b.any()):
             return 0.0
-        total = [camera.total[mine].sum(axis=0)[None] for mine in (a, b)]
-        count = np.array([camera.count[mine].sum() for mine in (a, b)])
-        distance = look_distances(total[0] / count[0], total[1] / count[1])[0]
-        return float(look_evidence(distance, count[:1], count[1:], camera.scale, WEIGHTS)[0])
+        total = [camera.histogram_sum[mine].sum(axis=0)[None] for mine in (a, b)]
+        count = np.array([camera.frame_count[mine].sum() for mine in (a, b)])
+        distance = bhattacharyya_distances(total[0] / count[0], total[1] / count[1])[0]
+        return float(appearance_evidence(distance, count[:1], count[1:], camera.scale, WEIGHTS)[0])
 
 
 @st.composite
@@ -77,7 +79,7 @@ def cases(draw: st.DrawFn, most: int = 9) -> Case:
         if rows.size:
             frames = rng.integers(1, 12, rows.size).astype(float)
             total = rng.dirichlet(np.ones(4), rows.size) * frames[:, None]
-            looks.append(CameraLooks(rows, total, frames, LookScale(0.1, 0.3)))
+            looks.append(CameraAppearances(rows, total, frames, DistanceScale(0.1, 0.3)))
     linked = np.triu(rng.random((count, count)) < draw(st.sampled_from([0.2, 0.6, 1.0])), 1)
     return Case(evidence, apart | apart.T, rng.random(count) < 0.3, linked | linked.T, looks)
 
@@ -90,7 +92,7 @@ def plainly(case: Case) -> list[int]:
     groups = [[row] for row in range(len(case.evidence))]
     while True:
         pairs = [
-            (-case.value(one, two), one[0], two[0], i, j)
+            (-case.values(one, two), one[0], two[0], i, j)
             for i, one in enumerate(groups)
             for j, two in enumerate(groups)
             if i < j
@@ -108,20 +110,20 @@ def plainly(case: Case) -> list[int]:
 @settings(deadline=None, max_examples=300)
 @given(cases(12))
 def test_groups_are_those_of_joining_the_best_pair_until_none_is_left(case: Case) -> None:
-    assert case.grouped() == plainly(case)
+    assert case.cluster() == plainly(case)
 
 
 @settings(deadline=None, max_examples=100)
 @given(cases())
 def test_nobody_is_joined_who_was_seen_apart_and_nobody_is_left_who_belongs_together(case: Case) -> None:
-    labels = np.array(case.grouped())
+    labels = np.array(case.cluster())
     same = labels[:, None] == labels
-    assert not (same & case.apart).any()
+    assert not (same & case.cannot_link).any()
     groups = [np.flatnonzero(labels == label).tolist() for label in sorted(set(labels.tolist()))]
-    assert all(case.past[group].all() <= (len(group) == 1) for group in groups)
+    assert all(case.people[group].all() <= (len(group) == 1) for group in groups)
     for i, one in enumerate(groups):
         for two in groups[i + 1 :]:
-            assert case.value(one, two) < JOIN + 1e-9
+            assert case.values(one, two) < JOIN + 1e-9
 
 
 def partitions(rows: list[int]) -> Iterator[list[list[int]]]:
@@ -152,13 +154,13 @@ def test_where_evidence_is_right_on_the_whole_groups_are_the_best_of_all_partiti
         partitions(list(range(count))),
         key=lambda groups: sum(float(np.triu(evidence[np.ix_(g, g)], 1).sum()) for g in groups),
     )
-    assert case.grouped() == [min(group) for row in range(count) for group in best if row in group]
+    assert case.cluster() == [min(group) for row in range(count) for group in best if row in group]
 
 
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.dictionaries(st.integers(1, 4), st.integers(1, 9), max_size=3), max_size=4))
 def test_names_keep_as_many_frames_as_can_be_what_they_were_told(told: list[dict[int, int]]) -> None:
-    numbers = named(told)
+    numbers = assign_ids(told)
     given_ = [number for number in numbers if number]
     assert len(given_) == len(set(given_))
     kept = sum(frames.get(number, 0) for frames, number in zip(told, numbers, strict=True))

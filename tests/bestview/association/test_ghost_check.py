@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import IdentityRegistry, IdentitySettings
-from bestview.association.ghost_check import in_full_view
+from bestview.association.ghost_check import fully_in_view
 from fakes.bestview.identity_scenes import CALIBRATED, STRIDE, VIEWS, Stay, both, play
 
 WIDE, HIGH, TALL = 640, 440, 1.75
@@ -23,7 +23,7 @@ def born(stays: list[Stay], speaking: dict[str, tuple[int, int]], *blind: str) -
     """By which frames somebody gets a number; cameras that are `blind` have no homography."""
     ground = {**CALIBRATED, **dict.fromkeys(blind)}
     seen = play(IdentityRegistry(SETTINGS, ground), stays, 300, speaking=speaking)
-    return [(place + 1) * STRIDE for place, update in enumerate(seen) for _ in update.born]
+    return [(place + 1) * STRIDE for place, update in enumerate(seen) for _ in update.created]
 
 
 def test_who_no_other_camera_sees_though_it_should_needs_more_frames_for_each() -> None:
@@ -49,15 +49,15 @@ def test_who_has_gone_before_they_were_anybody_gets_no_number() -> None:
     # The others fall silent: there is no reason to doubt any more, and nobody there.
     seen = IdentityRegistry(SETTINGS, CALIBRATED)
     early = play(seen, [Stay("south", 1, 0, 80, (0, 0))], 120, speaking=SPEAKING)
-    late = play(seen, [], 300, begin=120)
-    assert not [update for update in early + late if update.born]
+    late = play(seen, [], 300, start=120)
+    assert not [update for update in early + late if update.created]
 
 
 @given(st.floats(-12, 12), st.floats(-12, 12))
 def test_in_full_view_is_whole_in_the_picture_and_large_enough(x: float, y: float) -> None:
     names = list(VIEWS)
     ground = np.array([CALIBRATED[name] for name in names], dtype=np.float64)
-    told = in_full_view(ground, np.full((3, 2), (WIDE, HIGH), dtype=np.float64), np.array([x, y]), TALL)
+    told = fully_in_view(ground, np.full((3, 2), (WIDE, HIGH), dtype=np.float64), np.array([x, y]), TALL)
     for name, seen in zip(names, told, strict=True):
         far = float((VIEWS[name] @ (x, y, 1.0))[2])
         assume(abs(far) > 0.01)
@@ -81,7 +81,7 @@ def margins(person: NDArray[np.float64]) -> list[float]:
 
 def test_a_plan_view_without_horizon_is_asked_too() -> None:
     plan = np.diag([0.02, 0.02, 1.0])
-    told = in_full_view(plan[None], np.array([[640.0, 480.0]]), np.array([6.0, 6.0]), 1.75)
+    told = fully_in_view(plan[None], np.array([[640.0, 480.0]]), np.array([6.0, 6.0]), 1.75)
     assert told.tolist() == [True]
 
 
@@ -89,4 +89,4 @@ def test_a_plan_view_without_horizon_is_asked_too() -> None:
 def test_without_doubt_everybody_is_counted_alike(doubt: float) -> None:
     registry = IdentityRegistry(replace(SETTINGS, ghost_penalty=doubt), CALIBRATED)
     seen = play(registry, [Stay("south", 1, 0, 999, (0, 0))], 60, speaking=SPEAKING)
-    assert sum(len(update.born) for update in seen) == 1
+    assert sum(len(update.created) for update in seen) == 1

@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import (
-    Glimpse,
+    AppearanceSample,
     IdentityRegistry,
     IdentitySettings,
     IdentityUpdate,
-    LocalTrack,
     Merge,
     Split,
     TrackKey,
+    TrackUpdate,
 )
 from fakes.bestview.identity_scenes import (
     BLIND,
@@ -53,7 +53,7 @@ def test_a_person_has_one_number_in_every_camera(most: int) -> None:
 def test_numbers_are_shown_only_when_confirmed_and_born_once() -> None:
     seen = play(registry(confirmation_frames=25, clustering_interval=5), both(1, (0, 0)), 60)
     # Two cameras see 10 frames together in every update.
-    assert [update.born for update in seen] == [(), (), (1,)] + [()] * 9
+    assert [update.created for update in seen] == [(), (), (1,)] + [()] * 9
     assert [len(numbers(update)) for update in seen[:4]] == [0, 0, 2, 2]
 
 
@@ -75,7 +75,7 @@ def test_a_restarted_camera_finds_everybody_again(most: int) -> None:
     seen = play(registry(maximum_open_tracklets=most), stays, 200)
     again = known(seen[: (150 // STRIDE) + 5])  # five updates after it came back
     assert [again["west", 101 + i] for i in range(3)] == [again["south", 1 + i] for i in range(3)]
-    assert max(max(update.numbers.values(), default=0) for update in seen) == 3
+    assert max(max(update.person_ids.values(), default=0) for update in seen) == 3
 
 
 def test_who_is_lost_and_found_at_the_same_place_keeps_the_number() -> None:
@@ -83,7 +83,7 @@ def test_who_is_lost_and_found_at_the_same_place_keeps_the_number() -> None:
     for homographies in (CALIBRATED, BLIND):
         seen = play(registry(homographies), stays, 200)
         assert numbers(seen[-1])["south", 2] == 1
-        assert all(update.born in {(), (1,)} for update in seen)
+        assert all(update.created in {(), (1,)} for update in seen)
 
 
 def test_who_turns_up_elsewhere_at_once_is_somebody_else() -> None:
@@ -98,7 +98,7 @@ def test_who_returns_in_the_same_coat_gets_the_number_back(settings: dict[str, i
     stays = [Stay("south", coat, 0, 150, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
     stays += [Stay("south", 10, 450, 999, (4, 2), coat=3), Stay("south", 11, 450, 999, (-4, 2), coat=7)]
     seen = play(registry(**settings), stays, 600)
-    assert [update.gone for update in seen if update.gone] == [(1, 2, 3)]
+    assert [update.departed for update in seen if update.departed] == [(1, 2, 3)]
     assert [update.returned for update in seen if update.returned] == [(2,)]
     assert numbers(seen[-1]) == {("south", 10): 2, ("south", 11): 4}
 
@@ -157,7 +157,7 @@ def test_a_track_that_takes_one_for_the_other_in_a_crowd_is_two_episodes(most: i
         Stay("west", 2, 0, 999, (3, 0.8), (-0.03, 0), dressed * 3),
     ]
     stays += [meeting("south", 1, -3, 0.03, end=100), meeting("south", 2, 3, -0.03, end=100)]
-    stays += [meeting("south", 2, -3, 0.03, begin=101), meeting("south", 1, 3, -0.03, begin=101)]
+    stays += [meeting("south", 2, -3, 0.03, start=101), meeting("south", 1, 3, -0.03, start=101)]
     seen = play(registry(maximum_open_tracklets=most), stays, 200)
     before, after = known(seen[: 80 // STRIDE]), known(seen)
     assert len({before["south", 1], before["south", 2]}) == 2
@@ -236,10 +236,10 @@ def test_who_is_settled_while_they_go_on_is_seen_and_not_gone(most: int) -> None
         both(1, (0, 0), end=400),
         600,
     )
-    assert [update.gone for update in seen if update.gone] == [(1,)]
-    gone = next(i for i, update in enumerate(seen) if update.gone)
+    assert [update.departed for update in seen if update.departed] == [(1,)]
+    gone = next(i for i, update in enumerate(seen) if update.departed)
     assert 400 + 60 < STRIDE * gone + STRIDE - 1 <= 400 + 60 + 2 * STRIDE
-    assert [update.born for update in seen if update.born] == [(1,)]
+    assert [update.created for update in seen if update.created] == [(1,)]
 
 
 def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
@@ -253,8 +253,8 @@ def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
     stays = [Stay("south", i, 30 * i, 30 * i + 25, (4.0 * (-1) ** i, i % 5 - 2)) for i in range(100)]
     sizes = []
     for _ in updates(who, stays, 3000):
-        open_ = who._episodes
-        sizes.append((len(who._people), len(open_.open), len(open_._current), len(who._tables)))
+        open_ = who._splitter
+        sizes.append((len(who._people), len(open_.active), len(open_._current), len(who._affinity)))
     assert max(max(size) for size in sizes) <= 20
     assert sizes[-1][0] <= 10
 
@@ -290,9 +290,9 @@ def test_any_setting_may_be_at_its_least_and_cameras_may_come_and_go(nothing: Ma
                 left = 100.0 * local + 0.1 * last * (local - 1.5)
                 boxes = np.array([left, 100.0, left + 40.0, 220.0]) + random.normal(0, 4, (STRIDE, 4))
                 look = random.random(random.choice([0, 8, 8, 16])) if local else np.zeros(8)
-                glimpse = Glimpse(last - STRIDE + 1, last, look)
+                glimpse = AppearanceSample(last - STRIDE + 1, last, look)
                 run = 1 + local + 4 * (last // 400)
-                tracks.append(LocalTrack(camera, run, last - STRIDE + 1, boxes, (glimpse,)))
+                tracks.append(TrackUpdate(camera, run, last - STRIDE + 1, boxes, (glimpse,)))
         updates.append(who.update(tracks, last))
         assert all(number >= 1 for number in numbers(updates[-1]).values())
     assert known(updates)
@@ -301,15 +301,15 @@ def test_any_setting_may_be_at_its_least_and_cameras_may_come_and_go(nothing: Ma
 def test_what_makes_no_sense_is_refused_in_one_line() -> None:
     track = Stay("south", 1, 0, 99, (0, 0)).track(0, 14)
 
-    def refused(match: str, *tracks: LocalTrack, last: int = 14) -> None:
+    def refused(match: str, *tracks: TrackUpdate, last: int = 14) -> None:
         with pytest.raises(ValueError, match=match) as refusal:
             registry().update(tracks, last)
         assert "\n" not in str(refusal.value)
 
     refused("camera is not known", replace(track, camera="cellar"))
     refused("shape", replace(track, boxes=np.zeros((15, 3))))
-    refused("histogram", replace(track, looks=(Glimpse(0, 3, np.zeros((2, 2))),)))
-    refused("of frames 3 to 20", replace(track, looks=(Glimpse(3, 20, np.zeros(2)),)))
+    refused("histogram", replace(track, appearance=(AppearanceSample(0, 3, np.zeros((2, 2))),)))
+    refused("of frames 3 to 20", replace(track, appearance=(AppearanceSample(3, 20, np.zeros(2)),)))
     refused("given twice", track, track)
     with pytest.raises(ValueError, match="of camera south is not invertible"):
         IdentityRegistry(IdentitySettings(), {"south": np.ones((3, 3))})

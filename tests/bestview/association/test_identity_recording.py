@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bestview import IdentityRegistry, IdentitySettings, LocalTrack
+from bestview import IdentityRegistry, IdentitySettings, TrackUpdate
 
 FRAMES, WINDOW, STRIDE = 1200, 15, 5
 NOISE = 0.06  # of the box height, on every edge, correlated in time
@@ -60,11 +60,11 @@ def agreement(
             for local, (person, boxes) in enumerate(mine):
                 rows = boxes[first : last + 1]
                 if not np.isnan(rows).all():
-                    given.append(LocalTrack(camera, local, first, rows))
+                    given.append(TrackUpdate(camera, local, first, rows))
                     who[given[-1].key] = person
         update = registry.update(given, last)
-        numbers = max(numbers, *update.born, 0)
-        number = {key.track: number for key, number in update.numbers.items() if number}
+        numbers = max(numbers, *update.created, 0)
+        number = {key.track: number for key, number in update.person_ids.items() if number}
         for one, two in combinations(who, 2):
             if one.camera != two.camera:
                 same = number.get(one, -1) == number.get(two, -2)

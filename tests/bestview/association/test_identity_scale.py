@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bestview import Glimpse, IdentityRegistry, IdentitySettings, LocalTrack
+from bestview import AppearanceSample, IdentityRegistry, IdentitySettings, TrackUpdate
 
 STRIDE, UPDATES, PEOPLE = 5, 40, 8
 PIXEL = 0.01
@@ -29,7 +29,7 @@ def walks() -> NDArray[np.float64]:
     return np.asarray(SIDE - np.abs(way % (2 * SIDE) - SIDE))
 
 
-def tracks(hall: int, update: int, places: NDArray[np.float64]) -> list[LocalTrack]:
+def tracks(hall: int, update: int, places: NDArray[np.float64]) -> list[TrackUpdate]:
     """What two cameras say of a hall: both see the same, but for noise, and all but some of the time."""
     found = []
     first = STRIDE * update
@@ -43,8 +43,8 @@ def tracks(hall: int, update: int, places: NDArray[np.float64]) -> list[LocalTra
                 continue
             feet = (places[person, first : first + STRIDE] + rng.normal(0, 0.1, (STRIDE, 2))) / PIXEL
             boxes = np.column_stack([feet - np.array([20, 170]), feet + np.array([20, 0])])
-            look = Glimpse(first, first + STRIDE - 1, coats[person] * rng.uniform(0.8, 1.2, 16))
-            found.append(LocalTrack(f"c{camera:03d}", 100 * turn + person, first, boxes, (look,)))
+            look = AppearanceSample(first, first + STRIDE - 1, coats[person] * rng.uniform(0.8, 1.2, 16))
+            found.append(TrackUpdate(f"c{camera:03d}", 100 * turn + person, first, boxes, (look,)))
     return found
 
 
@@ -55,14 +55,14 @@ def carried(halls: range) -> tuple[list[dict[tuple[int, str, int, int], int]], i
     places, told = walks(), []
     for update in range(UPDATES):
         seen = [track for hall in halls for track in tracks(hall, update, places)]
-        numbers = who.update(seen, STRIDE * (update + 1) - 1).numbers
+        numbers = who.update(seen, STRIDE * (update + 1) - 1).person_ids
         told.append(
             {
-                (int(it.camera[1:]) // 2, it.camera, it.local, it.first): number
+                (int(it.camera[1:]) // 2, it.camera, it.local_id, it.first_frame): number
                 for it, number in numbers.items()
             }
         )
-    return told, who.pairs
+    return told, who.pair_count
 
 
 @pytest.fixture(scope="module")

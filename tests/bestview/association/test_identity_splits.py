@@ -23,34 +23,34 @@ def told(updates: Sequence[IdentityUpdate]) -> list[Split]:
 def test_whom_a_camera_shows_is_somebody_new_and_stays_it(most: int) -> None:
     who, stays = registry(maximum_open_tracklets=most), both(1, (0, 0))
     assert known(play(who, stays, 100)) == {("south", 1): 1, ("west", 1): 1}
-    assert who.part([WEST], [1]) == 2
-    after = play(who, stays, 400, begin=100)
+    assert who.split_off([WEST], [1]) == 2
+    after = play(who, stays, 400, start=100)
     for update in after:
-        for key, number in update.numbers.items():
+        for key, number in update.person_ids.items():
             assert number == (2 if key.camera == "west" else 1)
     assert told(after) == []
     assert all(it.merged == () for it in after)
-    assert who.part([WEST], [1]) is None
-    assert who.part([WEST], [2]) == 3  # also where it was settled, of which updates say nothing
+    assert who.split_off([WEST], [1]) is None
+    assert who.split_off([WEST], [2]) == 3  # also where it was settled, of which updates say nothing
 
 
 @HOWEVER_MANY
 def test_all_that_is_shown_may_be_somebody_new_together(most: int) -> None:
     who, stays = registry(maximum_open_tracklets=most), both(1, (0, 0))
     play(who, stays, 100)
-    assert who.part([WEST, TrackKey("south", 1)], [1]) == 2
-    after = play(who, stays, 300, begin=100)
-    assert {number for update in after for number in update.numbers.values()} <= {2}
+    assert who.split_off([WEST, TrackKey("south", 1)], [1]) == 2
+    after = play(who, stays, 300, start=100)
+    assert {number for update in after for number in update.person_ids.values()} <= {2}
     assert told(after) == []
 
 
 def test_nobody_is_parted_from_whom_they_are_not() -> None:
     who, stays = registry(), both(1, (0, 0))
-    assert who.part([WEST], [1]) is None
+    assert who.split_off([WEST], [1]) is None
     play(who, stays, 100)
-    assert who.part([WEST], [7]) is None
-    assert who.part([TrackKey("west", 9)], [1]) is None
-    assert set(known(play(who, stays, 200, begin=100)).values()) == {1}
+    assert who.split_off([WEST], [7]) is None
+    assert who.split_off([TrackKey("west", 9)], [1]) is None
+    assert set(known(play(who, stays, 200, start=100)).values()) == {1}
 
 
 @settings(deadline=None, max_examples=8)
@@ -69,13 +69,13 @@ def test_whatever_is_said_two_tracks_seen_at_once_in_one_camera_share_no_number(
     ]
     given_so: set[int] = set()
     for step in range(12):
-        for update in play(who, stays, 10 * step + 10, begin=10 * step):
+        for update in play(who, stays, 10 * step + 10, start=10 * step):
             for camera in ("south", "west"):
                 shown = [number for (of, _), number in numbers(update).items() if of == camera]
                 assert len(shown) == len(set(shown))
         for at, tracks, number in said:
             if at == step:
-                new = who.part(tracks, [number])
+                new = who.split_off(tracks, [number])
                 assert new is None or new not in given_so
                 given_so.add(new or 0)
 
@@ -83,7 +83,7 @@ def test_whatever_is_said_two_tracks_seen_at_once_in_one_camera_share_no_number(
 def test_a_number_that_was_given_so_is_given_to_nobody_else() -> None:
     who, stays = registry(), both(1, (0, 0))
     play(who, stays, 100)
-    new = who.part([WEST], [1])
-    after = known(play(who, [*stays, *both(5, (4, 1), begin=100)], 300, begin=100))
+    new = who.split_off([WEST], [1])
+    after = known(play(who, [*stays, *both(5, (4, 1), start=100)], 300, start=100))
     assert after["south", 5] == after["west", 5]
     assert after["south", 5] not in {1, new}

@@ -43,15 +43,15 @@ def test_numbers_follow_the_people(most: int, apart: float, told: int) -> None:
     who, stays = registry(BLIND, maximum_open_tracklets=most), meeting(apart)
     before = known(play(who, stays, told))
     assert before == {ONE: 1, TWO: 2}
-    more = known(play(who, stays, told + 5, begin=told))
+    more = known(play(who, stays, told + 5, start=told))
     assert {**before, **more} == before, "nothing tells them apart but somebody's word"
-    splits = who.exchange(ONE, TWO, TAKEN, (1, 2))
+    splits = who.swap_tracks(ONE, TWO, TAKEN, (1, 2))
     assert splits == (Split(1, 2, "south"), Split(2, 1, "south"))
-    after = play(who, stays, 500, begin=told + 5)
+    after = play(who, stays, 500, start=told + 5)
     for update in after:
         assert numbers(update).get(ONE, 2) == 2
         assert numbers(update).get(TWO, 1) == 1
-        assert (update.born, update.merged, update.split) == ((), (), ())
+        assert (update.created, update.merged, update.split) == ((), (), ())
     assert known(after)[ONE] == 2
 
 
@@ -66,8 +66,8 @@ def test_who_was_taken_for_them_in_another_camera_since_follows() -> None:
     ]
     seen = known(play(who, stays, 180))
     assert len(set(seen.values())) == 2
-    who.exchange(ONE, TWO, TAKEN, (1, 2))
-    after = known(play(who, stays, 400, begin=180))
+    who.swap_tracks(ONE, TWO, TAKEN, (1, 2))
+    after = known(play(who, stays, 400, start=180))
     assert after["south", 1] == after["west", 8] == seen["west", 6]
     assert after["south", 2] == after["west", 7] == seen["west", 5]
 
@@ -79,20 +79,20 @@ def test_what_the_evidence_has_told_already_is_no_split() -> None:
         Stay("west", 6, 0, 999, (3.0, 0.8), (-0.03, 0.0), 3),
     ]
     play(who, stays, 80)
-    seen = known(play(who, stays, 180, begin=80))
+    seen = known(play(who, stays, 180, start=80))
     assert seen[TWO] == seen["west", 5]
     assert seen[ONE] == seen["west", 6]
-    assert who.exchange(ONE, TWO, TAKEN, (1, 2)) == ()
-    assert known(play(who, stays, 300, begin=180)) == seen
+    assert who.swap_tracks(ONE, TWO, TAKEN, (1, 2)) == ()
+    assert known(play(who, stays, 300, start=180)) == seen
 
 
 def test_nobody_is_exchanged_whom_nobody_knows() -> None:
     who, stays = registry(BLIND), meeting(0.8)
-    assert who.exchange(ONE, TWO, TAKEN, (1, 2)) == ()
+    assert who.swap_tracks(ONE, TWO, TAKEN, (1, 2)) == ()
     play(who, stays, 115)
-    assert who.exchange(ONE, TrackKey("south", 9), TAKEN, (1, 9)) == ()
-    assert who.exchange(ONE, ONE, TAKEN, (1, 1)) == ()
-    assert who.exchange(ONE, TWO, 0, (0, 0)) == (), "before that frame neither was there"
+    assert who.swap_tracks(ONE, TrackKey("south", 9), TAKEN, (1, 9)) == ()
+    assert who.swap_tracks(ONE, ONE, TAKEN, (1, 1)) == ()
+    assert who.swap_tracks(ONE, TWO, 0, (0, 0)) == (), "before that frame neither was there"
 
 
 TRACKS = [TrackKey(camera, local) for camera in ("south", "west") for local in (1, 2, 3)]
@@ -115,13 +115,13 @@ def test_whatever_is_said_two_tracks_seen_at_once_in_one_camera_share_no_number(
         for camera in ("south", "west")
     ]
     for step in range(16):
-        for update in play(who, stays, 10 * step + 10, begin=10 * step):
+        for update in play(who, stays, 10 * step + 10, start=10 * step):
             for camera in ("south", "west"):
                 shown = [number for (of, _), number in numbers(update).items() if of == camera]
                 assert len(shown) == len(set(shown))
         for at, one, two, frame in said:
             if at == step and one.camera == two.camera:
-                who.exchange(one, two, frame, (1, 2))
+                who.swap_tracks(one, two, frame, (1, 2))
 
 
 def test_of_tracks_that_are_never_seen_again_nothing_is_kept() -> None:
@@ -129,7 +129,7 @@ def test_of_tracks_that_are_never_seen_again_nothing_is_kept() -> None:
     stays = [replace(it, end=min(it.end, 199)) for it in meeting(3.0)]
     stays.append(Stay("south", 9, 0, 999, (0.0, 5.0)))
     play(who, stays, 200)
-    assert who.exchange(ONE, TWO, 190, (1, 2))
-    assert set(who._episodes._cut) == {ONE, TWO}, "their next sightings begin new parts"
-    play(who, stays, 900, begin=200)
-    assert not who._episodes._cut
+    assert who.swap_tracks(ONE, TWO, 190, (1, 2))
+    assert set(who._splitter._cut) == {ONE, TWO}, "their next sightings begin new parts"
+    play(who, stays, 900, start=200)
+    assert not who._splitter._cut

@@ -7,11 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview.association.affinity.affinity_fusion import comparable
-from bestview.association.appearance.equalized_histograms import Appearances
-from bestview.association.appearance.likelihood import LookScale, LookWeights, look_evidence
-from bestview.association.appearance.mean_histograms import Look, Looks
-from bestview.association.registry.reidentification import clearly_least, find_again, unlike
+from bestview.association.affinity.affinity_fusion import comparable_histograms
+from bestview.association.appearance.equalized_histograms import HistogramEqualizer
+from bestview.association.appearance.likelihood import AppearanceWeights, DistanceScale, appearance_evidence
+from bestview.association.appearance.mean_histograms import MeanHistogram, PersonAppearance
+from bestview.association.registry.reidentification import (
+    appearance_distances,
+    match_by_appearance,
+    unambiguous_minima,
+)
 
 BINS, RATIO = 16, 1.5
 
@@ -19,25 +23,25 @@ COSTS = st.one_of(st.just(np.nan), st.integers(0, 12).map(float))
 
 
 @st.composite
-def people(draw: st.DrawFn) -> list[Looks]:
+def people(draw: st.DrawFn) -> list[PersonAppearance]:
     """Draw how some people look, each in some of two cameras, with histograms of one of two sizes."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     found = []
     for _ in range(draw(st.integers(0, 5))):
-        looks = Looks()
+        looks = PersonAppearance()
         for camera in draw(st.sets(st.sampled_from(["c0", "c1"]))):
             bins = draw(st.sampled_from([BINS, BINS, 2 * BINS]))
-            looks.add(camera, Look.of(rng.dirichlet(np.full(bins, 0.3)), 30))
+            looks.add(camera, MeanHistogram.of(rng.dirichlet(np.full(bins, 0.3)), 30))
         found.append(looks)
     return found
 
 
 def test_once_looks_have_other_bins_those_of_before_are_compared_with_nobodys() -> None:
-    old, new = (Look.of(np.ones(bins), 30) for bins in (BINS, 2 * BINS))
-    assert comparable([(0, new), (1, new), (2, old), (3, old)], 2) == [(0, new), (1, new)]
-    assert comparable([(0, old), (1, new), (2, new)], 2) == [(1, new), (2, new)]
-    assert comparable([(2, old), (3, old)], 2) == [(2, old), (3, old)]
-    assert comparable([], 2) == []
+    old, new = (MeanHistogram.of(np.ones(bins), 30) for bins in (BINS, 2 * BINS))
+    assert comparable_histograms([(0, new), (1, new), (2, old), (3, old)], 2) == [(0, new), (1, new)]
+    assert comparable_histograms([(0, old), (1, new), (2, new)], 2) == [(1, new), (2, new)]
+    assert comparable_histograms([(2, old), (3, old)], 2) == [(2, old), (3, old)]
+    assert comparable_histograms([], 2) == []
 
 
 @settings(deadline=None, max_examples=200)
@@ -45,7 +49,7 @@ def test_once_looks_have_other_bins_those_of_before_are_compared_with_nobodys() 
 def test_clearly_least_is_least_of_its_row_and_column_by_far(data: st.DataObject) -> None:
     high, wide = data.draw(st.integers(1, 4)), data.draw(st.integers(1, 4))
     cost = np.array([[data.draw(COSTS) for _ in range(wide)] for _ in range(high)])
-    clear = clearly_least(cost, RATIO)
+    clear = unambiguous_minima(cost, RATIO)
     for i in range(high):
         for j in range(wide):
             rivals = [*np.delete(cost[i], j), *np.delete(cost[:, j], i)]
@@ -56,16 +60,16 @@ def test_clearly_least_is_least_of_its_row_and_column_by_far(data: st.DataObject
 @settings(deadline=None, max_examples=100)
 @given(people(), people(), st.floats(0.0, 0.3), st.data())
 def test_nobody_is_found_twice_nor_against_what_is_possible(
-    found: list[Looks], lost: list[Looks], gate: float, data: st.DataObject
+    found: list[PersonAppearance], lost: list[PersonAppearance], gate: float, data: st.DataObject
 ) -> None:
     shape = (len(found), len(lost))
     flat = data.draw(st.lists(st.booleans(), min_size=shape[0] * shape[1], max_size=shape[0] * shape[1]))
     possible = np.array(flat, dtype=np.bool_).reshape(shape)
-    answer = find_again(Appearances(), found, lost, possible, gate)
+    answer = match_by_appearance(HistogramEqualizer(), found, lost, possible, gate)
     assert len(answer) == len(found)
     again = [who for who in answer if who >= 0]
     assert len(again) == len(dict.fromkeys(again))
-    distance = unlike(Appearances(), found, lost)
+    distance = appearance_distances(HistogramEqualizer(), found, lost)
     for new, old in enumerate(answer):
         if old >= 0:
             assert possible[new, old]
@@ -75,9 +79,9 @@ def test_nobody_is_found_twice_nor_against_what_is_possible(
 @settings(deadline=None, max_examples=100)
 @given(people(), people())
 def test_looks_are_compared_in_common_cameras_alone_where_there_are_such(
-    found: list[Looks], lost: list[Looks]
+    found: list[PersonAppearance], lost: list[PersonAppearance]
 ) -> None:
-    distance = unlike(Appearances(), found, lost)
+    distance = appearance_distances(HistogramEqualizer(), found, lost)
     for i, new in enumerate(found):
         for j, old in enumerate(lost):
             pairs = [
@@ -89,7 +93,7 @@ def test_looks_are_compared_in_common_cameras_alone_where_there_are_such(
             fits = [
                 (new.by_camera[a], old.by_camera[b])
                 for a, b in pairs
-                if new.by_camera[a].total.size == old.by_camera[b].total.size
+                if new.by_camera[a].histogram_sum.size == old.by_camera[b].histogram_sum.size
             ]
             assert np.isnan(distance[i, j]) == (not fits)
             if any(a is not None and np.array_equal(a.mean, b.mean) for a, b in fits) and len(fits) == 1:
@@ -97,11 +101,13 @@ def test_looks_are_compared_in_common_cameras_alone_where_there_are_such(
 
 
 def test_a_look_that_nothing_can_be_compared_with_is_none() -> None:
-    looks = Looks()
+    looks = PersonAppearance()
     for histogram in (np.zeros(0), np.zeros(BINS), np.full(BINS, np.nan), np.full(BINS, -1.0)):
-        looks.add("c0", Look.of(histogram, 5))
+        looks.add("c0", MeanHistogram.of(histogram, 5))
     assert looks.by_camera == {}
-    assert find_again(Appearances(), [looks], [looks], np.ones((1, 1), dtype=np.bool_), 1.0) == [-1]
+    assert match_by_appearance(
+        HistogramEqualizer(), [looks], [looks], np.ones((1, 1), dtype=np.bool_), 1.0
+    ) == [-1]
 
 
 DISTANCES = st.lists(st.floats(0, 1), max_size=8).map(lambda it: np.array(it, dtype=np.float64))
@@ -112,17 +118,20 @@ DISTANCES = st.lists(st.floats(0, 1), max_size=8).map(lambda it: np.array(it, dt
 def test_nearer_looks_never_say_less_and_never_more_than_the_cap(
     own: np.ndarray, others: np.ndarray, one: float, two: float, frames: int, more: int
 ) -> None:
-    weights, scale = LookWeights(look=3.0, cap=4.0, frames=8), LookScale.learned(own, others)
-    assert 0.0 <= scale.own <= scale.others
+    weights, scale = (
+        AppearanceWeights(typical=3.0, maximum=4.0, full_weight_frames=8),
+        DistanceScale.learned(own, others),
+    )
+    assert 0.0 <= scale.same_person <= scale.different_people
 
     def evidence(distance: float, count: int) -> float:
         counts = np.array([float(count)])
-        return float(look_evidence(np.array([distance]), counts, np.array([8.0]), scale, weights)[0])
+        return float(appearance_evidence(np.array([distance]), counts, np.array([8.0]), scale, weights)[0])
 
     near, far = sorted((one, two))
     assert evidence(near, frames) >= evidence(far, frames)
     assert abs(evidence(one, frames + more)) >= abs(evidence(one, frames)), "more frames say more"
-    assert abs(evidence(one, frames)) <= weights.cap * min(frames / weights.frames, 1.0)
-    if scale.others > 1e-6:
-        assert evidence(scale.own, 8) == pytest.approx(weights.look)
-        assert evidence(scale.others, 8) == pytest.approx(-weights.look)
+    assert abs(evidence(one, frames)) <= weights.maximum * min(frames / weights.full_weight_frames, 1.0)
+    if scale.different_people > 1e-6:
+        assert evidence(scale.same_person, 8) == pytest.approx(weights.typical)
+        assert evidence(scale.different_people, 8) == pytest.approx(-weights.typical)

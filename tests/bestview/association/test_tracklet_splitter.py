@@ -8,47 +8,56 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import Glimpse, IdentitySettings, LocalTrack, TrackKey
-from bestview.association.sightings import FootError, line_up
-from bestview.association.tracklet_splitter import Episodes
+from bestview import AppearanceSample, IdentitySettings, TrackKey, TrackUpdate
+from bestview.association.sightings import FootPointError, align_tracks
+from bestview.association.tracklet_splitter import TrackletSplitter
 
-FEET = FootError(0.05, 0.15)
+FEET = FootPointError(0.05, 0.15)
 LEFT, RIGHT, ONTO_LEFT = (0.0, 0.0, 10.0, 20.0), (100.0, 0.0, 110.0, 20.0), (2.0, 0.0, 12.0, 20.0)
 
 
-def track(local: int, first: int, boxes: Sequence[tuple[float, ...] | None], *looks: Glimpse) -> LocalTrack:
+def track(
+    local: int, first: int, boxes: Sequence[tuple[float, ...] | None], *looks: AppearanceSample
+) -> TrackUpdate:
     rows = np.array([box or (np.nan,) * 4 for box in boxes])
-    return LocalTrack("c0", local, first, rows, looks)
+    return TrackUpdate("c0", local, first, rows, looks)
 
 
-def seen_at(frame: int) -> Glimpse:
-    return Glimpse(frame, frame, np.array([1.0, 3.0]))
+def seen_at(frame: int) -> AppearanceSample:
+    return AppearanceSample(frame, frame, np.array([1.0, 3.0]))
 
 
-def taken(*updates: Sequence[LocalTrack]) -> Episodes:
-    episodes = Episodes(IdentitySettings())
+def taken(*updates: Sequence[TrackUpdate]) -> TrackletSplitter:
+    tracklets = TrackletSplitter(IdentitySettings())
     for tracks in updates:
-        rows, _ = episodes.take(line_up(tracks, {"c0": None}, FEET), {it.key: it.looks for it in tracks})
-        assert rows.max(initial=-1) < len(episodes.open)
-    return episodes
+        rows, _ = tracklets.update(
+            align_tracks(tracks, {"c0": None}, FEET), {it.key: it.appearance for it in tracks}
+        )
+        assert rows.max(initial=-1) < len(tracklets.active)
+    return tracklets
 
 
-def looking(local: int, first: int, boxes: Sequence[tuple[float, ...] | None]) -> LocalTrack:
+def looking(local: int, first: int, boxes: Sequence[tuple[float, ...] | None]) -> TrackUpdate:
     """Give a track of which every sighting shows a look."""
     return track(local, first, boxes, *(seen_at(first + i) for i, box in enumerate(boxes) if box))
 
 
-def spans(episodes: Episodes, local: int) -> list[tuple[int, int]]:
-    mine = [it for it in episodes.open if it.key.track == TrackKey("c0", local)]
-    return [(it.key.first, it.end.frame) for it in mine]
+def spans(tracklets: TrackletSplitter, local: int) -> list[tuple[int, int]]:
+    mine = [it for it in tracklets.active if it.key.track == TrackKey("c0", local)]
+    return [(it.key.first_frame, it.end.frame) for it in mine]
 
 
 def test_who_comes_out_of_a_crowd_begins_anew() -> None:
     met = [RIGHT] * 5 + [ONTO_LEFT] * 3 + [RIGHT] * 4
-    episodes = taken([track(1, 0, [LEFT] * 12, seen_at(0)), track(2, 0, met, seen_at(0))])
-    assert spans(episodes, 1) == spans(episodes, 2) == [(0, 7), (8, 11)]
-    assert [it.crowded for it in episodes.open] == [0, 3, 0, 3]
-    assert [it.before for it in episodes.open] == [None, episodes.open[0], None, episodes.open[2]]
+    tracklets = taken([track(1, 0, [LEFT] * 12, seen_at(0)), track(2, 0, met, seen_at(0))])
+    assert spans(tracklets, 1) == spans(tracklets, 2) == [(0, 7), (8, 11)]
+    assert [it.crowd_frames_before for it in tracklets.active] == [0, 3, 0, 3]
+    assert [it.predecessor for it in tracklets.active] == [
+        None,
+        tracklets.active[0],
+        None,
+        tracklets.active[2],
+    ]
 
 
 def test_a_short_touch_and_a_short_moment_unseen_cut_nothing() -> None:
@@ -66,11 +75,11 @@ def test_where_no_look_is_known_the_tracker_is_believed() -> None:
 def test_looks_in_a_crowd_do_not_count() -> None:
     coat = np.array([1.0, 3.0])
     met = [RIGHT] * 4 + [ONTO_LEFT] * 2
-    crowded = Glimpse(3, 4, coat)
-    alone = Glimpse(0, 2, coat)
-    episodes = taken([track(1, 0, [LEFT] * 6), track(2, 0, met, alone, crowded)])
-    [look] = [it.looks.by_camera["c0"] for it in episodes.open if it.key.local == 2]
-    assert look.count == 3
+    crowded = AppearanceSample(3, 4, coat)
+    alone = AppearanceSample(0, 2, coat)
+    tracklets = taken([track(1, 0, [LEFT] * 6), track(2, 0, met, alone, crowded)])
+    [look] = [it.appearance.by_camera["c0"] for it in tracklets.active if it.key.local_id == 2]
+    assert look.frame_count == 3
     np.testing.assert_allclose(look.mean, [0.25, 0.75])
 
 
@@ -79,33 +88,33 @@ def test_of_too_many_those_unseen_for_longest_are_old_sooner_but_not_before_they
         maximum_open_tracklets=2, settle_after=100, publish_after=5, clustering_interval=10
     )
     tracks = [track(n, 0, [(50.0 * n, 0.0, 50.0 * n + 10, 20.0)] * (10 * n)) for n in range(1, 6)]
-    episodes = Episodes(few)
-    episodes.take(line_up(tracks, {"c0": None}, FEET), {})
-    assert [it.end.frame for it in episodes.open] == [9, 19, 29, 39, 49]
-    assert episodes.old(49) == [0, 1], "the third was told just now"
-    assert episodes.old(60) == [0, 1, 2], "two are left"
-    assert episodes.old(119) == [0, 1, 2]
-    assert episodes.old(130) == [0, 1, 2]
-    assert episodes.old(139) == [0, 1, 2, 3]
+    tracklets = TrackletSplitter(few)
+    tracklets.update(align_tracks(tracks, {"c0": None}, FEET), {})
+    assert [it.end.frame for it in tracklets.active] == [9, 19, 29, 39, 49]
+    assert tracklets.settleable_rows(49) == [0, 1], "the third was told just now"
+    assert tracklets.settleable_rows(60) == [0, 1, 2], "two are left"
+    assert tracklets.settleable_rows(119) == [0, 1, 2]
+    assert tracklets.settleable_rows(130) == [0, 1, 2]
+    assert tracklets.settleable_rows(139) == [0, 1, 2, 3]
 
 
 def test_who_was_nobody_when_they_were_settled_begins_anew() -> None:
-    episodes = taken([track(1, 0, [LEFT] * 5)])
-    episodes.settle(list(episodes.open), 200)
+    tracklets = taken([track(1, 0, [LEFT] * 5)])
+    tracklets.settle(list(tracklets.active), 200)
     again = [track(1, 201, [LEFT] * 5)]
-    rows, firm = episodes.take(line_up(again, {"c0": None}, FEET), {})
+    rows, firm = tracklets.update(align_tracks(again, {"c0": None}, FEET), {})
     assert rows.tolist() == [[0] * 5]
     assert not firm.any()
-    assert spans(episodes, 1) == [(201, 205)]
+    assert spans(tracklets, 1) == [(201, 205)]
 
 
 def test_a_track_that_is_settled_while_it_goes_on_is_not_cut() -> None:
-    episodes = taken([track(1, 0, [LEFT] * 5)])
-    episodes.open[0].told[7] = 5
-    episodes.settle(list(episodes.open), 5)
-    rows, firm = episodes.take(line_up([track(1, 5, [LEFT] * 5)], {"c0": None}, FEET), {})
+    tracklets = taken([track(1, 0, [LEFT] * 5)])
+    tracklets.active[0].published_frames[7] = 5
+    tracklets.settle(list(tracklets.active), 5)
+    rows, firm = tracklets.update(align_tracks([track(1, 5, [LEFT] * 5)], {"c0": None}, FEET), {})
     assert (rows.tolist(), firm.tolist()) == ([[-1] * 5], [[7] * 5])
-    assert not episodes.open
+    assert not tracklets.active
 
 
 @settings(deadline=None, max_examples=60)
@@ -126,4 +135,6 @@ def test_episodes_do_not_depend_on_how_frames_come_in_updates(data: st.DataObjec
     parts = taken(*updates)
     for local in (1, 2):
         assert spans(parts, local) == spans(whole, local)
-        assert sum(it.frames for it in whole.open if it.key.local == local) == sum(map(bool, boxes[local]))
+        assert sum(it.frame_count for it in whole.active if it.key.local_id == local) == sum(
+            map(bool, boxes[local])
+        )

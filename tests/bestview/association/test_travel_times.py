@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import IdentitySettings
-from bestview.association.affinity.travel_times import Sight, TravelTimes, time_bins
+from bestview.association.affinity.travel_times import CameraSighting, TravelTimeModel, travel_time_bins
 
 CAMERAS = ("c0", "c1", "c2")
 SETTINGS = IdentitySettings(travel_frames=1000, travel_half_weight_count=5.0, maximum_travel_evidence=4.0)
@@ -21,7 +21,7 @@ WAY = st.tuples(st.sampled_from(CAMERAS), st.sampled_from(CAMERAS), st.integers(
 
 def plain(ways: list[tuple[str, str, int]], lost: str, found: str, frames: int) -> float:
     """The rule, read plainly: from the list of all ways."""
-    edges = time_bins(SETTINGS.travel_frames).tolist()
+    edges = travel_time_bins(SETTINGS.travel_frames).tolist()
 
     def bin_of(time: int) -> int:
         return next((i for i, (low, high) in enumerate(pairwise(edges)) if low <= time < high), -1)
@@ -49,50 +49,58 @@ def plain(ways: list[tuple[str, str, int]], lost: str, found: str, frames: int) 
 def test_evidence_is_that_of_all_ways_read_plainly(
     ways: list[tuple[str, str, int]], asked: tuple[str, str, int]
 ) -> None:
-    travel = TravelTimes(SETTINGS, len(CAMERAS))
+    travel = TravelTimeModel(SETTINGS, len(CAMERAS))
     for lost, found, frames in ways:
-        travel.learn(Sight(lost, 100), Sight(found, 100 + frames))
+        travel.learn(CameraSighting(lost, 100), CameraSighting(found, 100 + frames))
     lost, found, frames = asked
-    said = travel.evidence([Sight(found, 70 + frames)], [Sight(lost, 70)])
+    said = travel.evidence([CameraSighting(found, 70 + frames)], [CameraSighting(lost, 70)])
     assert said.shape == (1, 1)
     assert said[0, 0] == pytest.approx(plain(ways, lost, found, frames))
 
 
 def test_the_usual_time_speaks_for_somebody_and_another_camera_or_time_against() -> None:
-    travel = TravelTimes(SETTINGS, len(CAMERAS))
+    travel = TravelTimeModel(SETTINGS, len(CAMERAS))
     for i in range(20):
-        travel.learn(Sight("c0", 0), Sight("c1", 150 + i))
-    found = [Sight("c1", 160), Sight("c1", 5), Sight("c1", 900), Sight("c2", 160), Sight("c1", 5000)]
-    usual, soon, late, elsewhere, ages = travel.evidence(found, [Sight("c0", 0)])[:, 0].tolist()
+        travel.learn(CameraSighting("c0", 0), CameraSighting("c1", 150 + i))
+    found = [
+        CameraSighting("c1", 160),
+        CameraSighting("c1", 5),
+        CameraSighting("c1", 900),
+        CameraSighting("c2", 160),
+        CameraSighting("c1", 5000),
+    ]
+    usual, soon, late, elsewhere, ages = travel.evidence(found, [CameraSighting("c0", 0)])[:, 0].tolist()
     assert usual > 1.0
     assert max(soon, late, elsewhere) < -1.0
     assert ages == 0.0, "who has been away for longer than a way takes"
-    assert not travel.evidence(found, [Sight("c2", 0)]).any(), "nobody has come from there yet"
+    assert not travel.evidence(found, [CameraSighting("c2", 0)]).any(), "nobody has come from there yet"
 
 
 def test_old_ways_fade_and_memory_is_bounded() -> None:
-    travel = TravelTimes(SETTINGS, len(CAMERAS))
+    travel = TravelTimeModel(SETTINGS, len(CAMERAS))
     for i in range(300):
-        travel.learn(Sight("c0", i), Sight("c1", i + 30))
+        travel.learn(CameraSighting("c0", i), CameraSighting("c1", i + 30))
     for i in range(150):
-        travel.learn(Sight("c0", i), Sight("c1", i + 700))
-    then, now = travel.evidence([Sight("c1", 30), Sight("c1", 700)], [Sight("c0", 0)])[:, 0]
+        travel.learn(CameraSighting("c0", i), CameraSighting("c1", i + 700))
+    then, now = travel.evidence(
+        [CameraSighting("c1", 30), CameraSighting("c1", 700)], [CameraSighting("c0", 0)]
+    )[:, 0]
     assert now > then
-    assert sum(times.sum() for times in travel._exits["c0"].into.values()) <= 64
+    assert sum(times.sum() for times in travel._departures["c0"].arrivals.values()) <= 64
 
 
 @given(st.integers(0, 10_000))
 def test_bins_cover_all_times_without_holes(longest: int) -> None:
-    edges = time_bins(longest)
+    edges = travel_time_bins(longest)
     assert edges[0] == 1.0
     assert edges[-1] == longest + 1 or longest < 1
     assert (np.diff(edges) > 0).all() or longest < 1
 
 
 def test_any_settings_may_be_at_their_least() -> None:
-    travel = TravelTimes(
+    travel = TravelTimeModel(
         replace(SETTINGS, travel_frames=0, travel_half_weight_count=0.0, maximum_travel_evidence=0.0), 0
     )
-    travel.learn(Sight("c0", 0), Sight("c1", 1))
-    assert travel.evidence([Sight("c1", 1)], [Sight("c0", 0)]).tolist() == [[0.0]]
+    travel.learn(CameraSighting("c0", 0), CameraSighting("c1", 1))
+    assert travel.evidence([CameraSighting("c1", 1)], [CameraSighting("c0", 0)]).tolist() == [[0.0]]
     assert travel.evidence([], []).shape == (0, 0)

@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview.association.index_ranges import distinct, pairs_within, written_out
-from bestview.association.runs import runs_of
+from bestview.association.index_ranges import expand_counts, pairs_of_equal_label, sorted_unique
+from bestview.association.runs import observation_runs
 from bestview.geometry.rectangle_overlap import overlapping
 
 
@@ -35,7 +35,7 @@ def test_rectangles_that_overlap_are_all_found_once(count: int, seed: int, size:
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.integers(-1, 3), max_size=9))
 def test_pairs_within_are_those_of_the_same_label(labels: list[int]) -> None:
-    one, two = pairs_within(np.array(labels, dtype=np.int64))
+    one, two = pairs_of_equal_label(np.array(labels, dtype=np.int64))
     expected = {
         (i, j) for j, label in enumerate(labels) for i in range(j) if label >= 0 and labels[i] == label
     }
@@ -47,10 +47,10 @@ def test_pairs_within_are_those_of_the_same_label(labels: list[int]) -> None:
 @settings(deadline=None, max_examples=50)
 @given(st.lists(st.integers(0, 4), max_size=6))
 def test_counts_are_written_out_one_after_the_other(counts: list[int]) -> None:
-    owner, which = written_out(np.array(counts, dtype=np.int64))
+    owner, which = expand_counts(np.array(counts, dtype=np.int64))
     expected = [(i, k) for i, count in enumerate(counts) for k in range(count)]
     assert list(zip(owner.tolist(), which.tolist(), strict=True)) == expected
-    assert distinct(np.array(counts, dtype=np.int64)).tolist() == sorted(set(counts))
+    assert sorted_unique(np.array(counts, dtype=np.int64)).tolist() == sorted(set(counts))
 
 
 @settings(deadline=None, max_examples=100)
@@ -60,11 +60,15 @@ def test_runs_are_all_sightings_in_order_parted_where_something_changes(
 ) -> None:
     rng = np.random.default_rng(seed)
     visible, crowded = rng.random((tracks, frames)) < 0.7, rng.random((tracks, frames)) < 0.4
-    runs = list(runs_of(visible, crowded, whole=whole))
+    runs = list(observation_runs(visible, crowded, whole=whole))
     sightings = [(run.track, column) for run in runs for column in range(run.start, run.stop)]
     assert sightings == [(int(i), int(k)) for i, k in np.argwhere(visible)]
     assert all((crowded[run.track, run.start : run.stop] == run.crowded).all() for run in runs)
     for one, two in pairwise(runs):
-        goes_on = (one.track, one.stop, one.crowded) == (two.track, two.start, two.crowded)
+        goes_on = (one.track, one.stop, one.crowded) == (
+            two.track,
+            two.start,
+            two.crowded,
+        )
         assert not (whole and goes_on)
     assert whole or all(run.stop == run.start + 1 for run in runs)

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from bestview import (
-    Glimpse,
+    AppearanceSample,
     IdentityRegistry,
     IdentitySettings,
     IdentityUpdate,
-    LocalTrack,
+    TrackUpdate,
 )
 
 STRIDE = 5
@@ -46,26 +46,26 @@ class Stay:
     """A person under one local number in one camera, for some frames, along a line on the ground."""
 
     camera: str
-    local: int
-    begin: int
+    local_id: int
+    start: int
     end: int
-    start: tuple[float, float]
+    place: tuple[float, float]
     speed: tuple[float, float] = (0.0, 0.0)
     coat: float = 0
 
     def box(self, frame: int) -> NDArray[np.float64]:
-        x, y = (p + v * frame for p, v in zip(self.start, self.speed, strict=True))
+        x, y = (p + v * frame for p, v in zip(self.place, self.speed, strict=True))
         u, v, w = VIEWS[self.camera] @ (x, y, 1.0)
         tall = FOCAL * 1.75 / w
         return np.array([u / w - 0.2 * tall, v / w - tall, u / w + 0.2 * tall, v / w])
 
-    def track(self, first: int, last: int) -> LocalTrack:
+    def track(self, first: int, last: int) -> TrackUpdate:
         boxes = np.full((last - first + 1, 4), np.nan)
-        seen = range(max(first, self.begin), min(last, self.end) + 1)
+        seen = range(max(first, self.start), min(last, self.end) + 1)
         for frame in seen:
             boxes[frame - first] = self.box(frame)
-        looks = (Glimpse(seen[0], seen[-1], coat(self.coat)),) if seen and self.coat else ()
-        return LocalTrack(self.camera, self.local, first, boxes, looks)
+        looks = (AppearanceSample(seen[0], seen[-1], coat(self.coat)),) if seen and self.coat else ()
+        return TrackUpdate(self.camera, self.local_id, first, boxes, looks)
 
 
 def coat(which: float) -> NDArray[np.float64]:
@@ -78,30 +78,30 @@ def play(
     registry: IdentityRegistry,
     stays: Sequence[Stay],
     frames: int,
-    begin: int = 0,
+    start: int = 0,
     speaking: Mapping[str, tuple[int, int]] | None = None,
 ) -> list[IdentityUpdate]:
-    return list(updates(registry, stays, frames, begin, speaking))
+    return list(updates(registry, stays, frames, start, speaking))
 
 
 def updates(
     registry: IdentityRegistry,
     stays: Sequence[Stay],
     frames: int,
-    begin: int = 0,
+    start: int = 0,
     speaking: Mapping[str, tuple[int, int]] | None = None,
 ) -> Iterator[IdentityUpdate]:
-    for last in range(begin + STRIDE - 1, frames, STRIDE):
+    for last in range(start + STRIDE - 1, frames, STRIDE):
         first = last - STRIDE + 1
-        tracks: dict[tuple[str, int], LocalTrack] = {}
+        tracks: dict[tuple[str, int], TrackUpdate] = {}
         for stay in stays:
-            if stay.begin <= last and stay.end >= first:
+            if stay.start <= last and stay.end >= first:
                 track = stay.track(first, last)
-                before = tracks.get((stay.camera, stay.local))
+                before = tracks.get((stay.camera, stay.local_id))
                 if before is not None:
                     boxes = np.where(np.isnan(track.boxes), before.boxes, track.boxes)
-                    track = replace(track, boxes=boxes, looks=(*before.looks, *track.looks))
-                tracks[stay.camera, stay.local] = track
+                    track = replace(track, boxes=boxes, appearance=(*before.appearance, *track.appearance))
+                tracks[stay.camera, stay.local_id] = track
         yield registry.update(list(tracks.values()), last, speaking)
 
 
@@ -111,18 +111,18 @@ def registry(
     return IdentityRegistry(replace(IdentitySettings(), **changes), homographies)  # type: ignore[arg-type]
 
 
-def both(local: int, start: tuple[float, float], begin: int = 0, end: int = 999) -> list[Stay]:
-    return [Stay("south", local, begin, end, start), Stay("west", local, begin, end, start)]
+def both(local: int, place: tuple[float, float], start: int = 0, end: int = 999) -> list[Stay]:
+    return [Stay("south", local, start, end, place), Stay("west", local, start, end, place)]
 
 
 def known(seen: Sequence[IdentityUpdate]) -> dict[tuple[str, int], int]:
     """Whose each track is after these updates, also where that was settled before."""
-    every = {key: number for update in seen for key, number in update.numbers.items()}
+    every = {key: number for update in seen for key, number in update.person_ids.items()}
     newest = {key.track: number for key, number in sorted(every.items())}
-    return {(key.camera, key.local): number for key, number in newest.items() if number}
+    return {(key.camera, key.local_id): number for key, number in newest.items() if number}
 
 
 def numbers(update: IdentityUpdate) -> dict[tuple[str, int], int]:
     """Whose each track is now: its newest episode's; without those that are nobody's yet."""
-    newest = {key.track: number for key, number in update.numbers.items()}
-    return {(key.camera, key.local): number for key, number in newest.items() if number}
+    newest = {key.track: number for key, number in update.person_ids.items()}
+    return {(key.camera, key.local_id): number for key, number in newest.items() if number}

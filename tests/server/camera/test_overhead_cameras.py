@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bestview import IdentityRegistry, IdentitySettings, LocalTrack
+from bestview import IdentityRegistry, IdentitySettings, TrackUpdate
 from server.camera.detector_setup import make_detector
 from server.camera.tracker_setup import _measured
 from server.cli.track.command import track_one
@@ -84,12 +84,12 @@ def _agreement(boxes: NDArray[np.float64], overhead: tuple[str, ...]) -> float:
         first = last - _STRIDE + 1
         # Their numbers in the second camera are others.
         tracks = [
-            LocalTrack(f"c{camera}", (person + camera) % 3, first, boxes[camera, person, first : last + 1])
+            TrackUpdate(f"c{camera}", (person + camera) % 3, first, boxes[camera, person, first : last + 1])
             for camera in range(2)
             for person in range(3)
         ]
         update = registry.update(tracks, last)
-        numbers = {(key.camera, key.local): number for key, number in update.numbers.items()}
+        numbers = {(key.camera, key.local_id): number for key, number in update.person_ids.items()}
         if last > 100:
             pairs = [(numbers.get(("c0", it)), numbers.get(("c1", (it + 1) % 3))) for it in range(3)]
             same += [one is not None and one == other for one, other in pairs]

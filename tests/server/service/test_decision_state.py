@@ -26,7 +26,7 @@ class Counted:
 
 def test_a_decision_is_told_with_its_cuts_and_corrections() -> None:
     choices = (ObjectChoice(1, "c1", "c0", away=False), ObjectChoice(2, "c0", "c0", away=False))
-    turned_out = (Merge(kept=1, lost=5), Split(kept=2, parted=3, camera="c1"))
+    turned_out = (Merge(kept=1, lost=5), Split(kept=2, split_off=3, camera="c1"))
     told = Board(25.0).put(GopDecision(20, 10, choices, {"c0": [], "c1": []}, {5: 1}, turned_out, _UNTOLD))
     assert told.choices == {1: "c1", 2: "c0"}
     assert told.cuts == [ViewCut(object=1, pulse=20, from_camera="c0", to_camera="c1")]

@@ -87,7 +87,7 @@ def test_who_is_said_to_be_somebody_is_whoever_that_turns_out_to_be() -> None:
 
 
 def test_who_is_two_to_the_evidence_is_away_when_both_are() -> None:
-    it = dictated(TWO, replace(TWO, gone=(1,)), replace(TWO, gone=(2,)), replace(TWO, returned=(2,)))
+    it = dictated(TWO, replace(TWO, departed=(1,)), replace(TWO, departed=(2,)), replace(TWO, returned=(2,)))
     seen(it, 0)
     it.merge(1, 2)
     for epoch, away in ((1, set()), (2, {1}), (3, set())):
@@ -120,7 +120,7 @@ def test_whom_a_camera_shows_is_somebody_new_at_once_and_stays_it() -> None:
     assert it.part(one, ["c1"]) is not None
     [split] = it.take_corrections()
     assert isinstance(split, Split)
-    new = split.parted
+    new = split.split_off
     assert (split.kept, split.camera) == (one, "c1")
     assert new in it.known
     for epoch in range(3, 12):

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import EpisodeKey, IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split, TrackKey
+from bestview import IdentitySettings, IdentityUpdate, Merge, Split, TrackKey, TrackletKey, TrackUpdate
 from fakes.cameras import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
 from fakes.people import Dictated, boxes, people, said
 from server.service.identity.local_numbers import LocalNumbers
@@ -21,12 +21,12 @@ from server.service.ingest.window_history import History
 class Heard:
     """An identity registry that notes what it is given."""
 
-    def __init__(self, heard: list[LocalTrack]) -> None:
+    def __init__(self, heard: list[TrackUpdate]) -> None:
         self._heard = heard
         self.pictures: dict[str, tuple[int, int]] = {}
 
     def update(
-        self, tracks: list[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+        self, tracks: list[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
         del last_frame
         self._heard += tracks
@@ -71,7 +71,7 @@ def test_a_forgotten_track_that_comes_back_has_a_new_number() -> None:
 
 def test_feet_that_the_lower_edge_cuts_off_do_not_say_where_somebody_stands() -> None:
     it = people()
-    heard: list[LocalTrack] = []
+    heard: list[TrackUpdate] = []
     it._registry = registry = Heard(heard)  # type: ignore[assignment]
     it.update(epoch_of(0, word("c0", 0, {1: SMALL}, size=(WIDTH // 2, HEIGHT // 2)), word("c1", 0, {})))
     assert registry.pictures == {"c0": (WIDTH // 2, HEIGHT // 2), "c1": (WIDTH, HEIGHT)}, "also who sees none"
@@ -94,7 +94,7 @@ def test_a_camera_that_could_not_see_anybody_is_not_asked_who_is_there() -> None
 def test_a_camera_whose_source_is_exchanged_has_boxes_in_its_new_picture() -> None:
     it = people()
     for epoch, size in enumerate([(WIDTH, HEIGHT), (WIDTH // 2, HEIGHT // 2)]):
-        heard: list[LocalTrack] = []
+        heard: list[TrackUpdate] = []
         it._registry = Heard(heard)  # type: ignore[assignment]
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}, size=size, boot=1 + epoch)))
         [track] = heard
@@ -121,7 +121,9 @@ def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
 
 def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
     def since(*numbers: tuple[int, int]) -> IdentityUpdate:
-        return replace(said({}), numbers={EpisodeKey("c0", 1, first): number for first, number in numbers})
+        return replace(
+            said({}), person_ids={TrackletKey("c0", 1, first): number for first, number in numbers}
+        )
 
     later = 3 * STRIDE
     it = dictated(
@@ -141,7 +143,7 @@ def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
 
 def test_frames_that_are_not_decided_yet_keep_their_people_when_the_registry_has_settled_them() -> None:
     def since(*parts: tuple[int, int]) -> IdentityUpdate:
-        return replace(said({}), numbers={EpisodeKey("c0", 1, first): number for first, number in parts})
+        return replace(said({}), person_ids={TrackletKey("c0", 1, first): number for first, number in parts})
 
     second, third = 2 * STRIDE, 4 * STRIDE
     it = dictated(
@@ -201,7 +203,7 @@ def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> Non
 
 
 def test_what_turned_out_is_taken_once_and_in_order() -> None:
-    merge, split = Merge(kept=1, lost=2), Split(kept=1, parted=4, camera="c0")
+    merge, split = Merge(kept=1, lost=2), Split(kept=1, split_off=4, camera="c0")
     it = dictated(said({("c0", 1): 1}, merge), said({("c0", 1): 4}, split), said({("c0", 1): 4}))
     for epoch in range(2):
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL})))

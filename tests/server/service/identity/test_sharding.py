@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import EpisodeKey, IdentityUpdate, LocalTrack, Merge
+from bestview import IdentityUpdate, Merge, TrackletKey, TrackUpdate
 from fakes.cameras import (
     CAMERAS,
     LARGE,
@@ -87,11 +87,13 @@ def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
         def begin_at(self, number: int) -> None:
             """Nobody remembers more."""
 
-        def update(self, given: Sequence[LocalTrack], last_frame: int, _: object) -> IdentityUpdate:
+        def update(self, given: Sequence[TrackUpdate], last_frame: int, _: object) -> IdentityUpdate:
             if last_frame < 15:
-                return IdentityUpdate({EpisodeKey(*it.key, 0): it.local for it in given}, (), (), (), (), ())
+                return IdentityUpdate(
+                    {TrackletKey(*it.key, 0): it.local_id for it in given}, (), (), (), (), ()
+                )
             merged = (Merge(1, 2),) if last_frame < 20 else ()
-            numbers = dict.fromkeys((EpisodeKey("c0", 1, 0), EpisodeKey("c0", 2, 0)), 1)
+            numbers = dict.fromkeys((TrackletKey("c0", 1, 0), TrackletKey("c0", 2, 0)), 1)
             return IdentityUpdate(numbers, (), (), (), merged, ())
 
     service = FedService(small_config(**shared(0)))
