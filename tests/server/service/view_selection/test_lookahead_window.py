@@ -40,7 +40,7 @@ class Drifting(People):
     @staticmethod
     def one(key: TrackKey, pulse: int) -> int:
         """Return one track's number in one frame; two tracks may share it, and -1 is nobody."""
-        return (key.local + CAMERAS.index(key.camera) + pulse // 7) % 4 or -1
+        return (key.local_id + CAMERAS.index(key.camera) + pulse // 7) % 4 or -1
 
 
 def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]) -> CameraTracks:
