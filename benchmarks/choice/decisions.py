@@ -66,7 +66,7 @@ class Crowd:
                     id=person,
                     boxes=[(a, b, c, d) for a, b, c, d in boxes],
                     confidence=0.7,
-                    looks=[AppearanceHistogram(first=first, last=first, histogram=[float(person + 1)])],
+                    appearance=[AppearanceHistogram(first=first, last=first, histogram=[float(person + 1)])],
                 )
                 for camera in cameras[person]:
                     said[config.camera_ids[camera]].append(track)

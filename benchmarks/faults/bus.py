@@ -29,8 +29,8 @@ from server.system.child_process import terminate_with_parent
 SITE = "faults"
 SHARE = 0.3
 PICTURES = "video"
-FOUND = "found"
-POINTING = "pointing"
+FOUND = "detections"
+POINTING = "operator_points"
 _FROM_CAMERAS = (PICTURES, "tracks", "status", "thumbs/*", FOUND)
 _LATER = 2
 """A message that is held back comes after so many others of its key: others of its camera and kind."""
@@ -138,7 +138,7 @@ async def _run() -> None:
         for what in _FROM_CAMERAS:
             router.subscribe(keys.camera(camera, what), way.take)
         others = [bus for other, bus in near.items() if other != camera]
-        router.watch_alive(keys.camera(camera, "hears"), _Known(*others).note)
+        router.watch_alive(keys.camera(camera, "peer_listener"), _Known(*others).note)
         router.watch_alive(keys.camera(camera, "alive"), presence.note)
     far.subscribe(keys.camera("*", POINTING), way.take)
     far.watch_alive(keys.bestview("alive"), _Known(*near.values()).note)

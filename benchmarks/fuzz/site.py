@@ -103,14 +103,14 @@ def word(rng: Random, camera: str, epoch: int) -> CameraTracks:
         final_to=first + STRIDE - 1,
         ended=False,
         shed=[first] if rng.random() < 0.1 else [],
-        alone=[],
+        without_peers=[],
         tracks=[_track(rng, person, first) for person in range(1, rng.randrange(1, 5))],
         solve=SolverReport(objective=1.0, bound=1.0, gap=0.0, integral=True, rounds=1),
         solved_at=(first + STRIDE) / FPS,
-        troubles=[
+        risk_events=[
             RiskEvent(reason="alike", tracks=[1, 2], pulse=first + 9, margin=rng.random(), risk=rng.random())
         ],
-        mended_from=first if rng.random() < 0.1 else None,
+        revised_from=first if rng.random() < 0.1 else None,
     )
 
 
@@ -123,7 +123,11 @@ def _track(rng: Random, person: int, first: int) -> TrackMessage:
         histogram=[float(place == person % _BINS) for place in range(_BINS)],
     )
     return TrackMessage(
-        id=person, boxes=[*boxes], confidence=1.0, looks=[look], sharpness=rng.choice((None, rng.random()))
+        id=person,
+        boxes=[*boxes],
+        confidence=1.0,
+        appearance=[look],
+        sharpness=rng.choice((None, rng.random())),
     )
 
 
@@ -136,7 +140,7 @@ def one_each(rng: Random, camera: str, epoch: int) -> CameraTracks:
             first=first, last=first + STRIDE - 1, histogram=[float(it == number) for it in range(8)]
         )
     ]
-    track = TrackMessage(id=1, boxes=[*boxes], confidence=1.0, looks=looks, sharpness=0.5)
+    track = TrackMessage(id=1, boxes=[*boxes], confidence=1.0, appearance=looks, sharpness=0.5)
     return msgspec.structs.replace(word(rng, camera, epoch), tracks=[track], shed=[])
 
 

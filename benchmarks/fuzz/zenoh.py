@@ -114,7 +114,7 @@ class Words(Scripts):
         for pulse in range(3):
             boxes = [(1.0, 2.0, 9.0, 30.0, 0.9)] * rng.randrange(3)
             told = FrameDetections(camera="c1", boot=1, size=(WIDTH, HEIGHT), pulse=pulse, boxes=boxes)
-            message = Message(KEYS.camera("c1", "found"), msgspec.json.encode(told), b"")
+            message = Message(KEYS.camera("c1", "detections"), msgspec.json.encode(told), b"")
             it = wrong(rng, message) if rng.random() < 0.7 else message
             script.append((it.key, it.payload, b""))
         return _packed(script)
@@ -125,7 +125,7 @@ class Words(Scripts):
         for pulse, (_, payload, _) in enumerate(_script.decode(data)):
             self.messages += 1
             # The key is what was asked for: the bus hands nothing else on.
-            heard = self._exchange._read(Message(KEYS.camera("c1", "found"), payload, b""))
+            heard = self._exchange._read(Message(KEYS.camera("c1", "detections"), payload, b""))
             if heard is not None and heard.camera == "c1":
                 earshot.put(heard, 0.0)
             earshot.ask(pulse, 1.0)
@@ -144,10 +144,10 @@ class Places(Scripts):
         """Return some words of the best view."""
         script: Script = []
         for pulse in range(3):
-            place = OperatorPoint(pulse=pulse, track=1, x=9.0, y=9.0, reach=rng.random() + 0.1)
+            place = OperatorPoint(pulse=pulse, track=1, x=9.0, y=9.0, tolerance=rng.random() + 0.1)
             points = [place] * rng.randrange(3)
             payload = msgspec.json.encode(OperatorPoints(boot=1, points=points))
-            message = Message(KEYS.camera("c0", "pointing"), payload, b"")
+            message = Message(KEYS.camera("c0", "operator_points"), payload, b"")
             it = wrong(rng, message) if rng.random() < 0.7 else message
             script.append((it.key, it.payload, b""))
         return _packed(script)

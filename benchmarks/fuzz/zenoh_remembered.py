@@ -10,9 +10,9 @@ from benchmarks.fuzz.site import CAMERAS, FPS, HEIGHT, KEYS, STRIDE, WIDTH, site
 from benchmarks.fuzz.target import Scripts
 from benchmarks.fuzz.zenoh_wrong import wrong
 from server.messaging.epochs import end_of_epoch
+from server.messaging.identity_snapshot import IdentitySnapshot, PersonSnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import DECODE_ERRORS
-from server.messaging.retained_state import IdentitySnapshot, PersonSnapshot
 from server.service.identity.people import People
 from server.service.identity.state_replication import Remembering
 from server.service.ingest.epoch_aligner import Epoch
@@ -38,11 +38,11 @@ class Memories(Scripts):
             said = IdentitySnapshot(
                 pulse=rng.randrange(40),
                 boot=rng.randrange(1, 3),
-                next=rng.randrange(1, 9),
-                since=rng.random(),
+                next_number=rng.randrange(1, 9),
+                numbered_since=rng.random(),
                 people=[self._somebody(rng) for _ in range(rng.randrange(4))],
             )
-            message = Message(KEYS.camera(camera, "remembered"), msgspec.json.encode(said), b"")
+            message = Message(KEYS.camera(camera, "retained_identities"), msgspec.json.encode(said), b"")
             it = wrong(rng, message) if rng.random() < 0.5 else message
             script.append((it.key, it.payload))
         return msgspec.msgpack.encode((rng.randrange(1000), script))
@@ -52,9 +52,9 @@ class Memories(Scripts):
         return PersonSnapshot(
             number=rng.randrange(1, 8),
             tracks=[rng.randrange(5) for _ in range(rng.randrange(3))],
-            also=[rng.randrange(1, 8) for _ in range(rng.randrange(3))],
+            aliases=[rng.randrange(1, 8) for _ in range(rng.randrange(3))],
             name=rng.choice(("", "Ann", "Bob")),
-            by_hand=rng.random() < 0.3,
+            manual=rng.random() < 0.3,
         )
 
     def feed(self, data: bytes) -> bool:

@@ -149,7 +149,7 @@ class Tracker:
                 id=self._number(person, epoch),
                 boxes=[None if np.isnan(box[0]) else tuple(box) for box in rows],
                 confidence=0.8,
-                looks=self._looks(person, first, final_to),
+                appearance=self._looks(person, first, final_to),
             )
             for person, rows in zip(view.people.tolist(), view.boxes.tolist(), strict=True)
         ]

@@ -44,7 +44,7 @@ class Pointed:
             log.info(told, self._camera, ended.count)
         if said.boot == self._boot:
             self._waiting.extend(
-                PositionCorrection(it.pulse, it.track, it.x, it.y, it.reach) for it in said.points
+                PositionCorrection(it.pulse, it.track, it.x, it.y, it.tolerance) for it in said.points
             )
 
     def take(self) -> list[PositionCorrection]:

@@ -110,9 +110,9 @@ class CameraProcess:
         self._bus = bus = Bus.client(self._config.zenoh, self._id)
         try:
             if self._config.track.assist.enabled:
-                bus.subscribe(self._keys.camera(self._id, "pointing"), self._pointed.put)
-            keeping = Keeping(partial(self._publish, "remembered"))
-            bus.subscribe(self._keys.camera(self._id, "remember"), keeping.put)
+                bus.subscribe(self._keys.camera(self._id, "operator_points"), self._pointed.put)
+            keeping = Keeping(partial(self._publish, "retained_identities"))
+            bus.subscribe(self._keys.camera(self._id, "identities"), keeping.put)
             bus.watch_alive(self._keys.bestview("**"), lambda _, there: keeping.service(there))
             await self._wait_for_bestview(bus)
             bus.declare_alive(self._keys.camera(self._id, "alive"))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from server.messaging.identity_snapshot import SNAPSHOT_BYTES_MAX
 from server.messaging.inbox import Message
-from server.messaging.retained_state import SNAPSHOT_BYTES_MAX
 
 
 class Keeping:

@@ -58,8 +58,8 @@ class Reporter:
             final_to=last,
             ended=True,
             shed=_taken(self._shed),
-            unsearched=_taken(self._unsearched),
-            alone=_taken(self._alone),
+            without_detection=_taken(self._unsearched),
+            without_peers=_taken(self._alone),
             tracks=[],
             solve=None,
         )
@@ -75,12 +75,12 @@ class Reporter:
             final_to=result.final_to,
             ended=ended,
             shed=_taken(self._shed),
-            unsearched=_taken(self._unsearched),
-            alone=_taken(self._alone),
+            without_detection=_taken(self._unsearched),
+            without_peers=_taken(self._alone),
             tracks=[_track(track) for track in result.tracks],
             solve=_solve(result.report),
-            troubles=[_trouble(it) for it in result.risk_events[:RISK_EVENTS_MAX]],
-            mended_from=result.revised_from,
+            risk_events=[_trouble(it) for it in result.risk_events[:RISK_EVENTS_MAX]],
+            revised_from=result.revised_from,
         )
 
 
@@ -97,7 +97,7 @@ def _track(track: WindowTrack) -> TrackMessage:
         id=track.id,
         boxes=[_box(row) for row in track.interpolated],
         confidence=float(track.confidence),
-        looks=[_glimpse(look) for look in track.appearance_samples],
+        appearance=[_glimpse(look) for look in track.appearance_samples],
     )
 
 

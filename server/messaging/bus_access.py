@@ -15,7 +15,7 @@ _SENDS = ["put", "delete", "liveliness_token"]
 _ASKS = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
 _PASSES = [*_SENDS, "declare_subscriber"]
 """What the router tells others: messages, who is there, and what somebody wants to hear."""
-_TOLD = ("pointing", "remember")
+_TOLD = ("operator_points", "identities")
 """What best-view services say to a camera, under its key."""
 _SERVICES = 64
 """Best-view services that a site may have, beside the first."""
@@ -44,7 +44,11 @@ def build_access_control(
     """
     keys = ZenohKeys(site)
     everything = f"myview/{site}/**"
-    found, hears, services = keys.camera("*", "found"), keys.camera("*", "hears"), keys.bestview("**")
+    found, hears, services = (
+        keys.camera("*", "detections"),
+        keys.camera("*", "peer_listener"),
+        keys.bestview("**"),
+    )
     rules = [
         _rule("services", "both", [*_SENDS, *_ASKS], [everything]),
         _rule("all is asked for", "ingress", _ASKS, [everything]),

@@ -4,25 +4,25 @@ Everything but pictures is JSON, so that any zenoh subscriber can read it; video
 H.264 (or frames of VP8) with a small JSON head in zenoh's attachment. Numbers survive the way exactly: JSON
 floats are written with as many digits as they need.
 
-========================================  =======================================  =====================
-key                                       payload                                  attachment
-========================================  =======================================  =====================
-``myview/SITE/camera/ID/video``           one access unit, Annex B H.264 or VP8    :class:`FrameHeader`
-``myview/SITE/camera/ID/tracks``          :class:`CameraTracks`
-``myview/SITE/camera/ID/status``          :class:`CameraStatus`
-``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbnailHeader`
-``myview/SITE/camera/ID/found``           :class:`FrameDetections`
-``myview/SITE/camera/ID/pointing``        :class:`server.messaging.operator_messages.OperatorPoints`
-``myview/SITE/camera/ID/remember``        :class:`server.messaging.retained_state.IdentitySnapshot`
-``myview/SITE/camera/ID/remembered``      the same, to a service that has come; empty: nothing
-``myview/SITE/camera/ID/hears``           liveliness token: it hears what the other cameras find
-``myview/SITE/camera/ID/alive``           liveliness token
-``myview/SITE/sound``                     frames of sound, one after the other     :class:`AudioHeader`
-``myview/SITE/bestview/choices``          :class:`GopChoices`
-``myview/SITE/bestview/INDEX/choices``    of a further service that shares the site
-``myview/SITE/bestview/alive``            liveliness token
-``myview/SITE/bestview/INDEX/alive``      of a further service
-========================================  =======================================  =====================
+============================================  ===================================  ==========================
+key                                           payload                              attachment
+============================================  ===================================  ==========================
+``myview/SITE/camera/ID/video``               one access unit, Annex B or VP8      :class:`FrameHeader`
+``myview/SITE/camera/ID/tracks``              :class:`CameraTracks`
+``myview/SITE/camera/ID/status``              :class:`CameraStatus`
+``myview/SITE/camera/ID/thumbs/LOCAL``        JPEG of one person                   :class:`ThumbnailHeader`
+``myview/SITE/camera/ID/detections``          :class:`FrameDetections`
+``myview/SITE/camera/ID/operator_points``     ``OperatorPoints``, to the camera
+``myview/SITE/camera/ID/identities``          ``IdentitySnapshot``, to the camera
+``myview/SITE/camera/ID/retained_identities``  the same, to a service that starts; empty: unknown
+``myview/SITE/camera/ID/peer_listener``       liveliness token: receives the other cameras' detections
+``myview/SITE/camera/ID/alive``               liveliness token
+``myview/SITE/sound``                         consecutive frames of audio          :class:`AudioHeader`
+``myview/SITE/bestview/choices``              :class:`GopChoices`
+``myview/SITE/bestview/INDEX/choices``        of a further service that shares the site
+``myview/SITE/bestview/alive``                liveliness token
+``myview/SITE/bestview/INDEX/alive``          of a further service
+============================================  ===================================  ==========================
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class TrackMessage(msgspec.Struct, frozen=True, kw_only=True):
     boxes: list[Box | None]
     """One per frame of the window; null where the person is hidden."""
     confidence: Cost
-    looks: list[AppearanceHistogram] = []
+    appearance: list[AppearanceHistogram] = []
     """Where nobody else was in the boxes, in the frames up to ``final_to``; in their order."""
     sharpness: Annotated[float, msgspec.Meta(ge=0, le=1)] | None = None
     """How sharp the picture of the person is; null where nobody has measured it."""
@@ -139,10 +139,10 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """The recording is over: nothing follows."""
     shed: list[Pulse]
     """Frames of this epoch that were missed or not searched for people because the machine was too busy."""
-    unsearched: list[Pulse] = []
+    without_detection: list[Pulse] = []
     """Frames of this epoch in which nobody could have been found: those that are shed, and those before the
     recording begins or while the detector does not know its background yet."""
-    alone: list[Pulse] = []
+    without_peers: list[Pulse] = []
     """Frames in which people were followed without what some other camera found: its word was not there."""
     tracks: Annotated[list[TrackMessage], msgspec.Meta(max_length=TRACKS_MAX)]
     solve: SolverReport | None
@@ -152,9 +152,9 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """Seconds that it took to look for people in a frame, the mean of this epoch's; null offline."""
     solve_s: Duration | None = None
     """Seconds that it took to follow everybody to the end of the window; null offline."""
-    troubles: Annotated[list[RiskEvent], msgspec.Meta(max_length=RISK_EVENTS_MAX)] = []
+    risk_events: Annotated[list[RiskEvent], msgspec.Meta(max_length=RISK_EVENTS_MAX)] = []
     """What the tracker foresees, where it is set to."""
-    mended_from: Pulse | None = None
+    revised_from: Pulse | None = None
     """The first frame, final before, that somebody's pointing has changed; null: none has."""
 
 
@@ -202,7 +202,7 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """How much is left out because the machine has too much to do; 0: nothing."""
     load: Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[ -~]*\Z")] = ""
     """What is left out, for people: printable, since it stands on pages and in terminals."""
-    pointed: Number = 0
+    operator_points: Number = 0
     """Places that an operator pointed at and the tracker was given, since the start."""
     bad_messages: Number = 0
     """Messages to the camera that it could not understand, since the start."""

@@ -43,7 +43,7 @@ class OperatorPoint(msgspec.Struct, frozen=True, kw_only=True):
     x: Coordinate
     """Pixels of the site's picture, as ``y`` and ``reach``."""
     y: Coordinate
-    reach: Annotated[float, msgspec.Meta(ge=TOLERANCE_MIN, le=1e4)]
+    tolerance: Annotated[float, msgspec.Meta(ge=TOLERANCE_MIN, le=1e4)]
     """How far off the pointing may be."""
 
 

@@ -91,12 +91,14 @@ class BestViewService:
             config, homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
         )
         self.board = Board(config.site.fps)
-        self.assist = OperatorAssist(config, self.decider.people, partial(self._tell_camera, "pointing"))
+        self.assist = OperatorAssist(
+            config, self.decider.people, partial(self._tell_camera, "operator_points")
+        )
         self.remembering = Remembering(
             self.decider.people,
             cameras,
             fps,
-            partial(self._tell_camera, "remember"),
+            partial(self._tell_camera, "identities"),
             tells=config.view.share.index == 0,
         )
         self.walking = WalkSession(config)
@@ -142,7 +144,7 @@ class BestViewService:
             "tracks": self._tracks,
             "status": self.intake.status,
             "thumbs/*": self.intake.thumbnail,
-            "remembered": self._remembered,
+            "retained_identities": self._remembered,
         }
         for what, handler in handlers.items():
             self.inboxes.append(bus.subscribe(self._keys.camera("*", what), handler))

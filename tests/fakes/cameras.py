@@ -97,7 +97,7 @@ def word(camera: str, epoch: int, boxes: Mapping[int, Box | None], **changes: An
                 id=track,
                 boxes=[box] * STRIDE,
                 confidence=1.0,
-                looks=[]
+                appearance=[]
                 if box is None
                 else [AppearanceHistogram(first=last - STRIDE + 1, last=last, histogram=look(track))],
             )
@@ -175,7 +175,7 @@ class FedService(BestViewService):
         for camera in cameras:
             for part in (self.intake, self.remembering):
                 part.alive(ZenohKeys("hall").camera(camera, "alive"), there=True)
-            self.remembering.heard(Message(ZenohKeys("hall").camera(camera, "remembered"), b"", b""))
+            self.remembering.heard(Message(ZenohKeys("hall").camera(camera, "retained_identities"), b"", b""))
 
     def feed(self, epoch: int, seen: Mapping[str, Mapping[int, Box | None]]) -> None:
         """Send an epoch's frames and words of the cameras in ``seen``, and decide."""

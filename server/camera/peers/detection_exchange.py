@@ -90,9 +90,9 @@ class Exchange:
             log.info("camera %s: hears the others", self._camera)
         for other in self._others:
             self._listen(bus, other)
-        bus.watch_alive(self._keys.camera("*", "hears"), self._alive)
+        bus.watch_alive(self._keys.camera("*", "peer_listener"), self._alive)
         # After the subscriptions: who knows this token knows them, too.
-        bus.declare_alive(self._keys.camera(self._camera, "hears"))
+        bus.declare_alive(self._keys.camera(self._camera, "peer_listener"))
         self._bus = bus
 
     async def of(self, pulse: int, word: FrameDetections | None, taken: float, *, needed: bool) -> Heard:
@@ -141,7 +141,7 @@ class Exchange:
             self._told = True
             until = asyncio.get_running_loop().time() + _LISTENERS_S
             await self._until(lambda: self._listening.issuperset(self._others), until)
-        self._bus.publish(self._keys.camera(self._camera, "found"), msgspec.json.encode(word))
+        self._bus.publish(self._keys.camera(self._camera, "detections"), msgspec.json.encode(word))
 
     async def _until(self, done: Callable[[], bool], until: float) -> None:
         """Wait until something holds, asked whenever anything comes; no longer than until then."""
@@ -160,7 +160,7 @@ class Exchange:
                 end()  # of a hundred cameras most look elsewhere
             self._came.set()
 
-        end = bus.listen(self._keys.camera(other, "found"), take)
+        end = bus.listen(self._keys.camera(other, "detections"), take)
 
     def _read(self, message: Message) -> FrameDetections | None:
         other = camera_of_key(message.key)

@@ -56,7 +56,7 @@ class CameraStages(Collector):
         yield self._counter(
             "pointings",
             "Places that an operator pointed at and the tracker was given, since its start.",
-            _of_status(lambda it: it.pointed),
+            _of_status(lambda it: it.operator_points),
         )
         yield self._counter(
             "mended_windows",

@@ -9,7 +9,7 @@ from server.http.access.grants import OPERATING
 from server.http.api.handlers import answer, asked_for, no_camera, no_object, problem
 from server.http.app_keys import SERVICE
 from server.http.operator.schema import PeopleByHand
-from server.messaging.retained_state import NAME_LENGTH_MAX
+from server.messaging.identity_snapshot import NAME_LENGTH_MAX
 from server.service.identity.people import People
 from server.service.service import BestViewService
 

@@ -239,7 +239,7 @@ class People:
         """Take a window over, by what its tracks are called if its past was mended."""
         self.unsearched.note(window.message)
         history = self._histories[window.message.camera]
-        if window.message.mended_from is not None:
+        if window.message.revised_from is not None:
             before = history.over(window.first, window.fresh - 1)
             window, splits = self._mending.read(window, before, self._parts, self._asked_from)
             self._corrections += self._by_hand.read_splits(splits)

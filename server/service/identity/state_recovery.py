@@ -7,7 +7,12 @@ from dataclasses import dataclass
 from itertools import chain
 from math import inf
 
-from server.messaging.retained_state import ALIASES_MAX, PERSON_NUMBER_MAX, IdentitySnapshot, PersonSnapshot
+from server.messaging.identity_snapshot import (
+    ALIASES_MAX,
+    PERSON_NUMBER_MAX,
+    IdentitySnapshot,
+    PersonSnapshot,
+)
 from server.service.identity.local_numbers import Followed
 from server.service.identity.people import People
 
@@ -45,15 +50,15 @@ def remembered_by(
                 PersonSnapshot(
                     number=number,
                     tracks=theirs,
-                    also=also.get(number, [])[-ALIASES_MAX:],
+                    aliases=also.get(number, [])[-ALIASES_MAX:],
                     name=people.roll.names.get(number, ""),
-                    by_hand=number in by_hand,
+                    manual=number in by_hand,
                 )
             )
     following = min(people.next_number, PERSON_NUMBER_MAX + 1)
     return {
         camera: IdentitySnapshot(
-            pulse=pulse, boot=boots.get(camera, 0), next=following, since=since, people=them
+            pulse=pulse, boot=boots.get(camera, 0), next_number=following, numbered_since=since, people=them
         )
         for camera, them in known.items()
     }
@@ -90,8 +95,10 @@ class Returning:
         """No number below it is given any more, however long ago that was."""
         lately = {camera: it for camera, it in said.items() if it.pulse < pulse <= it.pulse + longest}
         # All that were told of lately were told the same: one that says otherwise does not decide.
-        since = sorted(it.since for it in lately.values())
-        self.since = since[len(since) // 2] if since else max((it.since for it in said.values()), default=inf)
+        since = sorted(it.numbered_since for it in lately.values())
+        self.numbered_since = (
+            since[len(since) // 2] if since else max((it.numbered_since for it in said.values()), default=inf)
+        )
         """When numbers began, unix seconds; infinite: nobody remembers."""
         if lately:
             self._until = max(it.pulse for it in lately.values()) + longest
@@ -145,7 +152,7 @@ class Returning:
 
 def first_free(said: IdentitySnapshot) -> int:
     """Return the first number that nobody has or had; what a camera says may contradict itself."""
-    return max([said.next, *(number + 1 for it in said.people for number in (it.number, *it.also))])
+    return max([said.next_number, *(number + 1 for it in said.people for number in (it.number, *it.aliases))])
 
 
 def believed(firsts: Iterable[int]) -> int:
@@ -167,7 +174,7 @@ def _awaited(said: dict[str, IdentitySnapshot]) -> list[_Awaited]:
     for camera, it in sorted(said.items(), key=lambda named: (named[1].pulse, named[0])):
         for known in it.people:
             newest[known.number] = known
-            whose |= dict.fromkeys(known.also, known.number)
+            whose |= dict.fromkeys(known.aliases, known.number)
             theirs = tracks.setdefault(known.number, set())
             theirs |= {Followed(camera, it.boot, track) for track in known.tracks}
     for old in sorted(whose.keys() & newest.keys()):  # some camera had not heard yet that two are one
@@ -179,9 +186,9 @@ def _awaited(said: dict[str, IdentitySnapshot]) -> list[_Awaited]:
         _Awaited(
             number=number,
             tracks=tuple(sorted(tracks[number], key=lambda it: (it.camera, it.boot, it.track))),
-            also=tuple(old for old in known.also if whose[old] == number and old not in newest),
+            also=tuple(old for old in known.aliases if whose[old] == number and old not in newest),
             name=known.name,
-            by_hand=known.by_hand,
+            by_hand=known.manual,
         )
         for number, known in sorted(newest.items())
     ]

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 
 import msgspec
 
+from server.messaging.identity_snapshot import SNAPSHOT_BYTES_MAX, IdentitySnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import camera_of_key
-from server.messaging.retained_state import SNAPSHOT_BYTES_MAX, IdentitySnapshot
 from server.service.identity.people import People
 from server.service.identity.state_recovery import LONGEST_S, Returning, believed, first_free, remembered_by
 
@@ -99,7 +99,7 @@ class Remembering:
         said = msgspec.json.decode(message.payload, type=IdentitySnapshot)
         self._firsts[camera] = first_free(said)
         if again:
-            self._people.begin_at(min(said.next, believed(self._firsts.values())))
+            self._people.begin_at(min(said.next_number, believed(self._firsts.values())))
         else:
             self._said[camera] = said
 
@@ -141,7 +141,7 @@ class Remembering:
         self._returning.append(returning)
         if self._began_at is None:
             self._began_at, self._free = self._clock(), self._people.next_number
-            self._since = min(self._since, returning.since)
+            self._since = min(self._since, returning.numbered_since)
         if said:
             log.info("%s: remembered %d people", ", ".join(sorted(said)), len(returning.numbers))
 
@@ -169,7 +169,7 @@ class Remembering:
 
 def _below(free: float, said: IdentitySnapshot) -> IdentitySnapshot:
     """Leave out whom this run does not know by the number, since it may have given it to somebody else."""
-    known = [it for it in said.people if max([it.number, *it.also]) < free]
+    known = [it for it in said.people if max([it.number, *it.aliases]) < free]
     return msgspec.structs.replace(said, people=known)
 
 

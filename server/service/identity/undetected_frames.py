@@ -18,7 +18,7 @@ class Unsearched:
 
     def note(self, message: CameraTracks) -> None:
         """Take in what a camera says of an epoch."""
-        self._frames[message.camera].update(message.unsearched)
+        self._frames[message.camera].update(message.without_detection)
 
     def over(self, camera: str, first: int, frames: int) -> NDArray[np.bool_]:
         """Tell it of each of a camera's frames from `first` on, (frames,)."""

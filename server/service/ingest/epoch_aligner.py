@@ -198,7 +198,7 @@ class Aligner:
 
     def _too_late(self, message: CameraTracks) -> None:
         self.late_messages[message.camera] += 1
-        if message.mended_from is not None:
+        if message.revised_from is not None:
             self._mended.append(message)  # that the past was mended is not said again
         # It ended while nobody waited for it: that must not be lost, or its end is waited for.
         self._places[message.camera].ended |= message.ended

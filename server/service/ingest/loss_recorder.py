@@ -46,7 +46,7 @@ class Lacking:
                 told = "camera %s: its tracks for pulses up to %d came too late%s"
                 log.warning(told, camera, epoch.last, more)
         for camera, message in epoch.tracks.items():
-            self._states[camera].unheard += len(message.alone)
+            self._states[camera].unheard += len(message.without_peers)
             if ended := self._late[camera].end():
                 told = "camera %s: its tracks come in time again; those of %d windows in %.0f s did not"
                 log.info(told, camera, ended.count, ended.seconds)
@@ -56,7 +56,7 @@ class Lacking:
             self.recorder.late(camera, range(epoch.last - self._stride + 1, epoch.last + 1), "tracks late")
         for camera, message in epoch.tracks.items():
             self.recorder.late(camera, message.shed, "not searched")
-            self.recorder.late(camera, message.alone, "others not heard")
+            self.recorder.late(camera, message.without_peers, "others not heard")
 
     def gop(self, decision: GopDecision) -> None:
         """Note the pictures of a GOP that did not come, of cameras that were delivering."""

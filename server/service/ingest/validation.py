@@ -15,16 +15,16 @@ def makes_sense(message: CameraTracks, stride: int) -> bool:
     """Return whether the frames, the tracks and the sizes in a message fit together."""
     frames, end = message.last - message.first + 1, end_of_epoch(message.epoch, stride)
     ids = [track.id for track in message.tracks]
-    looks = [look for track in message.tracks for look in track.looks]
+    looks = [look for track in message.tracks for look in track.appearance]
     bins = [len(look.histogram) for look in looks]
     return (
         0 <= frames <= _WINDOW_MAX
         and message.final_to <= message.last <= end
-        and all(_is_short(it, end) for it in (message.shed, message.unsearched, message.alone))
+        and all(_is_short(it, end) for it in (message.shed, message.without_detection, message.without_peers))
         and len(ids) == len(dict.fromkeys(ids))
         and all(count == bins[0] > 0 for count in bins)
         and all(len(track.boxes) == frames for track in message.tracks)
-        and (message.mended_from is None or message.first <= message.mended_from <= message.final_to)
+        and (message.revised_from is None or message.first <= message.revised_from <= message.final_to)
         and all(message.first <= look.first <= look.last <= message.final_to for look in looks)
     )
 

@@ -41,7 +41,7 @@ class Totals:
 
     def window(self, tracks: CameraTracks, due: float | None, *, proven: bool) -> None:
         """Count a window; ``due`` is when its last frame was, None: not known."""
-        self.mended += tracks.mended_from is not None
+        self.mended += tracks.revised_from is not None
         if tracks.search_s is not None:
             self.search.observe(tracks.search_s)
         if tracks.solve is not None:

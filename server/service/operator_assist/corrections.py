@@ -43,7 +43,7 @@ def corrections_for_tracker(
     if not boots:
         return None
     points = [
-        OperatorPoint(pulse=it.pulse, track=track.track, x=it.x, y=it.y, reach=it.reach)
+        OperatorPoint(pulse=it.pulse, track=track.track, x=it.x, y=it.y, tolerance=it.reach)
         for it, track in tracks
         if track is not None and track.boot == max(boots)
     ]

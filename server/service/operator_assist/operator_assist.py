@@ -48,7 +48,7 @@ class OperatorAssist:
     def _foreseen(self, epoch: Epoch) -> Iterator[RiskEvent]:
         """Give the troubles of an epoch whose people all have a number."""
         for camera, message in epoch.tracks.items():
-            for trouble in message.troubles:
+            for trouble in message.risk_events:
                 whose = [self._people.whose(camera, message.boot, it, message.last) for it in trouble.tracks]
                 known = tuple(dict.fromkeys(number for number in whose if number is not None))
                 if known and len(known) == len(whose):

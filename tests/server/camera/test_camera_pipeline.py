@@ -120,7 +120,7 @@ def test_people_in_a_recording_are_looked_for_from_its_first_frame_on(
     words = [pipeline.follow(it) for it in searched]
     pipeline.close()
     assert [it.looked for it in searched] == [pulse >= first for pulse in range(30)]
-    assert [pulse for word in words if word for pulse in word.unsearched] == list(range(first))
+    assert [pulse for word in words if word for pulse in word.without_detection] == list(range(first))
 
 
 def test_frames_that_were_missed_are_reported_once_and_begin_a_new_gop_where_they_must(
@@ -128,7 +128,7 @@ def test_frames_that_were_missed_are_reported_once_and_begin_a_new_gop_where_the
 ) -> None:
     missed = frozenset({7, 10, 11, 12, 33})
     units, words = live(config_of(recording), missed)
-    for told in ([word.shed for word in words], [word.unsearched for word in words]):
+    for told in ([word.shed for word in words], [word.without_detection for word in words]):
         assert sorted(pulse for frames in told for pulse in frames) == sorted(missed)
     assert [unit.pulse for unit in units if unit.key] == [0, 13, 20, 30, 40]
 
@@ -150,7 +150,7 @@ def test_a_frame_of_which_only_the_number_is_left_is_reported(recording: Path) -
         word = pipeline.track(pulse, None if pulse == 3 else image)
     pipeline.close()
     assert word is not None
-    assert word.shed == word.unsearched == [3]
+    assert word.shed == word.without_detection == [3]
 
 
 def test_a_camera_that_starts_after_its_recording_is_over_says_that_it_is_over(recording: Path) -> None:

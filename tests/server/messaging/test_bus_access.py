@@ -167,7 +167,7 @@ def _all(buses: Sequence[Bus], number: int) -> None:
     c1.publish(SITE.camera("c1", "video"), str(number).encode())
 
 
-@pytest.mark.parametrize("what", ["pointing", "remember"])
+@pytest.mark.parametrize("what", ["operator_points", "identities"])
 async def test_what_a_camera_is_told_is_said_by_the_best_view_and_heard_by_that_camera(
     settings: ZenohSettings, what: str
 ) -> None:
@@ -209,15 +209,15 @@ async def test_cameras_hear_what_others_found_and_not_what_they_see(settings: Ze
         lambda: Bus.hearing(settings, "c1"),
         lambda: Bus.hearing(settings, "auditor"),
     ) as (_, c0, c1, auditor):
-        for key in (SITE.camera("c0", "*"), SITE.camera("c0", "found"), SITE.camera("c1", "found")):
+        for key in (SITE.camera("c0", "*"), SITE.camera("c0", "detections"), SITE.camera("c1", "detections")):
             c1.subscribe(key, heard)
         everything = Heard()
         auditor.subscribe(SITE.camera("c0", "*"), everything)
 
         def all_of_it() -> None:
             c0.publish(SITE.camera("c0", "video"), b"seen")
-            auditor.publish(SITE.camera("c1", "found"), b"false")
-            c0.publish(SITE.camera("c0", "found"), b"found")
+            auditor.publish(SITE.camera("c1", "detections"), b"false")
+            c0.publish(SITE.camera("c0", "detections"), b"detections")
 
         await heard.until("c0/found found", all_of_it)
         await everything.until("c0/video seen", all_of_it)  # it may come in mid-round

@@ -73,7 +73,7 @@ async def test_a_camera_that_nobody_understands_is_told_of_once_and_not_by_frame
         exchange._bad[camera] = LogThrottle(lambda: clock[0])
 
     def hear(camera: str, payload: bytes) -> None:
-        exchange._read(Message(KEYS.camera(camera, "found"), payload, b""))
+        exchange._read(Message(KEYS.camera(camera, "detections"), payload, b""))
 
     for frame in range(250):
         clock[0] = frame / 25
@@ -93,9 +93,9 @@ async def test_what_a_camera_does_not_understand_is_in_its_status(monkeypatch: p
     camera = CameraProcess(config.model_copy(update={"cameras": cameras}), "c0")
     said: list[bytes] = []
     monkeypatch.setattr(camera, "_publish", lambda _, payload: said.append(payload))
-    camera._exchange._read(Message(KEYS.camera("c1", "found"), b"{", b""))
+    camera._exchange._read(Message(KEYS.camera("c1", "detections"), b"{", b""))
     for _ in range(2):
-        camera._pointed.put(Message(KEYS.camera("c0", "pointing"), b"{", b""))
+        camera._pointed.put(Message(KEYS.camera("c0", "operator_points"), b"{", b""))
     camera._send_status()
     camera._pipeline.close()
     [status] = [msgspec.json.decode(it, type=CameraStatus) for it in said]

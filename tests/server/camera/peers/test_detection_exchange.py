@@ -220,7 +220,7 @@ async def test_a_camera_that_is_gone_is_waited_for_once(pair: tuple[Bus, Exchang
 async def test_what_is_no_word_is_counted_and_left(pair: tuple[Bus, Exchange, Exchange]) -> None:
     _, one, two = pair
     await both(one, two, needed=False)
-    key = ZenohKeys("hall").camera("c1", "found")
+    key = ZenohKeys("hall").camera("c1", "detections")
     assert two._bus is not None
     far = msgspec.json.encode(word("c0", 1))
     for nonsense in (b"", b"{", b"[1]", b'{"camera": "c1"}', far, b"\xff\xfe"):
@@ -303,8 +303,8 @@ def test_a_frame_without_a_needed_word_is_told(recording: Path) -> None:
         if searched.asks:
             asked.append(pulse)
         tracks = pipeline.follow(searched, Heard(alone=True))
-        told += tracks.alone if tracks else []
-    told += pipeline.finish(FRAMES).alone
+        told += tracks.without_peers if tracks else []
+    told += pipeline.finish(FRAMES).without_peers
     pipeline.close()
     assert asked
     assert told == asked

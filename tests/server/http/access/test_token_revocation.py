@@ -20,9 +20,9 @@ from fakes.tokens import LATER, bearer, line_of, locked, token_of, write_tokens
 from server.config.tokens_file import token_digest
 from server.http.access.csrf import CHANGES
 from server.http.access.token_file import TokenFile
+from server.messaging.identity_snapshot import IdentitySnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
-from server.messaging.retained_state import IdentitySnapshot
 
 
 @pytest.fixture(autouse=True)
@@ -179,8 +179,8 @@ async def test_a_person_s_token_is_void_when_people_were_numbered_anew_since(
         )
         hall.service.come(*CAMERAS)
         if remembered is not None:
-            said = IdentitySnapshot(pulse=0, boot=1, next=9, since=remembered, people=[])
-            key = ZenohKeys("hall").camera("c0", "remembered")
+            said = IdentitySnapshot(pulse=0, boot=1, next_number=9, numbered_since=remembered, people=[])
+            key = ZenohKeys("hall").camera("c0", "retained_identities")
             hall.service.remembering.heard(Message(key, msgspec.json.encode(said), b""))
         while True:  # the file of tokens is looked at now and then
             await asyncio.sleep(0.1)

@@ -56,12 +56,14 @@ async def test_the_camera_is_told_by_its_own_track(helped: Hall) -> None:
     [(camera, said)] = told
     assert (camera, said.boot) == (A, 1)
     assert [(it.pulse, it.track, it.x, it.y) for it in said.points] == [(2, 2, 12, 20), (7, 2, 12, 20)]
-    assert [it.reach for it in said.points] == [pytest.approx(0.02 * WIDTH), 3.0]
+    assert [it.tolerance for it in said.points] == [pytest.approx(0.02 * WIDTH), 3.0]
     status, answer = await say(helped, at(7), camera=B)
     assert (status, answer["taken"]) == (200, 1)
     assert told[1][0] == B
     assert (await say(helped, at(7, reach=1e-200)))[0] == 200
-    assert told[2][1].points[0].reach == 1.0, "nobody points better than a pixel, and squares of this are 0"
+    assert told[2][1].points[0].tolerance == 1.0, (
+        "nobody points better than a pixel, and squares of this are 0"
+    )
 
 
 async def test_what_is_too_long_ago_is_left_out_and_said(helped: Hall) -> None:

@@ -16,14 +16,14 @@ from fakes.cameras import CAMERAS, FPS, LARGE, SMALL, STRIDE, FedService, small_
 from server.camera.retained_state import Keeping
 from server.http.app import make_app
 from server.messaging.epochs import end_of_epoch
-from server.messaging.inbox import Message
-from server.messaging.messages import Box, ZenohKeys
-from server.messaging.retained_state import (
+from server.messaging.identity_snapshot import (
     PERSON_NUMBER_MAX,
     SNAPSHOT_BYTES_MAX,
     IdentitySnapshot,
     PersonSnapshot,
 )
+from server.messaging.inbox import Message
+from server.messaging.messages import Box, ZenohKeys
 from server.service.identity.state_recovery import ALONE_MOST, LONGEST_S, Returning, believed
 from server.service.identity.state_replication import PATIENCE_S, Remembering
 
@@ -68,10 +68,10 @@ class Site:
         return number
 
     def _tell(self, camera: str, payload: bytes) -> None:
-        self.cameras[camera].put(Message(KEYS.camera(camera, "remember"), payload, b""))
+        self.cameras[camera].put(Message(KEYS.camera(camera, "identities"), payload, b""))
 
     def _hear(self, camera: str, payload: bytes) -> None:
-        self.service._remembered(Message(KEYS.camera(camera, "remembered"), payload, b""))
+        self.service._remembered(Message(KEYS.camera(camera, "retained_identities"), payload, b""))
 
 
 def told(*, merge: bool = False, **changes: object) -> Site:
@@ -292,7 +292,7 @@ def test_nothing_is_decided_before_every_camera_that_is_there_has_had_time_to_sa
     it.alive(KEYS.camera("cellar", "alive"), there=True)
     it.alive(KEYS.camera(B, "alive"), there=True)
     assert it.waits
-    it.heard(Message(KEYS.camera(A, "remembered"), b"", b""))
+    it.heard(Message(KEYS.camera(A, "retained_identities"), b"", b""))
     assert it.waits
     it.alive(KEYS.camera(A, "alive"), there=True)
     it.alive(KEYS.camera(B, "alive"), there=False)
@@ -352,16 +352,16 @@ known = st.builds(
     PersonSnapshot,
     number=numbers,
     tracks=st.lists(st.integers(0, 4), max_size=3),
-    also=st.lists(numbers, max_size=3),
+    aliases=st.lists(numbers, max_size=3),
     name=st.sampled_from(["", "Ann", "Bob"]),
-    by_hand=st.booleans(),
+    manual=st.booleans(),
 )
 remembered = st.builds(
     IdentitySnapshot,
     pulse=st.integers(0, 60),
     boot=st.integers(1, 2),
-    next=st.integers(1, 12),
-    since=st.floats(0, 1e12),
+    next_number=st.integers(1, 12),
+    numbered_since=st.floats(0, 1e12),
     people=st.lists(known, max_size=4),
 )
 
@@ -373,7 +373,7 @@ def test_whatever_cameras_remember_two_tracks_seen_at_once_in_a_camera_are_two(
 ) -> None:
     site = Site()
     for camera, it in zip(CAMERAS, (one, other), strict=True):
-        people = [msgspec.structs.replace(them, by_hand=False) for them in it.people]
+        people = [msgspec.structs.replace(them, manual=False) for them in it.people]
         said = msgspec.json.encode(msgspec.structs.replace(it, people=people))
         site.cameras[camera].put(Message("", said, b""))
     site.start()
@@ -407,7 +407,7 @@ def lying(site: Site, camera: str, **changes: object) -> None:
     [
         {"next": PERSON_NUMBER_MAX + 1},
         {"people": [PersonSnapshot(number=PERSON_NUMBER_MAX, tracks=[3])]},
-        {"people": [PersonSnapshot(number=5, tracks=[3], also=[PERSON_NUMBER_MAX])]},
+        {"people": [PersonSnapshot(number=5, tracks=[3], aliases=[PERSON_NUMBER_MAX])]},
     ],
 )
 @pytest.mark.parametrize("again", [False, True])
@@ -431,7 +431,7 @@ def test_no_camera_alone_moves_everybodys_numbers_far_ahead(lie: dict[str, objec
 def test_large_numbers_that_two_cameras_remember_go_on() -> None:
     site = told()
     for camera in CAMERAS:
-        lying(site, camera, next=50_000_000 + len(camera))
+        lying(site, camera, next_number=50_000_000 + len(camera))
     site.start()
     site.tell(range(7, 9))
     assert site.service.decider.people.next_number >= 50_000_000
@@ -444,21 +444,21 @@ def test_whatever_one_camera_says_the_others_say_how_far_it_is_believed(others: 
 
 
 def remembers(since: float, pulse: int = 90) -> IdentitySnapshot:
-    return IdentitySnapshot(pulse=pulse, boot=1, next=5, since=since, people=[])
+    return IdentitySnapshot(pulse=pulse, boot=1, next_number=5, numbered_since=since, people=[])
 
 
 @pytest.mark.parametrize("lie", [0.0, 1e12])
 def test_no_camera_alone_says_since_when_numbers_mean_what_they_do(lie: float) -> None:
     said = {"c0": remembers(lie), "c1": remembers(1000.0), "c2": remembers(1000.0)}
-    assert Returning(said, 100, 50).since == 1000.0
+    assert Returning(said, 100, 50).numbered_since == 1000.0
 
 
 def test_of_two_words_on_when_numbers_began_the_later_counts() -> None:
-    assert Returning({"c0": remembers(900.0), "c1": remembers(1000.0)}, 100, 50).since == 1000.0
+    assert Returning({"c0": remembers(900.0), "c1": remembers(1000.0)}, 100, 50).numbered_since == 1000.0
     long_ago = {"c0": remembers(900.0, pulse=1), "c1": remembers(900.0, pulse=1)}
-    assert Returning({**long_ago, "c2": remembers(1000.0)}, 100, 50).since == 1000.0
-    assert Returning(long_ago, 100, 50).since == 900.0
-    assert Returning({}, 100, 50).since == float("inf")
+    assert Returning({**long_ago, "c2": remembers(1000.0)}, 100, 50).numbered_since == 1000.0
+    assert Returning(long_ago, 100, 50).numbered_since == 900.0
+    assert Returning({}, 100, 50).numbered_since == float("inf")
 
 
 def test_a_camera_that_comes_and_goes_and_never_says_what_it_remembers_is_waited_for_once() -> None:

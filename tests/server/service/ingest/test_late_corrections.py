@@ -21,7 +21,7 @@ MENDED = STRIDE
 def mended(epoch: int) -> CameraTracks:
     """Return a camera's word that the two were in each other's place since then."""
     last = end_of_epoch(epoch, STRIDE)
-    said = word("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, mended_from=MENDED)
+    said = word("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, revised_from=MENDED)
     frames = last - MENDED + 1
     tracks = [msgspec.structs.replace(it, boxes=it.boxes[:1] * frames) for it in said.tracks]
     return msgspec.structs.replace(said, tracks=tracks)

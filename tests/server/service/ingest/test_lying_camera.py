@@ -91,10 +91,10 @@ REFUSED: dict[str, Lie] = {
         epoch, epoch=FAR, first=FAR * STRIDE, last=FAR * STRIDE - 1, final_to=FAR * STRIDE - 1, tracks=[]
     ),
     "final for ever": lambda epoch: said(epoch, final_to=FAR),
-    "final to 2^63": lambda epoch: said(epoch, final_to=2**63, mended_from=epoch * STRIDE),
-    "not searched for ever": lambda epoch: said(epoch, unsearched=list(range(FAR, FAR + 1000))),
+    "final to 2^63": lambda epoch: said(epoch, final_to=2**63, revised_from=epoch * STRIDE),
+    "not searched for ever": lambda epoch: said(epoch, without_detection=list(range(FAR, FAR + 1000))),
     "shed in times to come": lambda epoch: said(epoch, shed=[FAR]),
-    "alone in times to come": lambda epoch: said(epoch, alone=[FAR]),
+    "alone in times to come": lambda epoch: said(epoch, without_peers=[FAR]),
     "solved at no time": lambda epoch: said(epoch, solved_at=1e308),
     "a gap without measure": lambda epoch: said(epoch, solve=SOLVED | {"gap": 1e308}),
     "sure without measure": lambda epoch: of_one(epoch, confidence=1e308),
@@ -104,10 +104,10 @@ REFUSED: dict[str, Lie] = {
     "at pulse 10^18": lambda _: [status(LIAR, pulse=10**18)],
     "in a state of a million letters": lambda _: [status(LIAR, state="x" * 10**6)],
     "looks beyond all measure": lambda epoch: of_one(
-        epoch, looks=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [1e308] * 8}]
+        epoch, appearance=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [1e308] * 8}]
     ),
     "looks of very many colours": lambda epoch: of_one(
-        epoch, looks=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [0.1] * 10_000}]
+        epoch, appearance=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [0.1] * 10_000}]
     ),
     "small pictures far ahead": lambda _: [thumbnail(LIAR, 1, b"jpeg", pulse=FAR)],
     "small pictures that are none": lambda _: [thumbnail(LIAR, 1, bytes(10**6))],
@@ -124,7 +124,7 @@ TAKEN: dict[str, Lie] = {
     "boxes of nothing": lambda epoch: of_one(epoch, boxes=[[1e6, 1e6, -1e6, -1e6]] * STRIDE),
     "looks of any length": lambda epoch: of_one(
         epoch,
-        looks=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [1e6] * (8 + epoch)}],
+        appearance=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [1e6] * (8 + epoch)}],
     ),
     "tracks of any number": lambda epoch: of_one(epoch, id=2**62 - epoch),
     "small pictures without end": lambda epoch: [

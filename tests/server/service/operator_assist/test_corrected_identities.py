@@ -82,11 +82,11 @@ def played(
                 people, "c0", left, [PointedPosition(it, places(it)[0] + 20, 160, 10) for it in of]
             )
             assert asked is not None
-            said = [PositionCorrection(it.pulse, it.track, it.x, it.y, it.reach) for it in asked.points]
+            said = [PositionCorrection(it.pulse, it.track, it.x, it.y, it.tolerance) for it in asked.points]
         message = camera.take(frame, said)
         if message is None:
             continue
-        assert (message.mended_from is not None) == bool(said), "only then the past has changed"
+        assert (message.revised_from is not None) == bool(said), "only then the past has changed"
         missed = late and bool(said)
         tracks, came = {} if missed else {"c0": message}, tuple(held)
         held = [message] if missed else []

@@ -34,9 +34,9 @@ from fakes.site import Hall, opened
 from server.media.containers.mpegts import Counters
 from server.media.picture import Picture as Shown
 from server.media.stream_format import Agreement
+from server.messaging.identity_snapshot import IdentitySnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
-from server.messaging.retained_state import IdentitySnapshot
 from server.service.recording.media_files import pulse_of
 from server.service.recording.recording_folder import RecordingFolder
 from server.service.recording.recording_session import InitSegments
@@ -435,8 +435,8 @@ async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tm
         hall.service.pulse0 = PULSE0 + 0.01
         hall.service.past.open()
         hall.service.come(*CAMERAS)
-        said = IdentitySnapshot(pulse=19, boot=1, next=9, since=since, people=[])
-        key = ZenohKeys("hall").camera(A, "remembered")
+        said = IdentitySnapshot(pulse=19, boot=1, next_number=9, numbered_since=since, people=[])
+        key = ZenohKeys("hall").camera(A, "retained_identities")
         hall.service.remembering.heard(Message(key, msgspec.json.encode(said), b""))
         for epoch in range(5, 8):
             hall.service.feed(epoch, IN_A)

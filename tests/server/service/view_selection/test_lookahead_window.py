@@ -51,7 +51,7 @@ def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]
         type(it)(
             id=it.id,
             boxes=list(boxes[it.id][: told.last - first + 1]),
-            looks=it.looks,
+            appearance=it.appearance,
             confidence=1.0,
         )
         for it in told.tracks

@@ -34,10 +34,10 @@ class PersonSnapshot(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tr
     number: PersonNumber
     tracks: list[Number]
     """Those that follow them, by the camera's own numbers."""
-    also: Annotated[list[PersonNumber], msgspec.Meta(max_length=ALIASES_MAX)] = []
+    aliases: Annotated[list[PersonNumber], msgspec.Meta(max_length=ALIASES_MAX)] = []
     """Numbers that turned out to be theirs."""
     name: Annotated[str, msgspec.Meta(max_length=NAME_LENGTH_MAX)] = ""
-    by_hand: bool = False
+    manual: bool = False
     """Somebody said that several numbers are theirs."""
 
 
@@ -47,8 +47,8 @@ class IdentitySnapshot(msgspec.Struct, frozen=True, kw_only=True):
     pulse: Pulse
     boot: Number
     """The run of the camera whose tracks are named."""
-    next: Annotated[int, msgspec.Meta(ge=1, le=PERSON_NUMBER_MAX + 1)]
+    next_number: Annotated[int, msgspec.Meta(ge=1, le=PERSON_NUMBER_MAX + 1)]
     """The first number that nobody was given yet in the whole site."""
-    since: UnixTime
+    numbered_since: UnixTime
     """When numbers began: since then none was given twice."""
     people: list[PersonSnapshot]
