@@ -56,7 +56,7 @@ class CameraWindow:
                 local_id=key.local_id,
                 first_frame=self.fresh,
                 boxes=boxes,
-                appearance=_glimpses(track.looks, self.fresh),
+                appearance=_glimpses(track.appearance, self.fresh),
                 picture_height=float(height),
             )
             for key, track, boxes, gone in zip(self.keys, self.message.tracks, own, hidden, strict=True)
@@ -117,7 +117,7 @@ class Reader:
         boxes = boxes_array(track.boxes for track in message.tracks)
         locals_ = np.array([key.local_id for key in keys], dtype=np.int64)
         fresh = message.first
-        if message.mended_from is not None:
+        if message.revised_from is not None:
             fresh = max(fresh, min(self._final.get(message.camera, -1), message.final_to) + 1)
         return CameraWindow(message, keys, locals_, fit, boxes.reshape(len(keys), frames, 4), fresh)
 
