@@ -19,8 +19,8 @@ from benchmarks.report import Report
 from benchmarks.surroundings import parser
 from server.camera.encoding.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
-from server.media.containers.fmp4 import Sample, fragment
-from server.media.h264.annexb import nal_units, sample
+from server.media.containers.fmp4 import FragmentSample, fragment
+from server.media.h264.annexb import join_sample, nal_units
 from server.media.rendering_messages import Canvas
 from server.service.rendering.decided_boxes import GopOverlay, first_pulse
 from server.service.rendering.mjpeg_streams import MjpegVariant
@@ -93,7 +93,9 @@ class Stage:
         data = b""
         for pulse in range(self._pulse, self._pulse + self.gop):
             unit = self._encoder.encode(pulse, self._images[pulse % _DRAWN])
-            data += fragment([Sample(sample(nal_units(unit.data)), unit.key)], pulse, self.site.fps)
+            data += fragment(
+                [FragmentSample(join_sample(nal_units(unit.data)), unit.key)], pulse, self.site.fps
+            )
         self._pulse += self.gop
         return BytesChunk(data, random_access=True)
 

@@ -18,8 +18,8 @@ from server.config.site_config import Config
 from server.messaging.epochs import closing_epoch
 from server.messaging.messages import Box, CameraTracks, TrackMessage
 from server.service.decision_files.decision_writer import DecisionWriter
-from server.service.ingest.epoch_aligner import Aligner
-from server.service.view_selection.decider import Decider, homographies
+from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.view_selection.decider import ViewDecider, camera_homographies
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow, read_rows
 
@@ -53,9 +53,11 @@ class GivenNumbers:
 
 def decide(config: Config, messages: Messages, people: Sequence[int] | None = None) -> Rendering:
     """Line up what the cameras said, join it, choose views; with `people`, they are not joined but known."""
-    aligner = Aligner(config.camera_ids, config.track.window.stride, grace=0)
+    aligner = EpochAligner(config.camera_ids, config.track.window.stride, grace=0)
     last = {camera: said[-1].last for camera, said in messages.items()}
-    decider = Decider(config, homographies(config), lambda camera, pulse: 0 <= pulse <= last[camera])
+    decider = ViewDecider(
+        config, camera_homographies(config), lambda camera, pulse: 0 <= pulse <= last[camera]
+    )
     if people is not None:
         decider.people._registry = GivenNumbers(people)  # type: ignore[assignment]  # noqa: SLF001 — truth in its place
     for camera in config.camera_ids:

@@ -10,18 +10,18 @@ from benchmarks.bestview.watch import Messages
 from bestview.association.sightings import FootPointError, align_tracks
 from bestview.association.tracklet_splitter import TrackletSplitter
 from server.config.site_config import Config
-from server.service.identity.camera_window import Reader
-from server.service.ingest.epoch_aligner import Aligner
-from server.service.view_selection.decider import homographies
+from server.service.identity.camera_window import WindowReader
+from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.view_selection.decider import camera_homographies
 from tracking.motchallenge import MotRow
 
 
 def own_parts(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
     """Return each camera's final boxes, numbered by part of track as the service cuts them."""
     settings = config.view.identity
-    tracklets, reader = TrackletSplitter(settings), Reader((config.site.width, config.site.height))
-    ground, error = homographies(config), FootPointError(settings.foot_sideways, settings.foot_upwards)
-    aligner = Aligner(config.camera_ids, config.track.window.stride, grace=0)
+    tracklets, reader = TrackletSplitter(settings), WindowReader((config.site.width, config.site.height))
+    ground, error = camera_homographies(config), FootPointError(settings.foot_sideways, settings.foot_upwards)
+    aligner = EpochAligner(config.camera_ids, config.track.window.stride, grace=0)
     for camera in config.camera_ids:
         aligner.come(camera)
         aligner.frame(camera, messages[camera][0].boot, 0)

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.observations.observers import SURE, rows_of
-from server.camera.peers.cross_view_scorer import Witness
+from server.camera.peers.cross_view_scorer import CrossViewScorer
 from server.camera.pipeline import CameraPipeline
-from server.camera.sources import SourceEnded
-from server.camera.track_messages import Reporter
+from server.camera.sources import SourceEndedError
+from server.camera.track_messages import TrackMessageBuilder
 from server.config.site_config import Config
 from server.messaging.messages import CameraTracks
 from tracking import Detections, OnlineTracker, create_solver
@@ -64,7 +64,7 @@ def in_pictures(config: Config, camera: str) -> Frames:
     for pulse in count():
         try:
             searched = pipeline.search(pulse, pipeline.take(pulse))
-        except SourceEnded:
+        except SourceEndedError:
             break
         frames.found.append(searched.detections)
         frames.looked.append(searched.looked)
@@ -111,8 +111,8 @@ class _Camera:
     def __init__(self, config: Config, camera: str, frames: Frames) -> None:
         track = config.track
         self.tracker = OnlineTracker(track.window, track.costs, create_solver(track.solver))
-        self.reporter = Reporter(camera, 0, frames.size, track.window.stride)
-        self.witness = Witness(config, camera, frames.size, 0) if config.witnesses(camera) else None
+        self.reporter = TrackMessageBuilder(camera, 0, frames.size, track.window.stride)
+        self.witness = CrossViewScorer(config, camera, frames.size, 0) if config.witnesses(camera) else None
         self._frames = frames
 
     def told(self, pulse: int) -> Detections | None:

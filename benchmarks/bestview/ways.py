@@ -27,7 +27,7 @@ from server.cli.evaluate.choices_file import Choice
 from server.cli.evaluate.ground_truth import SceneTruth, people_of_objects
 from server.cli.evaluate.view_scores import evaluate_views
 from server.cli.render.site_file import SiteInfo
-from server.service.view_selection.decider import homographies
+from server.service.view_selection.decider import camera_homographies
 from tracking.evaluation import MultiCameraScores, TruthAndTracks, evaluate_cameras
 from tracking.motchallenge import MotRow, format_rows
 
@@ -147,7 +147,7 @@ def ways(
             yield Way(f"{name}, looks alone", decide(scene.config(view=LOOKS_ALONE), said))
         yield Way(f"{name}, again", chosen(ours.tracks))
         yield Way(f"{name}, largest", simple(ours.tracks))
-        ground = {camera: it for camera, it in homographies(scene.config()).items() if it is not None}
+        ground = {camera: it for camera, it in camera_homographies(scene.config()).items() if it is not None}
         short = "nearest feet" if scene is case else "nearest feet, calibr."
         yield Way(short, simple(by_nearest_feet(own_tracks(apart), ground)))
         if case.detections is None and not case.apart:

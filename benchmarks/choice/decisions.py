@@ -15,13 +15,13 @@ from server.config.site_config import Config
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import AppearanceHistogram, CameraTracks, TrackMessage
 from server.service.decision_state import Board
-from server.service.identity.camera_window import Reader
-from server.service.identity.people import People
+from server.service.identity.camera_window import WindowReader
+from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.view_selection import decider as decider_module
-from server.service.view_selection.decider import Decider
-from server.service.view_selection.lookahead_window import Outlook, Part
-from server.service.view_selection.view_quality_buffer import Sight
+from server.service.view_selection.decider import ViewDecider
+from server.service.view_selection.lookahead_window import LookaheadPart, LookaheadWindow
+from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 _SEED, _WIDTH, _HEIGHT = 5, 1280, 720
 _WARM = 6
@@ -114,19 +114,19 @@ def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> S
     """Decide for a crowd, and give what the stages cost."""
     config = _config(crowd, gop, asdict(_ALL) if all_terms else {})
     ground = np.array([[1.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.002, 1.0]])
-    decider = Decider(config, dict.fromkeys(config.camera_ids, ground), lambda _camera, _pulse: True)
+    decider = ViewDecider(config, dict.fromkeys(config.camera_ids, ground), lambda _camera, _pulse: True)
     decider.people._registry = _Given()  # type: ignore[assignment]  # noqa: SLF001 — joining is measured elsewhere
     board, watch = Board(25.0), Stopwatch()
     stages: tuple[Watched, ...] = (
-        (Reader, "read", "reading"),
-        (Sight, "put", "quality"),
-        (Outlook, "__init__", "costs"),
-        (Outlook, "part", "costs"),
-        (Part, "gops", "costs"),
+        (WindowReader, "read", "reading"),
+        (ViewQualityBuffer, "put", "quality"),
+        (LookaheadWindow, "__init__", "costs"),
+        (LookaheadWindow, "part", "costs"),
+        (LookaheadPart, "gops", "costs"),
         (decider_module, "choose_by_gops", "choice"),
-        (Decider, "step", "rest"),
-        (People, "update", "people"),
-        (People, "boxes", "telling"),
+        (ViewDecider, "step", "rest"),
+        (PersonTracker, "update", "people"),
+        (PersonTracker, "boxes", "telling"),
         (Board, "put", "telling"),
     )
     for epoch in crowd.epochs(config, _WARM + epochs):

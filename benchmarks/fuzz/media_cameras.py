@@ -14,20 +14,20 @@ import numpy as np
 from benchmarks.fuzz.media_made import wrong
 from benchmarks.fuzz.site import FPS, HEIGHT, STRIDE, WIDTH, pictures
 from benchmarks.fuzz.target import Target, folder, refused
-from server.camera.passthrough.access_units import packing_of
-from server.camera.passthrough.compatibility import MisfitError, Wanted
-from server.camera.passthrough.recording_source import OwnRecording
-from server.camera.sources.base import Source, SourceEnded
+from server.camera.passthrough.access_units import parse_packing
+from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
+from server.camera.passthrough.recording_source import PassthroughRecording
+from server.camera.sources.base import PictureSource, SourceEndedError
 from server.camera.sources.recording import Recording
 from server.system.errors import UserError
 
 
-def _take(source: Source) -> None:
+def _take(source: PictureSource) -> None:
     """Take the first frames of a recording, and close it."""
     try:
         for pulse in range(12):
             source.take(pulse)
-    except SourceEnded:
+    except SourceEndedError:
         pass
     finally:
         source.close()
@@ -56,7 +56,7 @@ class OwnPackets(Target):
         """Unpack it."""
         beside, packet = msgspec.msgpack.decode(data, type=tuple[bytes, bytes])
         try:
-            packing_of(beside).annex_b(packet)
+            parse_packing(beside).annex_b(packet)
         except ValueError as error:
             return refused(error)
         return True
@@ -90,15 +90,15 @@ class Files(Target):
     def feed(self, data: bytes) -> bool:
         """Take its frames; then those that are passed on as they are."""
         self._path.write_bytes(data)
-        wanted = Wanted((WIDTH, HEIGHT), FPS, STRIDE, None)
+        wanted = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
         try:
             recording = Recording(str(self._path), 0, "stop")
         except UserError as error:
             return refused(error)
         _take(recording)
         try:
-            own = OwnRecording(str(self._path), 0, "stop", wanted)
-        except (UserError, MisfitError) as error:
+            own = PassthroughRecording(str(self._path), 0, "stop", wanted)
+        except (UserError, IncompatibleStreamError) as error:
             return refused(error)
         _take(own)
         return True

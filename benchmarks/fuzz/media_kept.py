@@ -9,8 +9,8 @@ from random import Random
 from benchmarks.fuzz.media_made import stream, wrong
 from benchmarks.fuzz.site import FPS, HEIGHT, STRIDE, WIDTH
 from benchmarks.fuzz.target import Target, folder
-from server.media.audio.audio_format import SoundFormat
-from server.media.rendering_messages import Canvas, Draw
+from server.media.audio.audio_format import AudioFormat
+from server.media.rendering_messages import Canvas, RenderRequest
 from server.service.recording.audio_file import read_audio_frames
 from server.service.recording.media_files import read_gops
 from server.service.recording.playlist_file import RecordingPlaylist
@@ -49,7 +49,7 @@ class Drawing(Target):
         boxes = [[(1, 2.0, 3.0, 20.0, 40.0)]] * _DRAWN
         film = zlib.crc32(data) % _FILMED_EVERY == 0
         drawn = StreamRenderer(canvas).draw(
-            Draw(fragments=data, boxes=boxes, film=film, boxed=[2.0], still="plain")
+            RenderRequest(fragments=data, boxes=boxes, film=film, boxed=[2.0], still="plain")
         )
         return drawn.newest >= 0
 
@@ -67,7 +67,7 @@ class Kept(Target):
         self._stream = stream("h264")
         self._folder = folder()
         self._path = Path(self._folder.name)
-        self._form = SoundFormat(48_000, 2)
+        self._form = AudioFormat(48_000, 2)
 
     def make(self, rng: Random) -> bytes:
         """Return a playlist, or a file of pictures and sound."""

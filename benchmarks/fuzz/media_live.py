@@ -15,11 +15,11 @@ from av.video.stream import VideoStream
 from benchmarks.fuzz.media_made import wrong
 from benchmarks.fuzz.site import FPS, HEIGHT, STRIDE, WIDTH
 from benchmarks.fuzz.target import Scripts, folder, refused
-from server.camera.audio.live_source import LiveSound
-from server.camera.passthrough.compatibility import MisfitError, Wanted
-from server.camera.passthrough.stream_source import OwnStream
-from server.camera.sources.live_stream import Stream
-from server.camera.sources.opening import Opened
+from server.camera.audio.live_source import LiveAudioSource
+from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
+from server.camera.passthrough.stream_source import PassthroughStream
+from server.camera.sources.live_stream import LiveStream
+from server.camera.sources.opening import OpenedVideo
 from server.config.sections import SoundSettings
 from server.system.errors import UserError
 
@@ -28,14 +28,14 @@ _FRAMES = 2 * STRIDE + 3
 _FORMS = {"mpegts": "libx264", "h264": "libx264", "mpjpeg": "mjpeg"}
 
 
-class _Once(Stream):
+class _Once(LiveStream):
     """Reads until what the camera sends ends; what its thread raises is kept."""
 
     failure: BaseException | None = None
     units = 0
     """That came out of what the camera sends."""
 
-    def _run(self, opened: Opened | None) -> None:
+    def _run(self, opened: OpenedVideo | None) -> None:
         try:
             if opened is not None:
                 self._read(opened)
@@ -47,7 +47,7 @@ class _Once(Stream):
         return super()._decode(packet)
 
 
-class _OwnOnce(OwnStream, _Once):
+class _OwnOnce(PassthroughStream, _Once):
     """The same where its access units are passed on."""
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
@@ -59,7 +59,7 @@ class Live(Scripts):
     """A camera that sends whatever it likes. How it is reached is FFmpeg's: here it is in a file."""
 
     name = "media-live"
-    _wanted = Wanted((WIDTH, HEIGHT), FPS, STRIDE, None)
+    _wanted = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
 
     def __init__(self) -> None:
         self._folder, self._memory = TemporaryDirectory(), folder()
@@ -74,13 +74,13 @@ class Live(Scripts):
     def feed(self, data: bytes) -> bool:
         """Decode it, or pass its access units on."""
         self._path.write_bytes(data[1:])
-        sound = LiveSound(SoundSettings(source="c0"), FPS)
+        sound = LiveAudioSource(SoundSettings(source="c0"), FPS)
         try:
             if data[:1] == b"P":
                 self._watch(_OwnOnce(str(self._path), {}, sound, self._wanted), range(_FRAMES))
             else:
                 self._watch(_Once(str(self._path), {}, sound), range(1))
-        except (UserError, MisfitError) as error:
+        except (UserError, IncompatibleStreamError) as error:
             self.messages += 1
             return refused(error)
         sound.at(0)

@@ -7,10 +7,10 @@ from typing import Literal
 
 from benchmarks.fuzz.mutate import damaged
 from benchmarks.fuzz.site import FPS, HEIGHT, WIDTH, pictures
-from server.media.audio.audio_format import SoundFormat
-from server.media.containers.mp4_audio import sound_fragment
-from server.media.stream_format import Agreement
-from server.media.vp8.stream_format import Vp8Agreement
+from server.media.audio.audio_format import AudioFormat
+from server.media.containers.mp4_audio import audio_fragment
+from server.media.stream_format import StreamFormat
+from server.media.vp8.stream_format import Vp8StreamFormat
 
 WORDS = (
     b"\x00\x00\x01", b"\x00\x00\x00\x01", b"\x00\x00\x01\x67", b"\x00\x00\x01\x68", b"\x00\x00\x01\x65",
@@ -28,13 +28,13 @@ def wrong(rng: Random, data: bytes) -> bytes:
 
 def stream(codec: Literal["h264", "vp8"], frames: int = 10) -> bytes:
     """Return a stream of some GOPs as a viewer is sent it."""
-    agreement = Vp8Agreement(WIDTH, HEIGHT) if codec == "vp8" else None
-    form, units = SoundFormat(48_000, 2), pictures(0, frames, codec)
+    agreement = Vp8StreamFormat(WIDTH, HEIGHT) if codec == "vp8" else None
+    form, units = AudioFormat(48_000, 2), pictures(0, frames, codec)
     if agreement is None:
-        found = Agreement()
+        found = StreamFormat()
         found.accept(units[0].data)
         head = found.head((WIDTH, HEIGHT), FPS, form) or b""
-        sound = sound_fragment(form, [form.silence] * 9, 0)
+        sound = audio_fragment(form, [form.silence] * 9, 0)
         return head + sound + b"".join(found.pack(it.data, it.pulse, FPS, key=it.key) for it in units)
     head = agreement.head((WIDTH, HEIGHT), FPS)
     return head + b"".join(agreement.pack(it.data, it.pulse, FPS, key=it.key) for it in units)

@@ -29,20 +29,20 @@ from benchmarks.fuzz.site import (
 from benchmarks.fuzz.target import Scripts, Target
 from benchmarks.fuzz.zenoh_remembered import Memories
 from benchmarks.fuzz.zenoh_wrong import wrong
-from server.camera.operator_corrections import Pointed as PointedAt
-from server.camera.peers.detection_buffer import Earshot
-from server.camera.peers.detection_exchange import Exchange
+from server.camera.operator_corrections import CorrectionInbox as PointedAt
+from server.camera.peers.detection_buffer import PeerDetectionBuffer
+from server.camera.peers.detection_exchange import PeerDetectionExchange
 from server.http.api.responses import cameras_info, choice_info, objects_info, site_info
 from server.http.app import make_app
 from server.http.app_keys import METRICS
-from server.media.audio.audio_format import SoundFormat
-from server.media.stream_format import Agreement
+from server.media.audio.audio_format import AudioFormat
+from server.media.stream_format import StreamFormat
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import FrameDetections
 from server.messaging.operator_messages import OPERATOR_POINTS_MAX, OperatorPoint, OperatorPoints
-from server.service.ingest.epoch_aligner import Aligner
-from server.service.ingest.ingest import Intake
+from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.ingest.ingest import Ingest
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.media_chunk import MediaChunk
@@ -63,7 +63,7 @@ class Messages(Target):
 
     def __init__(self) -> None:
         self._pictures = pictures(0, 10)
-        self._form = SoundFormat(48_000, 2)
+        self._form = AudioFormat(48_000, 2)
 
     def make(self, rng: Random) -> bytes:
         """Return a message."""
@@ -82,11 +82,11 @@ class Messages(Target):
 
     def feed(self, data: bytes) -> bool:
         """Take it in, and the epoch out that it may have made."""
-        agreement = Agreement()
+        agreement = StreamFormat()
         frame_buffers = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
-        aligner = Aligner(CAMERAS, STRIDE, grace=5)
+        aligner = EpochAligner(CAMERAS, STRIDE, grace=5)
         frame_buffer = AudioBuffer(self._form, FPS, 10.0)
-        intake = Intake(frame_buffers, aligner, lambda *_: None, frame_buffer, sounding=CAMERAS[0])
+        intake = Ingest(frame_buffers, aligner, lambda *_: None, frame_buffer, sounding=CAMERAS[0])
         handlers = (intake.video, intake.tracks, intake.status, intake.thumbnail)
         for key, payload, head in _script.decode(data):
             message = Message(key, payload, head)
@@ -106,7 +106,7 @@ class Words(Scripts):
     name = "zenoh-found"
 
     def __init__(self) -> None:
-        self._exchange = Exchange(site(), "c0", None, 50)
+        self._exchange = PeerDetectionExchange(site(), "c0", None, 50)
 
     def make(self, rng: Random) -> bytes:
         """Return some words of the other camera."""
@@ -121,7 +121,7 @@ class Words(Scripts):
 
     def feed(self, data: bytes) -> bool:
         """Hear them."""
-        earshot, bad = Earshot(("c1",), 50, lambda _: True), self._exchange.bad_messages
+        earshot, bad = PeerDetectionBuffer(("c1",), 50, lambda _: True), self._exchange.bad_messages
         for pulse, (_, payload, _) in enumerate(_script.decode(data)):
             self.messages += 1
             # The key is what was asked for: the bus hands nothing else on.

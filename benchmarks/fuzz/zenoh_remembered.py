@@ -13,8 +13,8 @@ from server.messaging.epochs import end_of_epoch
 from server.messaging.identity_snapshot import IdentitySnapshot, PersonSnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import DECODE_ERRORS
-from server.service.identity.people import People
-from server.service.identity.state_replication import Remembering
+from server.service.identity.people import PersonTracker
+from server.service.identity.state_replication import StateReplication
 from server.service.ingest.epoch_aligner import Epoch
 
 _SAID = 12
@@ -61,10 +61,10 @@ class Memories(Scripts):
         """Begin with them, follow people for a while, and tell the cameras."""
         seed, script = _script.decode(data)
         told: list[bytes] = []
-        people = People(
+        people = PersonTracker(
             self._config.view.identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0, fps=FPS
         )
-        it = Remembering(people, CAMERAS, FPS, lambda _, payload: told.append(payload))
+        it = StateReplication(people, CAMERAS, FPS, lambda _, payload: told.append(payload))
         for camera in CAMERAS:
             it.alive(KEYS.camera(camera, "alive"), there=True)
         wrong = 0

@@ -106,7 +106,7 @@ class ThreadWatch:
 def time_camera(folder: str, camera: str) -> None:
     """Time the stages of this process, which is about to be a camera's."""
     # What is timed is imported here: the benchmark itself need not load it.
-    from server.camera.peers.cross_view_scorer import Witness  # noqa: PLC0415
+    from server.camera.peers.cross_view_scorer import CrossViewScorer  # noqa: PLC0415
     from server.camera.pipeline import CameraPipeline  # noqa: PLC0415
     from server.messaging.bus import Bus  # noqa: PLC0415
     from tracking import DEFAULT_SOLVER, OnlineTracker, create_solver  # noqa: PLC0415
@@ -128,8 +128,8 @@ def time_camera(folder: str, camera: str) -> None:
     watch.wrap(CameraPipeline, "encode", "encode")
     watch.wrap(CameraPipeline, "search", "report")
     watch.wrap(CameraPipeline, "follow", "report")
-    watch.wrap(Witness, "word", "witness")
-    watch.wrap(Witness, "scored", "witness")
+    watch.wrap(CrossViewScorer, "word", "witness")
+    watch.wrap(CrossViewScorer, "scored", "witness")
     watch.wrap(BackgroundDetector, "detect", "detect")
     watch.wrap(OnlineTracker, "push", "track")
     watch.wrap(type(create_solver(DEFAULT_SOLVER)), "solve", "solve")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from benchmarks.occupancy.masks import Masks
 from server.camera.pipeline import CameraPipeline
-from server.camera.sources import SourceEnded
+from server.camera.sources import SourceEndedError
 from server.config.site_config import Config
 from tracking.boxes import Floats
 from tracking.detectors.color_histogram import AppearanceSettings, color_histograms
@@ -38,7 +38,7 @@ def looks_of(
     for frame in range(len(masks.foreground)):
         try:
             image = pipeline.take(frame)
-        except SourceEnded:
+        except SourceEndedError:
             break
         foreground = masks.foreground[frame]
         if image is None or foreground is None or frame % _EVERY:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.camera.pipeline import CameraPipeline
-from server.camera.sources import SourceEnded
+from server.camera.sources import SourceEndedError
 from server.config.site_config import Config
 from tracking.boxes import Floats
 from tracking.detectors import BackgroundDetector
@@ -63,7 +63,7 @@ def masks_of(config: Config, camera: str) -> Masks:
     for pulse in count():
         try:
             pipeline.search(pulse, pipeline.take(pulse))
-        except SourceEnded:
+        except SourceEndedError:
             break
         one, other = heard.last()
         foreground.append(one)

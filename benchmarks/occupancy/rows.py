@@ -23,7 +23,7 @@ from benchmarks.occupancy.masks import Masks, masks_of
 from benchmarks.occupancy.paths import Lattice, shortest_paths
 from benchmarks.occupancy.walks import Walk, WalkSettings, rows_of_walks, walk_of
 from server.config.site_config import Config
-from server.service.view_selection.decider import homographies
+from server.service.view_selection.decider import camera_homographies
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow
 
@@ -70,7 +70,7 @@ def occupancy_rows(case: Case, boxes: Rows, settings: Settings | None = None) ->
     """
     settings, config = settings or Settings(), case.config()
     masks = {camera: masks_of(config, camera) for camera in case.gt}
-    ground = {camera: it for camera, it in homographies(config).items() if it is not None}
+    ground = {camera: it for camera, it in camera_homographies(config).items() if it is not None}
     views = views_of(masks, ground, boxes)
     floor = lay_out(list(views.values()), settings.floor)
     q = occupancy(floor, list(masks.values()), settings.map)

@@ -16,8 +16,8 @@ from aiohttp import web
 from benchmarks.surroundings import ROOT
 from server.camera.encoding.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
-from server.media.containers.fmp4 import init_segment, rebased, ticks
-from server.media.stream_format import Agreement
+from server.media.containers.fmp4 import init_segment, shift_fragment, ticks
+from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 
 _PAGE = ROOT / "client" / "page"
@@ -54,7 +54,7 @@ class FastSite:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._agreement = Agreement()
+        self._agreement = StreamFormat()
         self._fragments = [self._loop(seed) for seed in range(len(_CAMERAS))]
         assert self._agreement.parameters is not None  # noqa: S101 — pictures have been packed
         self._head = init_segment(self._agreement.parameters, _WIDTH, _HEIGHT)
@@ -146,7 +146,7 @@ class FastSite:
             async for first in self._released():
                 loop = self._fragments[_camera(number, first)]
                 moved = ticks(first - first % _LOOP, _FPS)
-                gop = [rebased(it, moved) for it in loop[first % _LOOP : first % _LOOP + _GOP]]
+                gop = [shift_fragment(it, moved) for it in loop[first % _LOOP : first % _LOOP + _GOP]]
                 await response.write(b"".join(gop))
         return response
 

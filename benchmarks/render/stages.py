@@ -7,15 +7,15 @@ from pathlib import Path
 
 from benchmarks.stopwatch import Stopwatch
 from benchmarks.views import Views
-from server.camera.peers.cross_view_scorer import Witness
+from server.camera.peers.cross_view_scorer import CrossViewScorer
 from server.camera.pipeline import CameraPipeline
 from server.cli.generated_config import config_for_videos
 from server.cli.render.camera_workers import run_cameras
 from server.cli.render.renderer import Renderer
 from server.config.loader import read_content
 from server.config.site_config import Config
-from server.service.ingest.epoch_aligner import Aligner
-from server.service.view_selection.decider import Decider
+from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.view_selection.decider import ViewDecider
 from tracking import OnlineTracker, create_solver
 from tracking.detectors import BackgroundDetector
 
@@ -50,16 +50,16 @@ def time_stages(views: Views, config_path: Path, folder: Path) -> StageTimes:
         (CameraPipeline, "take", "decode"),
         (CameraPipeline, "encode", "encode"),
         (BackgroundDetector, "detect", "detect"),
-        (Witness, "word", "witness"),
-        (Witness, "scored", "witness"),
+        (CrossViewScorer, "word", "witness"),
+        (CrossViewScorer, "scored", "witness"),
         (OnlineTracker, "push", "track"),
         (OnlineTracker, "flush", "track"),
         (type(create_solver(config.track.solver)), "solve", "solve"),
         (CameraPipeline, "follow", "publish"),
         (CameraPipeline, "finish", "publish"),
-        (Decider, "step", "decide"),
-        (Decider, "finish", "decide"),
-        (Aligner, "ready", "write"),
+        (ViewDecider, "step", "decide"),
+        (ViewDecider, "finish", "decide"),
+        (EpochAligner, "ready", "write"),
         (Renderer, "take", "write"),
     ):
         frames = _render(config, folder)

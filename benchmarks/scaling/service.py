@@ -22,14 +22,14 @@ from server.cli.main import main as command_line
 from server.http.api.events import Events
 from server.messaging.bus import Bus
 from server.service.decision_state import Board
-from server.service.identity.people import People
-from server.service.ingest.epoch_aligner import Aligner
-from server.service.ingest.ingest import Intake
+from server.service.identity.people import PersonTracker
+from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.ingest.ingest import Ingest
 from server.service.service import BestViewService
 from server.service.streaming.splicer import Splicer
-from server.service.view_selection.decider import Decider
-from server.service.view_selection.lookahead_window import Outlook
-from server.service.view_selection.view_quality_buffer import Sight
+from server.service.view_selection.decider import ViewDecider
+from server.service.view_selection.lookahead_window import LookaheadWindow
+from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 LISTS = "lists"
 STAGES = {
@@ -92,14 +92,14 @@ def watch(path: Path) -> None:
     for name in ("tracks", "video", "thumbnail"):
         _count(name, count)
     for owner, method, stage in (
-        (Intake, "tracks", "tracks in"),
-        (Intake, "video", "frames in"),
-        (Intake, "thumbnail", "frames in"),
-        (Aligner, "ready", "align"),
+        (Ingest, "tracks", "tracks in"),
+        (Ingest, "video", "frames in"),
+        (Ingest, "thumbnail", "frames in"),
+        (EpochAligner, "ready", "align"),
         (IdentityRegistry, "update", "who is who"),
-        (People, "update", "people"),
-        (Sight, "put", "quality"),
-        (Outlook, "__init__", "costs"),
+        (PersonTracker, "update", "people"),
+        (ViewQualityBuffer, "put", "quality"),
+        (LookaheadWindow, "__init__", "costs"),
         (Board, "put", "board"),
         (BestViewService, "_publish", "publish"),
         (Bus, "publish", "publish"),
@@ -107,19 +107,19 @@ def watch(path: Path) -> None:
         (Events, "_lists", LISTS),
     ):
         watched.wrap(owner, method, stage)
-    watched.wrap(Decider, "step", "choose", told)
+    watched.wrap(ViewDecider, "step", "choose", told)
 
 
 def _count(name: str, count: dict[str, int]) -> None:
-    original = getattr(Intake, name)
+    original = getattr(Ingest, name)
 
     @functools.wraps(original)
-    def run(self: Intake, message: Any) -> None:
+    def run(self: Ingest, message: Any) -> None:
         count["messages"] += 1
         count["size"] += len(message.payload) + len(message.attachment)
         original(self, message)
 
-    setattr(Intake, name, run)
+    setattr(Ingest, name, run)
 
 
 if __name__ == "__main__":

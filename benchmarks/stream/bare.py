@@ -17,7 +17,7 @@ from benchmarks.stream.crowd import Heard
 from benchmarks.stream.load import send_delays
 from benchmarks.stream.site import viewers
 from server.camera.encoding.encoder import AccessUnit
-from server.media.containers.fmp4 import Sample, fragment
+from server.media.containers.fmp4 import FragmentSample, fragment
 
 _BACKLOG = 1000
 
@@ -84,4 +84,4 @@ def _rounds(
 
 def _gop(film: Sequence[AccessUnit], first: int) -> bytes:
     units = ((pulse, film[pulse % len(film)]) for pulse in range(first, first + ENCODE.gop))
-    return b"".join(fragment([Sample(unit.data, unit.key)], pulse, SITE.fps) for pulse, unit in units)
+    return b"".join(fragment([FragmentSample(unit.data, unit.key)], pulse, SITE.fps) for pulse, unit in units)

@@ -16,15 +16,15 @@ from benchmarks.stream.cameras import CAMERAS, ENCODE, SITE
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
-from server.media.codec import agreement_for
+from server.media.codec import stream_format_for
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.streaming.subscriber_queue import Chunk
 from server.service.view_selection.decider import GopDecision, ObjectChoice
-from server.service.view_selection.explanation import Why
+from server.service.view_selection.explanation import SelectionReasons
 
 _NAMES = tuple(f"c{number}" for number in range(CAMERAS))
-_NO_REASON = cast("Why", None)
+_NO_REASON = cast("SelectionReasons", None)
 _US = 1e6
 
 
@@ -33,7 +33,7 @@ class Cut:
 
     def __init__(self, films: Sequence[Sequence[AccessUnit]], config: Config) -> None:
         self._films, self.gop = films, config.encode.gop
-        self.agreement = agreement = agreement_for(
+        self.agreement = agreement = stream_format_for(
             config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
         )
         self._shelves = {

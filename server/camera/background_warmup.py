@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from server.camera.detector_setup import FittedDetections, Observer, make_detector
-from server.camera.sources import Recording, Source
+from server.camera.detector_setup import CameraDetector, LetterboxedDetections, make_detector
+from server.camera.sources import PictureSource, Recording
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from tracking.detectors import BackgroundDetector
 
 
-def ready_detector(config: Config, camera: CameraSettings, source: Source, fit: Letterbox) -> Observer:
+def warm_up_detector(
+    config: Config, camera: CameraSettings, source: PictureSource, fit: Letterbox
+) -> CameraDetector:
     """Return a camera's detector, ready for the first frame where the source is a recording.
 
     A live camera's learns as it goes.
@@ -19,7 +21,7 @@ def ready_detector(config: Config, camera: CameraSettings, source: Source, fit: 
         UserError: the detector's files or the recording cannot be read.
     """
     detector, settings = make_detector(config, camera, fit), config.detect
-    if isinstance(detector, FittedDetections) and isinstance(source, Recording):
+    if isinstance(detector, LetterboxedDetections) and isinstance(source, Recording):
         detector.count_by(source.counted)
     if isinstance(detector, BackgroundDetector):
         places = range(0, settings.prescan_frames, settings.prescan_every)

@@ -9,7 +9,7 @@ import numpy as np
 from tracking import WindowResult, WindowTrack, merge_results
 
 
-def mended(result: WindowResult, anew: WindowResult) -> WindowResult:
+def corrected_messages(result: WindowResult, anew: WindowResult) -> WindowResult:
     """Return what to publish where a correction has had a window solved again.
 
     It begins with the first frame that was told as final and has changed, or where nothing has with the first

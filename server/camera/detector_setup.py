@@ -33,8 +33,8 @@ from tracking.detectors import (
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
 
-class Observer(Detector, Protocol):
-    """A detector that says how long the rows of its histograms are, and when it cannot see."""
+class CameraDetector(Detector, Protocol):
+    """A detector that also knows the size of its appearance histograms, and when it cannot see."""
 
     @property
     def bins(self) -> int:
@@ -47,7 +47,7 @@ class Observer(Detector, Protocol):
         ...
 
 
-def make_detector(config: Config, camera: CameraSettings, fit: Letterbox) -> Observer:
+def make_detector(config: Config, camera: CameraSettings, fit: Letterbox) -> CameraDetector:
     """Return the detector of a camera; its boxes are in the site's picture.
 
     Raises:
@@ -56,7 +56,7 @@ def make_detector(config: Config, camera: CameraSettings, fit: Letterbox) -> Obs
     if camera.detections is not None:
         with _told(f"camera {camera.id}: detections"):
             file = MotFileDetector(camera.detections, MotFileSettings(first_frame=camera.offset))
-            return FittedDetections(file, fit, config.detect)
+            return LetterboxedDetections(file, fit, config.detect)
     polygons = [fit.to_site(np.asarray(polygon, dtype=np.float64)) for polygon in camera.ignore]
     ignore = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in polygons)
     with _told(f"camera {camera.id}: detect"):
@@ -94,7 +94,7 @@ def _floor(config: Config, camera: CameraSettings, fit: Letterbox) -> FloorGeome
     return FloorGeometry(seen, slope) if _LEAST_SLOPE <= slope <= _MOST_SLOPE else None
 
 
-def _of_kind(settings: DetectSettings, floor: FloorGeometry | None) -> Observer:
+def _of_kind(settings: DetectSettings, floor: FloorGeometry | None) -> CameraDetector:
     """Return the detector that the settings name."""
     looks = AppearanceExtractor(settings.appearance, settings.gray_bins)
     match settings.kind:
@@ -123,8 +123,8 @@ def _told(where: str) -> Iterator[None]:
         raise UserError(f"{where}: {error}") from error
 
 
-class FittedDetections:
-    """Detections from a file, which are in the camera's own pixels, moved into the site's picture."""
+class LetterboxedDetections:
+    """Detections from a file, moved from the camera's own pixels into the site's picture."""
 
     warming_up = False
 

@@ -18,8 +18,8 @@ log = logging.getLogger(__name__)
 _DECODER = msgspec.json.Decoder(OperatorPoints)
 
 
-class Pointed:
-    """Keeps the newest that was pointed at in one run of a camera. What cannot be understood is counted."""
+class CorrectionInbox:
+    """Keeps the newest corrections of one run of a camera. Messages that cannot be parsed are counted."""
 
     def __init__(self, camera: str, boot: int) -> None:
         self._camera, self._boot = camera, boot

@@ -6,19 +6,19 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from server.camera.audio import LiveSound
-from server.camera.background_warmup import ready_detector
-from server.camera.corrected_windows import mended
+from server.camera.audio import LiveAudioSource
+from server.camera.background_warmup import warm_up_detector
+from server.camera.corrected_windows import corrected_messages
 from server.camera.detector_setup import make_detector
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.camera.floor_check import check_floor
-from server.camera.load.frame_skipper import Stepping
-from server.camera.passthrough import Passing, open_own
-from server.camera.peers.cross_view_scorer import Heard, Witness
-from server.camera.sharpness import Sharpness
-from server.camera.sources import Image, Source, open_source
-from server.camera.track_messages import Reporter
-from server.camera.tracker_setup import ready_tracker
+from server.camera.load.frame_skipper import FrameSkipper
+from server.camera.passthrough import PassthroughEncoder, open_passthrough
+from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
+from server.camera.sharpness import SharpnessMemory
+from server.camera.sources import Image, PictureSource, open_source
+from server.camera.track_messages import TrackMessageBuilder
+from server.camera.tracker_setup import set_up_tracker
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks, FrameDetections
@@ -26,14 +26,14 @@ from server.messaging.operator_messages import OPERATOR_POINTS_MAX
 from tracking import Detections, create_solver
 from tracking.interactive import PositionCorrection
 
-_BY_ITSELF = Heard()
+_BY_ITSELF = PeerDetections()
 _TOLD_MOST = 50_000
 """Frames of one hole that are told of, the last ones: a machine that slept has missed millions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Searched:
-    """A frame that people were looked for in.
+class DetectedFrame:
+    """A frame after detection.
 
     Attributes:
         pulse: its pulse.
@@ -77,27 +77,27 @@ class CameraPipeline:
         config: Config,
         camera_id: str,
         boot: int = 0,
-        listener: LiveSound | None = None,
+        listener: LiveAudioSource | None = None,
         *,
         ready: bool = True,
     ) -> None:
         camera, site = config.camera(camera_id), config.site
-        own = open_own(config, camera, listener)
+        own = open_passthrough(config, camera, listener)
         self.passes = own.source is not None
         """The source's own H.264 is passed on."""
         self.why_encoded = own.why
         """Why it is not, where it could have been; empty: nobody wished it."""
-        self.source: Source = own.source or open_source(camera, site, listener, ready=ready)
+        self.source: PictureSource = own.source or open_source(camera, site, listener, ready=ready)
         self._fit = Letterbox(self.source.size, (site.width, site.height))
         check_floor(camera, self.source.size)
-        self._encoder = Passing(own.source) if own.source else Encoder(site, config.encode)
+        self._encoder = PassthroughEncoder(own.source) if own.source else Encoder(site, config.encode)
         self._detector = (
-            ready_detector(config, camera, self.source, self._fit)
+            warm_up_detector(config, camera, self.source, self._fit)
             if ready
             else make_detector(config, camera, self._fit)
         )
         track = config.track
-        tracker = ready_tracker(
+        tracker = set_up_tracker(
             config,
             track.tracker,
             camera,
@@ -106,11 +106,13 @@ class CameraPipeline:
             self._fit,
             ready=ready,
         )
-        self._tracker = Stepping(tracker, self._detector.bins, track.window.stride)
-        self._reporter = Reporter(camera_id, boot, self.source.size, track.window.stride)
-        self._sharpness = Sharpness() if config.view.quality.sharpness > 0 else None
+        self._tracker = FrameSkipper(tracker, self._detector.bins, track.window.stride)
+        self._reporter = TrackMessageBuilder(camera_id, boot, self.source.size, track.window.stride)
+        self._sharpness = SharpnessMemory() if config.view.quality.sharpness > 0 else None
         self.witness = (
-            Witness(config, camera_id, self.source.size, boot) if config.witnesses(camera_id) else None
+            CrossViewScorer(config, camera_id, self.source.size, boot)
+            if config.witnesses(camera_id)
+            else None
         )
         self.begins = camera.offset if self.source.recorded else 0
         """The pulse at which the pictures begin."""
@@ -146,7 +148,7 @@ class CameraPipeline:
         """Search a frame and follow everybody into it by what this camera sees itself."""
         return self.follow(self.search(pulse, image))
 
-    def search(self, pulse: int, image: Image | None, *, left_out: bool = False) -> Searched:
+    def search(self, pulse: int, image: Image | None, *, left_out: bool = False) -> DetectedFrame:
         """Look for people in a frame, which has no image where it was not taken, or has to be left out.
 
         ``left_out``: on purpose, so that the frames around it tell who was there. Pulses must grow.
@@ -157,10 +159,13 @@ class CameraPipeline:
             detections = self._detector.detect(image, pulse)
             looked = not self._detector.warming_up
         word = self.witness.word(pulse, detections if looked else None) if self.witness else None
-        return Searched(pulse, image, detections, looked, word, left_out=left_out)
+        return DetectedFrame(pulse, image, detections, looked, word, left_out=left_out)
 
     def follow(
-        self, searched: Searched, heard: Heard = _BY_ITSELF, pointings: Sequence[PositionCorrection] = ()
+        self,
+        searched: DetectedFrame,
+        heard: PeerDetections = _BY_ITSELF,
+        pointings: Sequence[PositionCorrection] = (),
     ) -> CameraTracks | None:
         """Follow everybody into a frame; give the tracks when a window has ended.
 
@@ -195,7 +200,7 @@ class CameraPipeline:
         if self._pointings:
             anew = self._tracker.point(list(self._pointings))
             self._pointings.clear()
-            result = result if anew is None else mended(result, anew)
+            result = result if anew is None else corrected_messages(result, anew)
         return self._measured(self._reporter.regular(result), searched.image)
 
     def last_word(self, end: int) -> FrameDetections | None:

@@ -15,14 +15,14 @@ from typing import TypeVar
 import msgspec
 
 from camsync import ClientSettings, Pulse, PulseClient, steady_unix_clock
-from server.camera.audio import LiveSound, open_sound, runs
-from server.camera.load.load_monitor import Load
-from server.camera.operator_corrections import Pointed
-from server.camera.peers.detection_exchange import Exchange
+from server.camera.audio import LiveAudioSource, consecutive_runs, open_audio
+from server.camera.load.load_monitor import LoadMonitor
+from server.camera.operator_corrections import CorrectionInbox
+from server.camera.peers.detection_exchange import PeerDetectionExchange
 from server.camera.pipeline import CameraPipeline
-from server.camera.retained_state import Keeping
-from server.camera.sources import Image, SourceEnded
-from server.camera.status_meter import Meter
+from server.camera.retained_state import RetainedState
+from server.camera.sources import Image, SourceEndedError
+from server.camera.status_meter import StatusMeter
 from server.camera.thumbnails import thumbnails
 from server.config.pulse_access import pulse_client_tls, pulse_credentials
 from server.config.site_config import Config
@@ -80,8 +80,8 @@ class CameraProcess:
         self._boot = time.time_ns() // 1_000_000
         self._clock = steady_unix_clock()  # of pulses and all that is measured from them
         self._keys = ZenohKeys(config.site.name)
-        self._sound = open_sound(config, camera_id)
-        listener = self._sound if isinstance(self._sound, LiveSound) else None
+        self._sound = open_audio(config, camera_id)
+        listener = self._sound if isinstance(self._sound, LiveAudioSource) else None
         self._pipeline = CameraPipeline(config, camera_id, self._boot, listener)
         if self._pipeline.passes:
             log.info("camera %s: its own H.264 passes through", camera_id)
@@ -96,10 +96,12 @@ class CameraProcess:
         )
         # What passes through is decoded from picture to picture, and a recording is shown whole.
         live = not (self._pipeline.source.recorded or self._pipeline.passes)
-        self._load = Load(config, camera_id, live=live)
-        self._exchange = Exchange(config, camera_id, self._pipeline.witness, self._backlog.maxsize)
-        self._pointed = Pointed(camera_id, self._boot)
-        self._meter = Meter(fps)
+        self._load = LoadMonitor(config, camera_id, live=live)
+        self._exchange = PeerDetectionExchange(
+            config, camera_id, self._pipeline.witness, self._backlog.maxsize
+        )
+        self._pointed = CorrectionInbox(camera_id, self._boot)
+        self._meter = StatusMeter(fps)
         self._state: CameraState = "starting"
         self._end = 0
         """The first pulse that the recording has no frame for, once it is over."""
@@ -111,7 +113,7 @@ class CameraProcess:
         try:
             if self._config.track.assist.enabled:
                 bus.subscribe(self._keys.camera(self._id, "operator_points"), self._pointed.put)
-            keeping = Keeping(partial(self._publish, "retained_identities"))
+            keeping = RetainedState(partial(self._publish, "retained_identities"))
             bus.subscribe(self._keys.camera(self._id, "identities"), keeping.put)
             bus.watch_alive(self._keys.bestview("**"), lambda _, there: keeping.service(there))
             await self._wait_for_bestview(bus)
@@ -182,7 +184,7 @@ class CameraProcess:
             async for pulse in pulses:
                 try:
                     await self._on_pulse(pulse, pulses.now() - pulse.due)
-                except SourceEnded:
+                except SourceEndedError:
                     log.info("camera %s: the recording is over", self._id)
                     self._state, self._end = "ended", pulse.number
                     await self._backlog.put(None)
@@ -223,7 +225,7 @@ class CameraProcess:
         sound = self._sound
         if sound is None:
             return
-        for run in runs(await self._in(self._video, lambda: sound.at(pulse))):
+        for run in consecutive_runs(await self._in(self._video, lambda: sound.at(pulse))):
             head = AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])
             if self._bus is not None:
                 data = b"".join(frame.data for frame in run)

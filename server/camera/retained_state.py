@@ -8,8 +8,8 @@ from server.messaging.identity_snapshot import SNAPSHOT_BYTES_MAX
 from server.messaging.inbox import Message
 
 
-class Keeping:
-    """Keeps the newest word of the service, unread, and says it to every service that comes.
+class RetainedState:
+    """Keeps the newest state of the service, unread, and sends it to every service that starts.
 
     ``send`` sends it.
     """

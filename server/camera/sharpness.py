@@ -23,8 +23,8 @@ _LEAST = 4
 """Pixels of a side below which nothing can be said."""
 
 
-class Sharpness:
-    """Remembers how sharp each track was seen last, for windows in whose last frame it is hidden."""
+class SharpnessMemory:
+    """Remembers the last sharpness of each track, for windows in whose last frame it is hidden."""
 
     def __init__(self) -> None:
         self._known: dict[int, float] = {}

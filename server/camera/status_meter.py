@@ -6,14 +6,14 @@ import time
 from collections import deque
 
 from camsync import PulseClient
-from server.camera.load.load_monitor import Load
+from server.camera.load.load_monitor import LoadMonitor
 from server.messaging.messages import CameraState, CameraStatus
 
 _SPAN_S = 2.0
 """The frame rate is measured over this long."""
 
 
-class Meter:
+class StatusMeter:
     """Counts frames, missed pulses and shed frames."""
 
     def __init__(self, fps: float) -> None:
@@ -42,7 +42,9 @@ class Meter:
         """Count a frame that nobody is looked for in."""
         self._shed += 1
 
-    def status(self, camera: str, boot: int, state: CameraState, waiting: int, load: Load) -> CameraStatus:
+    def status(
+        self, camera: str, boot: int, state: CameraState, waiting: int, load: LoadMonitor
+    ) -> CameraStatus:
         """Return the camera's status; ``waiting`` frames are to be searched, ``load`` is what is left out."""
         sync = self._client.status() if self._client is not None else None
         since = time.monotonic() - _SPAN_S

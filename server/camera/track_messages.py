@@ -18,8 +18,8 @@ _LOOK_DIGITS = 5
 """Of a share of the pixels: more would only make messages longer."""
 
 
-class Reporter:
-    """Writes a camera's messages, and keeps count of the frames that were not searched for people."""
+class TrackMessageBuilder:
+    """Builds a camera's track messages, and counts the frames without detection."""
 
     def __init__(self, camera: str, boot: int, size: tuple[int, int], stride: int) -> None:
         self._camera, self._boot, self._size, self._stride = camera, boot, size, stride

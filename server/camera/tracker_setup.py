@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bestview import to_ground
-from server.camera.sources import Source
+from server.camera.sources import PictureSource
 from server.config.ground_unit import UNITS_PER_METER
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
@@ -18,17 +18,17 @@ from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.registry import PrescanTracker, Tracker, create_tracker
 
 
-def ready_tracker(
+def set_up_tracker(
     config: Config,
     name: str,
     camera: CameraSettings,
-    source: Source | None,
+    source: PictureSource | None,
     solver: Callable[[], Solver],
     fit: Letterbox | None = None,
     *,
     ready: bool = True,
 ) -> Tracker:
-    """Return tracker of that name; what has to learn the room has done so where the source is a recording.
+    """Return the tracker of that name; for a recording, what has to learn the room has done so.
 
     It looks at the source's pictures as ``fit`` makes them, or at these themselves; not ``ready``: at none
     ahead.

@@ -23,7 +23,7 @@ _THREADS = 1
 """FFmpeg would take one for each core, for a fraction of a millisecond's work."""
 
 
-def bgr(picture: VideoFrame) -> NDArray[np.uint8]:
+def to_bgr(picture: VideoFrame) -> NDArray[np.uint8]:
     """Return a decoded picture as ``(height, width, 3)`` BGR.
 
     One that names colours which FFmpeg cannot convert (ITU-T H.273, 8.3: half of the numbers there are) is
@@ -38,7 +38,7 @@ def bgr(picture: VideoFrame) -> NDArray[np.uint8]:
     return np.asarray(found.to_ndarray(), dtype=np.uint8)
 
 
-def yuv(image: NDArray[np.uint8]) -> VideoFrame:
+def to_yuv(image: NDArray[np.uint8]) -> VideoFrame:
     """Return a picture, ``(height, width, 3)`` BGR, as it is encoded: colour at half the size."""
     picture = VideoFrame.from_ndarray(image, format="bgr24")
     return _kept.to_yuv.reformat(picture, format="yuv420p", threads=_THREADS)

@@ -9,8 +9,8 @@ from server.media.h264.annexb import ParameterSets
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
-    """One picture, ready to be sent."""
+class EncodedPicture:
+    """One encoded picture, ready to be sent."""
 
     pulse: int
     key: bool

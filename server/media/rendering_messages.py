@@ -37,8 +37,8 @@ class Canvas(msgspec.Struct, frozen=True, kw_only=True):
     """0 to 100."""
 
 
-class Draw(msgspec.Struct, frozen=True, kw_only=True):
-    """Frames to decode, and what is wanted of them."""
+class RenderRequest(msgspec.Struct, frozen=True, kw_only=True):
+    """Frames to decode, and what to make of them."""
 
     fragments: bytes = b""
     """Fragments (or clusters) of consecutive frames; of the first request, they begin with a key frame."""
@@ -50,14 +50,14 @@ class Draw(msgspec.Struct, frozen=True, kw_only=True):
     film: bool = False
     """Wanted: the frames with boxes, encoded."""
     plain: list[float] = []
-    """Wanted: JPEG at these rates, a second (:func:`belongs`)."""
+    """Wanted: JPEG at these rates, a second (:func:`is_in_series`)."""
     boxed: list[float] = []
     """Wanted: JPEG with boxes, likewise."""
     still: Still | None = None
     """Wanted: JPEG of the last frame that was decoded, in this request or before."""
 
 
-class Unit(msgspec.Struct, frozen=True):
+class EncodedFrame(msgspec.Struct, frozen=True):
     """One encoded frame, Annex B; a key one carries SPS and PPS."""
 
     pulse: int
@@ -67,25 +67,25 @@ class Unit(msgspec.Struct, frozen=True):
     """Pulses that it is shown for."""
 
 
-class Jpeg(msgspec.Struct, frozen=True):
+class JpegPicture(msgspec.Struct, frozen=True):
     """One JPEG."""
 
     pulse: int
     data: bytes
 
 
-class Drawn(msgspec.Struct, frozen=True, kw_only=True):
-    """The answer to :class:`Draw`."""
+class RenderResult(msgspec.Struct, frozen=True, kw_only=True):
+    """The answer to :class:`RenderRequest`."""
 
     newest: int
     """The last frame that was decoded, now or before; -1: none."""
-    film: list[Unit] = []
-    plain: list[Jpeg] = []
-    boxed: list[Jpeg] = []
-    still: Jpeg | None = None
+    film: list[EncodedFrame] = []
+    plain: list[JpegPicture] = []
+    boxed: list[JpegPicture] = []
+    still: JpegPicture | None = None
 
 
-def belongs(pulse: int, rate: float, fps: float) -> bool:
+def is_in_series(pulse: int, rate: float, fps: float) -> bool:
     """Return whether a frame belongs to a series of ``rate`` pictures a second out of ``fps``.
 
     It depends on the pulse alone, so that series share pictures, and a slower one is part of a faster one
@@ -94,7 +94,7 @@ def belongs(pulse: int, rate: float, fps: float) -> bool:
     return rate >= fps or pulse * rate // fps != (pulse - 1) * rate // fps
 
 
-def framed(message: msgspec.Struct) -> bytes:
-    """Return a message as it goes through a pipe."""
+def encode_message(message: msgspec.Struct) -> bytes:
+    """Encode a message behind its length, as it goes through a pipe."""
     body = msgspec.msgpack.encode(message)
     return len(body).to_bytes(LENGTH_BYTES, "big") + body

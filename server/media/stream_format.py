@@ -5,13 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from server.media.audio.audio_format import SoundFormat
-from server.media.containers.fmp4 import Sample, fragment, init_segment, rebased, sample_of, ticks
-from server.media.gap_filler import NO_CAMERAS, Bridge, H264Bridge
-from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets, sample, units_of
+from server.media.audio.audio_format import AudioFormat
+from server.media.containers.fmp4 import (
+    FragmentSample,
+    fragment,
+    init_segment,
+    sample_of,
+    shift_fragment,
+    ticks,
+)
+from server.media.gap_filler import NO_CAMERAS, GapFiller, H264GapFiller
+from server.media.h264.annexb import ParameterSets, join_sample, nal_units, parameter_sets, split_sample
 from server.media.h264.grey_picture import grey_picture
-from server.media.h264.repeat_picture import UnfitError, continuing
-from server.media.picture import Picture
+from server.media.h264.repeat_picture import UnsupportedParametersError, parse_repeatable
+from server.media.picture import EncodedPicture
 
 Container = Literal["mp4", "webm"]
 
@@ -20,7 +27,7 @@ class ParameterMismatchError(Exception):
     """The camera's parameters are not the site's: its frames would decode into wrong pixels."""
 
 
-class Agreement:
+class StreamFormat:
     """H.264 in MP4: the first key frame of a site fixes the parameter sets.
 
     Whoever has others cannot be spliced in.
@@ -60,13 +67,13 @@ class Agreement:
 
     def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
         """Return a frame as a fragment, which fits into any stream of the site."""
-        return fragment([Sample(sample(nal_units(access_unit)), key)], pulse, fps)
+        return fragment([FragmentSample(join_sample(nal_units(access_unit)), key)], pulse, fps)
 
     def head(
         self,
         size: tuple[int, int],
         fps: float,
-        sound: SoundFormat | None = None,
+        sound: AudioFormat | None = None,
         *,
         pulses: int | None = None,
     ) -> bytes | None:
@@ -81,19 +88,21 @@ class Agreement:
 
     def begun_at(self, origin: int, fragment: bytes, fps: float) -> bytes:
         """Return a fragment as it is in a stream that has this pulse at time 0."""
-        return rebased(fragment, -ticks(origin, fps))
+        return shift_fragment(fragment, -ticks(origin, fps))
 
     def told_by(self, key: bytes) -> ParameterSets | None:
         """Return the parameter sets of the pictures from a key fragment on, where they may be its own."""
         del key
         return None
 
-    def bridge(self, newest: Picture, fps: float) -> Bridge | None:
+    def bridge(self, newest: EncodedPicture, fps: float) -> GapFiller | None:
         """Return what bridges holes after a picture; None where it is not known how."""
         del newest
-        return None if self.parameters is None else bridge_by(self.parameters, fps)
+        return None if self.parameters is None else gap_filler_for(self.parameters, fps)
 
-    def blank(self, newest: Picture | None, first: int, frames: int, fps: float) -> list[Picture]:
+    def blank(
+        self, newest: EncodedPicture | None, first: int, frames: int, fps: float
+    ) -> list[EncodedPicture]:
         """Return a GOP of grey pictures that fits after a picture; nothing where it is not known how.
 
         Where its last picture cannot be repeated, the grey one lasts for all of it.
@@ -108,26 +117,28 @@ class Agreement:
         first: int,
         frames: int,
         fps: float,
-    ) -> list[Picture]:
+    ) -> list[EncodedPicture]:
         """Return that GOP by some parameter sets; ``decoded_by`` is what its pictures say of themselves."""
         if written_by is None:
             return []
         try:
             grey = grey_picture(written_by, first // frames % 2)
-        except UnfitError:
+        except UnsupportedParametersError:
             return []
-        bridge = bridge_by(written_by, fps)
+        bridge = gap_filler_for(written_by, fps)
         lasts = frames if bridge is None else 1
-        made = fragment([Sample(grey, key=True, lasts=lasts)], first, fps)
-        key = Picture(first, key=True, fragment=made, boot=NO_CAMERAS, lasts=lasts, parameters=decoded_by)
+        made = fragment([FragmentSample(grey, key=True, lasts=lasts)], first, fps)
+        key = EncodedPicture(
+            first, key=True, fragment=made, boot=NO_CAMERAS, lasts=lasts, parameters=decoded_by
+        )
         if bridge is None:
             return [key]
         bridge = replace(bridge, parameters=decoded_by)
         return [key, *bridge.after(key, [(pulse, 1) for pulse in range(first + 1, first + frames)])]
 
 
-class OwnParameters(Agreement):
-    """The same, but cameras may have parameter sets of their own, which their key frames carry."""
+class PerCameraStreamFormat(StreamFormat):
+    """H.264 in MP4 where each camera has parameter sets of its own, carried by its key frames."""
 
     def accept(self, key: bytes) -> ParameterSets:
         """Take a camera's parameter sets for its own.
@@ -144,24 +155,26 @@ class OwnParameters(Agreement):
 
     def told_by(self, key: bytes) -> ParameterSets | None:
         """Find them in the picture, where they always are."""
-        return parameter_sets(units_of(sample_of(key)))
+        return parameter_sets(split_sample(sample_of(key)))
 
-    def bridge(self, newest: Picture, fps: float) -> Bridge | None:
+    def bridge(self, newest: EncodedPicture, fps: float) -> GapFiller | None:
         """Return what bridges holes after a picture, by that picture's own parameter sets."""
         if newest.parameters is None:
             return None
-        bridge = bridge_by(newest.parameters, fps)
+        bridge = gap_filler_for(newest.parameters, fps)
         return None if bridge is None else replace(bridge, parameters=newest.parameters)
 
-    def blank(self, newest: Picture | None, first: int, frames: int, fps: float) -> list[Picture]:
+    def blank(
+        self, newest: EncodedPicture | None, first: int, frames: int, fps: float
+    ) -> list[EncodedPicture]:
         """Return a GOP of grey pictures by the parameter sets of a picture; they are in it, as at any cut."""
         known = self.parameters if newest is None or newest.parameters is None else newest.parameters
         return self._blank(known, known, first, frames, fps)
 
 
-def bridge_by(parameters: ParameterSets, fps: float) -> H264Bridge | None:
-    """Return what bridges holes in a stream of these parameter sets; None where it is not known how."""
+def gap_filler_for(parameters: ParameterSets, fps: float) -> H264GapFiller | None:
+    """Return the gap filler for a stream of these parameter sets; None where there is none."""
     try:
-        return H264Bridge(continuing(parameters), fps)
-    except UnfitError:
+        return H264GapFiller(parse_repeatable(parameters), fps)
+    except UnsupportedParametersError:
         return None

@@ -6,19 +6,19 @@ from bestview import Merge, Split
 from server.messaging.messages import GopChoices, PersonMerge, PersonSplit, ViewCut
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 from server.service.view_selection.explanation import Explanation
-from server.service.view_selection.recent_reasons import Reason, Reasons, Standing
+from server.service.view_selection.recent_reasons import RecentReasons, SelectedView, SelectionReason
 
 
 class Board:
     """Remembers every object's newest decision, and the reasons of the last minute."""
 
     def __init__(self, fps: float) -> None:
-        self.standings: dict[int, Standing] = {}
+        self.standings: dict[int, SelectedView] = {}
         self.merged: dict[int, int] = {}
         self.cuts = 0
         self.end = 0
         """The first pulse that nothing is decided about."""
-        self._reasons = Reasons(fps)
+        self._reasons = RecentReasons(fps)
 
     def put(self, decision: GopDecision) -> GopChoices:
         """Take a decision over; give it as the message that is published and sent to the page."""
@@ -60,7 +60,7 @@ class Board:
         """Give the number that a merged one goes by now."""
         return self.merged.get(number, number)
 
-    def explain(self, number: int, pulse: int | None = None) -> Reason | None:
+    def explain(self, number: int, pulse: int | None = None) -> SelectionReason | None:
         """Explain an object's newest view, or that at a pulse of the last minute.
 
         What was before the first question about an object is not kept.
@@ -77,7 +77,7 @@ class Board:
     def _stand(self, decision: GopDecision, choice: ObjectChoice, cameras: tuple[str, ...]) -> None:
         known = self.standings.get(choice.number)
         stays = known is not None and known.choice.camera == choice.camera
-        self.standings[choice.number] = Standing(
+        self.standings[choice.number] = SelectedView(
             choice=choice,
             first=decision.first,
             frames=decision.frames,

@@ -18,7 +18,7 @@ from logthrottle import LogThrottle
 from server.config.pulse_access import bestview_client_name, pulse_client_tls, pulse_credentials
 from server.config.sections import ViewSettings
 from server.config.site_config import Config
-from server.media.codec import agreement_for
+from server.media.codec import stream_format_for
 from server.messaging.bus import Bus
 from server.messaging.bus_access import access_control_of
 from server.messaging.inbox import Inbox, Message
@@ -26,18 +26,18 @@ from server.messaging.messages import GopChoices, ZenohKeys
 from server.service.calibration.walk_session import WalkSession
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 from server.service.decision_state import Board
-from server.service.identity.state_replication import PATIENCE_S, Remembering
-from server.service.ingest.backlog import KeepingUp
-from server.service.ingest.epoch_aligner import Aligner, Epoch
-from server.service.ingest.ingest import Intake
-from server.service.ingest.loss_recorder import Lacking
-from server.service.metrics.stage_timers import Stages
+from server.service.identity.state_replication import PATIENCE_S, StateReplication
+from server.service.ingest.backlog import BacklogMonitor
+from server.service.ingest.epoch_aligner import Epoch, EpochAligner
+from server.service.ingest.ingest import Ingest
+from server.service.ingest.loss_recorder import LossRecorder
+from server.service.metrics.stage_timers import StageTimers
 from server.service.operator_assist.operator_assist import OperatorAssist
 from server.service.recording.recorder import Recorder
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
-from server.service.view_selection.decider import Decider, GopDecision, homographies
+from server.service.view_selection.decider import GopDecision, ViewDecider, camera_homographies
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -63,22 +63,22 @@ class BestViewService:
         frames = max(round(config.view.buffer_s * fps), behind + 4 * (config.view.lookahead + grace + stride))
         self.most_lookahead = (frames - behind) // 2 - grace - stride
         """Frames that can be looked ahead while this runs: half as many as what is kept could do for."""
-        self.agreement = agreement_for(
+        self.agreement = stream_format_for(
             config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
         )
         self.frame_buffers = {
             camera: FrameBuffer(config.site.fps, frames, self.agreement) for camera in cameras
         }
         far = round(_FAR_S * fps)
-        self.aligner = Aligner(cameras, stride, grace, behind, far + grace + behind)
+        self.aligner = EpochAligner(cameras, stride, grace, behind, far + grace + behind)
         form = config.sound.format
         self.sound = None if form is None else AudioBuffer(form, config.site.fps, frames / config.site.fps)
-        self._keeping_up = KeepingUp(frames - config.view.lookahead - config.encode.gop)
+        self._keeping_up = BacklogMonitor(frames - config.view.lookahead - config.encode.gop)
         self.left_out = 0
         """Epochs that were not decided, since there was more to decide than could be."""
         self._leaving_out = LogThrottle()
         self.splicer = Splicer(self.frame_buffers, self.agreement, config, self.sound)
-        self.intake = Intake(
+        self.intake = Ingest(
             self.frame_buffers,
             self.aligner,
             self.splicer.publish_frame,
@@ -87,14 +87,14 @@ class BestViewService:
             now=lambda: self.pulse,
             ahead=far,
         )
-        self.decider = Decider(
-            config, homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
+        self.decider = ViewDecider(
+            config, camera_homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
         )
         self.board = Board(config.site.fps)
         self.assist = OperatorAssist(
             config, self.decider.people, partial(self._tell_camera, "operator_points")
         )
-        self.remembering = Remembering(
+        self.remembering = StateReplication(
             self.decider.people,
             cameras,
             fps,
@@ -111,8 +111,8 @@ class BestViewService:
         self._pulsed_at: float | None = None
         self._clock: Callable[[], float] = time.time
         """The pulses', which does not step when the system's is set."""
-        self.lacking = Lacking(self.frame_buffers, self.intake.states, stride)
-        self.stages = Stages()
+        self.lacking = LossRecorder(self.frame_buffers, self.intake.states, stride)
+        self.stages = StageTimers()
         self.inboxes: list[Inbox[Message]] = []
         """Where the bus's messages wait for the event loop."""
         self.on_decision: list[Callable[[GopChoices], None]] = []

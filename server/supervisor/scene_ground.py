@@ -19,6 +19,6 @@ def add_scene_ground(config: Config) -> Config:
 def _calibrated(camera: CameraSettings, site: SiteSettings) -> CameraSettings:
     if camera.ground is not None or source_kind(camera.source) is not SourceKind.SCENE:
         return camera
-    from server.camera.sources.synthetic import Stage  # noqa: PLC0415 — it draws, and other sites need not load it
+    from server.camera.sources.synthetic import SyntheticSource  # noqa: PLC0415 — it draws, and other sites need not load it
 
-    return camera.model_copy(update={"ground": Stage(camera.source, site).ground})
+    return camera.model_copy(update={"ground": SyntheticSource(camera.source, site).ground})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 
-from server.camera.audio import open_sound
+from server.camera.audio import open_audio
 from server.camera.pipeline import CameraPipeline
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
@@ -46,7 +46,7 @@ def check_recordings(config: Config) -> None:
         UserError: a recording, a scene, a file of detections or the sound cannot be opened.
     """
     if config.sounding is not None:
-        open_sound(config, config.sounding)
+        open_audio(config, config.sounding)
     for camera in config.camera_ids:
         check_recording(config, camera)
 

@@ -14,7 +14,7 @@ from benchmarks.scaling.service import REST, STAGES, Times
 from benchmarks.scaling.site import carry
 from bestview import foot_points, to_ground
 from server.messaging.messages import CameraTracks
-from server.service.ingest.validation import makes_sense
+from server.service.ingest.validation import is_plausible
 
 
 @pytest.mark.parametrize("cameras", [4, 25])
@@ -54,7 +54,7 @@ def test_a_tracker_says_what_the_service_takes_and_renames_who_comes_back() -> N
         last = (epoch + 1) * STRIDE - 1
         message = tracker.message(epoch, hall.places(last + 1 - WINDOW, last))
         assert msgspec.json.decode(msgspec.json.encode(message), type=CameraTracks) == message
-        assert makes_sense(message, STRIDE)
+        assert is_plausible(message, STRIDE)
         for track in message.tracks:
             [look] = track.appearance
             ids.setdefault(tuple(look.histogram), set()).add(track.id)

@@ -109,11 +109,11 @@ def test_what_is_kept_is_counted_in_the_time_of_the_site(tmp_path: Path) -> None
 def test_a_stream_has_a_hole_where_there_is_nothing_to_show_and_not_where_a_picture_lasts() -> None:
     seen = Seen()
     pictures = [
-        fmp4.fragment([fmp4.Sample(b"a", key=True)], 10, 25.0),
-        fmp4.fragment([fmp4.Sample(b"b", key=False), fmp4.Sample(b"c", key=False)], 11, 25.0),
-        fmp4.still([fmp4.Sample(b"d", key=False)], 13, 90, 25.0),
-        fmp4.fragment([fmp4.Sample(b"e", key=True)], 90, 25.0),
-        fmp4.fragment([fmp4.Sample(b"f", key=True)], 94, 25.0),
+        fmp4.fragment([fmp4.FragmentSample(b"a", key=True)], 10, 25.0),
+        fmp4.fragment([fmp4.FragmentSample(b"b", key=False), fmp4.FragmentSample(b"c", key=False)], 11, 25.0),
+        fmp4.still_fragment([fmp4.FragmentSample(b"d", key=False)], 13, 90, 25.0),
+        fmp4.fragment([fmp4.FragmentSample(b"e", key=True)], 90, 25.0),
+        fmp4.fragment([fmp4.FragmentSample(b"f", key=True)], 94, 25.0),
     ]
     for place, data in enumerate(pictures):
         shown = shown_by(data[4:], 25.0)
@@ -152,4 +152,4 @@ async def test_a_person_may_be_forgotten_and_a_camera_may_not() -> None:
     assert visitors.camera.holes == visitors.person.holes == 0
 
 
-FILM = [fmp4.fragment([fmp4.Sample(b"a", key=not it)], it, 25.0) for it in range(3)]
+FILM = [fmp4.fragment([fmp4.FragmentSample(b"a", key=not it)], it, 25.0) for it in range(3)]

@@ -27,9 +27,9 @@ from benchmarks.stream.splice import encode_again, splice
 from benchmarks.stream.stalled import Beside, Turn, beside_stalled, stalling
 from benchmarks.stream.tables import Found, describe, per_core, plot
 from server.camera.encoding.encoder import AccessUnit
-from server.media.containers.fmp4 import Sample, fragment, ticks
-from server.media.containers.mpegts import Counters
-from server.media.picture import Picture
+from server.media.containers.fmp4 import FragmentSample, fragment, ticks
+from server.media.containers.mpegts import ContinuityCounters
+from server.media.picture import EncodedPicture
 from server.service.streaming.media_chunk import MediaChunk
 
 GOP = 10
@@ -72,14 +72,14 @@ def test_the_delay_is_the_same_to_the_end_and_the_times_are_the_pulses(films: Fi
 
 @pytest.mark.parametrize("pulse", [0, 12_345, 2**31])
 def test_the_times_of_a_piece_are_read_from_both_forms(pulse: int) -> None:
-    made = fragment([Sample(b"\x00\x00\x17\x70" + b"\x65" * 6000, key=True)], pulse, 25)
+    made = fragment([FragmentSample(b"\x00\x00\x17\x70" + b"\x65" * 6000, key=True)], pulse, 25)
     at = ticks(pulse, 25)
-    piece = MediaChunk([Picture(pulse, key=True, fragment=made, boot=1)], 25, Counters())
+    piece = MediaChunk([EncodedPicture(pulse, key=True, fragment=made, boot=1)], 25, ContinuityCounters())
     assert times(piece) == (at, at % 2**33)
 
 
 def test_the_first_fragment_ends_where_its_pictures_do() -> None:
-    whole = fragment([Sample(b"abc", key=True)], 7, 25)
+    whole = fragment([FragmentSample(b"abc", key=True)], 7, 25)
     head = b"\x00\x00\x00\x10ftypiso5\x00\x00\x00\x00"
     assert [end_of_first_fragment((head + whole)[:size]) for size in (0, 20, len(head + whole) - 1)] == [
         0,
@@ -126,7 +126,7 @@ def shouting(data: bytes) -> Iterator[int]:
 
 
 def test_a_crowd_hears_all_that_is_sent_and_notices_who_hangs_up() -> None:
-    data = fragment([Sample(b"abc" * 100, key=True)], 9, 25)
+    data = fragment([FragmentSample(b"abc" * 100, key=True)], 9, 25)
     with shouting(data) as port:
         crowd, began = Crowd(port), time.monotonic()
         crowd.watch(["/"] * 3)

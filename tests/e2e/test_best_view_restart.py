@@ -22,7 +22,7 @@ from server.config.sections import ZenohSettings
 from server.messaging.bus import Bus
 from server.messaging.inbox import Message
 from server.messaging.messages import CameraTracks, ZenohKeys
-from server.service.identity.local_numbers import Followed
+from server.service.identity.local_numbers import TrackName
 
 pytestmark = [
     pytest.mark.live,
@@ -31,7 +31,7 @@ pytestmark = [
 ]
 
 
-def whose(gops: Sequence[Gop], words: Sequence[CameraTracks]) -> dict[Followed, set[int]]:
+def whose(gops: Sequence[Gop], words: Sequence[CameraTracks]) -> dict[TrackName, set[int]]:
     """Return the numbers under which each track's boxes were shown."""
     numbers = {
         (camera, gop.first + at, (box.left, box.top, box.right, box.bottom)): box.object
@@ -40,13 +40,13 @@ def whose(gops: Sequence[Gop], words: Sequence[CameraTracks]) -> dict[Followed, 
         for at, row in enumerate(frames)
         for box in row
     }
-    found: dict[Followed, set[int]] = defaultdict(set)
+    found: dict[TrackName, set[int]] = defaultdict(set)
     for word in words:
         for track in word.tracks:
             for at, place in enumerate(track.boxes):
                 number = None if place is None else numbers.get((word.camera, word.first + at, tuple(place)))
                 if number is not None:
-                    found[Followed(word.camera, word.boot, track.id)].add(number)
+                    found[TrackName(word.camera, word.boot, track.id)].add(number)
     return found
 
 
@@ -97,7 +97,7 @@ async def killed(site: RunningSite, words: list[CameraTracks]) -> None:
             await asyncio.sleep(0.05)
     told = whose(site.gops[:count], words)
 
-    def again() -> dict[Followed, set[int]]:
+    def again() -> dict[TrackName, set[int]]:
         """Return the tracks that went on over the time without a service, as they are told now."""
         on = {track for word in words if word.last > died for track in tracks_of(word)}
         now = whose(site.gops[count:], words)
@@ -121,8 +121,8 @@ def seen_now(gop: Gop) -> set[int]:
     return {box.object for frames in gop.boxes.values() for box in frames[-1]}
 
 
-def tracks_of(word: CameraTracks) -> list[Followed]:
-    return [Followed(word.camera, word.boot, track.id) for track in word.tracks]
+def tracks_of(word: CameraTracks) -> list[TrackName]:
+    return [TrackName(word.camera, word.boot, track.id) for track in word.tracks]
 
 
 async def asked(session: aiohttp.ClientSession, url: str, number: int) -> int | None:

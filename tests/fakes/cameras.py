@@ -29,14 +29,14 @@ from server.messaging.messages import (
 )
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.service import BestViewService
-from server.service.view_selection.explanation import Why
+from server.service.view_selection.explanation import SelectionReasons
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 GOP = STRIDE = 5
 CAMERAS = ("c0", "c1")
 SMALL: Box = (10.0, 10.0, 16.0, 28.0)
 LARGE: Box = (20.0, 4.0, 36.0, 44.0)
-NO_REASON = cast("Why", None)
+NO_REASON = cast("SelectionReasons", None)
 """Of decisions that a test makes up: nobody will ask why."""
 
 

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from bestview import IdentitySettings, IdentityUpdate, Merge, Split, TrackletKey, TrackUpdate
 from fakes.cameras import CAMERAS, HEIGHT, WIDTH
 from server.messaging.messages import Box
-from server.service.identity.people import People
+from server.service.identity.people import PersonTracker
 
 
-def people(**settings: int) -> People:
+def people(**settings: int) -> PersonTracker:
     identity = IdentitySettings(**{"confirmation_frames": 1, "clustering_interval": 1, **settings})
-    return People(identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
+    return PersonTracker(identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
 
 
 class Dictated:
@@ -28,7 +28,7 @@ class Dictated:
         return self._updates.pop(0)
 
 
-def boxes(it: People, camera: str, pulse: int) -> dict[int, Box]:
+def boxes(it: PersonTracker, camera: str, pulse: int) -> dict[int, Box]:
     """Return everybody's box in one frame by number."""
     [rows] = it.boxes(camera, pulse, 1)
     numbers = [number for number, *_ in rows]

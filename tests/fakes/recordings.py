@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, WIDTH, encoded
 from server.media.containers.fmp4 import init_segment
-from server.media.stream_format import Agreement
+from server.media.stream_format import StreamFormat
 from server.messaging.messages import GopChoices
 from server.service.recording.age_clock import MachineClocks
 from server.service.recording.media_files import RecordedGop, _fragments
@@ -66,7 +66,7 @@ class ClocksByHand:
 @cache
 def filled() -> tuple[dict[str, FrameBuffer], bytes]:
     """Return a shelf per camera with all its frames, and what every file begins with."""
-    agreement = Agreement()
+    agreement = StreamFormat()
     frame_buffers = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, FRAMES):

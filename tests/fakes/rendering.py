@@ -8,8 +8,8 @@ import av
 import numpy as np
 
 from fakes.cameras import FPS, GOP, HEIGHT, WIDTH, encoded
-from server.media.containers.fmp4 import Sample, fragment
-from server.media.h264.annexb import nal_units, sample
+from server.media.containers.fmp4 import FragmentSample, fragment
+from server.media.h264.annexb import join_sample, nal_units
 from server.media.rendering_messages import Canvas
 from server.service.rendering.worker.box_overlay import Image
 
@@ -22,7 +22,8 @@ def fragments(first: int, count: int, seed: int = 0) -> bytes:
     """Return frames of a camera as the service passes them on."""
     units = encoded(seed)[first : first + count]
     return b"".join(
-        fragment([Sample(sample(nal_units(unit.data)), unit.key)], unit.pulse, FPS) for unit in units
+        fragment([FragmentSample(join_sample(nal_units(unit.data)), unit.key)], unit.pulse, FPS)
+        for unit in units
     )
 
 

@@ -16,17 +16,17 @@ from bestview import validate_homography
 from client.fmp4 import Mp4Error
 from client.mp4_writer import write_plain
 from client.webm import ElementReader, WebmError, cluster_time
-from server.camera.peers.detection_exchange import Exchange
+from server.camera.peers.detection_exchange import PeerDetectionExchange
 from server.cli.calibrate.points_file import read_points
 from server.config.loader import build_config, change_view_settings, load_config
 from server.config.sections import ViewSettings
 from server.config.tokens_file import read_tokens
 from server.http.app import make_app, serving
-from server.media.audio.audio_format import SoundFormat
-from server.media.containers.mp4_audio import sound_fragment
+from server.media.audio.audio_format import AudioFormat
+from server.media.containers.mp4_audio import audio_fragment
 from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets
-from server.media.h264.repeat_picture import UnfitError, continuing
-from server.media.stream_format import Agreement
+from server.media.h264.repeat_picture import UnsupportedParametersError, parse_repeatable
+from server.media.stream_format import StreamFormat
 from server.messaging.inbox import Message
 from server.service.recording.audio_file import read_audio_frames
 from server.service.recording.playlist_file import RecordingPlaylist
@@ -180,10 +180,10 @@ async def test_an_access_unit_without_a_picture_is_counted_and_dropped(damaged: 
 def test_parameter_sets_of_pictures_beyond_every_level_are_unfit() -> None:
     found = parameter_sets(nal_units(pictures(0, 1)[0].data))
     assert found is not None
-    continuing(found)
+    parse_repeatable(found)
     huge = found.sps[:4] + b"\xf6\x00\x00\x00\x80\x00\x00\x00\x80" + b"\xff" * 20
-    with pytest.raises(UnfitError):
-        continuing(ParameterSets(huge, found.pps))
+    with pytest.raises(UnsupportedParametersError):
+        parse_repeatable(ParameterSets(huge, found.pps))
 
 
 def test_parameter_sets_that_no_file_can_hold_are_none() -> None:
@@ -239,11 +239,11 @@ def test_a_playlist_of_a_time_that_no_calendar_has_is_written_without_it(tmp_pat
 
 
 def test_a_recording_of_times_that_no_film_has_is_left_as_it_is(tmp_path: Path) -> None:
-    agreement, (unit, *_) = Agreement(), pictures(0, 1)
+    agreement, (unit, *_) = StreamFormat(), pictures(0, 1)
     agreement.accept(unit.data)
-    head = agreement.head(site().site.size, site().site.fps, SoundFormat(48_000, 2)) or b""
-    form = SoundFormat(48_000, 2)
-    sound = sound_fragment(form, [form.silence] * 3, 0)
+    head = agreement.head(site().site.size, site().site.fps, AudioFormat(48_000, 2)) or b""
+    form = AudioFormat(48_000, 2)
+    sound = audio_fragment(form, [form.silence] * 3, 0)
     picture = bytearray(agreement.pack(unit.data, 0, 25.0, key=True))
     at = picture.index(b"tfdt") + 8
     picture[at : at + 8] = (1 << 60).to_bytes(8, "big")
@@ -254,8 +254,8 @@ def test_a_recording_of_times_that_no_film_has_is_left_as_it_is(tmp_path: Path) 
 
 
 def test_recorded_sound_that_says_it_is_longer_than_its_file_is_passed_over(tmp_path: Path) -> None:
-    form, path = SoundFormat(48_000, 2), tmp_path / "0.mp4"
-    right = sound_fragment(form, [form.silence] * 3, 0)
+    form, path = AudioFormat(48_000, 2), tmp_path / "0.mp4"
+    right = audio_fragment(form, [form.silence] * 3, 0)
     path.write_bytes(right)
     assert len(read_audio_frames(path, 0, len(right), 0, 9, form)) == 3
     at = right.index(b"trun") + 16
@@ -270,7 +270,7 @@ def test_a_cluster_whose_time_is_no_number_has_none() -> None:
 
 
 def test_words_nested_without_end_are_counted_and_dropped() -> None:
-    exchange = Exchange(site(), "c0", None, 50)
+    exchange = PeerDetectionExchange(site(), "c0", None, 50)
     payload = b'{"x":' * 100_000
     exchange._read(Message(KEYS.camera("c1", "detections"), payload, b""))
     service = Fed(site())

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from server.camera.audio.frames import Frame, runs
-from server.camera.audio.live_source import LiveSound
-from server.camera.audio.recorded_source import RecordedSound
+from server.camera.audio.frames import EncodedAudioFrame, consecutive_runs
+from server.camera.audio.live_source import LiveAudioSource
+from server.camera.audio.recorded_source import RecordedAudioSource
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
 from server.system.address_redaction import redact_address
 from server.system.errors import UserError
 
-__all__ = ["Frame", "LiveSound", "RecordedSound", "open_sound", "runs"]
+__all__ = ["EncodedAudioFrame", "LiveAudioSource", "RecordedAudioSource", "consecutive_runs", "open_sound"]
 
 
-def open_sound(config: Config, camera_id: str) -> RecordedSound | LiveSound | None:
+def open_audio(config: Config, camera_id: str) -> RecordedAudioSource | LiveAudioSource | None:
     """Open the site's sound, where this camera's process is to send it; None where it is not.
 
     Raises:
@@ -27,12 +27,12 @@ def open_sound(config: Config, camera_id: str) -> RecordedSound | LiveSound | No
         camera = config.camera(camera_id)
         path, offset, at_end = camera.source, camera.offset, camera.at_end
         if source_kind(path) is SourceKind.STREAM:
-            return LiveSound(settings, fps, config.encode.gop / fps)
+            return LiveAudioSource(settings, fps, config.encode.gop / fps)
         if source_kind(path) is not SourceKind.FILE:
             raise UserError(
                 f"sound: camera {camera_id} has none: {redact_address(path)}; name another, or a file"
             )
     try:
-        return RecordedSound(path, settings, fps, offset, at_end)
+        return RecordedAudioSource(path, settings, fps, offset, at_end)
     except UserError as error:
         raise UserError(f"sound: {error}") from error

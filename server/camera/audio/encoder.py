@@ -12,8 +12,8 @@ from av.audio.frame import AudioFrame
 from av.audio.resampler import AudioResampler
 from numpy.typing import NDArray
 
-from server.camera.audio.frames import Frame, Packet
-from server.media.audio.audio_format import SoundFormat
+from server.camera.audio.frames import EncodedAudioFrame, Packet
+from server.media.audio.audio_format import AudioFormat
 
 log = logging.getLogger(__name__)
 
@@ -25,10 +25,10 @@ _OFF_S = 0.02
 """Sound that is this far away from its place is moved there."""
 
 
-class Encoding:
-    """Decodes, resamples and encodes. Where nothing comes there is silence; what comes twice is left out."""
+class AudioEncoder:
+    """Decodes, resamples and encodes audio. Gaps become silence; overlapping packets are dropped."""
 
-    def __init__(self, form: SoundFormat, kbps: int) -> None:
+    def __init__(self, form: AudioFormat, kbps: int) -> None:
         self._rate, self._each, self._ahead = form.rate, form.samples, _AHEAD[form.coding]
         self._layout = "mono" if form.channels == 1 else "stereo"
         self._format = "fltp" if form.coding == "aac" else "flt"
@@ -45,7 +45,7 @@ class Encoding:
         self._too_many = 0
         """Samples that are to be left out of what comes."""
 
-    def take(self, packet: Packet, at: Fraction) -> list[Frame]:
+    def take(self, packet: Packet, at: Fraction) -> list[EncodedAudioFrame]:
         """Return the frames that have become whole."""
         if packet.pts is None or packet.time_base is None:
             return []
@@ -88,8 +88,8 @@ class Encoding:
             self._too_many -= out.samples - samples.shape[1]
             self._samples = np.concatenate((self._samples, samples), axis=1)
 
-    def _encoded(self) -> list[Frame]:
-        found: list[Frame] = []
+    def _encoded(self) -> list[EncodedAudioFrame]:
+        found: list[EncodedAudioFrame] = []
         while self._first is not None and self._samples.shape[1] >= self._each:
             samples = np.ascontiguousarray(self._samples[:, : self._each])
             frame = AudioFrame.from_ndarray(*self._laid_out(samples), layout=self._layout)
@@ -98,7 +98,7 @@ class Encoding:
                 # Its time says what the encoder looks ahead: of AAC the first is all before the first sample.
                 number = -1 if packet.pts is None else round(packet.pts / self._each)
                 if number >= 0:
-                    found.append(Frame(number, bytes(packet)))
+                    found.append(EncodedAudioFrame(number, bytes(packet)))
             self._samples, self._first = self._samples[:, self._each :], self._first + self._each
         return found
 
@@ -111,7 +111,7 @@ class Encoding:
             return samples, "fltp"
         return np.ascontiguousarray(samples.T).reshape(1, -1), "flt"
 
-    def _new_encoder(self, form: SoundFormat, kbps: int) -> AudioCodecContext:
+    def _new_encoder(self, form: AudioFormat, kbps: int) -> AudioCodecContext:
         encoder = av.CodecContext.create({"aac": "aac", "opus": "libopus"}[form.coding], "w")
         assert isinstance(encoder, AudioCodecContext)  # noqa: S101 — tells mypy what they are
         encoder.sample_rate, encoder.layout, encoder.format = form.rate, self._layout, self._format

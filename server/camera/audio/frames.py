@@ -14,24 +14,24 @@ Packet: TypeAlias = "av.Packet[AudioStream]"
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
-    """One frame."""
+class EncodedAudioFrame:
+    """One encoded audio frame and its number."""
 
     number: int
     data: bytes
 
 
-class Way(Protocol):
-    """How a source's packets become the site's frames."""
+class AudioFramer(Protocol):
+    """Turns the packets of a source into numbered audio frames."""
 
-    def take(self, packet: Packet, at: Fraction) -> list[Frame]:
+    def take(self, packet: Packet, at: Fraction) -> list[EncodedAudioFrame]:
         """Return what becomes whole by a packet that sounds ``at`` seconds after pulse 0; numbers grow."""
         ...
 
 
-def runs(frames: Sequence[Frame]) -> Iterator[list[Frame]]:
+def consecutive_runs(frames: Sequence[EncodedAudioFrame]) -> Iterator[list[EncodedAudioFrame]]:
     """Part frames into runs whose numbers follow each other."""
-    run: list[Frame] = []
+    run: list[EncodedAudioFrame] = []
     for frame in frames:
         if run and frame.number != run[-1].number + 1:
             yield run

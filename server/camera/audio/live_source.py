@@ -10,8 +10,8 @@ from fractions import Fraction
 from av.audio.stream import AudioStream
 
 from logthrottle import LogThrottle
-from server.camera.audio.frames import Frame, Packet, Way
-from server.camera.audio.selection import way_for
+from server.camera.audio.frames import AudioFramer, EncodedAudioFrame, Packet
+from server.camera.audio.selection import select_framer
 from server.config.sections import SoundSettings
 
 log = logging.getLogger(__name__)
@@ -26,8 +26,8 @@ _FAR_S = 2.0
 """Sound that is further away from what is shown is of another time: one of the two clocks has stepped."""
 
 
-class LiveSound:
-    """Sounds when the pictures are shown that were taken at the same moment, by the camera's own clock.
+class LiveAudioSource:
+    """Audio of a network camera, aligned with its pictures by the camera's own clock.
 
     A source tells it what comes, in a thread of its own; ``at`` is called in another. Pictures wait for up to
     ``waiting_s`` until they are shown, and sound with them.
@@ -47,8 +47,8 @@ class LiveSound:
         self._shifts: deque[float] = deque(maxlen=max(1, round(_MEAN_S * fps)))
         """Of the last pictures: how much later they are shown, counted from pulse 0."""
         self._shift: Fraction | None = None
-        self._frames: deque[Frame] = deque(maxlen=round(_WAITING_S * form.rate / form.samples))
-        self._way: Way | None = None
+        self._frames: deque[EncodedAudioFrame] = deque(maxlen=round(_WAITING_S * form.rate / form.samples))
+        self._way: AudioFramer | None = None
         self._last = -1
         self._silent = LogThrottle(quiet_s=0.0)
 
@@ -61,7 +61,7 @@ class LiveSound:
         else:
             if self._silent.end():
                 log.info("there is sound again in what the camera sends")
-            self._way = way_for(stream, self._form, self._kbps)
+            self._way = select_framer(stream, self._form, self._kbps)
 
     def picture(self, time: Fraction) -> None:
         """Note when the newest picture was taken, by the camera's clock."""
@@ -84,7 +84,7 @@ class LiveSound:
             with self._lock:
                 self._frames.append(frame)
 
-    def at(self, pulse: int) -> list[Frame]:
+    def at(self, pulse: int) -> list[EncodedAudioFrame]:
         """Return what has come since the pulse before, now that the newest picture is shown at this one."""
         with self._lock:
             self._asked = pulse / self._fps

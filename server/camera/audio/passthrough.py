@@ -6,9 +6,9 @@ from fractions import Fraction
 
 from av.audio.stream import AudioStream
 
-from server.camera.audio.frames import Frame, Packet
-from server.media.audio.audio_format import OPUS_RATE, SoundFormat
-from server.media.audio.opus import samples_in
+from server.camera.audio.frames import EncodedAudioFrame, Packet
+from server.media.audio.audio_format import OPUS_RATE, AudioFormat
+from server.media.audio.opus import packet_samples
 
 _OFF = Fraction(3, 4)
 """Frames by which one may be away from its place before it is moved: times in files are rounded."""
@@ -17,7 +17,7 @@ _EXTENSION = b"\x56\xe5"
 _PRESENT = 0x80
 
 
-def fits(stream: AudioStream, form: SoundFormat) -> bool:
+def is_compatible(stream: AudioStream, form: AudioFormat) -> bool:
     """Return whether a decoder that was told the site's format decodes these packets."""
     context = stream.codec_context
     if context.name in {"opus", "libopus"} and form.coding == "opus":
@@ -29,17 +29,17 @@ def fits(stream: AudioStream, form: SoundFormat) -> bool:
     return told == form.config and not richer
 
 
-class Passing:
-    """Gives each packet the number that is nearest to its time: half a frame off at most, 11 ms at 48 kHz."""
+class AudioPassthrough:
+    """Passes packets through; each gets the frame number nearest to its time."""
 
-    def __init__(self, form: SoundFormat) -> None:
+    def __init__(self, form: AudioFormat) -> None:
         self._form = form
         self._next: int | None = None
 
-    def take(self, packet: Packet, at: Fraction) -> list[Frame]:
+    def take(self, packet: Packet, at: Fraction) -> list[EncodedAudioFrame]:
         """Return the packet as a frame; nothing where its place is taken, or it is not as long as a frame."""
         data = bytes(packet)
-        if self._form.coding == "opus" and samples_in(data) != self._form.samples:
+        if self._form.coding == "opus" and packet_samples(data) != self._form.samples:
             return []
         place = at * self._form.rate / self._form.samples
         number = round(place)
@@ -48,4 +48,4 @@ class Passing:
         if number < (self._next or 0):
             return []
         self._next = number + 1
-        return [Frame(number, data)]
+        return [EncodedAudioFrame(number, data)]

@@ -13,9 +13,9 @@ from av.container import InputContainer
 from av.stream import Disposition
 from av.video.stream import VideoStream
 
-from server.camera.audio.frames import Frame, Packet, Way
-from server.camera.audio.selection import way_for
-from server.camera.sources.frame_timing import length_of, rate_of
+from server.camera.audio.frames import AudioFramer, EncodedAudioFrame, Packet
+from server.camera.audio.selection import select_framer
+from server.camera.sources.frame_timing import frame_count, frame_rate
 from server.config.sections import SoundSettings
 from server.config.source_address import path_is_missing
 from server.system.address_redaction import ffmpeg_reason, redact_address
@@ -29,8 +29,8 @@ _AHEAD_S = Fraction(1, 5)
 _FAR_S = 5
 
 
-class RecordedSound:
-    """Sounds at pulse ``offset + n`` as the recording does ``n / fps`` seconds after its first picture.
+class RecordedAudioSource:
+    """Audio of a recording: at pulse ``offset + n``, what sounds ``n / fps`` seconds after its first picture.
 
     What is of the site's format is passed on; all else is encoded.
 
@@ -50,7 +50,7 @@ class RecordedSound:
         container, stream = _open(path)
         try:
             self._start = _first_picture(container)
-            self._way: Way = way_for(stream, form, settings.kbps)
+            self._way: AudioFramer = select_framer(stream, form, settings.kbps)
             self._lasts = self._length(container, stream) if at_end == "loop" else None
         finally:
             container.close()
@@ -59,14 +59,14 @@ class RecordedSound:
         self._told = False
         """That it cannot be read to its end."""
 
-    def at(self, pulse: int) -> list[Frame]:
+    def at(self, pulse: int) -> list[EncodedAudioFrame]:
         """Return what is to be sent at a pulse: it is recorded, so it can be sent a moment early.
 
         The pictures of other cameras, shown at once, then find it there.
         """
         return self.until(pulse + max(1, round(_AHEAD_S * self._fps)))
 
-    def until(self, pulse: int) -> list[Frame]:
+    def until(self, pulse: int) -> list[EncodedAudioFrame]:
         """Return the frames that follow, up to what sounds when ``pulse`` is due; pulses must grow.
 
         The first call begins a second before that.
@@ -74,7 +74,7 @@ class RecordedSound:
         end = pulse / self._fps
         if self._packets is None:
             self._packets = self._from(max(Fraction(0), end - _WARM_S))
-        frames: list[Frame] = []
+        frames: list[EncodedAudioFrame] = []
         while (found := self._waiting or next(self._packets, None)) is not None:
             self._waiting = found if found[0] >= end else None
             if self._waiting is not None:
@@ -144,7 +144,7 @@ def _lasts(container: InputContainer, video: VideoStream, fps: Fraction) -> Frac
             times.append(packet.pts)
     if not times:
         return count / fps
-    return length_of(float((max(times) - min(times)) * unit), rate_of(video), float(fps)) / fps
+    return frame_count(float((max(times) - min(times)) * unit), frame_rate(video), float(fps)) / fps
 
 
 def _in_order(packets: Iterable[Packet]) -> Iterator[tuple[Fraction, Packet]]:

@@ -10,7 +10,7 @@ from av.video.frame import PictureType
 from numpy.typing import NDArray
 
 from server.camera.encoding.codecs import CLOCK, libvpx, x264
-from server.media.color_conversion import yuv
+from server.media.color_conversion import to_yuv
 from server.media.rendering_messages import Canvas
 
 if TYPE_CHECKING:  # a drawing process encodes too, and has no second to load the configuration's libraries
@@ -47,7 +47,7 @@ class Encoder:
     def encode(self, pulse: int, image: NDArray[np.uint8]) -> AccessUnit:
         """Encode the picture, ``(height, width, 3)`` BGR of the site's size, of one pulse."""
         key = self._last is None or pulse // self._gop != self._last // self._gop
-        frame = yuv(image)
+        frame = to_yuv(image)
         frame.pts = round(pulse * CLOCK.denominator / self._fps)
         frame.time_base = CLOCK
         frame.pict_type = PictureType.I if key else PictureType.NONE

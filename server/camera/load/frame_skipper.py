@@ -10,8 +10,8 @@ from tracking.interactive import InteractiveTracker, PositionCorrection
 from tracking.registry import Tracker
 
 
-class Stepping:
-    """Hands the frames of a camera to its tracker, in their order.
+class FrameSkipper:
+    """Hands the frames of a camera to its tracker in order, and skips detection in some.
 
     A frame that is left out waits for the next one that is searched, which is at the latest the last one of
     its window: no window is late for it.

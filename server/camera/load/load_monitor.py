@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from server.camera.load.load_shedder import Bounds, Ladder, Rung, rungs
+from server.camera.load.load_shedder import LevelBounds, LoadShedder, ShedLevel, shed_levels
 from server.config.site_config import Config
 
 log = logging.getLogger(__name__)
@@ -13,17 +13,17 @@ _BEHIND, _ABREAST = 0.25, 0.1
 """Of `track.backlog_s`, besides a frame's own time, which it may take, and the patience with others."""
 
 
-class Load:
-    """Asks the ladder and says when its rung changes; without `track.shed_load` nothing is left out."""
+class LoadMonitor:
+    """Asks the load shedder for its level and logs changes; without `track.shed_load` the level stays 0."""
 
     def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
         track = config.track
         self._camera, self._stride, self._gop = camera_id, track.window.stride, config.encode.gop
         waits = track.cross_view_wait_s if config.witnesses(camera_id) else 0.0
         waits += 1.0 / config.site.fps
-        bounds = Bounds(waits + _BEHIND * track.backlog_s, waits + _ABREAST * track.backlog_s)
-        all_rungs = rungs(self._stride, live=live) if track.shed_load else (Rung(),)
-        self._ladder = Ladder(all_rungs, bounds)
+        bounds = LevelBounds(waits + _BEHIND * track.backlog_s, waits + _ABREAST * track.backlog_s)
+        all_rungs = shed_levels(self._stride, live=live) if track.shed_load else (ShedLevel(),)
+        self._ladder = LoadShedder(all_rungs, bounds)
 
     @property
     def level(self) -> int:

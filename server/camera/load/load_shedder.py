@@ -19,8 +19,8 @@ _CATCHES_UP = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class Rung:
-    """How much is left out.
+class ShedLevel:
+    """How much of the work a level leaves out.
 
     Attributes:
         searched: one in so many frames is searched for people, counted back from the end of each window.
@@ -51,19 +51,19 @@ class Rung:
 _ORDINALS = {2: "2nd", 3: "3rd"}
 
 
-def rungs(stride: int, *, live: bool) -> tuple[Rung, ...]:
-    """Return the ladder from the ground up, for windows that end every ``stride`` frames.
+def shed_levels(stride: int, *, live: bool) -> tuple[ShedLevel, ...]:
+    """Return the levels from 0 up, for windows that end every ``stride`` frames.
 
     Frames of a recording are always taken: whoever watches it again would miss them.
     """
     searched = sorted({it for it in _SEARCHED if it <= stride} | {stride})
-    found = [Rung(it) for it in searched]
-    return (*found, Rung(searched[-1], 2)) if live else tuple(found)
+    found = [ShedLevel(it) for it in searched]
+    return (*found, ShedLevel(searched[-1], 2)) if live else tuple(found)
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
-    """When a rung is left.
+class LevelBounds:
+    """When a level is left.
 
     Attributes:
         behind_s: tracking is too far behind the pulses: upwards.
@@ -74,11 +74,11 @@ class Bounds:
     abreast_s: float
 
 
-class Ladder:
-    """Which rung a camera stands on: up at once, down slowly, more slowly where that was too soon."""
+class LoadShedder:
+    """Chooses the level: up at once, down slowly, and more slowly where going down was too early."""
 
-    def __init__(self, rungs: tuple[Rung, ...], bounds: Bounds) -> None:
-        self._rungs, self._bounds = rungs, bounds
+    def __init__(self, shed_levels: tuple[ShedLevel, ...], bounds: LevelBounds) -> None:
+        self._rungs, self._bounds = shed_levels, bounds
         self.level = 0
         self._behind_since: float | None = None
         self._behind_by = 0.0
@@ -87,7 +87,7 @@ class Ladder:
         self._went_down = -_DOWN_MOST_S
 
     @property
-    def rung(self) -> Rung:
+    def rung(self) -> ShedLevel:
         """What is left out now."""
         return self._rungs[self.level]
 

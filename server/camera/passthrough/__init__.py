@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.camera.passthrough.encoder import Passing
-from server.camera.passthrough.opening import Own, open_own
+from server.camera.passthrough.encoder import PassthroughEncoder
+from server.camera.passthrough.opening import PassthroughOpening, open_passthrough
 
-__all__ = ["Own", "Passing", "open_own"]
+__all__ = ["PassthroughEncoder", "PassthroughOpening", "open_passthrough"]

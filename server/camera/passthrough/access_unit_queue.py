@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from server.camera.passthrough.encoder import Unit
+from server.camera.passthrough.encoder import PassthroughUnit
 
 _CUSHION = 2
 """Units that wait behind the one that a stream begins with: a network does not bring them evenly."""
@@ -13,8 +13,8 @@ _TOO_LATE = 2 * _CUSHION + 1
 _MOST_GOPS = 4
 
 
-class Waiting:
-    """A queue that gives a GOP's first unit at the pulse at which a GOP begins, and never in between.
+class AccessUnitQueue:
+    """A queue that hands out the first access unit of a GOP only at a pulse where a GOP begins.
 
     A camera begins its GOPs when it likes, so what comes waits for up to a GOP and the cushion; that is how
     much later than others its pictures are. Its clock is not the site's either: now and then a GOP is left
@@ -23,19 +23,19 @@ class Waiting:
 
     def __init__(self, gop: int) -> None:
         self._gop = gop
-        self._units: deque[Unit] = deque()
+        self._units: deque[PassthroughUnit] = deque()
         self._last: int | None = None
         self._whole = False
         """Nothing is missing of the GOP that is being given."""
 
-    def put(self, unit: Unit) -> None:
+    def put(self, unit: PassthroughUnit) -> None:
         """Take what has come; where nobody asks, the oldest goes."""
         self._units.append(unit)
         if len(self._units) > _MOST_GOPS * self._gop + _CUSHION:
             self._units.popleft()
             self._whole = False
 
-    def take(self, pulse: int) -> Unit | None:
+    def take(self, pulse: int) -> PassthroughUnit | None:
         """Return what goes with a pulse; pulses must grow. None: nothing can."""
         begins = self._last is None or pulse // self._gop != self._last // self._gop
         skipped = self._last is not None and pulse != self._last + 1

@@ -14,8 +14,8 @@ _AVCC_HEAD = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Packing:
-    """How a container packs access units: what stands beside the pictures (its ``extradata``)."""
+class AccessUnitPacking:
+    """How a container packs access units, by its ``extradata``."""
 
     length_bytes: int
     """Of the length before each NAL unit; 0: there are start codes."""
@@ -37,15 +37,15 @@ class Packing:
         return data
 
 
-def packing_of(extradata: bytes | None) -> Packing:
-    """Read what stands beside the pictures: avcC (ISO/IEC 14496-15, 5.3.3.1) or NAL units.
+def parse_packing(extradata: bytes | None) -> AccessUnitPacking:
+    """Parse the ``extradata`` of a stream: avcC (ISO/IEC 14496-15, 5.3.3.1) or NAL units.
 
     Raises:
         ValueError: it is damaged.
     """
     if not extradata or extradata[0] != _AVCC_VERSION:
         units = nal_units(extradata or b"")
-        return Packing(0, tuple(unit for unit in units if nal_type(unit) in (NAL_SPS, NAL_PPS)))
+        return AccessUnitPacking(0, tuple(unit for unit in units if nal_type(unit) in (NAL_SPS, NAL_PPS)))
     if len(extradata) < _AVCC_HEAD + 1:
         raise ValueError("its avcC box is damaged")
     sets: list[bytes] = []
@@ -58,11 +58,11 @@ def packing_of(extradata: bytes | None) -> Packing:
             size = int.from_bytes(extradata[at : at + 2], "big")
             sets.append(extradata[at + 2 : at + 2 + size])
             at += 2 + size
-    return Packing(1 + (extradata[4] & 3), tuple(sets))
+    return AccessUnitPacking(1 + (extradata[4] & 3), tuple(sets))
 
 
-def is_key(annex_b: bytes) -> bool:
-    """Return whether an access unit is one that nothing before it is needed for."""
+def is_keyframe(annex_b: bytes) -> bool:
+    """Return whether an access unit can be decoded without any before it."""
     return any(nal_type(unit) == NAL_IDR for unit in nal_units(annex_b))
 
 

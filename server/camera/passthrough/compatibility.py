@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from server.camera.encoding.encoder import Encoder
-from server.camera.passthrough.access_units import is_key
-from server.camera.sources.frame_timing import place_of
-from server.camera.sources.opening import Opened
+from server.camera.passthrough.access_units import is_keyframe
+from server.camera.sources.frame_timing import frame_index
+from server.camera.sources.opening import OpenedVideo
 from server.camera.sources.orientation import Orientation
 from server.config.site_config import Config
 from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets
@@ -18,13 +18,13 @@ _SAME_RATE = 0.03
 """Part by which a camera's rate may be off the site's: cameras say it in round numbers."""
 
 
-class MisfitError(Exception):
-    """It does not fit; the text says why."""
+class IncompatibleStreamError(Exception):
+    """The camera's stream cannot be passed through; the text says why."""
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What every camera of a site sends."""
+class RequiredFormat:
+    """The format that every camera of a site sends."""
 
     size: tuple[int, int]
     fps: float
@@ -33,8 +33,8 @@ class Wanted:
     """Those of the cameras that encode; None: none does, and the cameras only have to agree."""
 
 
-def wanted_by(config: Config) -> Wanted:
-    """Return what a site wants."""
+def required_format(config: Config) -> RequiredFormat:
+    """Return the format that a site requires."""
     site = config.site
     parameters = None
     encoding = any(camera.h264 != "pass" for camera in config.cameras)
@@ -42,18 +42,18 @@ def wanted_by(config: Config) -> Wanted:
         blank = np.zeros((site.height, site.width, 3), dtype=np.uint8)
         first = Encoder(site, config.encode).encode(0, blank)
         parameters = parameter_sets(nal_units(first.data))
-    return Wanted((site.width, site.height), site.fps, config.encode.gop, parameters)
+    return RequiredFormat((site.width, site.height), site.fps, config.encode.gop, parameters)
 
 
-class Fitting:
-    """Looks at a video and at its access units, one after the other."""
+class CompatibilityCheck:
+    """Checks a video and its access units, one after the other."""
 
-    def __init__(self, wanted: Wanted) -> None:
+    def __init__(self, wanted: RequiredFormat) -> None:
         self._wanted = wanted
         self._parameters = wanted.parameters
         self._shown: int | None = None
 
-    def opened(self, opened: Opened) -> None:
+    def opened(self, opened: OpenedVideo) -> None:
         """Look at what a video says of itself.
 
         Raises:
@@ -61,13 +61,17 @@ class Fitting:
         """
         wanted, codec = self._wanted, opened.stream.codec_context.name
         if codec != "h264":
-            raise MisfitError(f"it is {codec}, not H.264")
+            raise IncompatibleStreamError(f"it is {codec}, not H.264")
         if opened.size != wanted.size:
             own, site = ("x".join(map(str, size)) for size in (opened.size, wanted.size))
-            raise MisfitError(f"its pictures are {own}, the site's {site} (site.width, site.height)")
+            raise IncompatibleStreamError(
+                f"its pictures are {own}, the site's {site} (site.width, site.height)"
+            )
         rate = opened.stream.average_rate
         if rate and abs(float(rate) / wanted.fps - 1) > _SAME_RATE:
-            raise MisfitError(f"it has {float(rate):g} pictures a second, the site {wanted.fps:g} (site.fps)")
+            raise IncompatibleStreamError(
+                f"it has {float(rate):g} pictures a second, the site {wanted.fps:g} (site.fps)"
+            )
 
     def lies(self, orientation: Orientation) -> None:
         """Look at how its pictures are shown.
@@ -76,7 +80,7 @@ class Fitting:
             MisfitError: not as they are stored, and nothing in a site's streams says so.
         """
         if orientation.words:
-            raise MisfitError(f"its pictures are shown {orientation.words}")
+            raise IncompatibleStreamError(f"its pictures are shown {orientation.words}")
 
     def at(self, frame: int, seconds: float) -> None:
         """Look at when a frame of a recording is shown, after its first one.
@@ -84,8 +88,8 @@ class Fitting:
         Raises:
             MisfitError: at another pulse than the one that it would be passed on at.
         """
-        if (place := place_of(seconds, self._wanted.fps)) != frame:
-            raise MisfitError(
+        if (place := frame_index(seconds, self._wanted.fps)) != frame:
+            raise IncompatibleStreamError(
                 f"frame {frame} is shown at {seconds:.2f} s, which is frame {place} at the site's "
                 f"{self._wanted.fps:g} pictures a second (site.fps)"
             )
@@ -99,19 +103,21 @@ class Fitting:
         gop = self._wanted.gop
         later = shown is not None and self._shown is not None and shown <= self._shown
         if later or (shown is not None and decoded is not None and shown != decoded):
-            raise MisfitError(f"frame {frame} is decoded and shown in another order: it has B pictures")
+            raise IncompatibleStreamError(
+                f"frame {frame} is decoded and shown in another order: it has B pictures"
+            )
         self._shown = shown
-        if is_key(data) != (pulse % gop == 0):
+        if is_keyframe(data) != (pulse % gop == 0):
             does = "begins a GOP, where none of the site does" if pulse % gop else "does not begin a GOP"
-            raise MisfitError(f"frame {frame} {does}: they begin every {gop} frames (encode.gop)")
+            raise IncompatibleStreamError(f"frame {frame} {does}: they begin every {gop} frames (encode.gop)")
         if pulse % gop == 0:
             self._key(frame, parameter_sets(nal_units(data)))
 
     def _key(self, frame: int, found: ParameterSets | None) -> None:
         if found is None:
-            raise MisfitError(f"frame {frame} begins a GOP without parameter sets")
+            raise IncompatibleStreamError(f"frame {frame} begins a GOP without parameter sets")
         if self._parameters is None:
             self._parameters = found
         elif found != self._parameters:
             whose = "this site encodes with" if self._wanted.parameters else "it began with"
-            raise MisfitError(f"frame {frame} has other parameter sets (SPS, PPS) than {whose}")
+            raise IncompatibleStreamError(f"frame {frame} has other parameter sets (SPS, PPS) than {whose}")

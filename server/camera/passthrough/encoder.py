@@ -7,13 +7,13 @@ from fractions import Fraction
 from typing import Protocol
 
 from server.camera.encoding.encoder import AccessUnit
-from server.camera.sources import Source
+from server.camera.sources import PictureSource
 from server.camera.sources.base import Image
 
 
 @dataclass(frozen=True, slots=True)
-class Unit:
-    """An access unit as it came, Annex B, and the picture that is decoded from it."""
+class PassthroughUnit:
+    """An access unit as it came, in Annex B, and its decoded picture."""
 
     key: bool
     data: bytes
@@ -22,17 +22,17 @@ class Unit:
     """When it was taken, seconds by the camera's clock; None: it does not say."""
 
 
-class OwnSource(Source, Protocol):
+class PassthroughSource(PictureSource, Protocol):
     """A source that keeps the access units of its pictures."""
 
-    taken: Unit | None
+    taken: PassthroughUnit | None
     """The one whose picture was taken last."""
 
 
-class Passing:
-    """Gives the access unit of the picture that was taken."""
+class PassthroughEncoder:
+    """Stands in for an encoder: returns the access unit of the picture that was taken."""
 
-    def __init__(self, source: OwnSource) -> None:
+    def __init__(self, source: PassthroughSource) -> None:
         self._source = source
 
     def encode(self, pulse: int, image: Image) -> AccessUnit:

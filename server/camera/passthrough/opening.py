@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from server.camera.audio import LiveSound
-from server.camera.passthrough.compatibility import MisfitError, wanted_by
-from server.camera.passthrough.encoder import OwnSource
-from server.camera.passthrough.recording_source import OwnRecording
-from server.camera.passthrough.stream_source import OwnStream
+from server.camera.audio import LiveAudioSource
+from server.camera.passthrough.compatibility import IncompatibleStreamError, required_format
+from server.camera.passthrough.encoder import PassthroughSource
+from server.camera.passthrough.recording_source import PassthroughRecording
+from server.camera.passthrough.stream_source import PassthroughStream
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
@@ -16,41 +16,43 @@ from server.system.errors import UnavailableError, UserError
 
 
 @dataclass(frozen=True, slots=True)
-class Own:
-    """What came of it."""
+class PassthroughOpening:
+    """The result of opening a camera for passthrough."""
 
-    source: OwnSource | None
+    source: PassthroughSource | None
     """None: the camera's pictures are to be encoded."""
     why: str
     """Why so; empty where nothing was asked for."""
 
 
-def open_own(config: Config, camera: CameraSettings, listener: LiveSound | None) -> Own:
-    """Open a camera's own H.264, if that is wished.
+def open_passthrough(
+    config: Config, camera: CameraSettings, listener: LiveAudioSource | None
+) -> PassthroughOpening:
+    """Open a camera for passthrough of its own H.264, where the configuration asks for that.
 
     Raises:
         UserError: it cannot be opened, or must fit and does not; the text says which camera and why.
         UnavailableError: the same, of a network camera that may yet come.
     """
     if camera.h264 == "encode":
-        return Own(None, "")
+        return PassthroughOpening(None, "")
     try:
-        return Own(_opened(config, camera, listener), "")
-    except MisfitError as misfit:
+        return PassthroughOpening(_opened(config, camera, listener), "")
+    except IncompatibleStreamError as misfit:
         if camera.h264 == "pass":
             hint = "set the camera so, or let it be encoded (h264: auto)"
             raise UserError(f"camera {camera.id}: h264: pass: {misfit}; {hint}") from misfit
-        return Own(None, str(misfit))
+        return PassthroughOpening(None, str(misfit))
     except UserError as error:
         away = source_kind(camera.source) is SourceKind.STREAM
         raise (UnavailableError if away else UserError)(f"camera {camera.id}: {error}") from error
 
 
-def _opened(config: Config, camera: CameraSettings, listener: LiveSound | None) -> OwnSource:
+def _opened(config: Config, camera: CameraSettings, listener: LiveAudioSource | None) -> PassthroughSource:
     match source_kind(camera.source):
         case SourceKind.STREAM:
-            return OwnStream(camera.source, camera.options, listener, wanted_by(config))
+            return PassthroughStream(camera.source, camera.options, listener, required_format(config))
         case SourceKind.FILE:
-            return OwnRecording(camera.source, camera.offset, camera.at_end, wanted_by(config))
+            return PassthroughRecording(camera.source, camera.offset, camera.at_end, required_format(config))
         case _:
-            raise MisfitError("there is no H.264 in single images")
+            raise IncompatibleStreamError("there is no H.264 in single images")

@@ -9,20 +9,24 @@ import av
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
-from server.camera.passthrough.access_units import is_key, packing_of
-from server.camera.passthrough.compatibility import Fitting, MisfitError, Wanted
-from server.camera.passthrough.encoder import Unit
-from server.camera.sources.base import Image, SourceEnded
-from server.camera.sources.opening import Opened, open_video
-from server.camera.sources.orientation import Orientation, orientation_of
-from server.camera.sources.recording import Recording, frames_at
+from server.camera.passthrough.access_units import is_keyframe, parse_packing
+from server.camera.passthrough.compatibility import (
+    CompatibilityCheck,
+    IncompatibleStreamError,
+    RequiredFormat,
+)
+from server.camera.passthrough.encoder import PassthroughUnit
+from server.camera.sources.base import Image, SourceEndedError
+from server.camera.sources.opening import OpenedVideo, open_video
+from server.camera.sources.orientation import Orientation, parse_orientation
+from server.camera.sources.recording import Recording, decode_frames
 from server.config.source_address import path_is_missing
-from server.media.color_conversion import bgr
+from server.media.color_conversion import to_bgr
 from server.system.address_redaction import ffmpeg_reason, redact_address
 from server.system.errors import UserError
 
 
-class OwnRecording:
+class PassthroughRecording:
     """Shows its frame ``pulse - offset``, as :class:`server.camera.sources.Recording` does.
 
     Raises:
@@ -32,16 +36,20 @@ class OwnRecording:
 
     recorded = True
 
-    def __init__(self, path: str, offset: int, at_end: Literal["stop", "loop"], wanted: Wanted) -> None:
+    def __init__(
+        self, path: str, offset: int, at_end: Literal["stop", "loop"], wanted: RequiredFormat
+    ) -> None:
         if path_is_missing(path):
             raise UserError(f"{redact_address(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
         self._fps = wanted.fps
         self._length = _checked(path, offset, wanted)
         if self._loop and self._length % wanted.gop:
-            raise MisfitError(f"its {self._length} frames are not whole GOPs: it cannot begin again (at_end)")
+            raise IncompatibleStreamError(
+                f"its {self._length} frames are not whole GOPs: it cannot begin again (at_end)"
+            )
         self.size = wanted.size
-        self.taken: Unit | None = None
+        self.taken: PassthroughUnit | None = None
         self._begin()
 
     def take(self, pulse: int) -> Image | None:
@@ -51,7 +59,7 @@ class OwnRecording:
             return None
         if index >= self._length:
             if not self._loop:
-                raise SourceEnded(self._path)
+                raise SourceEndedError(self._path)
             index %= self._length
         if index < self._next - 1:
             self._opened.container.close()
@@ -62,7 +70,7 @@ class OwnRecording:
 
     def ahead(self, places: Sequence[int]) -> Iterator[Image]:
         """Decode the frames at some places, from the file opened once more."""
-        return frames_at(self._path, places, self._fps)
+        return decode_frames(self._path, places, self._fps)
 
     def close(self) -> None:
         """Close the file."""
@@ -70,28 +78,28 @@ class OwnRecording:
 
     def _begin(self) -> None:
         self._opened = open_video(self._path)
-        self._packing = packing_of(self._opened.stream.codec_context.extradata)
-        self._packets, self._next = packets(self._opened), 0
+        self._packing = parse_packing(self._opened.stream.codec_context.extradata)
+        self._packets, self._next = access_unit_packets(self._opened), 0
 
     def _read(self) -> None:
         packet = next(self._packets, None)
         if packet is None:  # shorter than when it was looked through
-            raise SourceEnded(self._path)
+            raise SourceEndedError(self._path)
         data = self._packing.annex_b(bytes(packet))
-        image = decoded(packet)
+        image = decode_unit(packet)
         if image is None and self.taken is not None:
             image = self.taken.image  # damaged, which a viewer sees too
-        self.taken = None if image is None else Unit(is_key(data), data, image)
+        self.taken = None if image is None else PassthroughUnit(is_keyframe(data), data, image)
         self._next += 1
 
 
-def decoded(packet: av.Packet[VideoStream]) -> Image | None:
+def decode_unit(packet: av.Packet[VideoStream]) -> Image | None:
     """Return the picture of an access unit; None where it cannot be decoded (yet), or is to be turned."""
-    pictures = pictures_of(packet)
-    return bgr(pictures[-1]) if pictures and not orientation_of(pictures[-1]).turned else None
+    pictures = decode_pictures(packet)
+    return to_bgr(pictures[-1]) if pictures and not parse_orientation(pictures[-1]).turned else None
 
 
-def pictures_of(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
+def decode_pictures(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
     """Decode an access unit; nothing comes of one that is damaged, or waits for others."""
     try:
         return [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
@@ -99,14 +107,14 @@ def pictures_of(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
         return []
 
 
-def at_once(opened: Opened) -> None:
+def decode_without_delay(opened: OpenedVideo) -> None:
     """Let the decoder give each picture with its own access unit, whatever may come later."""
     opened.stream.codec_context.flags |= av.codec.context.Flags.low_delay
 
 
-def packets(opened: Opened) -> Iterator[av.Packet[VideoStream]]:
+def access_unit_packets(opened: OpenedVideo) -> Iterator[av.Packet[VideoStream]]:
     """Yield the packets that hold access units."""
-    at_once(opened)
+    decode_without_delay(opened)
     for packet in opened.container.demux(opened.stream):
         if packet.size:
             yield packet
@@ -118,15 +126,15 @@ def _orientation(path: str) -> Orientation:
     return recording.orientation
 
 
-def _checked(path: str, offset: int, wanted: Wanted) -> int:
+def _checked(path: str, offset: int, wanted: RequiredFormat) -> int:
     """Look at all of it; give the number of its frames."""
-    opened, fitting, frame = open_video(path), Fitting(wanted), -1
+    opened, fitting, frame = open_video(path), CompatibilityCheck(wanted), -1
     unit, first = float(opened.stream.time_base or 1), None
     try:
         fitting.opened(opened)
         fitting.lies(_orientation(path))
-        packing = packing_of(opened.stream.codec_context.extradata)
-        for frame, packet in enumerate(packets(opened)):
+        packing = parse_packing(opened.stream.codec_context.extradata)
+        for frame, packet in enumerate(access_unit_packets(opened)):
             data = packing.annex_b(bytes(packet))
             fitting.unit(frame, frame + offset, data, packet.pts, packet.dts)
             if packet.pts is not None:
@@ -134,7 +142,7 @@ def _checked(path: str, offset: int, wanted: Wanted) -> int:
                 fitting.at(frame, (packet.pts - first) * unit)
     except (av.error.FFmpegError, ValueError) as error:
         why = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
-        raise MisfitError(f"it cannot be read: {why}") from None
+        raise IncompatibleStreamError(f"it cannot be read: {why}") from None
     finally:
         opened.container.close()
     if frame < 0:

@@ -9,16 +9,25 @@ from fractions import Fraction
 import av
 from av.video.stream import VideoStream
 
-from server.camera.audio import LiveSound
-from server.camera.passthrough.access_unit_queue import Waiting
-from server.camera.passthrough.access_units import is_key, packing_of
-from server.camera.passthrough.compatibility import Fitting, MisfitError, Wanted
-from server.camera.passthrough.encoder import Unit
-from server.camera.passthrough.recording_source import at_once, decoded, packets, pictures_of
+from server.camera.audio import LiveAudioSource
+from server.camera.passthrough.access_unit_queue import AccessUnitQueue
+from server.camera.passthrough.access_units import is_keyframe, parse_packing
+from server.camera.passthrough.compatibility import (
+    CompatibilityCheck,
+    IncompatibleStreamError,
+    RequiredFormat,
+)
+from server.camera.passthrough.encoder import PassthroughUnit
+from server.camera.passthrough.recording_source import (
+    access_unit_packets,
+    decode_pictures,
+    decode_unit,
+    decode_without_delay,
+)
 from server.camera.sources.base import Image
-from server.camera.sources.live_stream import OPEN_S, READ_S, Stream
-from server.camera.sources.opening import Opened, no_answer, open_video
-from server.camera.sources.orientation import orientation_of, pixel_aspect_of
+from server.camera.sources.live_stream import OPEN_S, READ_S, LiveStream
+from server.camera.sources.opening import OpenedVideo, open_video, timeout_message
+from server.camera.sources.orientation import parse_orientation, pixel_aspect
 from server.system.address_redaction import ffmpeg_reason, redact_address
 from server.system.errors import UserError
 
@@ -26,8 +35,8 @@ _LOOKED_AT_GOPS = 2
 """GOPs that a camera sends before it is known to fit."""
 
 
-class OwnStream(Stream):
-    """Reads the camera in a thread, as :class:`Stream` does; gives each access unit once, in order.
+class PassthroughStream(LiveStream):
+    """Reads the camera in a thread, as :class:`LiveStream` does; returns each access unit once, in order.
 
     Raises:
         UserError: it cannot be opened.
@@ -35,16 +44,16 @@ class OwnStream(Stream):
     """
 
     def __init__(
-        self, url: str, options: Mapping[str, str], listener: LiveSound | None, wanted: Wanted
+        self, url: str, options: Mapping[str, str], listener: LiveAudioSource | None, wanted: RequiredFormat
     ) -> None:
         _check(url, options, wanted)
         self._wanted = wanted
-        self._waiting = Waiting(wanted.gop)
+        self._waiting = AccessUnitQueue(wanted.gop)
         self._waiting_lock = threading.Lock()
         self._frame_s = 1 / Fraction(wanted.fps).limit_denominator(1001)
         self._unbroken = False
         """Nothing has been lost since the last key unit."""
-        self.taken: Unit | None = None
+        self.taken: PassthroughUnit | None = None
         super().__init__(url, options, listener)
 
     def take(self, pulse: int) -> Image | None:
@@ -58,14 +67,14 @@ class OwnStream(Stream):
             self._listener.picture(taken.time + self._frame_s)
         return taken.image
 
-    def _read(self, opened: Opened) -> bool:
+    def _read(self, opened: OpenedVideo) -> bool:
         try:
-            Fitting(self._wanted).opened(opened)
-        except MisfitError as misfit:
+            CompatibilityCheck(self._wanted).opened(opened)
+        except IncompatibleStreamError as misfit:
             opened.container.close()
             self._lost(f"{redact_address(self._url)}: what it sends does not fit any more: {misfit}")
             return False
-        at_once(opened)
+        decode_without_delay(opened)
         self._unbroken = False
         return super()._read(opened)
 
@@ -74,10 +83,10 @@ class OwnStream(Stream):
         if not packet.size:
             return False
         try:
-            data = packing_of(packet.stream.codec_context.extradata).annex_b(bytes(packet))
+            data = parse_packing(packet.stream.codec_context.extradata).annex_b(bytes(packet))
         except ValueError:
             data = b""
-        key, image = is_key(data), decoded(packet)
+        key, image = is_keyframe(data), decode_unit(packet)
         self._sized.set()  # how it lies was looked at, and it may not change
         if image is not None and image.shape[1::-1] != self._wanted.size:
             image = None  # it has changed since the connection began, which it may not
@@ -87,39 +96,41 @@ class OwnStream(Stream):
             if packet.pts is not None and packet.time_base is not None:
                 time = packet.pts * packet.time_base
             with self._waiting_lock:
-                self._waiting.put(Unit(key, data, image, time))
+                self._waiting.put(PassthroughUnit(key, data, image, time))
         return image is not None
 
 
-def _check(url: str, options: Mapping[str, str], wanted: Wanted) -> None:
+def _check(url: str, options: Mapping[str, str], wanted: RequiredFormat) -> None:
     """Look at what a camera sends, from its first key unit on.
 
     Raises:
         UserError: it cannot be opened, or stops meanwhile.
         MisfitError: what it sends cannot stand in the site's streams.
     """
-    opened, fitting = open_video(url, options, (OPEN_S, READ_S)), Fitting(wanted)
+    opened, fitting = open_video(url, options, (OPEN_S, READ_S)), CompatibilityCheck(wanted)
     try:
         fitting.opened(opened)
-        aspect = pixel_aspect_of(opened.stream)
-        packing, begun = packing_of(opened.stream.codec_context.extradata), -1
-        for frame, packet in enumerate(packets(opened)):
+        aspect = pixel_aspect(opened.stream)
+        packing, begun = parse_packing(opened.stream.codec_context.extradata), -1
+        for frame, packet in enumerate(access_unit_packets(opened)):
             data = packing.annex_b(bytes(packet))
-            for picture in pictures_of(packet):
-                fitting.lies(orientation_of(picture, aspect))
-            if begun < 0 and is_key(data):
+            for picture in decode_pictures(packet):
+                fitting.lies(parse_orientation(picture, aspect))
+            if begun < 0 and is_keyframe(data):
                 begun = frame
             if begun >= 0:
                 fitting.unit(frame - begun, frame - begun, data, packet.pts, packet.dts)
             if frame - max(begun, 0) >= _LOOKED_AT_GOPS * wanted.gop:
                 break
         if begun < 0:
-            raise MisfitError(f"no GOP begins within {_LOOKED_AT_GOPS * wanted.gop} frames (encode.gop)")
+            raise IncompatibleStreamError(
+                f"no GOP begins within {_LOOKED_AT_GOPS * wanted.gop} frames (encode.gop)"
+            )
     except (av.error.InvalidDataError, ValueError) as error:
         why = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
-        raise MisfitError(f"it cannot be read: {why}") from None
+        raise IncompatibleStreamError(f"it cannot be read: {why}") from None
     except av.error.FFmpegError as error:  # it has gone, which says nothing of what it sends
-        why = no_answer(error, READ_S) or ffmpeg_reason(error)
+        why = timeout_message(error, READ_S) or ffmpeg_reason(error)
         raise UserError(f"{redact_address(url)}: it stopped while it was looked at: {why}") from None
     finally:
         opened.container.close()

@@ -21,15 +21,15 @@ _PIXEL_DIGITS, _SCORE_DIGITS = 1, 3
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
-    """What the other cameras found in a frame; ``alone``: somebody's word was needed and not there."""
+class PeerDetections:
+    """Detections of the other cameras in a frame; ``alone``: they were needed and did not come."""
 
     words: tuple[FrameDetections, ...] = ()
     alone: bool = False
 
 
-class Witness:
-    """One camera among those that look at the same ground. The same words give the same scores."""
+class CrossViewScorer:
+    """Scores a camera's detections by those of other cameras of the same ground."""
 
     def __init__(self, config: Config, camera_id: str, size: tuple[int, int], boot: int) -> None:
         self._config, self._camera, self._size, self._boot = config, camera_id, size, boot

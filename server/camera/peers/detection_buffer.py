@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from server.camera.peers.cross_view_scorer import Heard
+from server.camera.peers.cross_view_scorer import PeerDetections
 from server.messaging.messages import FrameDetections
 
 _ASKED = 256
@@ -28,8 +28,8 @@ class _Other:
     words: dict[int, FrameDetections] = field(default_factory=dict)
 
 
-class Earshot:
-    """Collects the words of other cameras, each at most once waited for in vain until it is in time again.
+class PeerDetectionBuffer:
+    """Collects the detections of other cameras. A camera that is late is not waited for until it is in time.
 
     A camera's words come in the order of their pulses, so whoever has spoken of a later one has nothing
     more to say. Who has never been there, is gone or is too slow costs one wait.
@@ -86,11 +86,11 @@ class Earshot:
             self._others[camera].trusted = False
         return late
 
-    def heard(self, pulse: int) -> Heard:
+    def heard(self, pulse: int) -> PeerDetections:
         """Return what was said of a frame, in the order of the configuration."""
         words = [other.words[pulse] for other in self._others.values() if pulse in other.words]
         alone = any(_expected(other, pulse) and pulse not in other.words for other in self._others.values())
-        return Heard(tuple(words), alone)
+        return PeerDetections(tuple(words), alone)
 
 
 def _expected(other: _Other, pulse: int) -> bool:

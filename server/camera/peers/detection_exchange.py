@@ -10,8 +10,8 @@ from collections.abc import Callable
 import msgspec
 
 from logthrottle import LogThrottle
-from server.camera.peers.cross_view_scorer import Heard, Witness
-from server.camera.peers.detection_buffer import Earshot
+from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
+from server.camera.peers.detection_buffer import PeerDetectionBuffer
 from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.inbox import Message
@@ -27,19 +27,19 @@ _LISTENERS_S = 1.0
 _DECODER = msgspec.json.Decoder(FrameDetections)
 
 
-class Exchange:
-    """What goes between one camera and the others that look at the same ground.
+class PeerDetectionExchange:
+    """Exchanges detections between one camera and the others of the same ground.
 
     It has a session of its own, since the one that a camera has from the start hears no other camera.
     """
 
-    def __init__(self, config: Config, camera_id: str, witness: Witness | None, most: int) -> None:
+    def __init__(self, config: Config, camera_id: str, witness: CrossViewScorer | None, most: int) -> None:
         self._config, self._camera = config, camera_id
         self._keys = ZenohKeys(config.site.name)
         self._others = config.witnesses(camera_id) if witness else ()
         self._patience = config.track.cross_view_wait_s
         looks_here = witness.looks_here if witness else lambda _: False
-        self._earshot = Earshot(self._others, most, looks_here)
+        self._earshot = PeerDetectionBuffer(self._others, most, looks_here)
         self._listening: set[str] = set()
         self._came = asyncio.Event()
         self._joining: asyncio.Task[None] | None = None
@@ -95,21 +95,23 @@ class Exchange:
         bus.declare_alive(self._keys.camera(self._camera, "peer_listener"))
         self._bus = bus
 
-    async def of(self, pulse: int, word: FrameDetections | None, taken: float, *, needed: bool) -> Heard:
+    async def of(
+        self, pulse: int, word: FrameDetections | None, taken: float, *, needed: bool
+    ) -> PeerDetections:
         """Tell the others what was found in a frame; give what they found in it, waited for where needed.
 
         ``taken`` is when the frame was taken, by the loop's clock. From then on patience is counted, and not
         from when it was searched: a camera that falls behind takes no other with it.
         """
         if word is None:
-            return Heard()
+            return PeerDetections()
         if self._joining is not None and self._joining.done():
             self._joining.result()
         await self._tell(word)
         until = taken + self._patience
         self._earshot.ask(pulse, until)
         if not needed:
-            return Heard()
+            return PeerDetections()
         if self._bus is not None:
             await self._until(lambda: not self._earshot.misses(pulse), until)
         for camera in self._earshot.give_up(pulse):

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from server.camera.audio import LiveSound
-from server.camera.sources.base import Image, Source, SourceEnded
-from server.camera.sources.image_folder import Folder
-from server.camera.sources.live_stream import Stream
+from server.camera.audio import LiveAudioSource
+from server.camera.sources.base import Image, PictureSource, SourceEndedError
+from server.camera.sources.image_folder import ImageFolder
+from server.camera.sources.live_stream import LiveStream
 from server.camera.sources.recording import Recording
-from server.camera.sources.synthetic import Stage
+from server.camera.sources.synthetic import SyntheticSource
 from server.config.sections import CameraSettings, SiteSettings
 from server.config.source_address import SourceKind, source_kind
 from server.system.errors import UnavailableError, UserError
 
-__all__ = ["Folder", "Image", "Recording", "Source", "SourceEnded", "open_source"]
+__all__ = ["Image", "ImageFolder", "PictureSource", "Recording", "SourceEndedError", "open_source"]
 
 
 def open_source(
-    camera: CameraSettings, site: SiteSettings, listener: LiveSound | None = None, *, ready: bool = True
-) -> Source:
+    camera: CameraSettings, site: SiteSettings, listener: LiveAudioSource | None = None, *, ready: bool = True
+) -> PictureSource:
     """Open a camera's source; a network camera's sound is handed to ``listener``, if there is one.
 
     ``ready``: for the first pulse; else it is only looked whether it can be opened.
@@ -29,12 +29,12 @@ def open_source(
     try:
         match source_kind(camera.source):
             case SourceKind.SCENE:
-                stage = Stage(camera.source, site)
+                stage = SyntheticSource(camera.source, site)
                 return stage.warm_up() if ready else stage
             case SourceKind.STREAM:
-                return Stream(camera.source, camera.options, listener)
+                return LiveStream(camera.source, camera.options, listener)
             case SourceKind.FOLDER:
-                return Folder(camera.source, camera.offset, camera.at_end)
+                return ImageFolder(camera.source, camera.offset, camera.at_end)
             case SourceKind.FILE:
                 return Recording(camera.source, camera.offset, camera.at_end, site.fps)
     except UserError as error:

@@ -12,12 +12,12 @@ Image = NDArray[np.uint8]
 """``(height, width, 3)`` BGR."""
 
 
-class SourceEnded(Exception):  # noqa: N818 — an end, not an error
+class SourceEndedError(Exception):
     """The recording has no picture for this pulse or any later one."""
 
 
-class Source(Protocol):
-    """Gives the picture of a pulse. Used from one thread at a time; ``take`` may block."""
+class PictureSource(Protocol):
+    """Returns the picture of a pulse. Used from one thread at a time; ``take`` may block."""
 
     size: tuple[int, int]
     """Width and height of its pictures in pixels."""

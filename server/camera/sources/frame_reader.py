@@ -12,8 +12,8 @@ import av
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
-from server.camera.sources.opening import Opened
-from server.camera.sources.timestamp_repair import Continuous
+from server.camera.sources.opening import OpenedVideo
+from server.camera.sources.timestamp_repair import TimestampRepair
 from server.system.address_redaction import redact_address
 
 log = logging.getLogger(__name__)
@@ -36,7 +36,7 @@ class TimedPicture:
     picture: VideoFrame | None
 
 
-def pictures(opened: Opened, *, again: bool = False) -> Iterator[TimedPicture]:
+def read_pictures(opened: OpenedVideo, *, again: bool = False) -> Iterator[TimedPicture]:
     """Decode the pictures in the order in which they are shown, also those that cannot be decoded.
 
     A file that cannot be read any further ends there, and that is said; not where it is read ``again``.
@@ -60,7 +60,7 @@ class _Line(Protocol):
         ...
 
 
-def _counted_or_timed(opened: Opened, first: av.Packet[VideoStream], *, again: bool) -> _Line:
+def _counted_or_timed(opened: OpenedVideo, first: av.Packet[VideoStream], *, again: bool) -> _Line:
     reordered = opened.stream.codec_context.reorder_depth > 0
     if first.pts is None or (opened.container.format.name in _COUNTED_WHEN_REORDERED and reordered):
         if first.pts is None and not again:
@@ -80,7 +80,7 @@ class _TimedLine:
     lost pictures from packets that never were pictures (VP8's invisible ones are stamped beside others).
     """
 
-    def __init__(self, opened: Opened) -> None:
+    def __init__(self, opened: OpenedVideo) -> None:
         self._unit = float(opened.stream.time_base or 1)
         self._frame = max(1, round(1 / (opened.fps * self._unit)))
         self._spacing = max(1, self._frame // 2)
@@ -136,7 +136,7 @@ class _CountedLine:
     change places, has lost it.
     """
 
-    def __init__(self, opened: Opened) -> None:
+    def __init__(self, opened: OpenedVideo) -> None:
         self._context, self._fps = opened.stream.codec_context, opened.fps
         self._context.copy_opaque = True
         self._awaited: list[int] = []
@@ -174,8 +174,8 @@ def _decoded(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
         return []
 
 
-def _packets(opened: Opened, *, again: bool) -> Iterator[av.Packet[VideoStream]]:
-    times = Continuous(opened)
+def _packets(opened: OpenedVideo, *, again: bool) -> Iterator[av.Packet[VideoStream]]:
+    times = TimestampRepair(opened)
     try:
         for packet in opened.container.demux(opened.stream):
             if times.leaps(packet) and not again:

@@ -16,7 +16,7 @@ _LATE = 0.45
 """Part of a frame by which a picture may come after its pulse: what files say of times is rounded."""
 
 
-def rate_of(stream: VideoStream) -> float:
+def frame_rate(stream: VideoStream) -> float:
     """Return pictures a second: the usual rate that they are spaced by, else their mean."""
     mean, spaced = stream.average_rate, stream.guessed_rate
     if not mean:
@@ -26,11 +26,11 @@ def rate_of(stream: VideoStream) -> float:
     return float(spaced)
 
 
-def place_of(seconds: float, fps: float) -> int:
+def frame_index(seconds: float, fps: float) -> int:
     """Return the first frame of a clock that shows a picture of so many seconds after the first one."""
     return math.ceil(seconds * fps - _LATE)
 
 
-def length_of(seconds: float, rate: float, fps: float) -> int:
+def frame_count(seconds: float, rate: float, fps: float) -> int:
     """Return the frames of a clock that a recording lasts whose last picture is at ``seconds``."""
-    return max(1, place_of(seconds + 1 / rate, fps))
+    return max(1, frame_index(seconds + 1 / rate, fps))

@@ -10,8 +10,8 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from server.camera.sources.base import Image, SourceEnded
-from server.camera.sources.missing_frames import Gaps
+from server.camera.sources.base import Image, SourceEndedError
+from server.camera.sources.missing_frames import MissingFrames
 from server.media.letterbox import Letterbox
 from server.system.errors import UserError
 
@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 _ENDINGS = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp"})
 
 
-class Folder:
+class ImageFolder:
     """Shows its image ``pulse - offset`` in the order of the file names, upright as EXIF says.
 
     All are of the first one's size: others are fitted into that. One that cannot be read shows as the one
@@ -45,7 +45,7 @@ class Folder:
             raise UserError(f"{self._files[0]}: cannot read this image")
         self._newest = first
         self.size = (first.shape[1], first.shape[0])
-        self._gaps = Gaps(path)
+        self._gaps = MissingFrames(path)
         self._resized = False
         """That one has another size has been said."""
 
@@ -57,7 +57,7 @@ class Folder:
         if index >= len(self._files):
             self._say_gaps()
             if not self._loop:
-                raise SourceEnded(self._path)
+                raise SourceEndedError(self._path)
             index %= len(self._files)
         image = _read(self._files[index])
         if image is None:

@@ -15,10 +15,10 @@ from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
 from logthrottle import LogThrottle
-from server.camera.audio import LiveSound
+from server.camera.audio import LiveAudioSource
 from server.camera.sources.base import Image
-from server.camera.sources.opening import Opened, no_answer, open_video
-from server.camera.sources.orientation import INTERLACED, Orientation, orientation_of, pixel_aspect_of
+from server.camera.sources.opening import OpenedVideo, open_video, timeout_message
+from server.camera.sources.orientation import INTERLACED, Orientation, parse_orientation, pixel_aspect
 from server.system.address_redaction import ffmpeg_reason, redact_address
 from server.system.backoff import Backoff
 from server.system.errors import UnavailableError, UserError
@@ -39,16 +39,16 @@ _HELD_BACK = 2
 pictures."""
 
 
-class Stream:
+class LiveStream:
     """Reads the camera in a thread, so that a pulse never waits for it; reconnects by itself."""
 
     recorded = False
 
-    def __init__(self, url: str, options: Mapping[str, str], listener: LiveSound | None = None) -> None:
+    def __init__(self, url: str, options: Mapping[str, str], listener: LiveAudioSource | None = None) -> None:
         self._url, self._options, self._listener = url, options, listener
         opened = open_video(url, options, (OPEN_S, READ_S))
         self._stored = opened.size
-        self._orientation = Orientation(pixel_aspect=pixel_aspect_of(opened.stream))
+        self._orientation = Orientation(pixel_aspect=pixel_aspect(opened.stream))
         self.size = self._orientation.size(self._stored)
         self._sized = threading.Event()
         """The first picture has come, and with it the size is known for good."""
@@ -88,7 +88,7 @@ class Stream:
         self._closing.set()
         self._thread.join(_LET_GO_S)  # a silent camera holds it up for longer: it ends by itself
 
-    def _run(self, opened: Opened | None) -> None:
+    def _run(self, opened: OpenedVideo | None) -> None:
         backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
         while not self._closing.is_set():
             if opened is not None and self._read_alive(opened):
@@ -101,9 +101,9 @@ class Stream:
                 opened = None
                 self._lost(str(error))
 
-    def _read(self, opened: Opened) -> bool:
+    def _read(self, opened: OpenedVideo) -> bool:
         """Read until the connection ends; tell whether any picture came."""
-        aspect = pixel_aspect_of(opened.stream)
+        aspect = pixel_aspect(opened.stream)
         size = replace(self._orientation, pixel_aspect=aspect).size(opened.size)
         if size != self.size:
             self._resized = size
@@ -124,7 +124,7 @@ class Stream:
         except _OddSizeError as error:
             why = str(error)  # by damage or for good: a new connection will tell
         except (av.error.FFmpegError, OSError) as error:
-            why = f"reading stopped: {no_answer(error, READ_S) or ffmpeg_reason(error)}"
+            why = f"reading stopped: {timeout_message(error, READ_S) or ffmpeg_reason(error)}"
         finally:
             opened.container.close()
         if not self._closing.is_set():
@@ -143,7 +143,7 @@ class Stream:
         if ended := self._away.end():
             log.info("%s: pictures come again, after %.0f s", redact_address(self._url), ended.seconds)
 
-    def _read_alive(self, opened: Opened) -> bool:
+    def _read_alive(self, opened: OpenedVideo) -> bool:
         """Do the same, and outlive mistakes: nobody would begin this thread anew."""
         try:
             return self._read(opened)
@@ -152,7 +152,7 @@ class Stream:
             opened.container.close()
             return False
 
-    def _listened_to(self, opened: Opened) -> tuple[AudioStream, ...]:
+    def _listened_to(self, opened: OpenedVideo) -> tuple[AudioStream, ...]:
         """Return what else is to be read than the pictures."""
         if self._listener is None:
             return ()
@@ -189,7 +189,7 @@ class Stream:
         self._sized.set()
 
     def _oriented(self, picture: VideoFrame) -> Orientation:
-        return orientation_of(picture, self._orientation.pixel_aspect)
+        return parse_orientation(picture, self._orientation.pixel_aspect)
 
     def _size_of(self, picture: VideoFrame) -> tuple[int, int]:
         return self._oriented(picture).size((picture.width, picture.height))

@@ -18,8 +18,8 @@ _UNEVEN = 0.1
 """Part of the frames from which on missing pictures are no loss, but how the camera takes them."""
 
 
-class Gaps:
-    """Notes the frames for which an earlier picture stands; they count from 0, and from 1 in what is said."""
+class MissingFrames:
+    """Counts the frames for which an earlier picture stands; from 0, and from 1 in log lines."""
 
     def __init__(self, path: str) -> None:
         self._path = path

@@ -14,7 +14,7 @@ from av.stream import Disposition
 from av.video.codeccontext import VideoCodecContext
 from av.video.stream import VideoStream
 
-from server.camera.sources.frame_timing import rate_of
+from server.camera.sources.frame_timing import frame_rate
 from server.config.source_address import is_device
 from server.system.address_redaction import ffmpeg_reason, redact_address
 from server.system.errors import UserError
@@ -24,7 +24,7 @@ _TEXT = "tty"
 
 
 @dataclass(frozen=True, slots=True)
-class Opened:
+class OpenedVideo:
     """An open video.
 
     Attributes:
@@ -48,7 +48,7 @@ def open_video(
     source: str,
     options: Mapping[str, str] | None = None,
     timeout: tuple[float, float] | None = None,
-) -> Opened:
+) -> OpenedVideo:
     """Open the first video stream; ``timeout`` is (seconds to open, seconds to read).
 
     Raises:
@@ -60,7 +60,7 @@ def open_video(
             source, format="v4l2" if is_device(source) else None, options=dict(options or {}), timeout=timeout
         )
     except (av.error.FFmpegError, OSError, ValueError) as error:
-        why = no_answer(error, timeout[0]) if timeout else None
+        why = timeout_message(error, timeout[0]) if timeout else None
         # FFmpeg's own words repeat the address, and so would a traceback that goes on to them.
         raise UserError(f"{name}: cannot open this video: {why or _reason(source, error)}") from None
     if container.format.name == _TEXT:
@@ -82,11 +82,11 @@ def open_video(
         raise UserError(f"{name}: cannot decode this video: no picture size in it; is the file whole?")
     context.thread_count = 1  # one process per camera already uses the cores
     size = (context.width, context.height)
-    return Opened(container, stream, size, rate_of(stream), stream.frames, len(videos))
+    return OpenedVideo(container, stream, size, frame_rate(stream), stream.frames, len(videos))
 
 
-def no_answer(error: Exception, seconds: float) -> str | None:
-    """Return that a source has kept silent for so long, where it was given up for that."""
+def timeout_message(error: Exception, seconds: float) -> str | None:
+    """Return the error text of a source that sent nothing for so long."""
     return f"no answer within {seconds:g} s" if isinstance(error, av.error.ExitError) else None
 
 

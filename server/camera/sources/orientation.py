@@ -12,7 +12,7 @@ from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
 from server.camera.sources.base import Image
-from server.media.color_conversion import bgr
+from server.media.color_conversion import to_bgr
 
 _MATRIX_NAME = "DISPLAYMATRIX"
 _MATRIX = struct.Struct("=9i")
@@ -61,7 +61,7 @@ class Orientation:
 
     def image(self, picture: VideoFrame) -> Image:
         """Return the picture as it is shown, ``(height, width, 3)`` BGR."""
-        image = bgr(picture)
+        image = to_bgr(picture)
         if self.pixel_aspect != 1.0:
             upright = replace(self, transposed=False).size((image.shape[1], image.shape[0]))
             how = cv2.INTER_AREA if self.pixel_aspect < 1.0 else cv2.INTER_LINEAR
@@ -86,7 +86,7 @@ _QUARTERS = (
 """By quarter turns to the left."""
 
 
-def orientation_of(picture: VideoFrame, pixel_aspect: float = 1.0) -> Orientation:
+def parse_orientation(picture: VideoFrame, pixel_aspect: float = 1.0) -> Orientation:
     """Parse a picture's display matrix (ISO/IEC 14496-12, 6.2.2; an EXIF orientation becomes one, too).
 
     What is between two quarter turns is taken for the nearer one. Of a photo's EXIF only the turn is known.
@@ -105,7 +105,7 @@ def orientation_of(picture: VideoFrame, pixel_aspect: float = 1.0) -> Orientatio
     return Orientation(transposed=True, mirrored_x=c < 0, mirrored_y=b < 0, pixel_aspect=pixel_aspect)
 
 
-def pixel_aspect_of(stream: VideoStream) -> float:
+def pixel_aspect(stream: VideoStream) -> float:
     """Return how wide a stored pixel is, in heights of it; 1 where nothing else is sensibly said."""
     said = stream.sample_aspect_ratio
     aspect = float(said) if said else 1.0

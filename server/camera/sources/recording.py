@@ -8,12 +8,12 @@ from typing import Literal
 
 from av.video.frame import VideoFrame
 
-from server.camera.sources.base import Image, SourceEnded
-from server.camera.sources.frame_reader import TimedPicture, pictures
-from server.camera.sources.frame_timing import length_of, place_of
-from server.camera.sources.missing_frames import Gaps
+from server.camera.sources.base import Image, SourceEndedError
+from server.camera.sources.frame_reader import TimedPicture, read_pictures
+from server.camera.sources.frame_timing import frame_count, frame_index
+from server.camera.sources.missing_frames import MissingFrames
 from server.camera.sources.opening import open_video
-from server.camera.sources.orientation import INTERLACED, orientation_of, pixel_aspect_of
+from server.camera.sources.orientation import INTERLACED, parse_orientation, pixel_aspect
 from server.config.source_address import path_is_missing
 from server.media.letterbox import Letterbox
 from server.system.address_redaction import redact_address
@@ -64,14 +64,14 @@ class Recording:
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
         self._quiet = quiet
         self._opened = open_video(path)
-        self._aspect = pixel_aspect_of(self._opened.stream)
+        self._aspect = pixel_aspect(self._opened.stream)
         self.fps = self._opened.fps
         """Pictures a second, as the file says."""
         self.frames = self._opened.frames
         """How many pictures the file says it has; 0 where it does not say."""
         self._site_fps = fps or self.fps
         self._same_rate = abs(self.fps / self._site_fps - 1) <= SAME_RATE
-        self._gaps: Gaps | None = None if quiet else Gaps(path)
+        self._gaps: MissingFrames | None = None if quiet else MissingFrames(path)
         self._length: int | None = None
         """Pulses that it lasts; None: not known before its end."""
         self._moved: dict[int, int] = {}
@@ -79,13 +79,13 @@ class Recording:
         self._begin()
         try:
             first = self._forward(0)  # a broken file is refused now, not at its first pulse
-        except SourceEnded:
+        except SourceEndedError:
             self._gaps = None  # all of it is damaged
             self.close()
             raise UserError(
                 f"{redact_address(path)}: there is not one picture in this video; is the file whole?"
             ) from None
-        self.orientation = orientation_of(first, self._aspect)
+        self.orientation = parse_orientation(first, self._aspect)
         """How its first picture is turned, mirrored and stretched."""
         self.size = self.orientation.size((first.width, first.height))
         self._resized = quiet
@@ -101,7 +101,7 @@ class Recording:
         try:
             place = self._place(index)
             picture = self._forward(place)
-        except SourceEnded:
+        except SourceEndedError:
             self._say_gaps()
             if not self._loop or not self._length:
                 raise
@@ -116,7 +116,7 @@ class Recording:
 
     def ahead(self, places: Sequence[int]) -> Iterator[Image]:
         """Decode the frames at some places, from the file opened once more."""
-        return frames_at(self._path, places, self._site_fps)
+        return decode_frames(self._path, places, self._site_fps)
 
     def close(self) -> None:
         """Close the file."""
@@ -125,7 +125,7 @@ class Recording:
 
     def _begin(self) -> None:
         again = self._quiet or self._length is not None
-        self._pictures = pictures(self._opened, again=again)
+        self._pictures = read_pictures(self._opened, again=again)
         self._coming: TimedPicture | None = None
         self._newest: VideoFrame | None = None
         self._at = self._number = self._asked = -1
@@ -137,7 +137,7 @@ class Recording:
         if self._length is None:
             return index
         if index >= self._length and not self._loop:
-            raise SourceEnded(self._path)
+            raise SourceEndedError(self._path)
         index %= self._length
         if index < self._asked:
             self._opened.container.close()
@@ -149,7 +149,7 @@ class Recording:
         """Decode up to what is shown at a place."""
         self._asked = place
         while (coming := self._coming or next(self._pictures, None)) is not None:
-            at = place_of(coming.seconds, self._site_fps)
+            at = frame_index(coming.seconds, self._site_fps)
             # Damaged from the start: what comes before the first good picture shows as that one.
             if at > place and self._newest is not None:
                 self._coming = coming
@@ -159,7 +159,7 @@ class Recording:
         else:
             self._end()
         if self._newest is None or (self._length is not None and place >= self._length):
-            raise SourceEnded(self._path)
+            raise SourceEndedError(self._path)
         return self._newest
 
     def _take_in(self, at: int, coming: TimedPicture) -> None:
@@ -176,7 +176,7 @@ class Recording:
 
     def _end(self) -> None:
         if self._length is None and self._newest is not None:
-            self._length = length_of(self._seconds, self.fps, self._site_fps)
+            self._length = frame_count(self._seconds, self.fps, self._site_fps)
 
     def _note_number(self, pulse: int, place: int) -> None:
         moved = self._number - place if self._at <= place else 0
@@ -186,7 +186,7 @@ class Recording:
                 del self._moved[next(iter(self._moved))]
 
     def _shown(self, picture: VideoFrame) -> Image:
-        image = orientation_of(picture, self._aspect).image(picture)
+        image = parse_orientation(picture, self._aspect).image(picture)
         size = image.shape[1], image.shape[0]
         if size == self.size:
             return image
@@ -220,8 +220,8 @@ class Recording:
             self._gaps.say(length, self._number / self._seconds if self._seconds else self.fps)
 
 
-def frames_at(path: str, places: Sequence[int], fps: float | None = None) -> Iterator[Image]:
-    """Decode the frames at some places of a file, by rising place; fewer where it is shorter.
+def decode_frames(path: str, places: Sequence[int], fps: float | None = None) -> Iterator[Image]:
+    """Decode frames of a file at ascending positions; fewer where the file is shorter.
 
     Raises:
         UserError: it cannot be opened.
@@ -232,7 +232,7 @@ def frames_at(path: str, places: Sequence[int], fps: float | None = None) -> Ite
             image = recording.take(place)
             if image is not None:
                 yield image
-    except SourceEnded:
+    except SourceEndedError:
         return
     finally:
         recording.close()

@@ -16,7 +16,7 @@ _WHOLE = re.compile(r"[0-9]{1,18}")
 _DEFAULTS = {"camera": 0, "cameras": None, "objects": None, "seed": 1}  # None: as many as suit the scene
 
 
-class Stage:
+class SyntheticSource:
     """Draws the picture of a pulse; endless.
 
     Raises:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import av
 from av.video.stream import VideoStream
 
-from server.camera.sources.opening import Opened
+from server.camera.sources.opening import OpenedVideo
 
 _BACK_S = 1.0
 _FAR_S, _FAR_FRAMES = 60.0, 10
 """A picture is not shown for longer than this, in seconds or in frames, whichever is more: that is a leap."""
 
 
-class Continuous:
-    """Moves times so that behind a leap they go on with the next frame."""
+class TimestampRepair:
+    """Moves time stamps so that they go on with the next frame after a jump."""
 
-    def __init__(self, opened: Opened) -> None:
+    def __init__(self, opened: OpenedVideo) -> None:
         unit = float(opened.stream.time_base or 1)
         self._frame = max(1, round(1 / (opened.fps * unit)))
         self._back = round(_BACK_S / unit) + self._frame

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, replace
 
 from server.camera.pipeline import CameraPipeline
-from server.camera.sources import SourceEnded
+from server.camera.sources import SourceEndedError
 from server.cli.doctor.stream_probe import StreamStats, file_fps, measure_stream
 from server.config.camera_password import fill_in_password
 from server.config.site_config import Config
@@ -71,7 +71,7 @@ def _tried(config: Config, pipeline: CameraPipeline, sent: StreamStats | None, u
     for pulse in range(pipeline.begins, pipeline.begins + max(1, round(_FRAMES_S * fps))):
         try:
             image = pipeline.take(pulse)
-        except SourceEnded:
+        except SourceEndedError:
             break
         if image is not None:
             frames, units = frames + 1, units + len(pipeline.encode(pulse, image).data)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import av
 from av.video.frame import VideoFrame
 
-from server.camera.sources.opening import Opened, open_video
+from server.camera.sources.opening import OpenedVideo, open_video
 
 _LEAST = 5
 """Pictures without which no rate is told."""
@@ -58,7 +58,7 @@ def file_fps(file: str) -> float:
     return opened.fps
 
 
-def _watched(opened: Opened, until: float) -> StreamStats:
+def _watched(opened: OpenedVideo, until: float) -> StreamStats:
     times: list[float] = []
     damaged, began = 0, time.thread_time()
     try:

@@ -11,9 +11,9 @@ from multiprocessing.queues import Queue
 from typing import TypeAlias
 
 from server.camera.encoding.encoder import AccessUnit
-from server.camera.peers.cross_view_scorer import Heard
-from server.camera.pipeline import CameraPipeline, Searched
-from server.camera.sources import SourceEnded
+from server.camera.peers.cross_view_scorer import PeerDetections
+from server.camera.pipeline import CameraPipeline, DetectedFrame
+from server.camera.sources import SourceEndedError
 from server.cli.render.peer_pipes import PeerLink, PeerPipeFactory, PeerPipes
 from server.config.site_config import Config
 from server.messaging.messages import CameraTracks, FrameDetections
@@ -149,14 +149,14 @@ class CameraRun:
         self._pipeline, self._camera = pipeline, camera
         self._units: list[AccessUnit] = []
         self._pulse = 0
-        self._searched: Searched | None = None
+        self._searched: DetectedFrame | None = None
         self.ended = False
 
     def search(self) -> FrameDetections | None:
         """Take, encode and search the next frame; give what the other cameras are told, if they are."""
         try:
             image = self._pipeline.take(self._pulse)
-        except SourceEnded:
+        except SourceEndedError:
             self._searched = None
             return self._pipeline.last_word(self._pulse)
         if image is not None:
@@ -172,7 +172,7 @@ class CameraRun:
         """
         if self._searched is None:
             return self._finish()
-        tracks = self._pipeline.follow(self._searched, Heard(tuple(words)))
+        tracks = self._pipeline.follow(self._searched, PeerDetections(tuple(words)))
         self._pulse += 1
         if tracks is None:
             return None

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import BinaryIO
 
 from server.config.sections import SiteSettings
-from server.media.audio.audio_chunk import Heard
-from server.media.containers.mp4_audio import sound_fragment
-from server.media.stream_format import Agreement
+from server.media.audio.audio_chunk import AudioChunk
+from server.media.containers.mp4_audio import audio_fragment
+from server.media.stream_format import StreamFormat
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.gapless_timeline import GaplessTimeline
@@ -41,7 +41,7 @@ class FilmWriter:
         self,
         folder: Path,
         frame_buffers: Mapping[str, FrameBuffer],
-        agreement: Agreement,
+        agreement: StreamFormat,
         site: SiteSettings,
         sound: AudioBuffer | None = None,
     ) -> None:
@@ -95,10 +95,10 @@ class FilmWriter:
         return self._agreement.head(self._site.size, self._site.fps, sound, pulses=pulses) or b""
 
 
-def _begun_at(origin: int, heard: Heard, fps: float) -> bytes:
+def _begun_at(origin: int, heard: AudioChunk, fps: float) -> bytes:
     """Give sound as it is in a film that has this pulse at time 0; a frame that begins before is left out."""
     form = heard.format
     sample = round(origin * form.rate / fps)
     early = max(0, -((heard.first * form.samples - sample) // form.samples))
     first, frames = heard.first + early, heard.frames[early:]
-    return sound_fragment(form, frames, first, sample) if frames else b""
+    return audio_fragment(form, frames, first, sample) if frames else b""

@@ -13,11 +13,11 @@ from server.cli.render.site_file import write_site
 from server.cli.render.soundtrack import Soundtrack
 from server.cli.render.video_info import Size
 from server.config.site_config import Config
-from server.media.codec import agreement_for
+from server.media.codec import stream_format_for
 from server.service.decision_files.decision_writer import DecisionWriter
-from server.service.ingest.epoch_aligner import Aligner
+from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.streaming.frame_buffer import FrameBuffer
-from server.service.view_selection.decider import Decider, GopDecision, homographies
+from server.service.view_selection.decider import GopDecision, ViewDecider, camera_homographies
 
 log = logging.getLogger(__name__)
 
@@ -32,15 +32,15 @@ class Renderer:
         self._config, self._folder = config, folder
         # What is to be decided, and what the camera that was run first has done since.
         frames = 4 * (config.view.lookahead + config.encode.gop + config.track.window.stride)
-        agreement = agreement_for(
+        agreement = stream_format_for(
             config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
         )
         self._shelves = {camera: FrameBuffer(config.site.fps, frames, agreement) for camera in cameras}
-        self._aligner = Aligner(cameras, config.track.window.stride, grace=0)
+        self._aligner = EpochAligner(cameras, config.track.window.stride, grace=0)
         for camera in cameras:
             self._aligner.come(camera)
-        self._decider = Decider(
-            config, homographies(config), lambda camera, pulse: self._shelves[camera].has(pulse)
+        self._decider = ViewDecider(
+            config, camera_homographies(config), lambda camera, pulse: self._shelves[camera].has(pulse)
         )
         self._recorder = DecisionWriter(folder, cameras, self._decider.people.fits)
         self._soundtrack = Soundtrack(config)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.camera.audio import RecordedSound, open_sound, runs
+from server.camera.audio import RecordedAudioSource, consecutive_runs, open_audio
 from server.config.site_config import Config
 from server.messaging.messages import AudioHeader
 from server.service.streaming.audio_buffer import AudioBuffer
@@ -21,8 +21,8 @@ class Soundtrack:
 
     def __init__(self, config: Config) -> None:
         camera, form = config.sounding, config.sound.format
-        opened = None if camera is None else open_sound(config, camera)
-        self._sound = opened if isinstance(opened, RecordedSound) else None
+        opened = None if camera is None else open_audio(config, camera)
+        self._sound = opened if isinstance(opened, RecordedAudioSource) else None
         self._fps = config.site.fps
         self._begun = False
         self.frame_buffer = None
@@ -36,6 +36,6 @@ class Soundtrack:
         frames = [] if self._begun else self._sound.until(first)
         self._begun = True
         frames += self._sound.until(until + round(_AHEAD_S * self._fps))
-        for run in runs(frames):
+        for run in consecutive_runs(frames):
             head = AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])
             self.frame_buffer.put(head, b"".join(frame.data for frame in run))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.camera.sources import Folder, Recording
+from server.camera.sources import ImageFolder, Recording
 from server.system.errors import UserError
 
 Size = tuple[int, int]
@@ -32,7 +32,7 @@ def read_video_info(view: Path) -> VideoInfo:
         UserError: it cannot be opened, or there is not one picture in it.
     """
     if view.is_dir():
-        return VideoInfo(Folder(str(view), 0, "stop").size, None)
+        return VideoInfo(ImageFolder(str(view), 0, "stop").size, None)
     recording = Recording(str(view), quiet=True)
     recording.close()
     return VideoInfo(recording.size, recording.fps)

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from server.camera.background_warmup import ready_detector
-from server.camera.sources import Image, Source, SourceEnded, open_source
-from server.camera.tracker_setup import ready_tracker
+from server.camera.background_warmup import warm_up_detector
+from server.camera.sources import Image, PictureSource, SourceEndedError, open_source
+from server.camera.tracker_setup import set_up_tracker
 from server.cli.generated_config import config_for_videos
 from server.config.loader import build_config, read_content
 from server.config.site_config import Config
@@ -84,9 +84,9 @@ def _follower(config: Config, name: str, solver: Callable[[], Solver]) -> Tracke
     """Give the tracker, which has looked ahead where it goes by pictures."""
     camera = config.cameras[0]
     if not needs_images(name):
-        return ready_tracker(config, name, camera, None, solver)
+        return set_up_tracker(config, name, camera, None, solver)
     with closing(open_source(camera, config.site)) as source:
-        return ready_tracker(config, name, camera, source, solver)
+        return set_up_tracker(config, name, camera, source, solver)
 
 
 def solver_for(config: Config, name: str | None) -> Solver:
@@ -118,7 +118,7 @@ def detect_frames(config: Config) -> Iterator[DetectedFrame]:
     camera = config.cameras[0]
     source = open_source(camera, config.site)
     fit = Letterbox(source.size, (config.site.width, config.site.height))
-    detector = ready_detector(config, camera, source, fit)
+    detector = warm_up_detector(config, camera, source, fit)
     for number, image in read_frames(source):
         if image is not None:
             found = detector.detect(fit.image(image), number)
@@ -126,12 +126,12 @@ def detect_frames(config: Config) -> Iterator[DetectedFrame]:
     source.close()
 
 
-def read_frames(source: Source, first: int = 0) -> Iterator[tuple[int, Image | None]]:
+def read_frames(source: PictureSource, first: int = 0) -> Iterator[tuple[int, Image | None]]:
     """Give the frames of a recording from `first` to its end; `None` where one has no picture."""
     for number in count(first):
         try:
             image = source.take(number)
-        except SourceEnded:
+        except SourceEndedError:
             return
         yield number, image
 

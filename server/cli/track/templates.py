@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from server.camera.sources import SourceEnded, open_source
+from server.camera.sources import SourceEndedError, open_source
 from server.cli.track.command import config_for_video, final_rows, read_frames, solver_for
 from server.system.atomic_write import atomic_file
 from server.system.errors import UserError
@@ -73,7 +73,7 @@ def track_templates(
                 progress(number + 1)
             rows += final_rows(tracker.flush())
             write_rows(draft, rows)
-    except (SourceEnded, ValueError) as error:
+    except (SourceEndedError, ValueError) as error:
         raise UserError(f"{video}: {error}") from error
     finally:
         source.close()

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from server.config.sections.base import Section
-from server.media.audio.audio_format import OPUS_RATE, Coding, SoundFormat
+from server.media.audio.audio_format import OPUS_RATE, AudioFormat, Coding
 
 
 class SoundSettings(Section):
@@ -35,6 +35,6 @@ class SoundSettings(Section):
         return self
 
     @property
-    def format(self) -> SoundFormat | None:
+    def format(self) -> AudioFormat | None:
         """What all streams of the site sound like; None: they have no sound."""
-        return None if self.source is None else SoundFormat(self.rate, self.channels, self.codec)
+        return None if self.source is None else AudioFormat(self.rate, self.channels, self.codec)

@@ -6,7 +6,7 @@ import time
 
 from server.http.api.schema import CameraInfo, Cameras, Choice, Elsewhere, ObjectInfo, Objects, SiteInfo
 from server.service.decision_state import reason
-from server.service.identity.sharding import server_of
+from server.service.identity.sharding import shard_address
 from server.service.ingest.ingest import CameraState, Thumbnail
 from server.service.service import BestViewService
 
@@ -50,7 +50,7 @@ def objects_info(service: BestViewService) -> Objects:
             )
         )
     share = service.config.view.share
-    return Objects(objects, [Elsewhere(it, server_of(it, share)) for it in people.elsewhere])
+    return Objects(objects, [Elsewhere(it, shard_address(it, share)) for it in people.elsewhere])
 
 
 def cameras_info(service: BestViewService) -> Cameras:

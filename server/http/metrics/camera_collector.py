@@ -10,7 +10,7 @@ from prometheus_client.registry import Collector
 
 from server.messaging.messages import CameraStatus
 from server.service.ingest.ingest import CameraState
-from server.service.metrics.camera_metrics import Spread
+from server.service.metrics.camera_metrics import RecentSeconds
 from server.service.service import BestViewService
 
 Value = Callable[[str, CameraState], float | None]
@@ -74,7 +74,7 @@ class CameraStages(Collector):
                 family.add_metric([camera, stage], took.buckets, took.sum)
         return family
 
-    def _spread(self, what: str, words: str, of: Callable[[CameraState], Spread | None]) -> Metric:
+    def _spread(self, what: str, words: str, of: Callable[[CameraState], RecentSeconds | None]) -> Metric:
         family = GaugeMetricFamily(f"myview_camera_{what}_seconds", words, labels=["camera", "lately"])
         for camera, state in self._service.intake.states.items():
             spread = of(state)
@@ -101,7 +101,7 @@ def _of_status(value: Callable[[CameraStatus], float]) -> Value:
     return lambda _, state: None if state.status is None else value(state.status)
 
 
-_SPREADS: tuple[tuple[str, str, Callable[[CameraState], Spread | None]], ...] = (
+_SPREADS: tuple[tuple[str, str, Callable[[CameraState], RecentSeconds | None]], ...] = (
     ("sync_error", "How long after its pulse a frame was taken.", lambda it: it.gauge.sync_error),
     (
         "tracking_delay",

@@ -10,7 +10,7 @@ from server.http.api.handlers import answer, asked_for, no_camera, no_object, pr
 from server.http.app_keys import SERVICE
 from server.http.operator.schema import PeopleByHand
 from server.messaging.identity_snapshot import NAME_LENGTH_MAX
-from server.service.identity.people import People
+from server.service.identity.people import PersonTracker
 from server.service.service import BestViewService
 
 routes = web.RouteTableDef()
@@ -62,7 +62,7 @@ def _call(service: BestViewService, number: int, name: str) -> web.Response:
     return answer(_told(service))
 
 
-def _merge(service: BestViewService, people: People, number: int, other: int) -> web.Response:
+def _merge(service: BestViewService, people: PersonTracker, number: int, other: int) -> web.Response:
     lost = people.roll.whose(other)
     if lost not in people.known:
         return no_object(service, other)
@@ -72,7 +72,7 @@ def _merge(service: BestViewService, people: People, number: int, other: int) ->
     return answer(_told(service))
 
 
-def _part(service: BestViewService, people: People, number: int, cameras: list[str]) -> web.Response:
+def _part(service: BestViewService, people: PersonTracker, number: int, cameras: list[str]) -> web.Response:
     unknown = [it for it in cameras if it not in service.frame_buffers]
     if unknown:
         return no_camera(service, unknown[0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from server.http.api.schema import CameraInfo
-from server.service.metrics.camera_metrics import Spread, Trouble
+from server.service.metrics.camera_metrics import CameraProblem, RecentSeconds
 
 
 class OwnPicture(msgspec.Struct, frozen=True):
@@ -24,15 +24,15 @@ class OperatorCamera(CameraInfo, frozen=True):
     bad_messages: int
     clock_offset: float | None
     """Seconds, pulse server's clock minus the camera's; null: not known."""
-    sync_error: Spread | None
+    sync_error: RecentSeconds | None
     """Seconds from the moment a frame was due to the moment it was taken, of the last ten seconds or so."""
-    tracking_delay: Spread | None
+    tracking_delay: RecentSeconds | None
     """Seconds from the moment a window's last frame was due to the moment the window was solved."""
     certified: float | None
     """Share of the windows whose answer is proven to be the optimum."""
     windows: int
     """How many windows that is about."""
-    last_trouble: Trouble | None
+    last_trouble: CameraProblem | None
     """What last went wrong, and when; it stays when the camera is well again."""
     picture: OwnPicture | None
     """Null: it has not said."""

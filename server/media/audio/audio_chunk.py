@@ -5,24 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from server.media.audio.audio_format import SoundFormat
-from server.media.containers.mp4_audio import sound_fragment
+from server.media.audio.audio_format import AudioFormat
+from server.media.containers.mp4_audio import audio_fragment
 
 
 @dataclass(frozen=True)
-class Heard:
-    """Consecutive frames of sound from number ``first`` on; those that did not come are silent."""
+class AudioChunk:
+    """Consecutive audio frames from number ``first`` on; missing ones are silent."""
 
     first: int
     frames: tuple[bytes, ...]
-    format: SoundFormat
+    format: AudioFormat
 
     @property
-    def silenced(self) -> Heard:
+    def silenced(self) -> AudioChunk:
         """As many frames of silence."""
-        return Heard(self.first, (self.format.silence,) * len(self.frames), self.format)
+        return AudioChunk(self.first, (self.format.silence,) * len(self.frames), self.format)
 
     @cached_property
     def fragment(self) -> bytes:
         """The frames as a fragment of MP4; nothing where there are none."""
-        return sound_fragment(self.format, self.frames, self.first) if self.frames else b""
+        return audio_fragment(self.format, self.frames, self.first) if self.frames else b""

@@ -23,8 +23,8 @@ _OPUS_SILENCE = (b"\xf8\xff\xfe", b"\xfc\xff\xfe")
 
 
 @dataclass(frozen=True, slots=True)
-class SoundFormat:
-    """All that a decoder has to be told."""
+class AudioFormat:
+    """All that an audio decoder needs to know."""
 
     rate: int
     """Samples a second."""

@@ -13,7 +13,7 @@ _MANY = 3
 """A code: the number of frames stands in the next byte."""
 
 
-def samples_in(packet: bytes) -> int:
+def packet_samples(packet: bytes) -> int:
     """Return how many samples at 48 kHz a packet holds; 0 where it does not say."""
     if not packet:
         return 0

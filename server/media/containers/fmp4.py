@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
-from server.media.audio.audio_format import SoundFormat
-from server.media.containers.mp4_audio import SOUND_TRACK, sound_track
+from server.media.audio.audio_format import AudioFormat
+from server.media.containers.mp4_audio import SOUND_TRACK, audio_track
 from server.media.containers.mp4_boxes import box, full, moof_mdat, movie_head, track, track_defaults
 from server.media.h264.annexb import ParameterSets
 from server.media.rendering_messages import TIMESCALE
@@ -27,7 +27,7 @@ _TFDT_AT = 8 + 16 + 8 + 16 + 12
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class FragmentSample:
     """One frame ready for a fragment."""
 
     data: bytes
@@ -43,7 +43,7 @@ def ticks(pulse: int, fps: float) -> int:
 
 
 def init_segment(
-    parameters: ParameterSets, width: int, height: int, sound: SoundFormat | None = None
+    parameters: ParameterSets, width: int, height: int, sound: AudioFormat | None = None
 ) -> bytes:
     """Return ``ftyp`` and ``moov``, which players need before the first fragment; all streams share it."""
     last = _TRACK if sound is None else SOUND_TRACK
@@ -58,24 +58,24 @@ def init_segment(
             _entry(parameters, width, height),
             size=(width, height),
         ),
-        b"" if sound is None else sound_track(sound),
+        b"" if sound is None else audio_track(sound),
         box("mvex", *(track_defaults(number + 1) for number in range(last))),
     )
 
 
-def fragment(samples: Sequence[Sample], first: int, fps: float) -> bytes:
+def fragment(samples: Sequence[FragmentSample], first: int, fps: float) -> bytes:
     """Return ``moof`` and ``mdat`` of consecutive frames, the first of them shown at pulse ``first``."""
     pulses = accumulate((sample.lasts for sample in samples), initial=first)
     return _fragment(samples, first, [ticks(pulse, fps) for pulse in pulses])
 
 
-def still(samples: Sequence[Sample], first: int, until: int, fps: float) -> bytes:
+def still_fragment(samples: Sequence[FragmentSample], first: int, until: int, fps: float) -> bytes:
     """Return a fragment that shows the last of some frames: those before it pass in a tick each."""
     begin = ticks(first, fps)
     return _fragment(samples, first, [*(begin + place for place in range(len(samples))), ticks(until, fps)])
 
 
-def _fragment(samples: Sequence[Sample], first: int, edges: Sequence[int]) -> bytes:
+def _fragment(samples: Sequence[FragmentSample], first: int, edges: Sequence[int]) -> bytes:
     """Return the fragment of samples, each shown from its edge to the next, in ticks."""
     entries = b"".join(
         struct.pack(
@@ -105,7 +105,7 @@ def _entry(parameters: ParameterSets, width: int, height: int) -> bytes:
     )  # fmt: skip
 
 
-def rebased(frame: bytes, by: int) -> bytes:
+def shift_fragment(frame: bytes, by: int) -> bytes:
     """Move a fragment of :func:`fragment` in time by ``by`` ticks."""
     (time,) = struct.unpack_from(">Q", frame, _TFDT_AT)
     return frame[:_TFDT_AT] + struct.pack(">Q", time + by) + frame[_TFDT_AT + 8 :]

@@ -12,10 +12,10 @@ import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from server.media.audio.audio_chunk import Heard
+from server.media.audio.audio_chunk import AudioChunk
 from server.media.containers.fmp4 import ticks
-from server.media.h264.annexb import units_of
-from server.media.picture import Picture
+from server.media.h264.annexb import split_sample
+from server.media.picture import EncodedPicture
 from server.media.rendering_messages import TIMESCALE
 
 PACKET_BYTES = 188
@@ -43,8 +43,8 @@ _FRAMES_AT_ONCE = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Counters:
-    """Where a piece of a stream stands: what has been sent of each PID before it, modulo 16."""
+class ContinuityCounters:
+    """Packets sent of each PID so far, modulo 16 (continuity_counter, 2.4.3.3)."""
 
     tables: int = 0
     video: int = 0
@@ -53,17 +53,22 @@ class Counters:
     """Stretch it to a multiple of 16 packets, so that any other can follow."""
 
 
-def packets(picture: Picture) -> int:
+def count_packets(picture: EncodedPicture) -> int:
     """Return how many packets with content a picture becomes; packing it is not needed for that."""
     return _packets(_PES_HEAD + len(_AUD) + len(picture.sample))
 
 
-def sound_packets(heard: Heard) -> int:
+def count_audio_packets(heard: AudioChunk) -> int:
     """Return how many packets with content some sound becomes; there is none of Opus here."""
     return sum(_plain_packets(len(content)) for content in _sound_pes(heard))
 
 
-def pack(pictures: Sequence[Picture], fps: float, counters: Counters, heard: Heard | None = None) -> bytes:
+def pack(
+    pictures: Sequence[EncodedPicture],
+    fps: float,
+    counters: ContinuityCounters,
+    heard: AudioChunk | None = None,
+) -> bytes:
     """Return consecutive pictures as packets, behind what is to be heard with them, if that is AAC.
 
     The tables come before each whole GOP and each key picture.
@@ -91,7 +96,7 @@ def pack(pictures: Sequence[Picture], fps: float, counters: Counters, heard: Hea
     return b"".join(out)
 
 
-def _pack_sound(heard: Heard, counters: Counters) -> Iterator[bytes]:
+def _pack_sound(heard: AudioChunk, counters: ContinuityCounters) -> Iterator[bytes]:
     counter, contents = counters.sound, _sound_pes(heard)
     for place, content in enumerate(contents):
         count = _plain_packets(len(content))
@@ -101,7 +106,7 @@ def _pack_sound(heard: Heard, counters: Counters) -> Iterator[bytes]:
         counter = (counter + count) % COUNTERS
 
 
-def _sound_pes(heard: Heard) -> list[bytes]:
+def _sound_pes(heard: AudioChunk) -> list[bytes]:
     """Return sound as PES packets, each frame behind its ADTS head."""
     form, made = heard.format, list[bytes]()
     for place in range(0, len(heard.frames) if form.coding == "aac" else 0, _FRAMES_AT_ONCE):
@@ -122,7 +127,7 @@ def _packets(content: int) -> int:
     return 1 + max(0, -(-(content - _PAYLOAD + _PCR_FIELD) // _PAYLOAD))
 
 
-def _pes(picture: Picture, fps: float) -> bytes:
+def _pes(picture: EncodedPicture, fps: float) -> bytes:
     """Return a picture as a PES packet (2.4.3.6) with its time, and with its length where that fits."""
     time = ticks(picture.pulse, fps) % _CLOCK
     stamp = _stamp(time)
@@ -138,7 +143,7 @@ def _stamp(time: int) -> bytes:
 
 
 def _annex_b(sample: bytes) -> Iterator[bytes]:
-    for unit in units_of(sample):
+    for unit in split_sample(sample):
         yield _START_CODE
         yield unit
 

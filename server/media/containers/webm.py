@@ -78,7 +78,7 @@ def pulse_of(frame: bytes, fps: float) -> int:
     return round(int(time) * fps / TICKS)
 
 
-def rebased(frame: bytes, by: int) -> bytes:
+def shift_cluster(frame: bytes, by: int) -> bytes:
     """Move a cluster of :func:`cluster` in time by so many ticks."""
     (time,) = struct.unpack_from(">Q", frame, _TIME_AT)
     return frame[:_TIME_AT] + struct.pack(">Q", time + by) + frame[_TIME_AT + 8 :]

@@ -53,13 +53,13 @@ def nal_units(access_unit: bytes) -> list[bytes]:
     return [unit for unit in units if unit]
 
 
-def units_of(sample: bytes) -> list[bytes]:
+def split_sample(join_sample: bytes) -> list[bytes]:
     """Split an MP4 sample into its NAL units; what is no whole one is left out."""
     units, at = [], 0
-    while at + 4 <= len(sample):
-        end = at + 4 + int.from_bytes(sample[at : at + 4], "big")
-        if at + 4 < end <= len(sample):
-            units.append(sample[at + 4 : end])
+    while at + 4 <= len(join_sample):
+        end = at + 4 + int.from_bytes(join_sample[at : at + 4], "big")
+        if at + 4 < end <= len(join_sample):
+            units.append(join_sample[at + 4 : end])
         at = end
     return units
 
@@ -78,7 +78,7 @@ def parameter_sets(units: list[bytes]) -> ParameterSets | None:
     return ParameterSets(sps, pps)
 
 
-def sample(units: list[bytes]) -> bytes:
+def join_sample(units: list[bytes]) -> bytes:
     """Return the units as an MP4 sample: each behind its length (ISO/IEC 14496-15, 5.3.2).
 
     Parameter sets stay in the sample: they cost some bytes a GOP, and a decoder that joins at a cut is right.

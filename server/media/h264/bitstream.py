@@ -8,12 +8,12 @@ _ESCAPED = re.compile(b"\x00\x00\x03")
 _TO_ESCAPE = re.compile(b"\x00\x00(?=[\x00-\x03])")
 
 
-def payload_of(unit: bytes) -> bytes:
+def unescape_payload(unit: bytes) -> bytes:
     """Return a NAL unit's payload: without its head, and without the bytes that keep start codes out."""
     return _ESCAPED.sub(b"\x00\x00", unit[1:])
 
 
-def unit_of(head: int, payload: bytes) -> bytes:
+def escape_payload(head: int, payload: bytes) -> bytes:
     """Return the NAL unit of a payload, escaped so that no start code is in it."""
     return bytes([head]) + _TO_ESCAPE.sub(b"\x00\x00\x03", payload)
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from functools import lru_cache
 
 from server.media.h264 import cabac
-from server.media.h264.annexb import NAL_IDR, ParameterSets, sample
-from server.media.h264.bitstream import BitWriter, unit_of
-from server.media.h264.repeat_picture import slice_heads
+from server.media.h264.annexb import NAL_IDR, ParameterSets, join_sample
+from server.media.h264.bitstream import BitWriter, escape_payload
+from server.media.h264.repeat_picture import parse_slice_head_format
 
 _SLICE_I = 7
 """slice_type of a picture all of whose slices are I."""
@@ -31,7 +31,7 @@ def grey_picture(parameters: ParameterSets, idr_pic_id: int) -> bytes:
     Raises:
         UnfitError: the parameter sets are damaged, or use what hardly any camera does.
     """
-    head = slice_heads(parameters)
+    head = parse_slice_head_format(parameters)
     bits = BitWriter()
     for value in (0, _SLICE_I, head.pps_id):
         bits.ue(value)
@@ -54,4 +54,4 @@ def grey_picture(parameters: ParameterSets, idr_pic_id: int) -> bytes:
         bits.copy(_GREY_MACROBLOCK * head.macroblocks)
         bits.u(1, 1)
     bits.align(0)
-    return sample([parameters.sps, parameters.pps, unit_of(_IDR, bits.done())])
+    return join_sample([parameters.sps, parameters.pps, escape_payload(_IDR, bits.done())])

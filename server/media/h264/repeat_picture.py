@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from server.media.h264 import cabac
 from server.media.h264.annexb import NAL_IDR, NAL_SLICE, ParameterSets, nal_type
-from server.media.h264.bitstream import BitReader, BitWriter, payload_of, unit_of
+from server.media.h264.bitstream import BitReader, BitWriter, escape_payload, unescape_payload
 
 _HIGH_PROFILES = frozenset({44, 83, 86, 100, 110, 118, 122, 128, 134, 135, 138, 139, 244})
 """Those whose sequence parameter set says more of colours (7.3.2.1.1)."""
@@ -28,13 +28,13 @@ _MOST_FRAME_NUM_BITS = 16
 """Also of pic_order_cnt_lsb."""
 
 
-class UnfitError(Exception):
-    """Streams of these parameter sets cannot be continued: they use what a site's cameras never do."""
+class UnsupportedParametersError(Exception):
+    """Pictures of these parameter sets cannot be repeated: they use what a site's cameras never do."""
 
 
 @dataclass(frozen=True, slots=True)
-class Continuing:
-    """What the parameter sets say about the head of a slice.
+class SliceHeadFormat:
+    """The format of a slice header, by the parameter sets.
 
     Attributes:
         width, height: of a picture, in macroblocks.
@@ -70,7 +70,7 @@ class Continuing:
             length = int.from_bytes(sample[at : at + _LENGTH_BYTES], "big")
             at += _LENGTH_BYTES
             if nal_type(sample[at : at + 1]) in (NAL_SLICE, NAL_IDR):
-                head = BitReader(payload_of(sample[at : at + min(length, 32)]))
+                head = BitReader(unescape_payload(sample[at : at + min(length, 32)]))
                 head.ue(), head.ue(), head.ue()
                 return head.u(self.frame_num_bits)
             at += length
@@ -113,39 +113,39 @@ class Continuing:
             bits.ue(self.macroblocks)  # mb_skip_run
             bits.u(1, 1)
         bits.align(0)
-        unit = unit_of(_REFERENCE if reference else NAL_SLICE, bits.done())
+        unit = escape_payload(_REFERENCE if reference else NAL_SLICE, bits.done())
         return len(unit).to_bytes(_LENGTH_BYTES, "big") + unit
 
 
-def continuing(parameters: ParameterSets) -> Continuing:
-    """Read the parameter sets of streams whose last picture can be repeated.
+def parse_repeatable(parameters: ParameterSets) -> SliceHeadFormat:
+    """Parse the parameter sets of streams whose last picture can be repeated.
 
     Raises:
         UnfitError: they are damaged, or use what x264 without B pictures does not.
     """
-    found = slice_heads(parameters)
+    found = parse_slice_head_format(parameters)
     if found.order_bits:
-        raise UnfitError("pictures may be shown in another order than they are decoded in")
+        raise UnsupportedParametersError("pictures may be shown in another order than they are decoded in")
     return found
 
 
 @lru_cache(maxsize=8)
-def slice_heads(parameters: ParameterSets) -> Continuing:
-    """Read the parameter sets.
+def parse_slice_head_format(parameters: ParameterSets) -> SliceHeadFormat:
+    """Parse the format of slice headers from the parameter sets.
 
     Raises:
         UnfitError: they are damaged, or use what hardly any camera does.
     """
     try:
-        sps = _read_sps(BitReader(payload_of(parameters.sps)))
-        return _read_pps(BitReader(payload_of(parameters.pps)), sps)
+        sps = _read_sps(BitReader(unescape_payload(parameters.sps)))
+        return _read_pps(BitReader(unescape_payload(parameters.pps)), sps)
     except ValueError as error:
-        raise UnfitError(str(error)) from error
+        raise UnsupportedParametersError(str(error)) from error
 
 
 @dataclass(frozen=True, slots=True)
 class _Sequence:
-    """What the sequence parameter set says; as in :class:`Continuing`."""
+    """What the sequence parameter set says; as in :class:`SliceHeadFormat`."""
 
     frame_num_bits: int
     width: int
@@ -179,7 +179,7 @@ def _read_sps(bits: BitReader) -> _Sequence:
     return _Sequence(frame_num_bits, width, height, order_bits)
 
 
-def _read_pps(bits: BitReader, sps: _Sequence) -> Continuing:
+def _read_pps(bits: BitReader, sps: _Sequence) -> SliceHeadFormat:
     pps_id = bits.ue()
     bits.ue()
     arithmetic = bool(bits.u(1))
@@ -196,7 +196,7 @@ def _read_pps(bits: BitReader, sps: _Sequence) -> Continuing:
     deblocking_control = bool(bits.u(1))
     bits.u(1)
     redundant = bool(bits.u(1))
-    return Continuing(
+    return SliceHeadFormat(
         pps_id=pps_id,
         frame_num_bits=sps.frame_num_bits,
         width=sps.width,

@@ -81,7 +81,7 @@ _MOTION_UPDATES = (
 
 
 @lru_cache(maxsize=4)
-def repeat(width: int, height: int) -> bytes:
+def repeat_frame(width: int, height: int) -> bytes:
     """Return a frame of this size in pixels that shows the one before it again."""
     bits = frame_header(_HEADER_BITS)
     for probability in (SELDOM, SELDOM, OFTEN, OFTEN):  # prob_skip_false, _intra, _last, _gf

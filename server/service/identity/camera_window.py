@@ -83,8 +83,8 @@ def _glimpses(looks: Sequence[messages.AppearanceHistogram], first: int) -> tupl
     )
 
 
-class Reader:
-    """Reads epochs, and remembers what tracks are called and how each camera's picture lies in the site's."""
+class WindowReader:
+    """Parses epochs into camera windows, and keeps the tracks' names and each camera's letterbox."""
 
     def __init__(self, site_size: tuple[int, int]) -> None:
         self._site_size = site_size

@@ -5,30 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from bestview import IdentityRegistry, Split, TrackKey
-from server.service.identity.camera_window import CameraWindow, Reader
-from server.service.identity.id_switches import exchanged
-from server.service.identity.track_parts import NOBODY_YET, UNKNOWN, Part, numbers_over
-from server.service.ingest.window_history import Stretch
+from server.service.identity.camera_window import CameraWindow, WindowReader
+from server.service.identity.id_switches import find_id_switches
+from server.service.identity.track_parts import NOBODY_YET, UNKNOWN, TrackPart, person_numbers
+from server.service.ingest.window_history import HistorySpan
 
-Parts = dict[TrackKey, Sequence[Part]]
+Parts = dict[TrackKey, Sequence[TrackPart]]
 
 
-class Mending:
-    """Reads windows whose past was mended.
+class IdSwitchRepair:
+    """Applies windows whose past was corrected.
 
     A track is what goes its way without a jump: where a camera's two tracks exchange their people, they
     exchange their names here, and what is known of them stays true. Whose they are from then on is said.
     """
 
-    def __init__(self, registry: IdentityRegistry, reader: Reader) -> None:
+    def __init__(self, registry: IdentityRegistry, reader: WindowReader) -> None:
         self._registry, self._reader = registry, reader
-        self._said: dict[TrackKey, Part] = {}
+        self._said: dict[TrackKey, TrackPart] = {}
         """Since when a track is whose, until the evidence speaks of that time no more."""
 
     def read(
         self,
         window: CameraWindow,
-        before: Sequence[Stretch[CameraWindow]],
+        before: Sequence[HistorySpan[CameraWindow]],
         parts: Parts,
         asked_from: int,
     ) -> tuple[CameraWindow, list[Split]]:
@@ -38,12 +38,12 @@ class Mending:
         of frames before ``asked_from`` it may be forgotten.
         """
         splits: list[Split] = []
-        for one, two, frame in exchanged(window, before):
+        for one, two, frame in find_id_switches(window, before):
             first, second = (_whose(parts.get(it, UNKNOWN), frame - 1, asked_from) for it in (one, two))
             self._reader.locals.exchange(one, two)
             splits += self._registry.swap_tracks(one, two, frame, (first, second))
             if first and second and first != second:
-                self._said |= {one: Part(frame, second), two: Part(frame, first)}
+                self._said |= {one: TrackPart(frame, second), two: TrackPart(frame, first)}
                 self.overlay(parts)
         return self._reader.read_again(window), splits
 
@@ -57,7 +57,9 @@ class Mending:
 
     def merge(self, merged: Mapping[int, int]) -> None:
         """Take over that numbers are another's now."""
-        self._said = {key: Part(it.first, merged.get(it.number, it.number)) for key, it in self._said.items()}
+        self._said = {
+            key: TrackPart(it.first, merged.get(it.number, it.number)) for key, it in self._said.items()
+        }
 
     def keep_only(self, parts: Parts, asked_from: int) -> None:
         """Forget what nobody asks for any more."""
@@ -68,9 +70,9 @@ class Mending:
         }
 
 
-def _whose(parts: Sequence[Part], frame: int, asked_from: int) -> int:
+def _whose(parts: Sequence[TrackPart], frame: int, asked_from: int) -> int:
     """Return whose a track was in a frame, 0: nobody's; where that is forgotten, in the first that is not."""
     if frame < parts[0].first <= asked_from:
         frame = parts[0].first
-    number = int(numbers_over([parts], frame, 1)[0, 0])
+    number = int(person_numbers([parts], frame, 1)[0, 0])
     return 0 if number == NOBODY_YET else number

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bestview import TrackKey
 from server.service.identity.camera_window import CameraWindow
-from server.service.ingest.window_history import Stretch
+from server.service.ingest.window_history import HistorySpan
 
 Floats = NDArray[np.float64]
 
@@ -21,16 +21,16 @@ _TOLD_BY = 2
 """Frames in which each must be in the other's place at least."""
 
 
-class Exchange(NamedTuple):
-    """Two tracks, and the first frame in which each turns out to have followed the other's person."""
+class IdSwitch(NamedTuple):
+    """Two tracks, and the first frame in which each follows the other's person."""
 
     one: TrackKey
     two: TrackKey
     frame: int
 
 
-def exchanged(mended: CameraWindow, before: Sequence[Stretch[CameraWindow]]) -> list[Exchange]:
-    """Compare what is said of some frames with what was said of them before.
+def find_id_switches(mended: CameraWindow, before: Sequence[HistorySpan[CameraWindow]]) -> list[IdSwitch]:
+    """Compare the tracks of some frames with what was published of them before.
 
     Two tracks have exchanged their people where from some frame on each is now where the other one was, and
     neither where it was itself. That three exchange theirs in a ring is not told.
@@ -53,7 +53,7 @@ def exchanged(mended: CameraWindow, before: Sequence[Stretch[CameraWindow]]) -> 
         count = int(min(same[one, two, since:].sum(), same[two, one, since:].sum()))
         if count >= _TOLD_BY:
             frame = first + since if kept.size else mended.first
-            found.append((-count, Exchange(mended.keys[one], mended.keys[two], frame)))
+            found.append((-count, IdSwitch(mended.keys[one], mended.keys[two], frame)))
     # In a crowd a box is in more than one other's place: the clearest pairs, and nobody in two of them.
     taken: set[TrackKey] = set()
     exchanges = []
@@ -65,7 +65,7 @@ def exchanged(mended: CameraWindow, before: Sequence[Stretch[CameraWindow]]) -> 
 
 
 def _laid_out(
-    keys: Sequence[TrackKey], said: Sequence[Stretch[CameraWindow]], first: int, last: int
+    keys: Sequence[TrackKey], said: Sequence[HistorySpan[CameraWindow]], first: int, last: int
 ) -> Floats:
     """Return where tracks were said to be in the frames from `first` to `last`: (T, F, 4), NaN: nowhere."""
     boxes = np.full((len(keys), last - first + 1, 4), np.nan)

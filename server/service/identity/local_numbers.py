@@ -8,8 +8,8 @@ from bestview import TrackKey
 from server.messaging.messages import CameraTracks
 
 
-class Followed(msgspec.Struct, frozen=True, array_like=True):
-    """A track as the camera names it, whatever it is called here."""
+class TrackName(msgspec.Struct, frozen=True, array_like=True):
+    """A track by the name that its camera gives it."""
 
     camera: str
     boot: int
@@ -44,9 +44,9 @@ class LocalNumbers:
         """Return what a track that was in some message is called here."""
         return self._keys.get((camera, boot), {}).get(track)
 
-    def origin(self, key: TrackKey) -> Followed:
+    def origin(self, key: TrackKey) -> TrackName:
         """Return what the camera calls a track that is not forgotten."""
-        return Followed(key.camera, *self._origin[key])
+        return TrackName(key.camera, *self._origin[key])
 
     def exchange(self, one: TrackKey, two: TrackKey) -> None:
         """Let two tracks of one run of a camera take each other's name here from now on."""

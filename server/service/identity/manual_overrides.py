@@ -12,8 +12,8 @@ from dataclasses import replace
 from bestview import IdentityUpdate, Merge, Split
 
 
-class ByHand:
-    """Numbers that are said to be another's."""
+class ManualOverrides:
+    """Numbers that an operator has merged, split or named."""
 
     def __init__(self) -> None:
         self._is: dict[int, int] = {}

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from bestview import TrackKey
 from server.messaging.messages import NumberedBox
 from server.service.identity.camera_window import CameraWindow
-from server.service.ingest.window_history import Stretch
+from server.service.ingest.window_history import HistorySpan
 
 Numbers = Callable[[Sequence[TrackKey], int, int], NDArray[np.int64]]
 """The people's numbers behind T tracks in some frames: tracks, first frame, frames -> (T, frames)."""
 
 
 def numbered_boxes(
-    stretches: Sequence[Stretch[CameraWindow]], numbers: Numbers, first: int, frames: int
+    stretches: Sequence[HistorySpan[CameraWindow]], numbers: Numbers, first: int, frames: int
 ) -> list[list[NumberedBox]]:
     """Return the boxes of each of the frames from `first` on, by rising number.
 

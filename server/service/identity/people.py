@@ -12,25 +12,25 @@ from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
 from server.config.sections import ShareSettings
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
-from server.service.identity.camera_window import CameraWindow, Reader
-from server.service.identity.id_switch_repair import Mending
-from server.service.identity.local_numbers import Followed
-from server.service.identity.manual_overrides import ByHand
+from server.service.identity.camera_window import CameraWindow, WindowReader
+from server.service.identity.id_switch_repair import IdSwitchRepair
+from server.service.identity.local_numbers import TrackName
+from server.service.identity.manual_overrides import ManualOverrides
 from server.service.identity.numbered_boxes import numbered_boxes
-from server.service.identity.person_registry import Roll
-from server.service.identity.published_tracks import ToldTracks
-from server.service.identity.sharding import served
+from server.service.identity.person_registry import PersonRegistry
+from server.service.identity.published_tracks import PublishedTracks
+from server.service.identity.sharding import own_numbers
 from server.service.identity.track_parts import (
     NOBODY_YET,
     UNKNOWN,
-    Part,
-    numbers_over,
-    parts_of,
-    with_settled,
+    TrackPart,
+    merge_settled_parts,
+    person_numbers,
+    track_parts,
 )
-from server.service.identity.undetected_frames import Unsearched
+from server.service.identity.undetected_frames import UndetectedFrames
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.ingest.window_history import History
+from server.service.ingest.window_history import WindowHistory
 
 ALL = ShareSettings()
 """One service for everybody."""
@@ -38,7 +38,7 @@ _LATELY = 100
 """Frames that tell whether a camera looks; at least those of an epoch."""
 
 
-class People:
+class PersonTracker:
     """Joins the cameras' tracks epoch by epoch, and remembers who was where.
 
     ``homographies`` map each camera's own picture to the ground; None where there is none. ``share`` says
@@ -60,24 +60,24 @@ class People:
     ) -> None:
         self._registry = IdentityRegistry(settings, homographies, overhead, fps)
         self._remembered = settings.forget_after
-        self.roll = Roll(settings.maximum_departed_people)
+        self.roll = PersonRegistry(settings.maximum_departed_people)
         """Everybody, also those whom another service decides for."""
         self._share = share
-        self._histories = {camera: History[CameraWindow]() for camera in cameras}
-        self._reader = Reader(site_size)
+        self._histories = {camera: WindowHistory[CameraWindow]() for camera in cameras}
+        self._reader = WindowReader(site_size)
         self._lag = lag
-        self._mending = Mending(self._registry, self._reader)
-        self.unsearched = Unsearched()
+        self._mending = IdSwitchRepair(self._registry, self._reader)
+        self.unsearched = UndetectedFrames()
         """Frames in which cameras could not have found anybody."""
-        self.told = ToldTracks()
+        self.told = PublishedTracks()
         """By which tracks people were shown in GOPs that are told."""
-        self._parts: dict[TrackKey, Sequence[Part]] = {}
+        self._parts: dict[TrackKey, Sequence[TrackPart]] = {}
         self._heard: dict[TrackKey, int] = {}
         self._asked_from = 0
         """Nobody asks for frames before this one any more."""
         self._corrections: list[Merge | Split] = []
-        self._by_hand = ByHand()
-        self._expected: dict[Followed, tuple[int, int]] = {}
+        self._by_hand = ManualOverrides()
+        self._expected: dict[TrackName, tuple[int, int]] = {}
         """Tracks that are not heard of yet: whose they were in an earlier run, and when that ended."""
         self._now = -1
         """The last frame that was spoken of."""
@@ -92,8 +92,8 @@ class People:
         pictures = self._pictures(windows, since - self._lag, epoch.last - self._lag)
         self._now = epoch.last
         update = self._by_hand.read(self._registry.update(tracks, epoch.last - self._lag, pictures))
-        for key, parts in parts_of(update.person_ids).items():
-            self._parts[key] = with_settled(self._parts.get(key, ()), parts, self._asked_from)
+        for key, parts in track_parts(update.person_ids).items():
+            self._parts[key] = merge_settled_parts(self._parts.get(key, ()), parts, self._asked_from)
         self._mending.overlay(self._parts)
         keys = chain.from_iterable(window.keys for window in windows)
         seen = chain.from_iterable(window.seen() for window in windows)
@@ -115,7 +115,7 @@ class People:
     @property
     def known(self) -> list[int]:
         """Everybody's number whom this service decides for, in order; those who are away too."""
-        return served(self.roll.everybody, self.roll.merged, self._share)
+        return own_numbers(self.roll.everybody, self.roll.merged, self._share)
 
     @property
     def elsewhere(self) -> list[int]:
@@ -132,13 +132,13 @@ class People:
         """Give no number below this one any more: an earlier run has given them."""
         self._registry.reserve_below(number)
 
-    def expect(self, tracks: Mapping[Followed, int], pulse: int) -> None:
+    def expect(self, tracks: Mapping[TrackName, int], pulse: int) -> None:
         """Take over whose tracks are that are not heard of yet, from a run that ended with a pulse."""
         self._expected |= {
             track: (number, pulse) for track, number in tracks.items() if not self.heard_of(track)
         }
 
-    def expect_no_more(self, tracks: Iterable[Followed]) -> None:
+    def expect_no_more(self, tracks: Iterable[TrackName]) -> None:
         """Take these tracks, should they be heard of, for somebody's of whom nothing is known."""
         for track in tracks:
             self._expected.pop(track, None)
@@ -173,8 +173,8 @@ class People:
             return None
         for key in tracks:  # those that the registry has settled it does not speak of again
             since = max(self._asked_from, self._parts[key][-1].first)
-            self._parts[key] = [*self._parts[key], Part(since, new)]
-            self.roll.note([Part(since, new)], since, max(since, self._now))
+            self._parts[key] = [*self._parts[key], TrackPart(since, new)]
+            self.roll.note([TrackPart(since, new)], since, max(since, self._now))
         self._corrections += [Split(number, new, camera) for camera in sorted({it.camera for it in tracks})]
         return new
 
@@ -193,13 +193,13 @@ class People:
         key = self._reader.locals.known(camera, boot, track)
         return None if key is None else self.number(key.camera, key.local_id, pulse)
 
-    def heard_of(self, track: Followed) -> bool:
+    def heard_of(self, track: TrackName) -> bool:
         """Return whether a camera has spoken of this track, lately."""
         return self._reader.locals.known(track.camera, track.boot, track.track) is not None
 
-    def followed(self, numbers: Collection[int], since: int) -> dict[int, list[Followed]]:
+    def followed(self, numbers: Collection[int], since: int) -> dict[int, list[TrackName]]:
         """Return the tracks by which these people were followed since a pulse; who was not is left out."""
-        found: dict[int, list[Followed]] = {}
+        found: dict[int, list[TrackName]] = {}
         wanted = set(numbers)
         for key, parts in self._parts.items():
             if parts[-1].number in wanted and self._heard.get(key, -1) >= since:
@@ -208,7 +208,7 @@ class People:
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
         """Return the persons' numbers behind T tracks, frame by frame, (T, frames); -1: nobody yet."""
-        return numbers_over([self._parts.get(key, UNKNOWN) for key in keys], first, frames)
+        return person_numbers([self._parts.get(key, UNKNOWN) for key in keys], first, frames)
 
     def take_corrections(self) -> tuple[Merge | Split, ...]:
         """Return what has turned out about numbers since this was last asked, in order."""
@@ -257,7 +257,7 @@ class People:
         self.roll.merge(kept, lost)
         self._mending.merge({lost: kept})
         self._parts = {
-            key: [Part(part.first, kept) if part.number == lost else part for part in parts]
+            key: [TrackPart(part.first, kept) if part.number == lost else part for part in parts]
             for key, parts in self._parts.items()
         }
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from server.service.identity.track_parts import NOBODY_YET, Part
+from server.service.identity.track_parts import NOBODY_YET, TrackPart
 
 
-class Roll:
-    """Everybody who has a number, from the first frame that shows them until they are forgotten.
+class PersonRegistry:
+    """All people who have a number, from their first frame until they are forgotten.
 
     Args:
         most_merged: how many numbers that turned out to be another's are remembered, the newest.
@@ -39,7 +39,7 @@ class Roll:
         """Return the other numbers that somebody once had, in order."""
         return sorted(old for old, new in self.merged.items() if new == number)
 
-    def note(self, parts: Sequence[Part], first: int, last: int) -> None:
+    def note(self, parts: Sequence[TrackPart], first: int, last: int) -> None:
         """Note that a track was seen from a frame to another, by whose it was in which part of them."""
         for place, part in enumerate(parts):
             ends = last if place + 1 == len(parts) else min(last, parts[place + 1].first - 1)

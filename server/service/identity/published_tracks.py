@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.service.identity.camera_window import CameraWindow
-from server.service.identity.local_numbers import Followed
-from server.service.ingest.window_history import Stretch
+from server.service.identity.local_numbers import TrackName
+from server.service.ingest.window_history import HistorySpan
 
 
-class ToldTracks:
-    """Remembers the tracks behind the numbers, for ``frames`` back at least; 0: nothing."""
+class PublishedTracks:
+    """Remembers the tracks behind published numbers, for at least ``frames`` back; 0: nothing."""
 
     def __init__(self) -> None:
         self.frames = 0
-        self._said: deque[tuple[int, int, Mapping[tuple[str, int], Followed]]] = deque()
+        self._said: deque[tuple[int, int, Mapping[tuple[str, int], TrackName]]] = deque()
         self._oldest: int | None = None
 
-    def note(self, said: Stretch[CameraWindow], whose: NDArray[np.int64]) -> None:
+    def note(self, said: HistorySpan[CameraWindow], whose: NDArray[np.int64]) -> None:
         """Take over by which tracks a camera shows people, (T,) their numbers; those below 0 are nobody's.
 
         Frames come in their order, of one camera as of another.
@@ -30,7 +30,7 @@ class ToldTracks:
             self._oldest = said.first
         message = said.window.message
         tracks = {
-            (message.camera, number): Followed(message.camera, message.boot, track.id)
+            (message.camera, number): TrackName(message.camera, message.boot, track.id)
             for track, number in zip(message.tracks, whose.tolist(), strict=True)
             if number >= 0
         }
@@ -42,7 +42,7 @@ class ToldTracks:
         """Return whether a frame is one of those that are remembered."""
         return self._oldest is not None and self._oldest <= pulse
 
-    def of(self, camera: str, numbers: Collection[int], pulse: int) -> Followed | None:
+    def of(self, camera: str, numbers: Collection[int], pulse: int) -> TrackName | None:
         """Return the track that showed somebody in a frame, or else last before it; None: none did.
 
         ``numbers`` are all that the person has had.

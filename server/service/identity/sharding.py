@@ -7,23 +7,23 @@ from collections.abc import Iterable, Mapping
 from server.config.sections import ShareSettings
 
 
-def index_of(number: int, share: ShareSettings) -> int:
-    """Return which service answers for a number: the same in all of them, and nobody has to ask."""
+def shard_of(number: int, share: ShareSettings) -> int:
+    """Return the shard that a number belongs to: the same in all services, without asking."""
     return number % share.of
 
 
-def served(numbers: Iterable[int], merged: Mapping[int, int], share: ShareSettings) -> list[int]:
-    """Return those of people's numbers whom this service decides for, in the given order.
+def own_numbers(numbers: Iterable[int], merged: Mapping[int, int], share: ShareSettings) -> list[int]:
+    """Return the numbers that belong to this service's shard, in the given order.
 
     It does for its own numbers, and for whoever turned out to be one of its own: who watches an old number
     stays there.
     """
     if share.of == 1:
         return list(numbers)
-    known_as = {new for old, new in merged.items() if index_of(old, share) == share.index}
-    return [number for number in numbers if index_of(number, share) == share.index or number in known_as]
+    known_as = {new for old, new in merged.items() if shard_of(old, share) == share.index}
+    return [number for number in numbers if shard_of(number, share) == share.index or number in known_as]
 
 
-def server_of(number: int, share: ShareSettings) -> str | None:
-    """Return the address of the service that answers for a number; None: the configuration does not say."""
-    return share.servers[index_of(number, share)].rstrip("/") + "/" if share.servers else None
+def shard_address(number: int, share: ShareSettings) -> str | None:
+    """Return the address of the service of a number's shard; None where the configuration has none."""
+    return share.servers[shard_of(number, share)].rstrip("/") + "/" if share.servers else None

@@ -13,8 +13,8 @@ from server.messaging.identity_snapshot import (
     IdentitySnapshot,
     PersonSnapshot,
 )
-from server.service.identity.local_numbers import Followed
-from server.service.identity.people import People
+from server.service.identity.local_numbers import TrackName
+from server.service.identity.people import PersonTracker
 
 ALONE_MOST = 1_000_000
 """The first free number that is believed of one camera alone: larger ones another must say, too."""
@@ -24,10 +24,10 @@ LONGEST_S = 30.0
 """Seconds that the service may be away: in a longer time a track may have gone over to somebody else."""
 
 
-def remembered_by(
-    people: People, cameras: Iterable[str], pulse: int, lately: int, since: float
+def state_for_cameras(
+    people: PersonTracker, cameras: Iterable[str], pulse: int, lately: int, since: float
 ) -> dict[str, IdentitySnapshot]:
-    """Put down for each camera whom it has followed lately, and since when numbers are not given twice."""
+    """Build the state that each camera retains: whom it followed lately, and the first free number."""
     followed = people.followed(people.roll.everybody, pulse - lately)
     boots: dict[str, int] = {}
     for it in chain.from_iterable(followed.values()):
@@ -69,14 +69,14 @@ class _Awaited:
     """One person, whom tracks of several cameras may follow."""
 
     number: int
-    tracks: tuple[Followed, ...]
+    tracks: tuple[TrackName, ...]
     also: tuple[int, ...]
     name: str
     by_hand: bool
 
 
-class Returning:
-    """Gives people their numbers back, and what was said of them by hand, as they are found again.
+class StateRecovery:
+    """Restores people's numbers and manual overrides after a restart, as their tracks are seen again.
 
     Args:
         said: what each camera remembers; only what is said of now counts.
@@ -87,11 +87,11 @@ class Returning:
     def __init__(self, said: dict[str, IdentitySnapshot], pulse: int, longest: int) -> None:
         self._until = -1
         self._over = False
-        self._tracks: dict[Followed, int] = {}
+        self._tracks: dict[TrackName, int] = {}
         self._awaited: list[_Awaited] = []
-        self._found: dict[Followed, int] = {}
+        self._found: dict[TrackName, int] = {}
         """The pulse at which each track was first heard of again."""
-        self.next_number = max((first_free(it) for it in said.values()), default=1)
+        self.next_number = max((first_free_number(it) for it in said.values()), default=1)
         """No number below it is given any more, however long ago that was."""
         lately = {camera: it for camera, it in said.items() if it.pulse < pulse <= it.pulse + longest}
         # All that were told of lately were told the same: one that says otherwise does not decide.
@@ -115,19 +115,19 @@ class Returning:
         """The numbers of those who are awaited, with those that they once had."""
         return {number for it in self._awaited for number in (it.number, *it.also)}
 
-    def begin(self, people: People, pulse: int) -> None:
+    def begin(self, people: PersonTracker, pulse: int) -> None:
         """Tell whose the tracks will be, before anybody has heard of them."""
         people.begin_at(self.next_number)
         people.expect(self._tracks, pulse - 1)
 
-    def look(self, people: People, pulse: int) -> None:
+    def look(self, people: PersonTracker, pulse: int) -> None:
         """Look for them after an epoch that ends with a pulse was taken in."""
         if pulse > self._until:
             self._awaited, self._over = [], True
             people.expect_no_more(self._tracks)
         self._awaited = [it for it in self._awaited if not self._give_back(it, people, pulse)]
 
-    def _give_back(self, awaited: _Awaited, people: People, pulse: int) -> bool:
+    def _give_back(self, awaited: _Awaited, people: PersonTracker, pulse: int) -> bool:
         """Return whether somebody is here again, with all that is to be said of them said."""
         found = [self._number(it, people, pulse) for it in awaited.tracks]
         numbers = sorted({it for it in found if it is not None})
@@ -142,7 +142,7 @@ class Returning:
                 people.merge(kept, other)
         return not awaited.by_hand or None not in found
 
-    def _number(self, track: Followed, people: People, pulse: int) -> int | None:
+    def _number(self, track: TrackName, people: PersonTracker, pulse: int) -> int | None:
         """Return whose a track was when it was first heard of again; None: nobody knows."""
         if people.heard_of(track):
             self._found.setdefault(track, pulse)
@@ -150,13 +150,13 @@ class Returning:
         return None if first is None else people.whose(track.camera, track.boot, track.track, first)
 
 
-def first_free(said: IdentitySnapshot) -> int:
-    """Return the first number that nobody has or had; what a camera says may contradict itself."""
+def first_free_number(said: IdentitySnapshot) -> int:
+    """Return the first number that is and was never used; a camera's state may contradict itself."""
     return max([said.next_number, *(number + 1 for it in said.people for number in (it.number, *it.aliases))])
 
 
-def believed(firsts: Iterable[int]) -> int:
-    """Return up to which first free number cameras are believed: no camera alone moves all to come far ahead.
+def trusted_first_free(firsts: Iterable[int]) -> int:
+    """Return the highest first free number that is believed: one camera alone cannot raise it far.
 
     >>> believed([7, 5]), believed([900_000_000, 5]), believed([2_000_007, 2_000_005])
     (1000000, 1000000, 2010005)
@@ -168,7 +168,7 @@ def believed(firsts: Iterable[int]) -> int:
 def _awaited(said: dict[str, IdentitySnapshot]) -> list[_Awaited]:
     """Put together what the cameras remember: the newest word on somebody counts."""
     newest: dict[int, PersonSnapshot] = {}
-    tracks: dict[int, set[Followed]] = {}
+    tracks: dict[int, set[TrackName]] = {}
     whose: dict[int, int] = {}
     """By an old number: who had it."""
     for camera, it in sorted(said.items(), key=lambda named: (named[1].pulse, named[0])):
@@ -176,7 +176,7 @@ def _awaited(said: dict[str, IdentitySnapshot]) -> list[_Awaited]:
             newest[known.number] = known
             whose |= dict.fromkeys(known.aliases, known.number)
             theirs = tracks.setdefault(known.number, set())
-            theirs |= {Followed(camera, it.boot, track) for track in known.tracks}
+            theirs |= {TrackName(camera, it.boot, track) for track in known.tracks}
     for old in sorted(whose.keys() & newest.keys()):  # some camera had not heard yet that two are one
         kept = whose[old]
         if kept != old and kept in newest:

@@ -12,8 +12,14 @@ import msgspec
 from server.messaging.identity_snapshot import SNAPSHOT_BYTES_MAX, IdentitySnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import camera_of_key
-from server.service.identity.people import People
-from server.service.identity.state_recovery import LONGEST_S, Returning, believed, first_free, remembered_by
+from server.service.identity.people import PersonTracker
+from server.service.identity.state_recovery import (
+    LONGEST_S,
+    StateRecovery,
+    first_free_number,
+    state_for_cameras,
+    trusted_first_free,
+)
 
 log = logging.getLogger(__name__)
 
@@ -27,8 +33,8 @@ _EVERY_S = 1.0
 """Seconds between two words of the same to a camera: each says when it was true."""
 
 
-class Remembering:
-    """Begins with what the cameras remember, and tells them what there is to remember.
+class StateReplication:
+    """Starts from the state that cameras retain, and sends them the state to retain.
 
     Args:
         people: who is who.
@@ -41,7 +47,7 @@ class Remembering:
 
     def __init__(
         self,
-        people: People,
+        people: PersonTracker,
         cameras: Sequence[str],
         fps: float,
         send: Callable[[str, bytes], None],
@@ -57,7 +63,7 @@ class Remembering:
         self._said: dict[str, IdentitySnapshot] = {}
         self._firsts: dict[str, int] = {}
         """The first free number by what each camera said last."""
-        self._returning: list[Returning] = []
+        self._returning: list[StateRecovery] = []
         """First of all who had come when this began, then a camera each that came later."""
         self._anybody = False
         self._began_at: float | None = None
@@ -97,9 +103,9 @@ class Remembering:
         if not message.payload:
             return
         said = msgspec.json.decode(message.payload, type=IdentitySnapshot)
-        self._firsts[camera] = first_free(said)
+        self._firsts[camera] = first_free_number(said)
         if again:
-            self._people.begin_at(min(said.next_number, believed(self._firsts.values())))
+            self._people.begin_at(min(said.next_number, trusted_first_free(self._firsts.values())))
         else:
             self._said[camera] = said
 
@@ -130,13 +136,13 @@ class Remembering:
         """
         if not self._anybody or (self._began_at is not None and not self._said):
             return
-        most = believed(self._firsts.values())
-        for camera in [camera for camera, it in self._said.items() if first_free(it) > most]:
+        most = trusted_first_free(self._firsts.values())
+        for camera in [camera for camera, it in self._said.items() if first_free_number(it) > most]:
             log.warning("camera %s alone remembers numbers beyond %d: it is not believed", camera, most)
             del self._said[camera]
         said = {camera: _below(self._free, it) for camera, it in self._said.items()}
         self._said = {}
-        returning = Returning(said, pulse, round(LONGEST_S * self._fps))
+        returning = StateRecovery(said, pulse, round(LONGEST_S * self._fps))
         returning.begin(self._people, pulse)
         self._returning.append(returning)
         if self._began_at is None:
@@ -155,7 +161,7 @@ class Remembering:
 
     def _tell(self, pulse: int) -> None:
         lately = round(_LATELY_S * self._fps)
-        for camera, now in remembered_by(self._people, self._cameras, pulse, lately, self._since).items():
+        for camera, now in state_for_cameras(self._people, self._cameras, pulse, lately, self._since).items():
             if camera not in self._heard:
                 continue
             before = self._sent.get(camera)

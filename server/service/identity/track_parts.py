@@ -14,8 +14,8 @@ NOBODY_YET = -1
 """Stands for a person's number where a track is not confirmed to be anybody."""
 
 
-class Part(NamedTuple):
-    """From which frame on a track is somebody's.
+class TrackPart(NamedTuple):
+    """From which frame on a track is a person's.
 
     A named tuple, since one is made of every track in every update.
     """
@@ -24,19 +24,21 @@ class Part(NamedTuple):
     number: int
 
 
-UNKNOWN = (Part(0, NOBODY_YET),)
+UNKNOWN = (TrackPart(0, NOBODY_YET),)
 """The parts of a track that nothing was said of."""
 
 
-def parts_of(numbers: Mapping[TrackletKey, int]) -> dict[TrackKey, list[Part]]:
+def track_parts(numbers: Mapping[TrackletKey, int]) -> dict[TrackKey, list[TrackPart]]:
     """Sort the numbers of episodes by track, the episodes of each in order."""
-    parts: dict[TrackKey, list[Part]] = {}
+    parts: dict[TrackKey, list[TrackPart]] = {}
     for key, number in numbers.items():
-        parts.setdefault(key.track, []).append(Part(key.first_frame, number or NOBODY_YET))
+        parts.setdefault(key.track, []).append(TrackPart(key.first_frame, number or NOBODY_YET))
     return parts
 
 
-def with_settled(before: Sequence[Part], parts: list[Part], asked_from: int) -> list[Part]:
+def merge_settled_parts(
+    before: Sequence[TrackPart], parts: list[TrackPart], asked_from: int
+) -> list[TrackPart]:
     """Put parts that the registry has settled before those that may still change.
 
     A long look-ahead asks for frames that are older than what the registry still speaks of; ``asked_from`` is
@@ -50,7 +52,7 @@ def with_settled(before: Sequence[Part], parts: list[Part], asked_from: int) -> 
     return asked + parts
 
 
-def numbers_over(known: Sequence[Sequence[Part]], first: int, frames: int) -> NDArray[np.int64]:
+def person_numbers(known: Sequence[Sequence[TrackPart]], first: int, frames: int) -> NDArray[np.int64]:
     """Return the persons' numbers behind T tracks, by their parts, frame by frame: (T, frames)."""
     newest = np.fromiter((parts[-1].number for parts in known), dtype=np.int64, count=len(known))
     since = np.fromiter((parts[-1].first for parts in known), dtype=np.int64, count=len(known))

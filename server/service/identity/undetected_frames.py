@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from server.messaging.messages import CameraTracks
 
 
-class Unsearched:
-    """Keeps them as the cameras say them. Who is not found in such a frame may be there all the same."""
+class UndetectedFrames:
+    """Keeps the frames without detection, by camera: a person may be there all the same."""
 
     def __init__(self) -> None:
         self._frames: dict[str, set[int]] = defaultdict(set)

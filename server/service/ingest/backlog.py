@@ -12,8 +12,8 @@ _CATCHES_UP = 0.95
 """Being behind by less than this part of what it was is catching up."""
 
 
-class KeepingUp:
-    """Tells when decisions are too far behind the pulses to be of use, and do not catch up.
+class BacklogMonitor:
+    """Detects decisions that are too far behind the pulses to be useful, and do not catch up.
 
     ``reach`` is by how many pulses they may be behind: what is decided later is of pictures that are gone.
     """

@@ -44,8 +44,8 @@ class _Place:
     waiting: dict[int, CameraTracks] = field(default_factory=dict)
 
 
-class Aligner:
-    """Collects the cameras' messages by epoch. It has no clock: it is told which pulse it is.
+class EpochAligner:
+    """Collects the cameras' messages by epoch. Has no clock: the caller passes the pulse number.
 
     ``grace`` is how many pulses a camera that is there is waited for, after an epoch's end and the first
     word on it. While none has, they are all ``behind``: the first is waited for so many pulses more.

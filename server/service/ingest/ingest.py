@@ -12,7 +12,7 @@ import msgspec
 
 from camsync.lines import RateLimit
 from logthrottle import LogThrottle
-from server.media.picture import Picture
+from server.media.picture import EncodedPicture
 from server.media.stream_format import ParameterMismatchError
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
@@ -25,9 +25,9 @@ from server.messaging.messages import (
     ThumbnailHeader,
     camera_of_key,
 )
-from server.service.ingest.epoch_aligner import Aligner
-from server.service.ingest.validation import makes_sense
-from server.service.metrics.camera_metrics import Gauge
+from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.ingest.validation import is_plausible
+from server.service.metrics.camera_metrics import CameraMetrics
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer, UndecodableFrameError
 
@@ -54,7 +54,7 @@ class CameraState:
     frames: int = 0
     unheard: int = 0
     """Frames in which people were followed without what some other camera found."""
-    gauge: Gauge = field(default_factory=Gauge)
+    gauge: CameraMetrics = field(default_factory=CameraMetrics)
     """What is measured of it, for the operator."""
 
     @property
@@ -96,8 +96,8 @@ class Thumbnail:
     pulse: int
 
 
-class Intake:
-    """Takes the cameras' messages in. What cannot be understood is counted and dropped.
+class Ingest:
+    """Receives the cameras' messages. A message that cannot be parsed is counted and dropped.
 
     So is what is of pulses more than ``ahead`` after the newest, which ``now`` gives (below 0: none):
     it would be waited for as long as that takes. ``sounding`` is the camera that sends the ``sound``.
@@ -106,8 +106,8 @@ class Intake:
     def __init__(
         self,
         frame_buffers: Mapping[str, FrameBuffer],
-        aligner: Aligner,
-        on_frame: Callable[[str, Picture], None],
+        aligner: EpochAligner,
+        on_frame: Callable[[str, EncodedPicture], None],
         sound: AudioBuffer | None = None,
         *,
         sounding: str | None = None,
@@ -193,7 +193,7 @@ class Intake:
         except DECODE_ERRORS as error:
             state.bad(error)
             return
-        if tracks.camera != camera or not makes_sense(tracks, self._aligner.stride):
+        if tracks.camera != camera or not is_plausible(tracks, self._aligner.stride):
             state.bad("its tracks make no sense; is it run with this configuration?")
             return
         if self._is_far_ahead(state, end_of_epoch(tracks.epoch, self._aligner.stride)):

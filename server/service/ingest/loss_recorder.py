@@ -17,8 +17,8 @@ from server.service.view_selection.decider import GopDecision
 log = logging.getLogger(__name__)
 
 
-class Lacking:
-    """Notes what was lacking when it was decided. ``recorder``, once there is one, is told of all of it."""
+class LossRecorder:
+    """Records what was missing when a GOP was decided, in ``recorder`` too once there is one."""
 
     def __init__(
         self,

@@ -11,8 +11,8 @@ _WINDOW_MAX = 100_000
 """Frames of one message; far more than any window and any gap that a tracker joins."""
 
 
-def makes_sense(message: CameraTracks, stride: int) -> bool:
-    """Return whether the frames, the tracks and the sizes in a message fit together."""
+def is_plausible(message: CameraTracks, stride: int) -> bool:
+    """Return whether the frames, the tracks and the sizes in a message are consistent."""
     frames, end = message.last - message.first + 1, end_of_epoch(message.epoch, stride)
     ids = [track.id for track in message.tracks]
     looks = [look for track in message.tracks for look in track.appearance]

@@ -9,19 +9,19 @@ Window = TypeVar("Window")
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch(Generic[Window]):
-    """Frames that one window spoke of last: the pulses from `first` to `last`."""
+class HistorySpan(Generic[Window]):
+    """Frames from pulse `first` to `last` whose newest window is the same."""
 
     window: Window
     first: int
     last: int
 
 
-class History(Generic[Window]):
-    """Keeps for every frame of one camera the window that spoke of it last."""
+class WindowHistory(Generic[Window]):
+    """Keeps for every frame of one camera the newest window that has it."""
 
     def __init__(self) -> None:
-        self._stretches: list[Stretch[Window]] = []
+        self._stretches: list[HistorySpan[Window]] = []
         """In order; no frame is in two of them."""
 
     def put(self, window: Window, first: int, last: int) -> None:
@@ -29,12 +29,12 @@ class History(Generic[Window]):
         if last < first:
             return
         before, after = self.over(self._earliest, first - 1), self.over(last + 1, self._latest)
-        self._stretches = [*before, Stretch(window, first, last), *after]
+        self._stretches = [*before, HistorySpan(window, first, last), *after]
 
-    def over(self, first: int, last: int) -> list[Stretch[Window]]:
+    def over(self, first: int, last: int) -> list[HistorySpan[Window]]:
         """Return what is known of the frames from `first` to `last`, in order; frames may be missing."""
         return [
-            Stretch(it.window, max(it.first, first), min(it.last, last))
+            HistorySpan(it.window, max(it.first, first), min(it.last, last))
             for it in self._stretches
             if it.first <= last and it.last >= first
         ]

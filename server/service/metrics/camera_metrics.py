@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from server.messaging.messages import CameraTracks, FrameHeader
-from server.service.metrics.stage_totals import Totals
+from server.service.metrics.stage_totals import StageTotals
 
 _FRAMES = 250
 """Frames that are measured: ten seconds at 25 a second."""
@@ -19,8 +19,8 @@ _PROVEN = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
-    """Seconds, as they were lately."""
+class RecentSeconds:
+    """Recent durations, in seconds."""
 
     median: float
     worst: float
@@ -28,15 +28,15 @@ class Spread:
 
 
 @dataclass(frozen=True, slots=True)
-class Trouble:
-    """What went wrong, and when: unix seconds."""
+class CameraProblem:
+    """A problem of a camera and when it was: unix seconds."""
 
     text: str
     at: float
 
 
-class Gauge:
-    """Measures one camera by the heads of its frames and the reports of its windows.
+class CameraMetrics:
+    """Measures one camera by its frame headers and the reports of its windows.
 
     Frames and windows carry times of the camera's own clock, and are compared with nothing else.
     """
@@ -47,9 +47,9 @@ class Gauge:
         self._due: OrderedDict[int, float] = OrderedDict()
         self._delays: deque[float] = deque(maxlen=_WINDOWS)
         self._proven: deque[bool] = deque(maxlen=_WINDOWS)
-        self.totals = Totals()
+        self.totals = StageTotals()
         """Since the service began: another run of the camera is added."""
-        self.last_trouble: Trouble | None = None
+        self.last_trouble: CameraProblem | None = None
         """Stays when the camera is well again."""
         self.size: tuple[int, int] | None = None
         """Width and height of the camera's own picture; None: it has not said."""
@@ -80,15 +80,15 @@ class Gauge:
 
     def trouble(self, text: str) -> None:
         """Note what went wrong."""
-        self.last_trouble = Trouble(" ".join(text.split()), self._now())
+        self.last_trouble = CameraProblem(" ".join(text.split()), self._now())
 
     @property
-    def sync_error(self) -> Spread | None:
+    def sync_error(self) -> RecentSeconds | None:
         """How long after its pulse a frame was taken; None: no frame came."""
         return _spread(self._errors)
 
     @property
-    def tracking_delay(self) -> Spread | None:
+    def tracking_delay(self) -> RecentSeconds | None:
         """How long after the pulse of a window's last frame it was solved; None: none was."""
         return _spread(self._delays)
 
@@ -103,5 +103,5 @@ class Gauge:
         return sum(self._proven) / len(self._proven) if self._proven else None
 
 
-def _spread(values: Collection[float]) -> Spread | None:
-    return Spread(statistics.median(values), max(values, key=abs)) if values else None
+def _spread(values: Collection[float]) -> RecentSeconds | None:
+    return RecentSeconds(statistics.median(values), max(values, key=abs)) if values else None

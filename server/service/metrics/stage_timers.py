@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from server.service.metrics.histogram import Histogram
 
 
-class Stages:
+class StageTimers:
     """Measures the service's own stages.
 
     Attributes:

@@ -6,7 +6,7 @@ from server.messaging.messages import CameraTracks, FrameHeader
 from server.service.metrics.histogram import Histogram
 
 
-class Totals:
+class StageTotals:
     """How long each stage of a camera took, and how well its windows were solved.
 
     All times are differences of the camera's own clock.

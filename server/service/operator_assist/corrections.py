@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from server.messaging.operator_messages import OperatorPoint, OperatorPoints
-from server.service.identity.people import People
+from server.service.identity.people import PersonTracker
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class PointedPosition:
 
 
 def corrections_for_tracker(
-    people: People, camera: str, number: int, places: Sequence[PointedPosition]
+    people: PersonTracker, camera: str, number: int, places: Sequence[PointedPosition]
 ) -> OperatorPoints | None:
     """Say in the camera's own terms where somebody is: by the track that it showed them by.
 

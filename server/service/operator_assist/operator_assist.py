@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 import msgspec
 
 from server.config.site_config import Config
-from server.service.identity.people import People
+from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.operator_assist.corrections import PointedPosition, corrections_for_tracker
 from server.service.operator_assist.flags import FlagQueue, RiskEvent
@@ -19,7 +19,7 @@ class OperatorAssist:
     ``send`` sends a camera what is pointed at in its picture.
     """
 
-    def __init__(self, config: Config, people: People, send: Callable[[str, bytes], None]) -> None:
+    def __init__(self, config: Config, people: PersonTracker, send: Callable[[str, bytes], None]) -> None:
         self.flags = FlagQueue(config.view.flags, config.site.fps)
         self.points = 0
         """Places that were pointed at and went to a camera."""

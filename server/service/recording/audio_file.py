@@ -12,7 +12,7 @@ from io import BufferedReader
 from itertools import accumulate, pairwise
 from pathlib import Path
 
-from server.media.audio.audio_format import SoundFormat
+from server.media.audio.audio_format import AudioFormat
 
 AUDIO_NAME = "sound"
 """Of the folder, and what a reference has instead of a camera."""
@@ -22,7 +22,7 @@ _HEAD = 8
 
 
 def read_audio_frames(
-    path: Path, offset: int, length: int, begin: int, end: int, form: SoundFormat
+    path: Path, offset: int, length: int, begin: int, end: int, form: AudioFormat
 ) -> dict[int, bytes]:
     """Read the frames ``begin … end - 1``, as far as they are in a piece of a file of sound.
 

@@ -13,9 +13,9 @@ from functools import partial
 from pathlib import Path
 from typing import BinaryIO, ParamSpec, TypeVar
 
-from server.media.picture import Picture
+from server.media.picture import EncodedPicture
 from server.media.rendering_messages import TIMESCALE
-from server.media.stream_format import Agreement
+from server.media.stream_format import StreamFormat
 from server.system.private_files import FOLDER, open_private
 
 Given = ParamSpec("Given")
@@ -58,11 +58,11 @@ class RecordedGop:
         return b"".join(self.fragments)
 
 
-def pictures_of_gop(gop: RecordedGop, agreement: Agreement) -> list[Picture]:
+def pictures_of_gop(gop: RecordedGop, agreement: StreamFormat) -> list[EncodedPicture]:
     """Give a GOP's pictures as the site's streams have them."""
     told = agreement.told_by(gop.fragments[0])
     return [
-        Picture(gop.first + place, is_key(fragment), fragment, boot=0, parameters=told)
+        EncodedPicture(gop.first + place, is_key(fragment), fragment, boot=0, parameters=told)
         for place, fragment in enumerate(gop.fragments)
     ]
 

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 
 from server.config.site_config import Config
 from server.media.containers.fmp4 import init_segment
-from server.media.containers.mp4_audio import sound_init_segment
+from server.media.containers.mp4_audio import audio_init_segment
 from server.media.h264.annexb import ParameterSets
-from server.media.stream_format import Agreement
+from server.media.stream_format import StreamFormat
 from server.messaging.messages import GopChoices
 from server.service.recording.recent_gops import RecentGops
 from server.service.recording.recording_folder import GopRecord, RecordingFolder
@@ -36,7 +36,7 @@ class Recorder:
         self,
         config: Config,
         frame_buffers: Mapping[str, FrameBuffer],
-        agreement: Agreement,
+        agreement: StreamFormat,
         frames: int,
         sound: AudioBuffer | None = None,
     ) -> None:
@@ -170,7 +170,7 @@ class Recorder:
         begin = self._begin
         if begin is None or begin[0] != parameters:
             pictures = init_segment(parameters, site.width, site.height)
-            begin = parameters, InitSegments(pictures, b"" if sound is None else sound_init_segment(sound))
+            begin = parameters, InitSegments(pictures, b"" if sound is None else audio_init_segment(sound))
             self._begin = begin
         return begin[1]
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import msgspec
 
 from logthrottle import LogThrottle
-from server.media.audio.audio_chunk import Heard
+from server.media.audio.audio_chunk import AudioChunk
 from server.messaging.messages import GopChoices
 from server.service.recording.age_clock import AgeClock, MachineClocks
 from server.service.recording.media_files import RecordedGop, is_same_file
@@ -49,7 +49,7 @@ class GopRecord:
     choices: GopChoices
     cameras: dict[str, RecordedGop]
     """What each camera delivered of it, from its first frame on."""
-    heard: Heard | None = None
+    heard: AudioChunk | None = None
     """What is to be heard meanwhile; None at a site without sound."""
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from server.media.audio.audio_chunk import Heard
+from server.media.audio.audio_chunk import AudioChunk
 from server.messaging.messages import GopChoices
 from server.service.recording.audio_file import AUDIO_NAME as SOUND
 from server.service.recording.media_files import MediaFile, RecordedGop, is_same_file, write_at
@@ -47,7 +47,7 @@ class SegmentWriter:
         return not self._index_bytes and all(file.is_empty for file in self._files.values())
 
     def write(
-        self, choices: GopChoices, cameras: Mapping[str, RecordedGop], heard: Heard | None, now: float
+        self, choices: GopChoices, cameras: Mapping[str, RecordedGop], heard: AudioChunk | None, now: float
     ) -> None:
         """Write a GOP: pictures and sound first, then what is said about them, then people's references.
 
@@ -99,7 +99,7 @@ class SegmentWriter:
         offset, length = self._append(path, self._headers.pictures, gop)
         return IndexEntry(camera, self.segment.first, offset, length, gop.first, len(gop.fragments))
 
-    def _write_sound(self, heard: Heard, choices: GopChoices) -> None:
+    def _write_sound(self, heard: AudioChunk, choices: GopChoices) -> None:
         """Write the sound of a GOP, which is referred to as if it were as long as the GOP."""
         path = self._run.sound_file(self.segment.first)
         gop = RecordedGop(choices.first, (heard.fragment,))

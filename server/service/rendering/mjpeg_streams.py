@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from server.media.rendering_messages import Canvas, Drawn, Jpeg, belongs
+from server.media.rendering_messages import Canvas, JpegPicture, RenderResult, is_in_series
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.subscriber_queue import BytesChunk, Subscriber
 
@@ -35,7 +35,7 @@ FIRST_BOUNDARY = b"--picture\r\n"
 PULSE_HEADER = "X-MyView-Pulse"
 
 
-def multipart_part(picture: Jpeg) -> bytes:
+def multipart_part(picture: JpegPicture) -> bytes:
     """Give one picture with the boundary that ends it: browsers show it only when they have seen that."""
     head = [
         "Content-Type: image/jpeg",
@@ -65,7 +65,7 @@ class _ScheduledPicture:
     """A picture and its moment."""
 
     at: float
-    picture: Jpeg
+    picture: JpegPicture
     boxed: bool
 
 
@@ -104,7 +104,7 @@ class MjpegStreams:
         """Give the rates that are watched."""
         return sorted({series.rate for series in self._channels if series.boxed is boxed})
 
-    def put(self, drawn: Drawn, now: float) -> None:
+    def put(self, drawn: RenderResult, now: float) -> None:
         """Take in what was drawn; ``now`` is in seconds by a clock that never steps."""
         pictures = [(it, False) for it in drawn.plain] + [(it, True) for it in drawn.boxed]
         for picture, boxed in sorted(pictures, key=lambda it: it[0].pulse):
@@ -119,7 +119,7 @@ class MjpegStreams:
             due = self._waiting.popleft()
             chunk = BytesChunk(multipart_part(due.picture), random_access=True)
             for series, channel in self._channels.items():
-                if series.boxed is due.boxed and belongs(due.picture.pulse, series.rate, self._fps):
+                if series.boxed is due.boxed and is_in_series(due.picture.pulse, series.rate, self._fps):
                     channel.publish(chunk)
         return self._waiting[0].at if self._waiting else None
 

@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from server.media.containers.fmp4 import Sample, fragment, init_segment
-from server.media.h264.annexb import nal_units, parameter_sets, sample
-from server.media.picture import Picture
-from server.media.rendering_messages import Canvas, Unit
-from server.media.stream_format import Agreement
+from server.media.containers.fmp4 import FragmentSample, fragment, init_segment
+from server.media.h264.annexb import join_sample, nal_units, parameter_sets
+from server.media.picture import EncodedPicture
+from server.media.rendering_messages import Canvas, EncodedFrame
+from server.media.stream_format import StreamFormat
 from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.gapless_timeline import GaplessTimeline
@@ -35,7 +35,7 @@ class OverlayVideo:
         self._format = None if sound is None else sound.format
         self._sound = None if sound is None else AudioFollower(sound)
         self._silent_holes = silent_holes
-        self._agreement = Agreement()
+        self._agreement = StreamFormat()
         self._time = GaplessTimeline(self._agreement, canvas.fps, canvas.gop)
         self._process = 0
         self.channel = Broadcaster(queue_gops=queue_gops)
@@ -46,7 +46,7 @@ class OverlayVideo:
         self.begun = asyncio.Event()
         """There is a head, or there will never be one."""
 
-    def put(self, units: Sequence[Unit], *, silent: bool = False) -> None:
+    def put(self, units: Sequence[EncodedFrame], *, silent: bool = False) -> None:
         """Pass on encoded frames of one request, after what bridges a hole before them.
 
         Where they are ``silent``, the site's sound is not heard meanwhile.
@@ -68,18 +68,18 @@ class OverlayVideo:
         self.channel.close()
         self.begun.set()
 
-    def _picture(self, unit: Unit) -> Picture:
+    def _picture(self, unit: EncodedFrame) -> EncodedPicture:
         units, canvas = nal_units(unit.data), self._canvas
         if unit.key:
             self._agreement.check(parameter_sets(units))
         if self.head is None and self._agreement.parameters is not None:
             self.head = init_segment(self._agreement.parameters, canvas.width, canvas.height, self._format)
             self.begun.set()
-        made = fragment([Sample(sample(units), unit.key, unit.lasts)], unit.pulse, canvas.fps)
-        return Picture(unit.pulse, unit.key, made, self._process, unit.lasts)
+        made = fragment([FragmentSample(join_sample(units), unit.key, unit.lasts)], unit.pulse, canvas.fps)
+        return EncodedPicture(unit.pulse, unit.key, made, self._process, unit.lasts)
 
 
-def _gops(pictures: Sequence[Picture]) -> Iterator[Sequence[Picture]]:
+def _gops(pictures: Sequence[EncodedPicture]) -> Iterator[Sequence[EncodedPicture]]:
     """Part pictures where key frames are: a viewer may begin there."""
     starts = [place for place, picture in enumerate(pictures) if picture.key or not place]
     for start, end in pairwise([*starts, len(pictures)]):

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from logthrottle import LogThrottle
-from server.media.rendering_messages import Canvas, Draw, Jpeg, Still
+from server.media.rendering_messages import Canvas, JpegPicture, RenderRequest, Still
 from server.service.rendering.decided_boxes import GopOverlay
 from server.service.rendering.mjpeg_streams import MjpegStreams
 from server.service.rendering.overlay_video import OverlayVideo
@@ -25,7 +25,7 @@ from server.system.backoff import Backoff
 class _StillRequest:
     pulse: int
     given: asyncio.Event
-    picture: Jpeg | None = None
+    picture: JpegPicture | None = None
 
 
 class StillRequests:
@@ -36,7 +36,7 @@ class StillRequests:
         self.asked = asyncio.Event()
         """Somebody has asked since it was cleared."""
 
-    async def get(self, kind: Still, pulse: int) -> Jpeg | None:
+    async def get(self, kind: Still, pulse: int) -> JpegPicture | None:
         """Wait for a picture of this frame or a newer one; None: there will be none."""
         while True:
             wish = self._wishes.get(kind)
@@ -51,7 +51,7 @@ class StillRequests:
         """List what can be given when ``newest`` is the newest frame."""
         return [kind for kind, wish in self._wishes.items() if wish.pulse <= newest]
 
-    def give(self, kind: Still, picture: Jpeg | None) -> None:
+    def give(self, kind: Still, picture: JpegPicture | None) -> None:
         """Give everybody their picture."""
         wish = self._wishes.pop(kind)
         wish.picture = picture
@@ -134,7 +134,7 @@ class RenderedStream:
             self._used.clear()
             self._begin()
 
-    async def still(self, kind: Still, pulse: int) -> Jpeg:
+    async def still(self, kind: Still, pulse: int) -> JpegPicture:
         """Give a picture of this frame or a newer one.
 
         Raises:
@@ -234,7 +234,7 @@ class RenderedStream:
         fragments = piece.data
         told = self._told(fragments)
         drawn = await process.ask(
-            Draw(
+            RenderRequest(
                 fragments=fragments,
                 first=told.first,
                 boxes=told.boxes,
@@ -255,7 +255,7 @@ class RenderedStream:
             await self._stills.asked.wait()
             self._stills.asked.clear()
             for kind in self._stills.possible(self.newest):
-                drawn = await process.ask(Draw(still=kind))
+                drawn = await process.ask(RenderRequest(still=kind))
                 self._stills.give(kind, drawn.still)
 
     async def _show(self) -> None:

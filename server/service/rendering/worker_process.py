@@ -8,7 +8,7 @@ from typing import NoReturn, Self
 
 import msgspec
 
-from server.media.rendering_messages import LENGTH_BYTES, Canvas, Draw, Drawn, framed
+from server.media.rendering_messages import LENGTH_BYTES, Canvas, RenderRequest, RenderResult, encode_message
 from server.system.child_process import start_worker
 
 _ANSWER_S = 5.0
@@ -27,7 +27,7 @@ class RenderWorker:
         assert process.stdout is not None  # noqa: S101
         self._process, self._requests, self._answers = process, process.stdin, process.stdout
         self._turn = asyncio.Lock()
-        self._decoder = msgspec.msgpack.Decoder(Drawn)
+        self._decoder = msgspec.msgpack.Decoder(RenderResult)
 
     @classmethod
     async def start(cls, canvas: Canvas) -> Self:
@@ -41,7 +41,7 @@ class RenderWorker:
         except OSError as error:
             raise WorkerDiedError(f"cannot be started: {error.strerror}") from error
         started = cls(process)
-        started._requests.write(framed(canvas))
+        started._requests.write(encode_message(canvas))
         return started
 
     @property
@@ -49,7 +49,7 @@ class RenderWorker:
         """Its number in the system."""
         return self._process.pid
 
-    async def ask(self, request: Draw) -> Drawn:
+    async def ask(self, request: RenderRequest) -> RenderResult:
         """Give the answer to a request; nothing else is asked meanwhile.
 
         Whoever gives up waiting must end the process: the answer would be taken for another's.
@@ -60,7 +60,7 @@ class RenderWorker:
         async with self._turn:
             try:
                 async with asyncio.timeout(_ANSWER_S):
-                    self._requests.write(framed(request))
+                    self._requests.write(encode_message(request))
                     await self._requests.drain()
                     size = int.from_bytes(await self._answers.readexactly(LENGTH_BYTES), "big")
                     return self._decoder.decode(await self._answers.readexactly(size))

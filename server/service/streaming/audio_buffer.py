@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import OrderedDict
 
-from server.media.audio.audio_chunk import Heard
-from server.media.audio.audio_format import SoundFormat
+from server.media.audio.audio_chunk import AudioChunk
+from server.media.audio.audio_format import AudioFormat
 from server.messaging.messages import AudioHeader
 from server.service.streaming.gapless_timeline import LONGEST_GAP_S
 
@@ -18,7 +18,7 @@ _RESTART_S = 10
 class AudioBuffer:
     """Keeps the last ``seconds`` of a site's audio."""
 
-    def __init__(self, form: SoundFormat, fps: float, seconds: float) -> None:
+    def __init__(self, form: AudioFormat, fps: float, seconds: float) -> None:
         self.format = form
         self.fps = fps
         self._max_frames = round(seconds * form.rate / form.samples)
@@ -41,14 +41,14 @@ class AudioBuffer:
         while len(self._frames) > self._max_frames:
             self._frames.popitem(last=False)
 
-    def audio_between(self, first: int, until: int) -> Heard:
+    def audio_between(self, first: int, until: int) -> AudioChunk:
         """Return the audio of the pulses ``first … until - 1``; missing frames are silent."""
         form, fps = self.format, self.fps
         return self._audio(form.frame_at(first, fps), form.frame_at(until, fps))
 
-    def _audio(self, begin: int, end: int) -> Heard:
+    def _audio(self, begin: int, end: int) -> AudioChunk:
         frames = tuple(self._frames.get(number, self._silence) for number in range(begin, end))
-        return Heard(begin, frames, self.format)
+        return AudioChunk(begin, frames, self.format)
 
     @property
     def max_late_frames(self) -> int:
@@ -59,7 +59,7 @@ class AudioBuffer:
         """Return a frame; None if it has not arrived or is no longer kept."""
         return self._frames.get(number)
 
-    def audio_so_far(self, begin: int, end: int, late: int) -> Heard:
+    def audio_so_far(self, begin: int, end: int, late: int) -> AudioChunk:
         """Return the frames from ``begin`` on, up to the first missing one that is not before ``late``."""
         at = begin
         while at < end and (at in self._frames or at < late):
@@ -77,7 +77,7 @@ class AudioFollower:
         self._buffer = buffer
         self._next = begin
 
-    def next_audio(self, first: int, until: int) -> Heard:
+    def next_audio(self, first: int, until: int) -> AudioChunk:
         """Return the next audio frames, as the pulses ``first … until - 1`` are shown."""
         buffer = self._buffer
         form, fps = buffer.format, buffer.fps

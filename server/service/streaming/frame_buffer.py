@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from server.media.h264.annexb import ParameterSets
-from server.media.picture import Picture
-from server.media.stream_format import Agreement
+from server.media.picture import EncodedPicture
+from server.media.stream_format import StreamFormat
 
 
 class UndecodableFrameError(ValueError):
@@ -17,17 +17,17 @@ class FrameBuffer:
     All frame buffers of a site share one ``agreement``, the format of its streams.
     """
 
-    def __init__(self, fps: float, frames: int, agreement: Agreement) -> None:
+    def __init__(self, fps: float, frames: int, agreement: StreamFormat) -> None:
         self._fps = fps
         self._max_frames = frames
         self._agreement = agreement
-        self._pictures: dict[int, Picture] = {}
+        self._pictures: dict[int, EncodedPicture] = {}
         self._parameters: ParameterSets | None = None
         self.newest = -1
 
     def put(
         self, pulse: int, boot: int, access_unit: bytes, *, key: bool, after: int | None = None
-    ) -> Picture:
+    ) -> EncodedPicture:
         """Store an access unit; ``after`` is the pulse of its reference frame, if known.
 
         Raises:
@@ -37,7 +37,7 @@ class FrameBuffer:
         if key:
             self._parameters = self._agreement.accept(access_unit)
         fragment = self._agreement.pack(access_unit, pulse, self._fps, key=key)
-        picture = Picture(pulse, key, fragment, boot, parameters=self._parameters, after=after)
+        picture = EncodedPicture(pulse, key, fragment, boot, parameters=self._parameters, after=after)
         bridge = self._agreement.bridge(picture, self._fps)
         if bridge is not None and not bridge.can_follow(picture):
             raise UndecodableFrameError(f"no picture can be read in the access unit of pulse {pulse}")
@@ -57,11 +57,11 @@ class FrameBuffer:
         """Return whether a frame is in the buffer."""
         return pulse in self._pictures
 
-    def get(self, pulse: int) -> Picture | None:
+    def get(self, pulse: int) -> EncodedPicture | None:
         """Return one frame; None if it is not in the buffer."""
         return self._pictures.get(pulse)
 
-    def pictures(self, first: int, frames: int) -> list[Picture]:
+    def pictures(self, first: int, frames: int) -> list[EncodedPicture]:
         """Return the frames of ``first … first + frames - 1`` that are in the buffer."""
         return [self._pictures[pulse] for pulse in range(first, first + frames) if pulse in self._pictures]
 

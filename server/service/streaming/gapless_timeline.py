@@ -6,9 +6,9 @@ again" takes the place of a missing one (:mod:`server.media.gap_filler`): a deco
 
 from __future__ import annotations
 
-from server.media.gap_filler import Bridge
-from server.media.picture import Picture
-from server.media.stream_format import Agreement
+from server.media.gap_filler import GapFiller
+from server.media.picture import EncodedPicture
+from server.media.stream_format import StreamFormat
 
 _PER_PULSE_S = 2
 """Gaps up to so long get a picture for every pulse, longer ones a single picture of that duration."""
@@ -24,16 +24,16 @@ class GaplessTimeline:
     ``gop`` is the number of pulses from keyframe to keyframe.
     """
 
-    def __init__(self, agreement: Agreement, fps: float, gop: int) -> None:
+    def __init__(self, agreement: StreamFormat, fps: float, gop: int) -> None:
         self.agreement, self._fps, self._gop = agreement, fps, gop
-        self._newest: Picture | None = None
+        self._newest: EncodedPicture | None = None
         """The reference of the next picture."""
         self._until = 0
         self._is_broken = False
         """Whether a reference picture of the present GOP is missing; until the next keyframe."""
 
     @property
-    def newest(self) -> Picture | None:
+    def newest(self) -> EncodedPicture | None:
         """The picture that was shown last; None before the first."""
         return self._newest
 
@@ -42,7 +42,7 @@ class GaplessTimeline:
         """The first pulse that is not shown yet; None before the first picture."""
         return None if self._newest is None else self._until
 
-    def push(self, picture: Picture) -> list[Picture]:
+    def push(self, picture: EncodedPicture) -> list[EncodedPicture]:
         """Return what to show when a picture arrives: the filler of a gap before it, then the picture.
 
         Late pictures, and those before the first keyframe, are dropped. A picture that cannot be decoded is
@@ -56,11 +56,11 @@ class GaplessTimeline:
             return self.fill(picture.until)
         return self._fill_before(picture) + self._show(picture)
 
-    def advance_past(self, last: Picture) -> None:
+    def advance_past(self, last: EncodedPicture) -> None:
         """Note that a complete GOP was shown, of which this is the last picture: there is no gap to fill."""
         self._show(last)
 
-    def fill(self, until: int) -> list[Picture]:
+    def fill(self, until: int) -> list[EncodedPicture]:
         """Return repetitions of the last picture up to a pulse; none before the first picture."""
         bridge, missing = self._bridge(), until - self._until
         if bridge is None or self._newest is None or not 0 < missing <= LONGEST_GAP_S * self._fps:
@@ -70,11 +70,11 @@ class GaplessTimeline:
         self._newest, self._until, self._is_broken = filler[-1], until, True
         return filler
 
-    def _show(self, picture: Picture) -> list[Picture]:
+    def _show(self, picture: EncodedPicture) -> list[EncodedPicture]:
         self._newest, self._until, self._is_broken = picture, picture.until, False
         return [picture]
 
-    def _fill_before(self, picture: Picture) -> list[Picture]:
+    def _fill_before(self, picture: EncodedPicture) -> list[EncodedPicture]:
         """Return the filler of the gap before a picture that can be decoded after the last one."""
         if picture.pulse == self._until:
             return []
@@ -83,7 +83,7 @@ class GaplessTimeline:
         bridge = self._bridge()
         return [] if bridge is None else bridge.before(picture, (self._until, picture.pulse - self._until))
 
-    def _reference_is_lost(self, picture: Picture) -> bool:
+    def _reference_is_lost(self, picture: EncodedPicture) -> bool:
         """Return whether a reference of a picture is missing."""
         bridge, newest = self._bridge(), self._newest
         if bridge is None or newest is None:
@@ -96,8 +96,8 @@ class GaplessTimeline:
             return True
         return bridge.is_lost_between(newest, picture, picture.pulse - self._until)
 
-    def _is_restart(self, picture: Picture) -> bool:
+    def _is_restart(self, picture: EncodedPicture) -> bool:
         return picture.key and picture.pulse < self._until - _RESTART_S * self._fps
 
-    def _bridge(self) -> Bridge | None:
+    def _bridge(self) -> GapFiller | None:
         return None if self._newest is None else self.agreement.bridge(self._newest, self._fps)

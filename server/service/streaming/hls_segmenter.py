@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
-from server.media.containers.fmp4 import Sample, still
+from server.media.containers.fmp4 import FragmentSample, still_fragment
 from server.service.streaming.media_chunk import MediaChunk
 
 _SHORTEST_PART_S = 0.1
@@ -78,8 +78,8 @@ def repeat_last_picture(lead: MediaChunk, first: int, until: int, fps: float) ->
 
     The pictures that it is decoded from are in it, too, and last a few clock ticks.
     """
-    samples = [Sample(picture.sample, picture.key) for picture in lead.pictures]
-    return still(samples, first, until, fps)
+    samples = [FragmentSample(picture.sample, picture.key) for picture in lead.pictures]
+    return still_fragment(samples, first, until, fps)
 
 
 class HlsSegment:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
-from server.media.audio.audio_chunk import Heard
-from server.media.containers.mpegts import Counters, pack, packets, sound_packets
-from server.media.picture import Picture
+from server.media.audio.audio_chunk import AudioChunk
+from server.media.containers.mpegts import ContinuityCounters, count_audio_packets, count_packets, pack
+from server.media.picture import EncodedPicture
 
 
 class MediaChunk:
@@ -18,12 +18,12 @@ class MediaChunk:
 
     def __init__(
         self,
-        pictures: Sequence[Picture],
+        pictures: Sequence[EncodedPicture],
         fps: float,
-        counters: Counters,
+        counters: ContinuityCounters,
         *,
         is_filler: bool = False,
-        audio: Heard | None = None,
+        audio: AudioChunk | None = None,
         is_muted: bool = False,
     ) -> None:
         self.pictures = tuple(pictures)
@@ -77,11 +77,11 @@ class TsContinuity:
         self._tables = self._packets = self._audio_packets = 0
 
     def chunk(
-        self, pictures: Sequence[Picture], audio: Heard | None, *, is_filler: bool = False
+        self, pictures: Sequence[EncodedPicture], audio: AudioChunk | None, *, is_filler: bool = False
     ) -> MediaChunk:
         """Return the next pictures, at least one, with their audio as a chunk."""
-        counters = Counters(self._tables, self._packets, self._audio_packets, whole=False)
-        self._audio_packets += 0 if audio is None else sound_packets(audio)
+        counters = ContinuityCounters(self._tables, self._packets, self._audio_packets, whole=False)
+        self._audio_packets += 0 if audio is None else count_audio_packets(audio)
         self._tables += pictures[0].key
-        self._packets += sum(packets(picture) for picture in pictures)
+        self._packets += sum(count_packets(picture) for picture in pictures)
         return MediaChunk(pictures, self._fps, counters, is_filler=is_filler, audio=audio)

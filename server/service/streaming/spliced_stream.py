@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from server.media.containers.mpegts import Counters
+from server.media.containers.mpegts import ContinuityCounters
 from server.media.h264.annexb import ParameterSets
-from server.media.picture import Picture
-from server.media.stream_format import Agreement
+from server.media.picture import EncodedPicture
+from server.media.stream_format import StreamFormat
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.frame_buffer import FrameBuffer
@@ -39,7 +39,7 @@ class GopAssembler:
         self._complete: dict[str, MediaChunk | None] = {}
         self._blank: dict[ParameterSets | None, MediaChunk | None] = {}
 
-    def pictures(self, camera: str) -> list[Picture]:
+    def pictures(self, camera: str) -> list[EncodedPicture]:
         """Return the pictures of a camera that have arrived."""
         return self._frame_buffers[camera].pictures(self.first, self.until - self.first)
 
@@ -51,7 +51,7 @@ class GopAssembler:
             self._complete[camera] = self.chunk(pictures) if is_complete else None
         return self._complete[camera]
 
-    def blank_chunk(self, agreement: Agreement, newest: Picture | None) -> MediaChunk | None:
+    def blank_chunk(self, agreement: StreamFormat, newest: EncodedPicture | None) -> MediaChunk | None:
         """Return a gray GOP that can follow a picture, shared by all streams of its parameter sets.
 
         None if there is no gray picture of this format.
@@ -62,7 +62,7 @@ class GopAssembler:
             self._blank[form] = self.chunk(pictures, is_muted=True) if pictures else None
         return self._blank[form]
 
-    def chunk(self, pictures: list[Picture], *, is_muted: bool = False) -> MediaChunk:
+    def chunk(self, pictures: list[EncodedPicture], *, is_muted: bool = False) -> MediaChunk:
         """Return pictures of this GOP as a chunk, with the site's audio or, if muted, with silence."""
         first, until = pictures[0].pulse, pictures[-1].until
         audio = self._audio  # of the whole GOP, shared by all streams
@@ -70,7 +70,7 @@ class GopAssembler:
             audio = self._audio_buffer.audio_between(first, until)
         if is_muted and audio is not None:
             audio = audio.silenced
-        is_filler, counters = not pictures[0].key, Counters(self._tables)
+        is_filler, counters = not pictures[0].key, ContinuityCounters(self._tables)
         return MediaChunk(pictures, self._fps, counters, is_filler=is_filler, audio=audio, is_muted=is_muted)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from server.config.site_config import Config
-from server.media.picture import Picture
-from server.media.stream_format import Agreement
+from server.media.picture import EncodedPicture
+from server.media.stream_format import StreamFormat
 from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.frame_buffer import FrameBuffer
@@ -37,7 +37,7 @@ class LiveStream:
         self._timeline, self._ts = timeline, TsContinuity(fps)
         self._audio = None if audio_buffer is None else AudioFollower(audio_buffer)
 
-    def push(self, picture: Picture) -> None:
+    def push(self, picture: EncodedPicture) -> None:
         """Publish a picture, after the filler of a gap before it."""
         for shown in self._timeline.push(picture):
             self._publish([shown], is_filler=False)
@@ -46,7 +46,7 @@ class LiveStream:
         """Repeat the last picture, if there is one, up to a pulse."""
         self._publish(self._timeline.fill(until), is_filler=True)
 
-    def _publish(self, pictures: list[Picture], *, is_filler: bool) -> None:
+    def _publish(self, pictures: list[EncodedPicture], *, is_filler: bool) -> None:
         if not pictures:
             return
         first, until = pictures[0].pulse, pictures[-1].until
@@ -64,7 +64,7 @@ class Splicer:
     def __init__(
         self,
         frame_buffers: Mapping[str, FrameBuffer],
-        agreement: Agreement,
+        agreement: StreamFormat,
         config: Config,
         audio_buffer: AudioBuffer | None = None,
     ) -> None:
@@ -90,7 +90,7 @@ class Splicer:
         self.cameras = {camera: stream.broadcaster for camera, stream in self._live.items()}
         self.decided_cameras = {camera: stream.broadcaster for camera, stream in self._decided.items()}
 
-    def publish_frame(self, camera: str, frame: Picture) -> None:
+    def publish_frame(self, camera: str, frame: EncodedPicture) -> None:
         """Publish a camera's frame in the live stream of that camera."""
         self._live[camera].push(frame)
 

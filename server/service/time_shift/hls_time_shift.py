@@ -9,9 +9,9 @@ from collections.abc import Callable
 from contextlib import aclosing
 from dataclasses import dataclass, replace
 
-from server.media.containers.mpegts import Counters
-from server.media.picture import Picture
-from server.media.stream_format import Agreement
+from server.media.containers.mpegts import ContinuityCounters
+from server.media.picture import EncodedPicture
+from server.media.stream_format import StreamFormat
 from server.service.streaming.gapless_timeline import GaplessTimeline
 from server.service.streaming.hls_segmenter import HlsSegment, SegmentLayout
 from server.service.streaming.media_chunk import MediaChunk
@@ -109,20 +109,20 @@ class TimeShift:
                 heard = None if hearing is None else await hearing.beside(begin, end)
                 if heard is not None and self._source.presence is not None and begin not in heard_from:
                     heard = heard.silenced
-                footage.append(MediaChunk(pictures, self._plan.fps, Counters(), audio=heard))
+                footage.append(MediaChunk(pictures, self._plan.fps, ContinuityCounters(), audio=heard))
         if not footage:
             return None
-        lead_footage = MediaChunk(led, self._plan.fps, Counters()) if led else footage[0]
+        lead_footage = MediaChunk(led, self._plan.fps, ContinuityCounters()) if led else footage[0]
         segment = HlsSegment(number, self._plan, lead_footage)
         for it in footage:
             segment.add(it)
         return segment
 
     async def _came(
-        self, first: int, until: int, agreement: Agreement
-    ) -> tuple[list[Picture], frozenset[int]]:
+        self, first: int, until: int, agreement: StreamFormat
+    ) -> tuple[list[EncodedPicture], frozenset[int]]:
         """Give the pictures that there are of some pulses, and the first pulses of GOPs that may be heard."""
-        came: list[Picture] = []
+        came: list[EncodedPicture] = []
         heard_from: set[int] = set()
         async with aclosing(play_gops(self._source, first)) as gops:
             async for gop in gops:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from server.media.audio.audio_chunk import Heard
-from server.media.audio.audio_format import SoundFormat
+from server.media.audio.audio_chunk import AudioChunk
+from server.media.audio.audio_format import AudioFormat
 from server.service.recording.audio_file import read_audio_frames
 from server.service.recording.media_files import run_in_reader_thread
 from server.service.recording.segment_index import IndexEntry
@@ -31,7 +31,7 @@ class PlaybackAudio:
         self._next: int | None = None
         self._live: AudioFollower | None = None
 
-    async def beside(self, first: int, until: int) -> Heard:
+    async def beside(self, first: int, until: int) -> AudioChunk:
         """Give what follows what was heard, now that the pulses ``first … until - 1`` are shown."""
         buffer = self._shelf
         form = buffer.format
@@ -47,9 +47,9 @@ class PlaybackAudio:
             frames |= await run_in_reader_thread(self._read, recorded, missing[0], missing[-1] + 1)
         self._next = next((it for it in missing if it >= late and frames[it] is None), max(begin, end))
         heard = (frames[number] or form.silence for number in range(begin, self._next))
-        return Heard(begin, tuple(heard), form)
+        return AudioChunk(begin, tuple(heard), form)
 
-    def live(self, first: int, until: int) -> Heard:
+    def live(self, first: int, until: int) -> AudioChunk:
         """Go on with the present: nothing is looked up any more."""
         if self._live is None:
             self._live = AudioFollower(self._shelf, self._next)
@@ -65,7 +65,7 @@ class PlaybackAudio:
 
 
 def _frames_of(
-    recorded: SessionEntries, stretch: IndexEntry, begin: int, end: int, form: SoundFormat
+    recorded: SessionEntries, stretch: IndexEntry, begin: int, end: int, form: AudioFormat
 ) -> dict[int, bytes]:
     path = recorded.run.sound_file(stretch.file)
     try:

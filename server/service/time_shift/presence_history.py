@@ -6,8 +6,8 @@ from bisect import bisect_left
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from server.media.picture import Picture
-from server.media.stream_format import Agreement
+from server.media.picture import EncodedPicture
+from server.media.stream_format import StreamFormat
 from server.service.recording.media_files import RecordedGop, pictures_of_gop
 from server.service.recording.recorder import Recorder
 from server.service.streaming.presence import last_seen_offsets
@@ -53,13 +53,13 @@ class PresenceHistory:
 class VisiblePictures:
     """Some pictures of the past, as somebody may see them."""
 
-    pictures: list[Picture]
+    pictures: list[EncodedPicture]
     silent: bool
     """Whether nothing may be heard meanwhile."""
 
 
 async def visible_pictures(
-    gop: RecordedGop, source: PlaybackSource, agreement: Agreement, fps: float
+    gop: RecordedGop, source: PlaybackSource, agreement: StreamFormat, fps: float
 ) -> VisiblePictures:
     """Return a GOP's pictures, or grey ones, if there are any, where the person had not been seen lately."""
     pictures, presence = pictures_of_gop(gop, agreement), source.presence

@@ -7,8 +7,8 @@ from collections.abc import AsyncGenerator, Callable, Iterator
 from contextlib import aclosing
 from dataclasses import dataclass
 
-from server.media.audio.audio_chunk import Heard
-from server.media.picture import Picture
+from server.media.audio.audio_chunk import AudioChunk
+from server.media.picture import EncodedPicture
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.gapless_timeline import LONGEST_GAP_S, GaplessTimeline
 from server.service.streaming.media_chunk import MediaChunk, TsContinuity
@@ -124,12 +124,14 @@ class TimeShiftStream:
         heard = None if hearing is None else await hearing.beside(first, until)
         return self._footage(shown.pictures, heard, silent=shown.silent)
 
-    def _present(self, pictures: list[Picture], *, silent: bool) -> MediaChunk:
+    def _present(self, pictures: list[EncodedPicture], *, silent: bool) -> MediaChunk:
         hearing, first, until = self._hearing, pictures[0].pulse, pictures[-1].until
         heard = None if hearing is None else hearing.live(first, until)
         return self._footage(pictures, heard, silent=silent)
 
-    def _footage(self, pictures: list[Picture], heard: Heard | None, *, silent: bool) -> MediaChunk:
+    def _footage(
+        self, pictures: list[EncodedPicture], heard: AudioChunk | None, *, silent: bool
+    ) -> MediaChunk:
         return self._tally.chunk(pictures, heard.silenced if silent and heard is not None else heard)
 
 

@@ -17,9 +17,9 @@ from bestview import (
 )
 from bestview.quality import CameraLayout, QualitySettings, TrackWindow, compute_view_quality
 from server.config.site_config import Config
-from server.service.view_selection.undetected_views import Tested, Unfound
-from server.service.view_selection.view_quality_buffer import Sight
-from server.service.view_selection.window_line import Line
+from server.service.view_selection.undetected_views import TestedViews, UndetectedViews
+from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
+from server.service.view_selection.window_line import WindowTracks
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -37,14 +37,14 @@ _LEAST = 0.25
 """Below this trust there is no view."""
 
 
-class Elsewhere:
-    """Looks for views of people where they are not found, and learns how often cameras find people where.
+class CrossViewInference:
+    """Infers views of people whom a camera does not detect, and learns how often cameras detect people where.
 
     It goes by what the cameras say alone, and by all people whichever service decides for them, so that all
     services of a site know the same.
     """
 
-    def __init__(self, config: Config, sight: Sight) -> None:
+    def __init__(self, config: Config, sight: ViewQualityBuffer) -> None:
         self._sight, self._cameras = sight, config.camera_ids
         self._fps = config.site.fps
         self._every = max(1, round(_EVERY_S * self._fps))
@@ -52,14 +52,14 @@ class Elsewhere:
         few, many = _FEW_S * self._fps, _MANY_S * self._fps
         self._findable = DetectionProbabilityMap(len(self._cameras), self._size, _PRIOR, few, many)
 
-    def look(self, line: Line, person: Ints, frames: int) -> Unfound:
+    def look(self, line: WindowTracks, person: Ints, frames: int) -> UndetectedViews:
         """Find the views in the outlook's frames; `person` (L,) says who is at each place in line, or -1."""
         floor = self._floor()
         if len(floor.cameras) < 2:  # noqa: PLR2004 — one that knows, one that does not find
-            return Unfound.nobody()
+            return UndetectedViews.nobody()
         told = _told(line, person, floor.cameras, len(self._cameras), self._every, frames)
         if not len(told.who):
-            return Unfound.nobody()
+            return UndetectedViews.nobody()
         known, shape = told.person >= 0, told.found.shape
         moment = told.person[known] * shape[1] + told.time[known]
         bottom = floor.looks.picture_boxes[:, 3]
@@ -76,7 +76,7 @@ class Elsewhere:
         inside = ((feet >= corners[:, :2]) & (feet <= corners[:, 2:])).all(axis=-1)
         others = body.known_by.sum(axis=1)[:, None] > body.known_by
         asked = np.nonzero(inside & told.said & others.reshape(shape))
-        tested = Tested(asked[1] * self._every, floor.cameras[asked[2]], feet[asked], told.found[asked])
+        tested = TestedViews(asked[1] * self._every, floor.cameras[asked[2]], feet[asked], told.found[asked])
         view = np.nonzero(inside & ~told.found)
         trust = self._findable.trust(floor.cameras[view[2]], feet[view])
         good = trust >= _LEAST
@@ -94,9 +94,11 @@ class Elsewhere:
         frame = time * self._every + np.arange(self._every)[:, None]
         there = frame < frames
         each = np.broadcast_to(np.arange(len(time)), frame.shape)[there]
-        return Unfound(frame[there], floor.cameras[camera[each]], told.who[of[each]], quality[each], tested)
+        return UndetectedViews(
+            frame[there], floor.cameras[camera[each]], told.who[of[each]], quality[each], tested
+        )
 
-    def learn(self, unfound: Unfound, frames: int) -> None:
+    def learn(self, unfound: UndetectedViews, frames: int) -> None:
         """Learn from the first frames of an outlook, which are decided now."""
         tested = unfound.tested
         of = np.flatnonzero(tested.frame < frames)
@@ -157,7 +159,7 @@ class _Told:
     found: Mask
 
 
-def _told(line: Line, person: Ints, cameras: Ints, count: int, every: int, frames: int) -> _Told:
+def _told(line: WindowTracks, person: Ints, cameras: Ints, count: int, every: int, frames: int) -> _Told:
     """Read what `cameras`, of `count`, say in every so many of the frames in line."""
     column = np.full(count, -1)
     column[cameras] = np.arange(len(cameras))

@@ -17,8 +17,8 @@ def _nobody() -> Ints:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shots:
-    """The shots that go on.
+class CurrentShots:
+    """The shots that are running.
 
     Attributes:
         numbers: (K,) whose they are, rising.
@@ -30,7 +30,7 @@ class Shots:
     cameras: Ints = field(default_factory=_nobody)
     held: Ints = field(default_factory=_nobody)
 
-    def of(self, numbers: Ints) -> Shots:
+    def of(self, numbers: Ints) -> CurrentShots:
         """Return the shots of these people, (K,) rising; who is new has none."""
         cameras, held = (
             np.full(len(numbers), NO_CAMERA, dtype=np.int64),
@@ -38,9 +38,9 @@ class Shots:
         )
         _, old, new = np.intersect1d(self.numbers, numbers, assume_unique=True, return_indices=True)
         cameras[new], held[new] = self.cameras[old], self.held[old]
-        return Shots(numbers, cameras, held)
+        return CurrentShots(numbers, cameras, held)
 
-    def then(self, views: Ints) -> Shots:
+    def then(self, views: Ints) -> CurrentShots:
         """Return the shots after one more GOP that these cameras (K,) show; -1 is a hole, which is no cut."""
         cameras = np.where(views == NO_CAMERA, self.cameras, views)
-        return Shots(self.numbers, cameras, np.where(cameras == self.cameras, self.held + 1, 1))
+        return CurrentShots(self.numbers, cameras, np.where(cameras == self.cameras, self.held + 1, 1))

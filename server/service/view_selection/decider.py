@@ -12,14 +12,14 @@ from bestview import NO_CAMERA, Merge, Split, select_views_by_gop
 from server.config.sections import LIVE_VIEW_SETTINGS, ViewSettings
 from server.config.site_config import Config
 from server.messaging.messages import NumberedBox
-from server.service.identity.people import People
+from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.view_selection.cross_view_inference import Elsewhere
-from server.service.view_selection.current_shots import Shots
-from server.service.view_selection.explanation import Why
-from server.service.view_selection.lookahead_window import Outlook
-from server.service.view_selection.recent_views import Lately
-from server.service.view_selection.view_quality_buffer import Sight
+from server.service.view_selection.cross_view_inference import CrossViewInference
+from server.service.view_selection.current_shots import CurrentShots
+from server.service.view_selection.explanation import SelectionReasons
+from server.service.view_selection.lookahead_window import LookaheadWindow
+from server.service.view_selection.recent_views import RecentViews
+from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 Floats = NDArray[np.float64]
 
@@ -53,11 +53,11 @@ class GopDecision:
     """Numbers that turned out to be another's, up to now."""
     corrections: tuple[Merge | Split, ...]
     """What has turned out about numbers since the last decision."""
-    why: Why = field(compare=False, repr=False)
+    why: SelectionReasons = field(compare=False, repr=False)
     """What the choices were made by."""
 
 
-def homographies(config: Config) -> dict[str, Floats | None]:
+def camera_homographies(config: Config) -> dict[str, Floats | None]:
     """Return every camera's homography from its own picture to the ground, None where there is none."""
     return {
         camera.id: None if camera.ground is None else np.array(camera.ground, dtype=np.float64)
@@ -65,15 +65,18 @@ def homographies(config: Config) -> dict[str, Floats | None]:
     }
 
 
-class Decider:
-    """Decides GOP by GOP as the epochs come in. No clock, no network: the same epochs give the same cuts.
+class ViewDecider:
+    """Selects views GOP by GOP as epochs come. No clock, no network: the same epochs give the same cuts.
 
     Every decision looks at the whole look-ahead anew: a camera that has died meanwhile is no longer in it.
     ``has(camera, pulse)`` tells whether a camera's frame can be shown.
     """
 
     def __init__(
-        self, config: Config, homographies: Mapping[str, Floats | None], has: Callable[[str, int], bool]
+        self,
+        config: Config,
+        camera_homographies: Mapping[str, Floats | None],
+        has: Callable[[str, int], bool],
     ) -> None:
         self._config = config
         self._take(config.view)
@@ -81,10 +84,10 @@ class Decider:
         self._has = has
         size = (config.site.width, config.site.height)
         fps, share = config.site.fps, config.view.share
-        self.people = People(
+        self.people = PersonTracker(
             config.view.identity,
             self._cameras,
-            homographies,
+            camera_homographies,
             size,
             config.track.lag(fps),
             share,
@@ -94,10 +97,10 @@ class Decider:
         stride, gop = config.track.window.stride, config.encode.gop
         self._at_once = -(-stride // gop) + 1
         """GOPs that an epoch decides at most: one more than it completes while the look-ahead stays."""
-        self._sight = Sight(config, homographies, self.people.fits)
-        self._elsewhere = Elsewhere(config, self._sight)
-        self._shots = Shots()
-        self._lately = Lately()
+        self._sight = ViewQualityBuffer(config, camera_homographies, self.people.fits)
+        self._elsewhere = CrossViewInference(config, self._sight)
+        self._shots = CurrentShots()
+        self._lately = RecentViews()
         self._next_gop: int | None = None
 
     @property
@@ -161,9 +164,9 @@ class Decider:
             for first in range(self._next_gop, last + 1, gop)
         ]
 
-    def _outlook(self, first: int, last: int) -> Outlook:
+    def _outlook(self, first: int, last: int) -> LookaheadWindow:
         """Look at the frames from `first` to `last` with what is known of people by now."""
-        return Outlook(
+        return LookaheadWindow(
             self._cameras,
             self._sight,
             self.people,
@@ -183,7 +186,7 @@ class Decider:
         weight[-last:] += self._goes_on / last
         return weight
 
-    def _decide(self, outlook: Outlook, first: int, frames: int, weight: Floats) -> GopDecision:
+    def _decide(self, outlook: LookaheadWindow, first: int, frames: int, weight: Floats) -> GopDecision:
         people, lookahead = self.people, len(weight)
         everybody, seen = outlook.numbers, people.roll.first_seen
         known = np.fromiter((seen[it] for it in everybody.tolist()), np.int64, len(everybody))
@@ -207,7 +210,7 @@ class Decider:
                 part.numbers.tolist(), views.tolist(), before.cameras.tolist(), strict=True
             )
         )
-        why = Why(part, before.cameras, weight, self.switch_cost, self._config.view.quality)
+        why = SelectionReasons(part, before.cameras, weight, self.switch_cost, self._config.view.quality)
         return GopDecision(
             first, frames, choices, boxes, dict(people.roll.merged), people.take_corrections(), why
         )

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from bestview import NO_CAMERA
 from bestview.quality import QualitySettings
-from server.service.view_selection.lookahead_window import Part
+from server.service.view_selection.lookahead_window import LookaheadPart
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class ViewReason:
+class ViewExplanation:
     """What one camera's view of one person is worth over the look-ahead."""
 
     cost: float | None
@@ -39,7 +39,7 @@ class Explanation:
 
     frames: int
     """Frames of the look-ahead."""
-    views: dict[str, ViewReason]
+    views: dict[str, ViewExplanation]
     """By camera."""
     weights: dict[str, float]
     """Of the terms: the share of a view's worth that is lost where a term is at its worst."""
@@ -53,8 +53,8 @@ class Explanation:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Why:
-    """What one GOP's choices were made by.
+class SelectionReasons:
+    """The costs by which the views of one GOP were selected.
 
     Attributes:
         part: the look-ahead.
@@ -64,7 +64,7 @@ class Why:
         settings: how the terms weigh.
     """
 
-    part: Part
+    part: LookaheadPart
     before: Ints
     weight: Floats
     switch_cost: float
@@ -100,11 +100,11 @@ class Why:
             switch_cost=self.switch_cost,
         )
 
-    def _view(self, views: Ints, unfound: Ints, mean: float) -> ViewReason:
+    def _view(self, views: Ints, unfound: Ints, mean: float) -> ViewExplanation:
         """Return what one camera had to say of a person: where it finds them, and where it does not."""
         outlook = self.part.outlook
         terms = [outlook.terms(int(view)) for view in views]
-        return ViewReason(
+        return ViewExplanation(
             cost=_finite(mean),
             seen=len(views) / self.part.frames,
             quality=float(np.mean(outlook.quality[views])) if terms else None,

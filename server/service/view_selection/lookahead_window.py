@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 
 from bestview import NO_VIEW_COST, GopCosts, VisibleViews, add_inferred_views, add_missed_detections
 from bestview.quality import relative_view_quality
-from server.service.identity.people import People
-from server.service.view_selection.cross_view_inference import Elsewhere
-from server.service.view_selection.recent_views import Lately
-from server.service.view_selection.undetected_views import Unfound
-from server.service.view_selection.view_quality_buffer import Sight
-from server.service.view_selection.window_line import Line, indices_of
+from server.service.identity.people import PersonTracker
+from server.service.view_selection.cross_view_inference import CrossViewInference
+from server.service.view_selection.recent_views import RecentViews
+from server.service.view_selection.undetected_views import UndetectedViews
+from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
+from server.service.view_selection.window_line import WindowTracks, find_indices
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-NOTHING = Lately()
+NOTHING = RecentViews()
 
 
-class Outlook:
+class LookaheadWindow:
     """The views of all people in the frames from `first` to `last`, as known at one epoch.
 
     One outlook serves all GOPs that the epoch decides. ``has(camera, pulse)`` tells whether a camera's frame
@@ -35,16 +35,16 @@ class Outlook:
     def __init__(
         self,
         cameras: Sequence[str],
-        sight: Sight,
-        people: People,
+        sight: ViewQualityBuffer,
+        people: PersonTracker,
         has: Callable[[str, int], bool],
         first: int,
         last: int,
         *,
         relative: bool,
-        lately: Lately = NOTHING,
+        lately: RecentViews = NOTHING,
         lasts: float = 0.0,
-        elsewhere: Elsewhere | None = None,
+        elsewhere: CrossViewInference | None = None,
         unfound: float = 0.0,
     ) -> None:
         self.cameras, self.first = cameras, first
@@ -52,11 +52,13 @@ class Outlook:
         """(K,) everybody's, rising."""
         pulses, everybody = range(first, last + 1), len(self.numbers)
         unsearched = np.array([people.unsearched.over(camera, first, len(pulses)) for camera in cameras])
-        line = Line([sight.over(camera, first, last) for camera in cameras], first, unsearched)
+        line = WindowTracks([sight.over(camera, first, last) for camera in cameras], first, unsearched)
         shown = np.array([[has(camera, it) for camera in cameras] for it in pulses], dtype=np.bool_)
         numbers: Ints = np.array(people.roll.everybody, dtype=np.int64)
-        anybody, mine = line.persons(people, numbers, len(pulses)), indices_of(numbers, self.numbers)
-        self.looked = Unfound.nobody() if elsewhere is None else elsewhere.look(line, anybody, len(pulses))
+        anybody, mine = line.persons(people, numbers, len(pulses)), find_indices(numbers, self.numbers)
+        self.looked = (
+            UndetectedViews.nobody() if elsewhere is None else elsewhere.look(line, anybody, len(pulses))
+        )
         """For all people, also those whom another service decides for."""
         person = np.append(mine, -1)[anybody]
         there = np.flatnonzero((line.quality >= 0.0) & (person >= 0))
@@ -84,22 +86,22 @@ class Outlook:
         self.taken = add_inferred_views(missed, other.frame, other.camera, other.person, extra)
         """The views, and those that are taken to be there though somebody was missed, or is not found."""
 
-    def lately(self, pulse: int) -> Lately:
+    def lately(self, pulse: int) -> RecentViews:
         """Return how everybody was seen before a pulse, for the next outlook."""
-        return Lately.after(self.numbers, self.before, self.views, self.first, pulse)
+        return RecentViews.after(self.numbers, self.before, self.views, self.first, pulse)
 
     def terms(self, view: int) -> Floats:
         """Return what the quality of a view is made of, (terms,)."""
         return self._line.terms(int(self._places[view]))
 
-    def part(self, first: int, frames: int, of: Mask) -> Part:
+    def part(self, first: int, frames: int, of: Mask) -> LookaheadPart:
         """Return the outlook on some of its frames, for the people of the mask (K,)."""
-        return Part(self, first - self.first, frames, np.flatnonzero(of))
+        return LookaheadPart(self, first - self.first, frames, np.flatnonzero(of))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Part:
-    """Some frames of an outlook, for some of the people.
+class LookaheadPart:
+    """Some frames of a look-ahead window, for some of the people.
 
     Attributes:
         outlook: of which it is a part.
@@ -108,7 +110,7 @@ class Part:
         people: (K,) indices into the outlook's people, rising.
     """
 
-    outlook: Outlook
+    outlook: LookaheadWindow
     first: int
     frames: int
     people: Ints
@@ -150,7 +152,7 @@ class Part:
         cost[views.frame[rows] - self.first, views.camera[rows]] -= views.quality[rows]
         return cost
 
-    def _rows(self, views: VisibleViews | Unfound, number: int) -> Ints:
+    def _rows(self, views: VisibleViews | UndetectedViews, number: int) -> Ints:
         person = self.people[self.numbers == number]
         if not person.size:
             raise KeyError(number)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from server.service.view_selection.decider import ObjectChoice
-from server.service.view_selection.explanation import Explanation, Why
+from server.service.view_selection.explanation import Explanation, SelectionReasons
 
 _ASKED_S = 30.0
 """Who was not asked about for so long is not followed any more."""
@@ -16,7 +16,7 @@ _KEPT_S = 65.0
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class SelectedView:
     """One object's view in one GOP."""
 
     choice: ObjectChoice
@@ -30,26 +30,26 @@ class Standing:
 
 
 @dataclass(frozen=True, slots=True)
-class Reason:
-    """One object's view in one GOP, and what it was chosen by."""
+class SelectionReason:
+    """One object's view in one GOP, and the costs it was selected by."""
 
-    standing: Standing
+    standing: SelectedView
     why: Explanation
 
 
-class Reasons:
-    """Keeps the reasons GOP by GOP, from the first question about an object on."""
+class RecentReasons:
+    """Keeps the reasons of recent GOPs, from the first query about an object on."""
 
     def __init__(self, fps: float) -> None:
         self._asked_for, self._kept_for = _ASKED_S * fps, _KEPT_S * fps
         self._asked: dict[int, int] = {}
         """By object: the GOP after which it was asked about last."""
-        self._kept: dict[int, list[Reason]] = {}
+        self._kept: dict[int, list[SelectionReason]] = {}
         """By object, in order."""
         self._newest = 0
-        self._why: Why | None = None
+        self._why: SelectionReasons | None = None
 
-    def put(self, standings: Mapping[int, Standing], first: int, why: Why) -> None:
+    def put(self, standings: Mapping[int, SelectedView], first: int, why: SelectionReasons) -> None:
         """Take in the GOP that begins at `first`."""
         if first < self._newest:  # the pulses began anew
             self._asked, self._kept = {}, {}
@@ -60,7 +60,7 @@ class Reasons:
             if number in standings:
                 self._keep(standings[number], why)
 
-    def newest(self, standing: Standing) -> Reason:
+    def newest(self, standing: SelectedView) -> SelectionReason:
         """Explain an object's newest view; from now on its reasons are kept.
 
         Raises:
@@ -75,7 +75,7 @@ class Reasons:
             raise KeyError(number)
         return self._keep(standing, self._why)
 
-    def at(self, number: int, pulse: int) -> Reason | None:
+    def at(self, number: int, pulse: int) -> SelectionReason | None:
         """Explain the view of an object at a pulse; None: that is not kept."""
         kept = self._kept.get(number, [])
         place = bisect_right(kept, pulse, key=lambda it: it.standing.first) - 1
@@ -84,8 +84,8 @@ class Reasons:
         standing = kept[place].standing
         return kept[place] if pulse < standing.first + standing.frames else None
 
-    def _keep(self, standing: Standing, why: Why) -> Reason:
-        reason = Reason(standing, why.of(standing.choice.number))
+    def _keep(self, standing: SelectedView, why: SelectionReasons) -> SelectionReason:
+        reason = SelectionReason(standing, why.of(standing.choice.number))
         oldest = standing.first - self._kept_for
         kept = [it for it in self._kept.get(standing.choice.number, []) if it.standing.first >= oldest]
         self._kept[standing.choice.number] = [*kept, reason]

@@ -17,8 +17,8 @@ def _nothing() -> LastDetections:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lately:
-    """What was seen before a pulse.
+class RecentViews:
+    """The last views before a pulse.
 
     Attributes:
         pulse: before which.
@@ -40,6 +40,8 @@ class Lately:
         return LastDetections(ago, worth)
 
     @staticmethod
-    def after(numbers: Ints, last: LastDetections, views: VisibleViews, first: int, pulse: int) -> Lately:
+    def after(
+        numbers: Ints, last: LastDetections, views: VisibleViews, first: int, pulse: int
+    ) -> RecentViews:
         """Return the same before a later pulse, by the views from `first` on."""
-        return Lately(pulse, numbers, last.advanced_to(views, pulse - first))
+        return RecentViews(pulse, numbers, last.advanced_to(views, pulse - first))

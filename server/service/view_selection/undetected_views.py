@@ -13,8 +13,8 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tested:
-    """T looks of cameras at places where somebody stands, as others know.
+class TestedViews:
+    """T tests of cameras at places where a person stands, as other cameras know.
 
     Attributes:
         frame: (T,) of the outlook.
@@ -30,8 +30,8 @@ class Tested:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Unfound:
-    """V views of people whom a camera does not find, though others know where they stand.
+class UndetectedViews:
+    """V views of people whom a camera does not detect, though other cameras know where they stand.
 
     Attributes:
         frame: (V,) of the outlook.
@@ -45,16 +45,16 @@ class Unfound:
     camera: Ints
     person: Ints
     quality: Floats
-    tested: Tested
+    tested: TestedViews
 
     @classmethod
-    def nobody(cls) -> Unfound:
+    def nobody(cls) -> UndetectedViews:
         """Return no views."""
         none = np.zeros(0, dtype=np.int64)
-        tested = Tested(none, none, np.zeros((0, 2)), np.zeros(0, dtype=np.bool_))
+        tested = TestedViews(none, none, np.zeros((0, 2)), np.zeros(0, dtype=np.bool_))
         return cls(none, none, none, np.zeros(0), tested)
 
-    def of(self, people: Ints, count: int, shown: Mask, found: Ints, factor: float) -> Unfound:
+    def of(self, people: Ints, count: int, shown: Mask, found: Ints, factor: float) -> UndetectedViews:
         """Return the views of some of the people, in frames that can be shown.
 
         Args:
@@ -73,4 +73,4 @@ class Unfound:
         taken[found] = True
         rows = rows[~taken[cell[rows] * count + person[rows]]]
         quality = factor * self.quality[rows]
-        return Unfound(self.frame[rows], self.camera[rows], person[rows], quality, self.tested)
+        return UndetectedViews(self.frame[rows], self.camera[rows], person[rows], quality, self.tested)

@@ -12,7 +12,7 @@ from bestview.quality import CameraLayout, QualitySettings, TrackWindow, ViewQua
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.service.identity.camera_window import CameraWindow
-from server.service.ingest.window_history import History, Stretch
+from server.service.ingest.window_history import HistorySpan, WindowHistory
 
 Floats = NDArray[np.float64]
 
@@ -20,8 +20,8 @@ _FOR_EVER = 2**62
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SeenWindow:
-    """How well one camera's window of F frames shows whom its T tracks follow.
+class WindowQuality:
+    """How well one camera's window of F frames shows the people of its T tracks.
 
     Attributes:
         window: the tracks.
@@ -34,8 +34,8 @@ class SeenWindow:
     terms: Floats
 
 
-class Sight:
-    """Weighs the views of every window as it comes, and keeps what was last said of each frame.
+class ViewQualityBuffer:
+    """Computes the view quality of every window, and keeps the newest of each frame.
 
     A window's quality does not depend on who its tracks are, nor on other cameras: it is worked out once.
     ``homographies`` lead from each camera's own picture to the ground.
@@ -49,7 +49,7 @@ class Sight:
         self._fps = config.site.fps
         self._homographies, self.fits = homographies, fits
         self._overhead = config.overhead
-        self._histories = {camera: History[SeenWindow]() for camera in config.camera_ids}
+        self._histories = {camera: WindowHistory[WindowQuality]() for camera in config.camera_ids}
 
     def put(self, windows: Sequence[CameraWindow]) -> None:
         """Take over what cameras said of an epoch."""
@@ -65,7 +65,7 @@ class Sight:
                 (seen,) = self._seen([said.window.window])
                 history.put(seen, said.first, said.last)
 
-    def over(self, camera: str, first: int, last: int) -> list[Stretch[SeenWindow]]:
+    def over(self, camera: str, first: int, last: int) -> list[HistorySpan[WindowQuality]]:
         """Return what was last said of a camera's frames from `first` to `last`."""
         return self._histories[camera].over(first, last)
 
@@ -74,7 +74,7 @@ class Sight:
         for history in self._histories.values():
             history.forget_before(pulse)
 
-    def _seen(self, windows: Sequence[CameraWindow]) -> list[SeenWindow]:
+    def _seen(self, windows: Sequence[CameraWindow]) -> list[WindowQuality]:
         """Weigh the views of some windows, all at once."""
         if not windows:
             return []
@@ -86,7 +86,7 @@ class Sight:
         for window, end in zip(windows, ends, strict=True):
             count, frames = window.boxes.shape[:2]
             rows, tracks = slice(window.first - start, window.first - start + frames), slice(end - count, end)
-            seen.append(SeenWindow(window, quality[rows, tracks], terms[:, rows, tracks]))
+            seen.append(WindowQuality(window, quality[rows, tracks], terms[:, rows, tracks]))
         return seen
 
     def _weigh(self, windows: Sequence[CameraWindow], start: int) -> ViewQuality:

@@ -8,16 +8,16 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from server.service.identity.people import People
-from server.service.ingest.window_history import Stretch
-from server.service.view_selection.view_quality_buffer import SeenWindow
+from server.service.identity.people import PersonTracker
+from server.service.ingest.window_history import HistorySpan
+from server.service.view_selection.view_quality_buffer import WindowQuality
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class Line:
-    """All tracks of all cameras in the frames from `first` on; hidden ones too: windows are read as they are.
+class WindowTracks:
+    """All tracks of all cameras in the frames from `first` on, hidden ones included.
 
     ``said`` has each camera's stretches, ``unsearched`` (C, F) the frames in which it could not have found
     anybody. One frame of one camera is a row.
@@ -31,7 +31,7 @@ class Line:
     """
 
     def __init__(
-        self, said: Sequence[Sequence[Stretch[SeenWindow]]], first: int, unsearched: NDArray[np.bool_]
+        self, said: Sequence[Sequence[HistorySpan[WindowQuality]]], first: int, unsearched: NDArray[np.bool_]
     ) -> None:
         self._stretches = list(chain.from_iterable(said))
         self._first = first
@@ -46,7 +46,7 @@ class Line:
         self.quality: Floats = np.concatenate([np.zeros(0), *(_quality(it) for it in self._stretches)])
         self._begins = np.cumsum(np.concatenate([[0], lengths * self._tracks]))
 
-    def persons(self, people: People, everybody: Ints, frames: int) -> Ints:
+    def persons(self, people: PersonTracker, everybody: Ints, frames: int) -> Ints:
         """Return the person at each place, (L,): indices into the sorted numbers (K,); -1: none of them.
 
         A track is in several windows; its numbers in all the frames are asked for once.
@@ -93,13 +93,13 @@ def _joined(parts: Sequence[Ints]) -> Ints:
     return np.concatenate([np.zeros(0, dtype=np.int64), *parts])
 
 
-def _quality(stretch: Stretch[SeenWindow]) -> Floats:
+def _quality(stretch: HistorySpan[WindowQuality]) -> Floats:
     """Return the quality of a stretch's views in line."""
     seen, first = stretch.window, stretch.window.window.first
     return seen.quality[stretch.first - first : stretch.last - first + 1].reshape(-1)
 
 
-def indices_of(numbers: Ints, everybody: Ints) -> Ints:
+def find_indices(numbers: Ints, everybody: Ints) -> Ints:
     """Find numbers (T,) among everybody's (K,), rising: their indices, -1 where they are not among them."""
     if not len(everybody):
         return np.full(numbers.shape, -1)
@@ -111,7 +111,7 @@ def _over_frames(numbers: Ints, everybody: Ints) -> Ints:
     """Do so for numbers (T, N)."""
     # Hardly any track becomes another person on the way.
     changing = (numbers != numbers[:, :1]).any(axis=1)
-    indices = np.repeat(indices_of(numbers[:, 0], everybody)[:, None], numbers.shape[1], axis=1)
+    indices = np.repeat(find_indices(numbers[:, 0], everybody)[:, None], numbers.shape[1], axis=1)
     if changing.any():
-        indices[changing] = indices_of(numbers[changing], everybody)
+        indices[changing] = find_indices(numbers[changing], everybody)
     return indices

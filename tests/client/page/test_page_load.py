@@ -9,13 +9,13 @@ from fakes.page.browser import visiting
 from fakes.page.site import FakeSite
 from fakes.page.video_pattern import CAMERAS
 from fakes.programs import needs_chromium
-from server.camera.load.load_shedder import rungs
+from server.camera.load.load_shedder import shed_levels
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 
 async def test_what_a_camera_leaves_out_stands_beside_its_name(browser: Browser) -> None:
-    ladder = rungs(5, live=True)
+    ladder = shed_levels(5, live=True)
     site = FakeSite(busy={CAMERAS[1]: ladder[1].words, CAMERAS[2]: ladder[-1].words})
     async with visiting(browser, site) as visit:
         await visit.playing(1)

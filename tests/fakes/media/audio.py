@@ -16,7 +16,7 @@ from av.video.stream import VideoStream
 from numpy.typing import NDArray
 
 from fakes.cameras import GOP, FedService
-from server.camera.audio import Frame, RecordedSound, runs
+from server.camera.audio import EncodedAudioFrame, RecordedAudioSource, consecutive_runs
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.messaging.inbox import Message
@@ -92,14 +92,14 @@ def flashing(recording: Path) -> tuple[AccessUnit, ...]:
 
 def sends(service: FedService, recording: Path, silent: range = range(0)) -> list[bytes]:
     """Send all of the recording's sound, but for some frames; give its frames."""
-    sound = RecordedSound(str(recording), service.config.sound, FPS, 0, "stop")
+    sound = RecordedAudioSource(str(recording), service.config.sound, FPS, 0, "stop")
     frames = [*sound.until(0), *sound.until(FRAMES)]
     for message in messages([it for it in frames if it.number not in silent]):
         service.intake.sound(message)
     return [frame.data for frame in frames]
 
 
-def messages(frames: list[Frame]) -> list[Message]:
+def messages(frames: list[EncodedAudioFrame]) -> list[Message]:
     """Return frames of sound as they come from the bus."""
     return [
         Message(
@@ -107,7 +107,7 @@ def messages(frames: list[Frame]) -> list[Message]:
             b"".join(frame.data for frame in run),
             msgspec.json.encode(AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])),
         )
-        for run in runs(frames)
+        for run in consecutive_runs(frames)
     ]
 
 

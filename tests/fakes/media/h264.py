@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.h264.annexb import nal_units, parameter_sets
-from server.media.h264.repeat_picture import Continuing, continuing
+from server.media.h264.repeat_picture import SliceHeadFormat, parse_repeatable
 
 PRESETS = ("ultrafast", "superfast", "medium")
 
@@ -22,10 +22,10 @@ def encoded(size: tuple[int, int], preset: str, frames: int, gop: int = 6) -> li
     return [encoder.encode(pulse, np.asarray(picture // 4 * 2)) for pulse, picture in enumerate(noise)]
 
 
-def how(unit: AccessUnit) -> Continuing:
+def how(unit: AccessUnit) -> SliceHeadFormat:
     found = parameter_sets(nal_units(unit.data))
     assert found is not None
-    return continuing(found)
+    return parse_repeatable(found)
 
 
 def decoded(samples: list[bytes]) -> list[NDArray[np.uint8]]:

@@ -14,7 +14,7 @@ from bestview import QualitySettings
 from fakes.media.videos import HEIGHT, WIDTH, write_video
 from server.camera.encoding.encoder import AccessUnit
 from server.camera.pipeline import CameraPipeline
-from server.camera.sources import SourceEnded
+from server.camera.sources import SourceEndedError
 from server.cli.render.camera_workers import EpochBatch, run_camera
 from server.config.loader import build_config
 from server.config.sections import SiteSettings
@@ -59,7 +59,7 @@ def live(config: Config, missed: frozenset[int] = frozenset()) -> tuple[list[Acc
         if pulse not in missed:
             try:
                 image = pipeline.take(pulse)
-            except SourceEnded:
+            except SourceEndedError:
                 break
             if image is not None:
                 units.append(pipeline.encode(pulse, image))
@@ -155,7 +155,7 @@ def test_a_frame_of_which_only_the_number_is_left_is_reported(recording: Path) -
 
 def test_a_camera_that_starts_after_its_recording_is_over_says_that_it_is_over(recording: Path) -> None:
     pipeline = CameraPipeline(config_of(recording), "c0")
-    with pytest.raises(SourceEnded):
+    with pytest.raises(SourceEndedError):
         pipeline.take(1000)
     word = pipeline.finish(1000)
     pipeline.close()

@@ -16,8 +16,8 @@ import zenoh
 from fakes.camera_processes import FPS, Running, in_folder
 from fakes.media.videos import write_video
 from fakes.timeouts import PATIENCE
-from server.camera.load.load_monitor import Load
-from server.camera.load.load_shedder import Bounds, Ladder, rungs
+from server.camera.load.load_monitor import LoadMonitor
+from server.camera.load.load_shedder import LevelBounds, LoadShedder, shed_levels
 from server.camera.pipeline import CameraPipeline
 from server.cli.generated_config import free_port
 from server.cli.render.camera_workers import run_camera
@@ -243,12 +243,14 @@ async def test_a_camera_started_after_its_recording_was_over_lets_everything_end
     assert it.service.intake.states["c0"].word == "ended"
 
 
-class Overloaded(Load):
+class Overloaded(LoadMonitor):
     """A camera's load that stands on the topmost rung."""
 
     def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
         super().__init__(config, camera_id, live=live)
-        self._ladder = Ladder(rungs(config.track.window.stride, live=True)[-1:], Bounds(1e9, 1e9))
+        self._ladder = LoadShedder(
+            shed_levels(config.track.window.stride, live=True)[-1:], LevelBounds(1e9, 1e9)
+        )
 
     @property
     def level(self) -> int:
@@ -258,7 +260,7 @@ class Overloaded(Load):
 async def test_a_camera_on_the_topmost_rung_shows_every_gop_and_ends_every_window_in_time(
     recording: Path, tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.camera.process.Load", Overloaded)
+    monkeypatch.setattr("server.camera.process.LoadMonitor", Overloaded)
     config = site(recording, c0="c0.mp4", c1="c1.mp4")
     it = Running(config, tmp_path / "out")
     running.append(it)

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fakes.cameras import word
-from server.camera.sharpness import Sharpness, sharpness
+from server.camera.sharpness import SharpnessMemory, sharpness
 from server.messaging.messages import Box
 
 BOX: Box = (20.0, 10.0, 84.0, 138.0)
@@ -46,7 +46,7 @@ def test_of_next_to_nothing_nothing_is_said(box: Box) -> None:
 
 
 def test_who_is_hidden_is_as_sharp_as_they_were_and_who_went_is_forgotten() -> None:
-    it = Sharpness()
+    it = SharpnessMemory()
     [seen] = it.measured(word("c0", 0, {1: BOX}), picture()).tracks
     assert seen.sharpness == sharpness(picture(), BOX)
     hidden = it.measured(word("c0", 1, {1: None, 2: None}), picture(blur=5.0)).tracks
@@ -60,6 +60,6 @@ def test_who_is_hidden_is_as_sharp_as_they_were_and_who_went_is_forgotten() -> N
 
 def test_the_rest_of_the_message_stays() -> None:
     message = word("c0", 0, {1: BOX})
-    told = Sharpness().measured(message, picture())
+    told = SharpnessMemory().measured(message, picture())
     bare = [msgspec.structs.replace(track, sharpness=None) for track in told.tracks]
     assert msgspec.structs.replace(told, tracks=bare) == message

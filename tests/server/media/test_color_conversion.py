@@ -8,7 +8,7 @@ import numpy as np
 from av.video.frame import VideoFrame
 from av.video.reformatter import Colorspace
 
-from server.media.color_conversion import bgr, yuv
+from server.media.color_conversion import to_bgr, to_yuv
 
 SIZES = ((64, 48), (34, 18), (640, 360))
 
@@ -23,20 +23,20 @@ def decoded(seed: int, kind: str = "yuv420p") -> VideoFrame:
 def test_pictures_of_many_sizes_and_kinds_by_turns_are_what_each_is_alone() -> None:
     pictures = [decoded(seed, kind) for seed in range(9) for kind in ("yuv420p", "yuvj420p", "gray")]
     for picture in pictures:
-        assert np.array_equal(bgr(picture), picture.to_ndarray(format="bgr24"))
+        assert np.array_equal(to_bgr(picture), picture.to_ndarray(format="bgr24"))
 
 
 def test_what_is_encoded_is_what_it_would_be_alone() -> None:
     for seed in range(9):
         image = decoded(seed).to_ndarray(format="bgr24")
         alone = VideoFrame.from_ndarray(image, format="bgr24").reformat(format="yuv420p")
-        assert np.array_equal(yuv(image).to_ndarray(), alone.to_ndarray())
+        assert np.array_equal(to_yuv(image).to_ndarray(), alone.to_ndarray())
 
 
 def test_threads_do_not_disturb_each_other() -> None:
     pictures = [decoded(seed) for seed in range(200)]
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(bgr, pictures))
+        found = list(pool.map(to_bgr, pictures))
     for picture, image in zip(pictures, found, strict=True):
         assert np.array_equal(image, picture.to_ndarray(format="bgr24"))
 
@@ -47,5 +47,7 @@ def test_colours_that_cannot_be_converted_are_taken_for_the_usual_ones() -> None
     for number in unknown:
         picture = decoded(2)
         picture.colorspace = number
-        assert np.array_equal(bgr(picture), bgr(usual)), number
-    assert np.array_equal(bgr(decoded(2)), decoded(2).to_ndarray(format="bgr24"))  # as if they had not been
+        assert np.array_equal(to_bgr(picture), to_bgr(usual)), number
+    assert np.array_equal(
+        to_bgr(decoded(2)), decoded(2).to_ndarray(format="bgr24")
+    )  # as if they had not been

@@ -8,9 +8,9 @@ from bestview import Merge, Split
 from server.messaging.messages import PersonMerge, PersonSplit, ViewCut
 from server.service.decision_state import Board
 from server.service.view_selection.decider import GopDecision, ObjectChoice
-from server.service.view_selection.explanation import Explanation, Why
+from server.service.view_selection.explanation import Explanation, SelectionReasons
 
-_UNTOLD = cast("Why", None)
+_UNTOLD = cast("SelectionReasons", None)
 
 
 class Counted:
@@ -38,7 +38,7 @@ def decided(board: Board, first: int, numbers: tuple[int, ...] = (1, 2)) -> Coun
     """Put a GOP of ten frames; give what explains it."""
     choices = tuple(ObjectChoice(number, "c0", "c0", away=False) for number in numbers)
     why = Counted()
-    board.put(GopDecision(first, 10, choices, {}, {7: 1}, (), cast("Why", why)))
+    board.put(GopDecision(first, 10, choices, {}, {7: 1}, (), cast("SelectionReasons", why)))
     return why
 
 

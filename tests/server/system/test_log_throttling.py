@@ -17,14 +17,14 @@ from fakes.media.videos import write_video
 from fakes.rendering import CANVAS, fragments
 from fakes.site import Hall
 from logthrottle import LogThrottle
-from server.camera.audio import LiveSound, RecordedSound, recorded_source
-from server.camera.peers.detection_exchange import Exchange
+from server.camera.audio import LiveAudioSource, RecordedAudioSource, recorded_source
+from server.camera.peers.detection_exchange import PeerDetectionExchange
 from server.camera.process import CameraProcess
 from server.camera.sources import recording
-from server.camera.sources.frame_reader import pictures
+from server.camera.sources.frame_reader import read_pictures
 from server.camera.sources.recording import Recording
 from server.config.sections import SoundSettings
-from server.media.rendering_messages import Draw
+from server.media.rendering_messages import RenderRequest
 from server.messaging.inbox import Message
 from server.messaging.messages import CameraStatus, FrameDetections, ZenohKeys
 from server.service.rendering import rendered_stream as stream_source
@@ -47,7 +47,7 @@ async def test_words_that_come_too_late_again_and_again_are_told_of_seldom_and_w
 ) -> None:
     caplog.set_level("INFO")
     clock = [0.0]
-    exchange = Exchange(small_config(), "c0", None, 10)
+    exchange = PeerDetectionExchange(small_config(), "c0", None, 10)
     exchange._late["c1"] = LogThrottle(lambda: clock[0])
     for pulse in range(3):
         exchange._tell_late("c1", pulse)
@@ -68,7 +68,7 @@ async def test_a_camera_that_nobody_understands_is_told_of_once_and_not_by_frame
 ) -> None:
     caplog.set_level("INFO")
     clock = [0.0]
-    exchange = Exchange(small_config(), "c0", None, 10)
+    exchange = PeerDetectionExchange(small_config(), "c0", None, 10)
     for camera in ("c1", "c2"):
         exchange._bad[camera] = LogThrottle(lambda: clock[0])
 
@@ -106,7 +106,7 @@ def test_a_camera_without_sound_is_told_of_once_however_often_it_is_opened(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level("INFO")
-    sound = LiveSound(SoundSettings(source="c0"), 25.0)
+    sound = LiveAudioSource(SoundSettings(source="c0"), 25.0)
     for _ in range(10):
         sound.opened(None)
     assert caplog.messages == ["there is no sound in what the camera sends; the site is silent"]
@@ -118,9 +118,9 @@ def test_a_damaged_recording_that_repeats_is_told_of_once(caplog: pytest.LogCapt
 
     container = SimpleNamespace(name="hall.mp4", demux=demux)
     opened: Any = SimpleNamespace(container=container, stream=SimpleNamespace(time_base=None), fps=25.0)
-    assert not list(pictures(opened))
+    assert not list(read_pictures(opened))
     for _ in range(5):
-        assert not list(pictures(opened, again=True))
+        assert not list(read_pictures(opened, again=True))
     assert caplog.messages == ["hall.mp4: cannot be read any further: damaged"]
 
 
@@ -132,7 +132,7 @@ def test_damaged_sound_that_repeats_is_told_of_once(
 
     container = SimpleNamespace(demux=demux, close=lambda: None)
     monkeypatch.setattr(recorded_source, "_open", lambda _: (container, None))
-    sound = RecordedSound.__new__(RecordedSound)
+    sound = RecordedAudioSource.__new__(RecordedAudioSource)
     sound._path, sound._told = "hall.mp4", False
     for _ in range(5):
         assert not list(sound._once())
@@ -144,9 +144,9 @@ def test_a_recording_that_repeats_is_read_again(tmp_path: Path, monkeypatch: pyt
 
     def noted(opened: Any, *, again: bool = False) -> Any:
         asked.append(again)
-        return pictures(opened, again=again)
+        return read_pictures(opened, again=again)
 
-    monkeypatch.setattr(recording, "pictures", noted)
+    monkeypatch.setattr(recording, "read_pictures", noted)
     repeated = Recording(str(write_video(tmp_path / "hall.avi", 3, codec="mjpeg")), 0, "loop")
     for pulse in range(9):
         repeated.take(pulse)
@@ -164,7 +164,7 @@ def test_frames_that_cannot_be_decoded_are_told_of_once_for_a_stream(
     monkeypatch.setattr(stream_renderer, "_decoder", lambda _: Damaged())
     drawing = stream_renderer.StreamRenderer(CANVAS)
     for gop in range(3):
-        drawing.draw(Draw(fragments=fragments(gop * GOP, GOP)))
+        drawing.draw(RenderRequest(fragments=fragments(gop * GOP, GOP)))
     assert len(caplog.messages) == 1
     assert caplog.messages[0].startswith("frame 0 cannot be decoded: ")
 

@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 from fakes.command_line import Run
 from fakes.passwords import PASSWORDS, PLACES, tells
 from fakes.system.ports import free
-from server.camera.audio import open_sound
-from server.camera.passthrough.opening import open_own
+from server.camera.audio import open_audio
+from server.camera.passthrough.opening import open_passthrough
 from server.camera.sources import open_source
 from server.config import yaml_file
 from server.config.loader import build_config
@@ -169,8 +169,8 @@ def test_why_a_camera_cannot_be_opened_is_said_without_its_password(source: str,
     config = built(cameras=[door(address, h264="auto")], sound={"source": address})
     for attempt in (
         lambda: open_source(CameraSettings(id="door", source=address), SiteSettings()),
-        lambda: open_own(config, config.camera("door"), None),
-        lambda: open_sound(config, "door"),
+        lambda: open_passthrough(config, config.camera("door"), None),
+        lambda: open_audio(config, "door"),
     ):
         with pytest.raises(UserError) as refused:
             attempt()

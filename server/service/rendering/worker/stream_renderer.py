@@ -14,8 +14,15 @@ from av.video.codeccontext import VideoCodecContext
 from av.video.frame import VideoFrame
 
 from server.camera.encoding.encoder import Encoder
-from server.media.color_conversion import bgr
-from server.media.rendering_messages import Canvas, Draw, Drawn, Jpeg, Unit, belongs
+from server.media.color_conversion import to_bgr
+from server.media.rendering_messages import (
+    Canvas,
+    EncodedFrame,
+    JpegPicture,
+    RenderRequest,
+    RenderResult,
+    is_in_series,
+)
 from server.messaging.number_types import PULSE_MAX
 from server.service.rendering.worker.box_overlay import Image, draw_boxes
 from server.service.rendering.worker.demuxers import demux_mp4, demux_webm
@@ -36,7 +43,7 @@ class DecodedPicture:
     @cached_property
     def plain(self) -> Image:
         """The picture, ``(height, width, 3)`` BGR."""
-        return bgr(self.frame)
+        return to_bgr(self.frame)
 
     @cached_property
     def boxed(self) -> Image:
@@ -60,30 +67,30 @@ class StreamRenderer:
         self._encoded_last = -1
         self._last: DecodedPicture | None = None
 
-    def draw(self, request: Draw) -> Drawn:
+    def draw(self, request: RenderRequest) -> RenderResult:
         """Decode the frames and give what is wanted of them."""
         fps = self._canvas.fps
-        film: list[Unit] = []
-        plain: list[Jpeg] = []
-        boxed: list[Jpeg] = []
+        film: list[EncodedFrame] = []
+        plain: list[JpegPicture] = []
+        boxed: list[JpegPicture] = []
         for painting in self._paintings(request):
             self._last, pulse = painting, painting.pulse
             if request.film:
                 film.append(self._encoded(painting))
-            if any(belongs(pulse, rate, fps) for rate in request.plain):
+            if any(is_in_series(pulse, rate, fps) for rate in request.plain):
                 plain.append(self._jpeg(pulse, painting.plain))
-            if any(belongs(pulse, rate, fps) for rate in request.boxed):
+            if any(is_in_series(pulse, rate, fps) for rate in request.boxed):
                 boxed.append(self._jpeg(pulse, painting.boxed))
         newest = -1 if self._last is None else self._last.pulse
-        return Drawn(newest=newest, film=film, plain=plain, boxed=boxed, still=self._still(request))
+        return RenderResult(newest=newest, film=film, plain=plain, boxed=boxed, still=self._still(request))
 
-    def _still(self, request: Draw) -> Jpeg | None:
+    def _still(self, request: RenderRequest) -> JpegPicture | None:
         if request.still is None or self._last is None:
             return None
         image = self._last.boxed if request.still == "boxed" else self._last.plain
         return self._jpeg(self._last.pulse, image)
 
-    def _paintings(self, request: Draw) -> Iterator[DecodedPicture]:
+    def _paintings(self, request: RenderRequest) -> Iterator[DecodedPicture]:
         unpack = demux_webm if self._canvas.codec == "vp8" else demux_mp4
         for unit in unpack(request.fragments, self._canvas.fps):
             good = bool(unit.data) and unit.pulse <= PULSE_MAX  # no data would mean the end
@@ -106,16 +113,16 @@ class StreamRenderer:
                 boxes = request.boxes[place] if 0 <= place < len(request.boxes) else []
                 yield DecodedPicture(pulse, unit.lasts, frame, boxes, request.chosen)
 
-    def _encoded(self, painting: DecodedPicture) -> Unit:
+    def _encoded(self, painting: DecodedPicture) -> EncodedFrame:
         if self._encoder is None or painting.pulse <= self._encoded_last:  # it goes back: begun anew
             self._encoder = Encoder(self._canvas, self._canvas)
         self._encoded_last = painting.pulse
         unit = self._encoder.encode(painting.pulse, painting.boxed)
-        return Unit(unit.pulse, unit.key, unit.data, painting.lasts)
+        return EncodedFrame(unit.pulse, unit.key, unit.data, painting.lasts)
 
-    def _jpeg(self, pulse: int, image: Image) -> Jpeg:
+    def _jpeg(self, pulse: int, image: Image) -> JpegPicture:
         _, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, self._canvas.jpeg_quality])
-        return Jpeg(pulse, np.asarray(jpeg).tobytes())
+        return JpegPicture(pulse, np.asarray(jpeg).tobytes())
 
 
 def _decoder(codec: str) -> VideoCodecContext:

@@ -17,15 +17,15 @@ import pytest
 
 from fakes.media.audio import EVERY, FPS, beeps, write_flashes
 from fakes.timeouts import PATIENCE
-from server.camera.audio import Frame, LiveSound
-from server.camera.sources.live_stream import Stream
+from server.camera.audio import EncodedAudioFrame, LiveAudioSource
+from server.camera.sources.live_stream import LiveStream
 from server.config.sections import SoundSettings
 from server.media.audio.aac import SAMPLES as FRAME
-from server.media.audio.audio_format import Coding, SoundFormat
-from server.media.containers.mp4_audio import sound_fragment, sound_init_segment
+from server.media.audio.audio_format import AudioFormat, Coding
+from server.media.containers.mp4_audio import audio_fragment, audio_init_segment
 
 FRAMES = 3 * EVERY
-FORM = SoundFormat(48_000, 2)
+FORM = AudioFormat(48_000, 2)
 
 
 def send(path: Path, to: Any) -> None:
@@ -69,9 +69,9 @@ def camera(tmp_path: Path) -> Iterator[str]:
 
 
 def test_a_camera_is_heard_beside_its_pictures(camera: str) -> None:
-    sound = LiveSound(SoundSettings(source="c0"), FPS)
-    source = Stream(camera, {"probesize": "20000", "analyzeduration": "200000"}, sound)
-    frames: list[Frame] = []
+    sound = LiveAudioSource(SoundSettings(source="c0"), FPS)
+    source = LiveStream(camera, {"probesize": "20000", "analyzeduration": "200000"}, sound)
+    frames: list[EncodedAudioFrame] = []
     begin = time.monotonic()
     while len(frames) < (FRAMES - 20) / FPS * FORM.rate / FRAME:
         time.sleep(1 / FPS)
@@ -83,16 +83,16 @@ def test_a_camera_is_heard_beside_its_pictures(camera: str) -> None:
     assert [frame.number for frame in frames] == sorted({frame.number for frame in frames})
 
 
-def moments(frames: list[Frame], form: SoundFormat = FORM) -> list[float]:
+def moments(frames: list[EncodedAudioFrame], form: AudioFormat = FORM) -> list[float]:
     """Return when beeps begin, seconds after pulse 0."""
     found = {frame.number: frame.data for frame in frames}
     data = [found.get(number, form.silence) for number in range(max(found) + 1)]
-    return beeps(sound_init_segment(form) + sound_fragment(form, data, 0))
+    return beeps(audio_init_segment(form) + audio_fragment(form, data, 0))
 
 
-def handed_over(path: Path, sound: LiveSound, first: int) -> list[Frame]:
+def handed_over(path: Path, sound: LiveAudioSource, first: int) -> list[EncodedAudioFrame]:
     """Hand over a recording as a camera would whose pulse numbers are ``first`` ahead of its clock's."""
-    frames: list[Frame] = []
+    frames: list[EncodedAudioFrame] = []
     with av.open(str(path)) as container:
         sound.opened(container.streams.audio[0])
         for packet in container.demux():
@@ -116,7 +116,7 @@ def test_a_beep_is_where_the_flash_is_shown_also_after_the_camera_has_begun_anew
 ) -> None:
     path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
     settings = SoundSettings(source="c0", codec=codec)
-    sound = LiveSound(settings, FPS)
+    sound = LiveAudioSource(settings, FPS)
     one, two = handed_over(path, sound, 50), handed_over(path, sound, 50 + 2 * FRAMES)
     numbers = [frame.number for frame in one + two]
     assert numbers == sorted(set(numbers)), "each once, in order"
@@ -135,7 +135,7 @@ def test_a_camera_is_heard_on_when_its_sound_changes_while_it_sends(
     after = write_flashes(tmp_path / "after.aac", FRAMES, pictures=False)
     both = tmp_path / "both.aac"
     both.write_bytes(before.read_bytes() + after.read_bytes())
-    sound, frames = LiveSound(SoundSettings(source="c0"), FPS), []
+    sound, frames = LiveAudioSource(SoundSettings(source="c0"), FPS), []
     with av.open(str(both)) as container:
         sound.opened(container.streams.audio[0])
         for packet in container.demux(audio=0):
@@ -160,8 +160,8 @@ def test_when_a_cameras_time_steps_back_it_is_heard_on_and_so_it_is_when_it_is_c
 ) -> None:
     """As that of MPEG-TS does once in 26.5 hours; the sound's steps ``lag`` after the pictures'."""
     path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
-    sound, wrap, step = LiveSound(SoundSettings(source="c0"), FPS), 95_443, FRAMES / FPS / 2
-    frames: list[Frame] = []
+    sound, wrap, step = LiveAudioSource(SoundSettings(source="c0"), FPS), 95_443, FRAMES / FPS / 2
+    frames: list[EncodedAudioFrame] = []
     for again in (0, 1):
         with av.open(str(path)) as container:
             sound.opened(container.streams.audio[0])
@@ -191,7 +191,7 @@ def test_when_a_cameras_time_steps_back_it_is_heard_on_and_so_it_is_when_it_is_c
 
 def test_a_camera_without_sound_is_no_mistake(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mp4", 10)
-    sound = LiveSound(SoundSettings(source="c0"), FPS)
+    sound = LiveAudioSource(SoundSettings(source="c0"), FPS)
     sound.opened(None)
     with av.open(str(path)) as container:
         for packet in container.demux(audio=0):

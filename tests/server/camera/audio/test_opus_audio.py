@@ -34,32 +34,32 @@ from fakes.media.browser_playback import PLAY
 from fakes.media.ffprobe import probed
 from fakes.programs import needs_chromium, needs_ffprobe
 from fakes.site import A, Hall, opened
-from server.camera.audio import Frame, RecordedSound
-from server.camera.audio.encoder import Encoding
-from server.camera.audio.passthrough import Passing
+from server.camera.audio import EncodedAudioFrame, RecordedAudioSource
+from server.camera.audio.encoder import AudioEncoder
+from server.camera.audio.passthrough import AudioPassthrough
 from server.config.loader import build_config
 from server.config.sections import SoundSettings
-from server.media.audio.audio_format import SoundFormat
-from server.media.audio.opus import samples_in
-from server.media.containers.mp4_audio import sound_fragment, sound_init_segment
+from server.media.audio.audio_format import AudioFormat
+from server.media.audio.opus import packet_samples
+from server.media.containers.mp4_audio import audio_fragment, audio_init_segment
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 from server.system.errors import UserError
 
 STEREO = SoundSettings(source="here", codec="opus")
-FORM = SoundFormat(48_000, 2, "opus")
+FORM = AudioFormat(48_000, 2, "opus")
 
 
-def as_mp4(frames: list[Frame]) -> bytes:
+def as_mp4(frames: list[EncodedAudioFrame]) -> bytes:
     """Return frames 0 to the last one as a stream, silent where there is none."""
     found = {frame.number: frame.data for frame in frames}
     data = [found.get(number, FORM.silence) for number in range(max(found) + 1)]
-    return sound_init_segment(FORM) + sound_fragment(FORM, data, 0)
+    return audio_init_segment(FORM) + audio_fragment(FORM, data, 0)
 
 
 @pytest.mark.parametrize("name", ["own.mp4", "own.mkv"])
 def test_opus_is_passed_on_byte_for_byte(tmp_path: Path, name: str) -> None:
     path = write_flashes(tmp_path / name, FRAMES, codec="libopus")
-    sound = RecordedSound(str(path), STEREO, FPS, 0, "stop")
+    sound = RecordedAudioSource(str(path), STEREO, FPS, 0, "stop")
     with av.open(str(path)) as container:
         own = [bytes(it) for it in container.demux(audio=0) if it.size and it.pts is not None and it.pts >= 0]
     frames = [*sound.until(0), *sound.until(FRAMES + 10)]
@@ -84,25 +84,27 @@ def test_all_else_is_encoded_to_opus(
     tmp_path: Path, name: str, codec: str, rate: int, channels: int, options: dict[str, str]
 ) -> None:
     path = write_flashes(tmp_path / name, FRAMES, codec=codec, rate=rate, channels=channels, options=options)
-    sound = RecordedSound(str(path), STEREO, FPS, 0, "stop")
+    sound = RecordedAudioSource(str(path), STEREO, FPS, 0, "stop")
     frames = [*sound.until(0), *sound.until(FRAMES + 10)]
     way = getattr(sound._way, "_way", sound._way)
-    assert isinstance(way, Encoding)
-    assert {samples_in(frame.data) for frame in frames} == {960}
+    assert isinstance(way, AudioEncoder)
+    assert {packet_samples(frame.data) for frame in frames} == {960}
     assert beeps(as_mp4(frames)) == pytest.approx(BEEPS, abs=0.005), "also for what it looks ahead"
 
 
 def test_a_site_of_aac_encodes_opus(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mkv", 2 * EVERY, codec="libopus")
-    sound = RecordedSound(str(path), SoundSettings(source="here"), FPS, 0, "stop")
-    assert isinstance(sound._way, Encoding)
-    assert not isinstance(RecordedSound(str(path), STEREO, FPS, 0, "stop")._way, Encoding | Passing)
+    sound = RecordedAudioSource(str(path), SoundSettings(source="here"), FPS, 0, "stop")
+    assert isinstance(sound._way, AudioEncoder)
+    assert not isinstance(
+        RecordedAudioSource(str(path), STEREO, FPS, 0, "stop")._way, AudioEncoder | AudioPassthrough
+    )
 
 
 @pytest.mark.parametrize("channels", [1, 2])
 def test_silence_decodes_to_nothing_at_all(channels: int) -> None:
-    form = SoundFormat(48_000, channels, "opus")
-    data = sound_init_segment(form) + sound_fragment(form, [form.silence] * 20, 7)
+    form = AudioFormat(48_000, channels, "opus")
+    data = audio_init_segment(form) + audio_fragment(form, [form.silence] * 20, 7)
     times, samples = heard(data)
     assert times[0] == pytest.approx(7 * 0.02)
     assert len(samples) == 20 * 960
@@ -123,12 +125,12 @@ def test_a_packet_says_how_long_it_is(lasts: str, purpose: str) -> None:
     fifo.write(frame)
     size = round(48 * float(lasts))
     for piece in fifo.read_many(size):
-        assert {samples_in(bytes(packet)) for packet in encoder.encode(piece)} <= {size}
+        assert {packet_samples(bytes(packet)) for packet in encoder.encode(piece)} <= {size}
 
 
 @given(st.binary(max_size=8))
 def test_any_bytes_say_some_length_or_none(data: bytes) -> None:
-    assert 0 <= samples_in(data) <= 63 * 2880
+    assert 0 <= packet_samples(data) <= 63 * 2880
 
 
 def test_another_rate_is_refused_in_one_line(tmp_path: Path) -> None:

@@ -18,42 +18,48 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fakes.media.audio import EVERY, FPS, beeps, write_flashes
-from server.camera.audio import Frame, LiveSound, RecordedSound, open_sound, runs
-from server.camera.audio.encoder import Encoding
-from server.camera.audio.passthrough import Passing
+from server.camera.audio import (
+    EncodedAudioFrame,
+    LiveAudioSource,
+    RecordedAudioSource,
+    consecutive_runs,
+    open_audio,
+)
+from server.camera.audio.encoder import AudioEncoder
+from server.camera.audio.passthrough import AudioPassthrough
 from server.camera.audio.recorded_source import _in_order
 from server.config.loader import build_config
 from server.config.sections import SoundSettings
-from server.media.audio.audio_format import SoundFormat
+from server.media.audio.audio_format import AudioFormat
 from server.system.errors import UserError
 
 FRAMES = 70
 STEREO = SoundSettings(source="here")
-FORM = SoundFormat(48_000, 2)
+FORM = AudioFormat(48_000, 2)
 
 
-def all_until(sound: RecordedSound, pulse: int, first: int = 0) -> list[Frame]:
+def all_until(sound: RecordedAudioSource, pulse: int, first: int = 0) -> list[EncodedAudioFrame]:
     return [frame for it in range(first, pulse + 1) for frame in sound.until(it)]
 
 
-def as_adts(frames: list[Frame], form: SoundFormat) -> bytes:
+def as_adts(frames: list[EncodedAudioFrame], form: AudioFormat) -> bytes:
     """Return frames 0 to the last one as a stream, silent where there is none."""
     found = {frame.number: frame.data for frame in frames}
     data = [found.get(number, form.silence) for number in range(max(found) + 1)]
     return b"".join(form.adts(len(frame)) + frame for frame in data)
 
 
-def numbers_grow(frames: list[Frame]) -> bool:
+def numbers_grow(frames: list[EncodedAudioFrame]) -> bool:
     return all(a.number < b.number for a, b in pairwise(frames))
 
 
 def test_what_fits_is_passed_on_byte_for_byte(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mp4", FRAMES)
-    sound = RecordedSound(str(path), STEREO, FPS, 0, "stop")
+    sound = RecordedAudioSource(str(path), STEREO, FPS, 0, "stop")
     with av.open(str(path)) as container:
         own = [bytes(it) for it in container.demux(audio=0) if it.size and it.pts is not None and it.pts >= 0]
     frames = all_until(sound, FRAMES + 10)
-    assert isinstance(sound._way, Passing)
+    assert isinstance(sound._way, AudioPassthrough)
     assert [frame.data for frame in frames] == own
     assert [frame.number for frame in frames] == list(range(len(own)))
 
@@ -75,9 +81,9 @@ def test_beeps_are_where_the_pictures_are(
     path = write_flashes(
         tmp_path / name, FRAMES, codec=codec, rate=rate, channels=channels, pictures=name != "plain.wav"
     )
-    sound = RecordedSound(str(path), STEREO, FPS, offset, "stop")
+    sound = RecordedAudioSource(str(path), STEREO, FPS, offset, "stop")
     frames = all_until(sound, FRAMES + 10)
-    assert isinstance(sound._way, Passing if name == "same.mp4" else Encoding)
+    assert isinstance(sound._way, AudioPassthrough if name == "same.mp4" else AudioEncoder)
     assert numbers_grow(frames)
     form = STEREO.format
     assert form is not None
@@ -88,9 +94,9 @@ def test_beeps_are_where_the_pictures_are(
 @pytest.mark.parametrize("codec", ["aac", "mp3"])
 def test_a_recording_that_repeats_stays_in_step(tmp_path: Path, codec: str) -> None:
     path = write_flashes(tmp_path / "loop.mkv", FRAMES, codec=codec)
-    frames = all_until(RecordedSound(str(path), STEREO, FPS, 0, "loop"), 4 * FRAMES)
+    frames = all_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "loop"), 4 * FRAMES)
     assert numbers_grow(frames)
-    assert sum(1 for _ in runs(frames)) <= 5, "whole but for the places where it begins again"
+    assert sum(1 for _ in consecutive_runs(frames)) <= 5, "whole but for the places where it begins again"
     form = STEREO.format
     assert form is not None
     expected = [(n + m) / FPS for m in range(0, 4 * FRAMES, FRAMES) for n in range(EVERY, FRAMES, EVERY)]
@@ -101,7 +107,7 @@ def test_a_recording_with_no_sound_beside_its_pictures_is_silent_and_is_not_read
     tmp_path: Path,
 ) -> None:
     path = write_flashes(tmp_path / "loop.mkv", FRAMES)
-    sound = RecordedSound(str(path), STEREO, FPS, 0, "loop")
+    sound = RecordedAudioSource(str(path), STEREO, FPS, 0, "loop")
     sound._start -= 60  # as where the sound begins a minute after the pictures
     assert all_until(sound, 2 * FRAMES) == []
 
@@ -110,7 +116,7 @@ def test_a_recording_with_no_sound_beside_its_pictures_is_silent_and_is_not_read
 def test_whoever_begins_late_hears_the_same_moments(tmp_path: Path, codec: str) -> None:
     path = write_flashes(tmp_path / "late.mkv", FRAMES, codec=codec)
     late = 10 * FRAMES
-    frames = all_until(RecordedSound(str(path), STEREO, FPS, 0, "loop"), late + FRAMES, first=late)
+    frames = all_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "loop"), late + FRAMES, first=late)
     form = STEREO.format
     assert form is not None
     assert frames[0].number >= form.frame_at(late, FPS) - 48, "about a second before, not all that was"
@@ -130,7 +136,7 @@ def test_a_records_cover_is_no_picture_that_it_goes_by(tmp_path: Path) -> None:
     covered.write_bytes(tag + head + content + path.read_bytes())
     with av.open(str(covered)) as container:
         assert container.streams.video
-    ways = [RecordedSound(str(it), STEREO, FPS, 0, "loop") for it in (path, covered)]
+    ways = [RecordedAudioSource(str(it), STEREO, FPS, 0, "loop") for it in (path, covered)]
     plain, other = (beeps(as_adts(all_until(it, 2 * FRAMES), FORM), "aac") for it in ways)
     assert len(plain) > 2
     assert other == pytest.approx(plain, abs=0.03)
@@ -159,7 +165,7 @@ def test_sound_that_cannot_be_converted_is_silence_and_said_once(
         file.setsampwidth(2)
         file.setframerate(48_000)
         file.writeframes(bytes(2 * 9 * 48_000))
-    frames = all_until(RecordedSound(str(path), STEREO, FPS, 0, "stop"), FPS)
+    frames = all_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "stop"), FPS)
     assert beeps(as_adts(frames, FORM), "aac") == []
     (line,) = caplog.messages
     assert line.startswith("sound of 9 channels at 48000 Hz cannot be converted: ")
@@ -172,7 +178,7 @@ def test_sound_is_in_step_with_pictures_of_another_rate_than_the_site_s(
 ) -> None:
     path = write_flashes(tmp_path / "own.mkv", FRAMES)
     passes = 2 if at_end == "loop" else 1
-    sound = RecordedSound(str(path), STEREO, fps, 0, at_end)
+    sound = RecordedAudioSource(str(path), STEREO, fps, 0, at_end)
     frames = all_until(sound, round(passes * FRAMES / FPS * fps))
     expected = [(m * FRAMES + n) / FPS for m in range(passes) for n in range(EVERY, FRAMES, EVERY)]
     assert beeps(as_adts(frames, FORM), "aac") == pytest.approx(expected, abs=0.03)
@@ -182,9 +188,9 @@ def test_what_has_no_sound_is_refused(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mp4", FRAMES)
     cameras = [{"id": "c0", "source": str(path)}, {"id": "c1", "source": "scene:room"}]
 
-    def opened(camera: str, source: str) -> RecordedSound | LiveSound | None:
+    def opened(camera: str, source: str) -> RecordedAudioSource | LiveAudioSource | None:
         content = {"cameras": cameras, "sound": {"source": source}}
-        return open_sound(build_config(content, where="hall", folder=tmp_path), camera)
+        return open_audio(build_config(content, where="hall", folder=tmp_path), camera)
 
     assert opened("c0", "c0") is not None
     assert opened("c1", "c0") is None, "one process sends it"
@@ -201,7 +207,7 @@ def test_what_has_no_sound_is_refused(tmp_path: Path) -> None:
 
 @given(st.sampled_from([24_000, 32_000, 44_100, 48_000]), st.sampled_from([1, 2]), st.integers(1, 60))
 def test_silence_decodes_to_nothing_at_all(rate: int, channels: int, count: int) -> None:
-    form = SoundFormat(rate, channels)
+    form = AudioFormat(rate, channels)
     data = count * (form.adts(len(form.silence)) + form.silence)
     with av.open(io.BytesIO(data), format="aac") as container:
         frames = list(container.decode(audio=0))
@@ -217,6 +223,6 @@ def test_silence_decodes_to_nothing_at_all(rate: int, channels: int, count: int)
     st.sampled_from([24_000, 48_000]),
 )
 def test_the_frame_of_a_pulse_sounds_when_it_is_due(pulse: int, fps: float, rate: int) -> None:
-    number = SoundFormat(rate, 2).frame_at(pulse, fps)
+    number = AudioFormat(rate, 2).frame_at(pulse, fps)
     error = 1 + 2e-15 * pulse * rate / fps  # samples: rounded, and as precise as a float
     assert number * 1024 - error <= pulse * rate / fps <= (number + 1) * 1024 + error

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from benchmarks.endurance.crowd import crowd
-from server.camera.load.frame_skipper import Stepping
-from server.camera.load.load_shedder import Rung, rungs
+from server.camera.load.frame_skipper import FrameSkipper
+from server.camera.load.load_shedder import ShedLevel, shed_levels
 from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 
 WINDOW = WindowSettings()
 FRAMES = 80
 
 
-def stepping(bins: int) -> Stepping:
+def stepping(bins: int) -> FrameSkipper:
     tracker = OnlineTracker(WINDOW, CostSettings(), create_solver("columns"))
-    return Stepping(tracker, bins, WINDOW.stride)
+    return FrameSkipper(tracker, bins, WINDOW.stride)
 
 
 def walker(frame: int) -> Detections:
@@ -32,7 +32,7 @@ def walker(frame: int) -> Detections:
     return Detections(boxes, np.array([0.9, 0.35]), looks)
 
 
-def followed(rung: Rung) -> list[WindowResult]:
+def followed(rung: ShedLevel) -> list[WindowResult]:
     steps = stepping(4)
     results = []
     for frame in range(FRAMES):
@@ -41,11 +41,13 @@ def followed(rung: Rung) -> list[WindowResult]:
     return [it for it in (*results, steps.flush()) if it is not None]
 
 
-@pytest.mark.parametrize("rung", rungs(WINDOW.stride, live=False), ids=lambda it: f"every {it.searched}")
-def test_somebody_is_one_person_however_few_frames_are_searched(rung: Rung) -> None:
+@pytest.mark.parametrize(
+    "rung", shed_levels(WINDOW.stride, live=False), ids=lambda it: f"every {it.searched}"
+)
+def test_somebody_is_one_person_however_few_frames_are_searched(rung: ShedLevel) -> None:
     results = followed(rung)
     assert [it.last for it in results] == [
-        it.last for it in followed(Rung())
+        it.last for it in followed(ShedLevel())
     ]  # windows end when they do, and none is late
     final = {
         result.first + place: (track.id, track.interpolated[place])

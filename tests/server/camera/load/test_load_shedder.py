@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fakes.cameras import small_config
-from server.camera.load.load_monitor import Load
-from server.camera.load.load_shedder import Bounds, Ladder, Rung, rungs
+from server.camera.load.load_monitor import LoadMonitor
+from server.camera.load.load_shedder import LevelBounds, LoadShedder, ShedLevel, shed_levels
 
 FPS, STRIDE, GOP = 25.0, 5, 10
-BOUNDS = Bounds(0.5, 0.2)
+BOUNDS = LevelBounds(0.5, 0.2)
 BACKLOG_S = 2.0
 
 
@@ -23,7 +23,7 @@ def simulated(seconds: float, carried: Callable[[float], float], *, live: bool =
 
     Searching a frame takes three quarters of a frame's time, all else the rest.
     """
-    ladder = Ladder(rungs(STRIDE, live=live), BOUNDS)
+    ladder = LoadShedder(shed_levels(STRIDE, live=live), BOUNDS)
     free, levels = 0.0, []
     for pulse in range(round(seconds * FPS)):
         due, rung = pulse / FPS, ladder.rung
@@ -46,7 +46,7 @@ def test_a_camera_that_keeps_up_leaves_nothing_out() -> None:
 @pytest.mark.parametrize("share", [0.9, 0.7, 0.6, 0.5, 0.4])
 def test_whatever_the_machine_carries_the_camera_is_soon_where_it_keeps_up(share: float) -> None:
     levels = simulated(600.0, lambda _: share)
-    rung = rungs(STRIDE, live=True)[max(levels)]
+    rung = shed_levels(STRIDE, live=True)[max(levels)]
     work = sum(
         0.75 * rung.searches(it, STRIDE) + 0.25 * rung.takes(it, STRIDE, GOP) for it in range(STRIDE * GOP)
     )
@@ -72,7 +72,7 @@ def test_a_short_stall_is_caught_up_with() -> None:
 def test_no_rung_leaves_out_the_end_of_a_window_or_the_beginning_of_a_gop(
     stride: int, gop: int, *, live: bool, pulse: int
 ) -> None:
-    for rung in rungs(stride, live=live):
+    for rung in shed_levels(stride, live=live):
         end = (pulse + 1) * stride - 1
         assert rung.searches(end, stride)
         assert rung.takes(end, stride, gop)
@@ -81,8 +81,8 @@ def test_no_rung_leaves_out_the_end_of_a_window_or_the_beginning_of_a_gop(
 
 @given(stride=st.integers(1, 20), live=st.booleans())
 def test_every_rung_leaves_out_more_and_a_recording_is_always_shown_whole(stride: int, *, live: bool) -> None:
-    ladder = rungs(stride, live=live)
-    assert ladder[0] == Rung()
+    ladder = shed_levels(stride, live=live)
+    assert ladder[0] == ShedLevel()
     frames = range(stride * 60)
     searched = [sum(it.searches(pulse, stride) for pulse in frames) for it in ladder]
     taken = [sum(it.takes(pulse, stride, 60) for pulse in frames) for it in ladder]
@@ -96,14 +96,14 @@ def test_every_rung_leaves_out_more_and_a_recording_is_always_shown_whole(stride
 
 @pytest.mark.parametrize("fps", [0.5, 1.0, 2.0, FPS])
 def test_a_frame_may_take_all_the_time_that_it_has_at_any_rate(fps: float) -> None:
-    load = Load(small_config(site={"fps": fps}), "c0", live=True)
+    load = LoadMonitor(small_config(site={"fps": fps}), "c0", live=True)
     for pulse in range(200):
         load.measured(0.95 / fps, pulse / fps)
         assert load.level == 0
 
 
 def test_the_rungs_are_told_in_words() -> None:
-    assert [it.words for it in rungs(5, live=True)] == [
+    assert [it.words for it in shed_levels(5, live=True)] == [
         "",
         "searching every 2nd frame: the machine is too busy",
         "searching every 3rd frame: the machine is too busy",

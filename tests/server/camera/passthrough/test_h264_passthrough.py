@@ -27,19 +27,19 @@ from fakes.media.videos import write_video
 from fakes.paths import DOCS
 from fakes.programs import needs_ffmpeg
 from fakes.timeouts import PATIENCE
-from server.camera.audio import LiveSound
+from server.camera.audio import LiveAudioSource
 from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.camera.passthrough.access_unit_queue import Waiting
-from server.camera.passthrough.compatibility import wanted_by
-from server.camera.passthrough.encoder import Unit
-from server.camera.passthrough.stream_source import OwnStream
+from server.camera.passthrough.access_unit_queue import AccessUnitQueue
+from server.camera.passthrough.compatibility import required_format
+from server.camera.passthrough.encoder import PassthroughUnit
+from server.camera.passthrough.stream_source import PassthroughStream
 from server.camera.pipeline import CameraPipeline
 from server.camera.process import CameraProcess
-from server.camera.sources import SourceEnded
+from server.camera.sources import SourceEndedError
 from server.config.site_config import Config
-from server.media.containers.mpegts import Counters, pack
+from server.media.containers.mpegts import ContinuityCounters, pack
 from server.media.h264.annexb import NAL_AUD, nal_type, nal_units
-from server.media.stream_format import Agreement
+from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.system.errors import UnavailableError, UserError
 
@@ -59,9 +59,9 @@ def written(folder: Path, form: str, seed: int = 0) -> Path:
         path.write_bytes(b"".join(unit.data for unit in units))
         return path
     if form == "ts":
-        frame_buffer = FrameBuffer(FPS, FRAMES, Agreement())
+        frame_buffer = FrameBuffer(FPS, FRAMES, StreamFormat())
         pictures = [frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
-        path.write_bytes(pack(pictures, FPS, Counters()))
+        path.write_bytes(pack(pictures, FPS, ContinuityCounters()))
         return path
     with av.open(str(path), "w", format="mp4" if form == "mp4" else "matroska") as container:
         stream = container.add_stream("h264", rate=FPS)
@@ -95,7 +95,7 @@ def test_access_units_come_out_as_they_went_in(tmp_path: Path, form: str) -> Non
     pipeline = CameraPipeline(site(written(tmp_path, form)), "c0")
     assert pipeline.passes
     sent = passed(pipeline, range(FRAMES))
-    with pytest.raises(SourceEnded):
+    with pytest.raises(SourceEndedError):
         pipeline.take(FRAMES)
     pipeline.close()
     for unit, own in zip(sent, encoded(0)[:FRAMES], strict=True):
@@ -115,7 +115,7 @@ def test_the_tracker_is_given_the_pictures_that_are_sent(tmp_path: Path) -> None
 
 def test_it_can_be_cut_with_what_another_camera_encodes(tmp_path: Path) -> None:
     pipeline = CameraPipeline(site(written(tmp_path, "mp4")), "c0")
-    agreement = Agreement()
+    agreement = StreamFormat()
     frame_buffers = [FrameBuffer(FPS, FRAMES, agreement) for _ in range(2)]
     for frame_buffer, units in zip(frame_buffers, (passed(pipeline, range(FRAMES)), encoded(1)), strict=True):
         for unit in units:
@@ -241,11 +241,11 @@ def test_gops_begin_where_the_sites_do_and_are_never_torn(
     come: list[int], phase: int, gop: int, missed: set[int]
 ) -> None:
     """However units come: each is given once and in order, and in a GOP none is left out."""
-    waiting, count = Waiting(gop), 0
+    waiting, count = AccessUnitQueue(gop), 0
     given: list[tuple[int, int]] = []
     for pulse, some in enumerate(come):
         for _ in range(some):
-            waiting.put(Unit((count + phase) % gop == 0, count.to_bytes(4, "big"), IMAGE))
+            waiting.put(PassthroughUnit((count + phase) % gop == 0, count.to_bytes(4, "big"), IMAGE))
             count += 1
         unit = None if pulse in missed else waiting.take(pulse)
         if unit is not None:
@@ -264,10 +264,10 @@ def test_of_a_camera_in_step_nothing_is_lost_however_uneven_the_network_is(
     phase: int, gop: int, jitter: list[int]
 ) -> None:
     """A unit that comes up to a pulse early or late is there when it is needed."""
-    waiting, given, count = Waiting(gop), [], 0
+    waiting, given, count = AccessUnitQueue(gop), [], 0
     for pulse in range(100):
         while count <= pulse + jitter[pulse]:
-            waiting.put(Unit((count + phase) % gop == 0, count.to_bytes(4, "big"), IMAGE))
+            waiting.put(PassthroughUnit((count + phase) % gop == 0, count.to_bytes(4, "big"), IMAGE))
             count += 1
         unit = waiting.take(pulse)
         given.append(None if unit is None else int.from_bytes(unit.data, "big"))
@@ -321,7 +321,7 @@ def numbers() -> Mapping[tuple[bytes, ...], int]:
     return {tuple(nals(unit.data)): unit.pulse for unit in encoded(0, 1000)}
 
 
-def until_some_wait(camera: NetworkCamera | RtspCamera, source: OwnStream) -> None:
+def until_some_wait(camera: NetworkCamera | RtspCamera, source: PassthroughStream) -> None:
     """Let more come until there is enough for a pulse, wherever in a GOP that is.
 
     Never more than is on its way already: what a slow machine is late with would come all at once, and be
@@ -350,10 +350,10 @@ def rtsp() -> Iterator[RtspCamera]:
 @pytest.fixture
 def network() -> Iterator[NetworkCamera]:
     units = encoded(0, 1000)
-    frame_buffer = FrameBuffer(FPS, 1000, Agreement())
+    frame_buffer = FrameBuffer(FPS, 1000, StreamFormat())
     pictures = [frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
     gops = [pictures[first : first + GOP] for first in range(0, 1000, GOP)]
-    camera = NetworkCamera([pack(gop, FPS, Counters()) for gop in gops])
+    camera = NetworkCamera([pack(gop, FPS, ContinuityCounters()) for gop in gops])
     yield camera
     camera.close()
 
@@ -367,7 +367,7 @@ def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(
     pipeline = CameraPipeline(site(network.url, camera=camera), "c0")
     assert pipeline.passes
     source = pipeline.source
-    assert isinstance(source, OwnStream)
+    assert isinstance(source, PassthroughStream)
     assert pipeline.take(1) is None
     assert not pipeline.away, "it waits for a GOP to begin"
     sent: list[AccessUnit] = []
@@ -408,8 +408,8 @@ def test_a_network_camera_that_falls_silent_while_it_is_looked_at_is_away(
 def test_sound_beside_it_waits_as_long_as_the_pictures(network: NetworkCamera) -> None:
     options = {"probesize": "20000", "analyzeduration": "200000"}
     config = site(network.url, sound={"source": "c0"})
-    listener = LiveSound(config.sound, FPS)
-    source = OwnStream(network.url, options, listener, wanted_by(config))
+    listener = LiveAudioSource(config.sound, FPS)
+    source = PassthroughStream(network.url, options, listener, required_format(config))
     in_a_row, waited = 0, 0
     for pulse in range(300):
         until_some_wait(network, source)
@@ -438,7 +438,7 @@ def test_a_network_camera_that_comes_back_with_other_pictures_is_away(
     other = b"".join(encoder.encode(pulse, blank).data for pulse in range(FRAMES))
     path = tmp_path / "own.h264"
     path.write_bytes(own + other)  # it changes while it is read, and is changed when it is opened again
-    source = OwnStream(str(path), {}, None, wanted_by(config))
+    source = PassthroughStream(str(path), {}, None, required_format(config))
     (tmp_path / "other.h264").write_bytes(other)
     (tmp_path / "other.h264").replace(path)
     end = time.monotonic() + PATIENCE

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.camera.peers.detection_buffer import Earshot
+from server.camera.peers.detection_buffer import PeerDetectionBuffer
 from server.messaging.messages import FrameDetections
 
 PATIENCE, MOST = 0.2, 50
@@ -15,11 +15,11 @@ def word(pulse: int, camera: str = "c1", boot: int = 1, *, ended: bool = False) 
     return FrameDetections(camera=camera, boot=boot, size=(640, 480), pulse=pulse, boxes=[], ended=ended)
 
 
-def earshot(*others: str, near: bool = True) -> Earshot:
-    return Earshot(others or ("c1",), MOST, lambda _: near)
+def earshot(*others: str, near: bool = True) -> PeerDetectionBuffer:
+    return PeerDetectionBuffer(others or ("c1",), MOST, lambda _: near)
 
 
-def pulses(it: Earshot, pulse: int) -> list[tuple[str, int]]:
+def pulses(it: PeerDetectionBuffer, pulse: int) -> list[tuple[str, int]]:
     return [(said.camera, said.pulse) for said in it.heard(pulse).words]
 
 

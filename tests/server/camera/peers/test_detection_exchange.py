@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from fakes.camera_processes import Running, in_folder
 from fakes.timeouts import PATIENCE
-from server.camera.peers.cross_view_scorer import Heard, Witness
-from server.camera.peers.detection_exchange import Exchange
+from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
+from server.camera.peers.detection_exchange import PeerDetectionExchange
 from server.camera.pipeline import CameraPipeline
 from server.cli.generated_config import free_port
 from server.cli.render.camera_workers import CameraWorkers, EpochBatch, run_cameras
@@ -152,13 +152,14 @@ async def test_a_camera_that_never_comes_is_told_and_does_not_hold_up_the_others
 @pytest.fixture
 async def pair(
     recording: Path, monkeypatch: pytest.MonkeyPatch
-) -> AsyncIterator[tuple[Bus, Exchange, Exchange]]:
+) -> AsyncIterator[tuple[Bus, PeerDetectionExchange, PeerDetectionExchange]]:
     """The router, and two of the three cameras on the bus."""
     monkeypatch.setattr("server.camera.peers.detection_exchange._LISTENERS_S", WAIT / 4)
     config = config_of(recording, wait=WAIT)
     router = Bus.router(config.zenoh)
     exchanges = [
-        Exchange(config, camera, Witness(config, camera, (192, 108), 1), 100) for camera in ("c0", "c1")
+        PeerDetectionExchange(config, camera, CrossViewScorer(config, camera, (192, 108), 1), 100)
+        for camera in ("c0", "c1")
     ]
     for exchange in exchanges:
         await exchange.join()
@@ -178,13 +179,17 @@ def word(camera: str, pulse: int) -> FrameDetections:
     )
 
 
-async def both(one: Exchange, two: Exchange, pulse: int = 0, *, needed: bool = True) -> list[Heard]:
+async def both(
+    one: PeerDetectionExchange, two: PeerDetectionExchange, pulse: int = 0, *, needed: bool = True
+) -> list[PeerDetections]:
     """Let both say what they found in a frame, and hear the other."""
     pair = (("c0", one), ("c1", two))
     return await asyncio.gather(*(it.of(pulse, word(name, pulse), now(), needed=needed) for name, it in pair))
 
 
-async def test_words_go_both_ways_from_the_first_one_on(pair: tuple[Bus, Exchange, Exchange]) -> None:
+async def test_words_go_both_ways_from_the_first_one_on(
+    pair: tuple[Bus, PeerDetectionExchange, PeerDetectionExchange],
+) -> None:
     _, one, two = pair
     for pulse in range(5):
         first, second = await both(one, two, pulse)
@@ -200,14 +205,16 @@ async def test_a_camera_that_cannot_join_for_a_reason_nobody_foresaw_does_not_go
 
     monkeypatch.setattr(Bus, "hearing", hearing)
     config = config_of(recording, wait=WAIT)
-    alone = Exchange(config, "c0", Witness(config, "c0", (192, 108), 1), 100)
+    alone = PeerDetectionExchange(config, "c0", CrossViewScorer(config, "c0", (192, 108), 1), 100)
     await alone.join()
     with pytest.raises(MemoryError, match="no memory"):
         await alone.of(0, word("c0", 0), now(), needed=True)
     await alone.leave()
 
 
-async def test_a_camera_that_is_gone_is_waited_for_once(pair: tuple[Bus, Exchange, Exchange]) -> None:
+async def test_a_camera_that_is_gone_is_waited_for_once(
+    pair: tuple[Bus, PeerDetectionExchange, PeerDetectionExchange],
+) -> None:
     _, one, two = pair
     await both(one, two, needed=True)
     await two.leave()
@@ -217,7 +224,9 @@ async def test_a_camera_that_is_gone_is_waited_for_once(pair: tuple[Bus, Exchang
     assert asyncio.get_running_loop().time() - began < 50 * WAIT
 
 
-async def test_what_is_no_word_is_counted_and_left(pair: tuple[Bus, Exchange, Exchange]) -> None:
+async def test_what_is_no_word_is_counted_and_left(
+    pair: tuple[Bus, PeerDetectionExchange, PeerDetectionExchange],
+) -> None:
     _, one, two = pair
     await both(one, two, needed=False)
     key = ZenohKeys("hall").camera("c1", "detections")
@@ -243,7 +252,7 @@ ROWS = st.lists(st.lists(NUMBER, min_size=4, max_size=6), max_size=4) | NUMBER
 )
 def test_whatever_is_read_as_a_word_can_be_gone_by(message: dict[str, Any], boxes: list[Any]) -> None:
     config = _room()
-    witness = Witness(config, "c0", (640, 360), 1)
+    witness = CrossViewScorer(config, "c0", (640, 360), 1)
     seen = Detections(np.array([[300.0, 100.0, 340.0, 220.0]]), np.array([0.5]), np.ones((1, 1)))
     good = {"camera": "c1", "boot": 1, "size": [640, 360], "pulse": 3, "boxes": boxes}
     for it in (message, {**good, "boxes": message["boxes"]}, {**good, "size": message["size"]}, good):
@@ -271,7 +280,7 @@ def test_only_the_surest_boxes_are_told_and_in_their_order() -> None:
     config = _room()
     boxes = np.arange(4 * 150, dtype=np.float64).reshape(150, 4)
     scores = np.arange(150) % 101 / 100
-    said = Witness(config, "c0", (640, 360), 1).word(5, Detections(boxes, scores, np.empty((150, 0))))
+    said = CrossViewScorer(config, "c0", (640, 360), 1).word(5, Detections(boxes, scores, np.empty((150, 0))))
     assert said.boxes is not None
     assert len(said.boxes) == FRAME_DETECTIONS_MAX
     assert [row[0] for row in said.boxes] == sorted(row[0] for row in said.boxes)
@@ -287,7 +296,7 @@ def test_what_cannot_be_searched_is_no_word_that_nobody_is_there(recording: Path
         searched = pipeline.search(pulse, None if pulse == 35 else pipeline.take(pulse))
         assert searched.word is not None
         said.append(searched.word.boxes is not None)
-        pipeline.follow(searched, Heard())
+        pipeline.follow(searched, PeerDetections())
     pipeline.close()
     first = said.index(True)
     assert 0 < first < 35, "the background is not known at once"
@@ -302,7 +311,7 @@ def test_a_frame_without_a_needed_word_is_told(recording: Path) -> None:
         searched = pipeline.search(pulse, pipeline.take(pulse))
         if searched.asks:
             asked.append(pulse)
-        tracks = pipeline.follow(searched, Heard(alone=True))
+        tracks = pipeline.follow(searched, PeerDetections(alone=True))
         told += tracks.without_peers if tracks else []
     told += pipeline.finish(FRAMES).without_peers
     pipeline.close()

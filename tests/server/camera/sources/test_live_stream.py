@@ -22,10 +22,10 @@ from av.video.stream import VideoStream
 
 from fakes.media.videos import HEIGHT, STEP, WIDTH, frame_in, write_video
 from fakes.timeouts import PATIENCE
-from server.camera.audio import LiveSound
+from server.camera.audio import LiveAudioSource
 from server.camera.sources import live_stream, open_source
-from server.camera.sources.live_stream import Stream
-from server.camera.sources.opening import Opened, open_video
+from server.camera.sources.live_stream import LiveStream
+from server.camera.sources.opening import OpenedVideo, open_video
 from server.config.sections import CameraSettings, SiteSettings, SoundSettings
 from server.system.errors import UnavailableError, UserError
 
@@ -90,13 +90,13 @@ def until(condition: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def shown(source: Stream) -> int | None:
+def shown(source: LiveStream) -> int | None:
     picture = source.take(0)
     return None if picture is None else frame_in(picture)
 
 
 def test_the_newest_picture_is_shown(camera: MotionJpeg) -> None:
-    source = Stream(f"http://127.0.0.1:{camera.plug_in()}/", {})
+    source = LiveStream(f"http://127.0.0.1:{camera.plug_in()}/", {})
     try:
         assert source.size == (WIDTH, HEIGHT)
         until(lambda: shown(source) == 0)
@@ -113,7 +113,7 @@ def test_a_camera_that_was_away_is_shown_again_and_nothing_old_meanwhile(
     monkeypatch.setattr(live_stream, "_STALE_S", 0.2)
     monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
     port = camera.plug_in()
-    source = Stream(f"http://127.0.0.1:{port}/", {})
+    source = LiveStream(f"http://127.0.0.1:{port}/", {})
     try:
         until(lambda: shown(source) == 0)
         camera.unplug()
@@ -132,7 +132,7 @@ def test_a_camera_that_is_away_for_long_is_told_of_once_and_when_it_is_back(
     monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.01)
     monkeypatch.setattr(live_stream, "_RETRY_MAX_S", 0.01)
     port = camera.plug_in()
-    source = Stream(f"http://me:hunter2@127.0.0.1:{port}/?p=hunter2", {})
+    source = LiveStream(f"http://me:hunter2@127.0.0.1:{port}/?p=hunter2", {})
     try:
         until(lambda: shown(source) == 0)
         camera.unplug()
@@ -196,7 +196,7 @@ def test_a_picture_of_before_a_silence_is_not_shown_after_it(
     camera = Halting(write_video(tmp_path / "film.ts", 25), halt=20)
     frames = Frames()
     quick = {"analyzeduration": "100000", "probesize": "5000"}
-    source = Stream(f"http://127.0.0.1:{camera.port}/", quick, frames)
+    source = LiveStream(f"http://127.0.0.1:{camera.port}/", quick, frames)
     try:
         until(lambda: len(frames.shown) == 18)  # where the others end is not known yet
         until(lambda: source.take(0) is None)
@@ -217,7 +217,7 @@ def test_pictures_of_another_size_are_no_pictures_of_this_camera(
     """Where people stand goes by the size: the camera's process ends, and begins anew with the other one."""
     monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
     port = camera.plug_in()
-    source = Stream(f"http://127.0.0.1:{port}/", {})
+    source = LiveStream(f"http://127.0.0.1:{port}/", {})
 
     def take_them_all() -> None:
         while True:
@@ -245,13 +245,13 @@ def test_a_picture_that_cannot_be_decoded_cuts_no_connection(
     """What damage makes FFmpeg say differs from codec to codec."""
     damaged = threading.Event()
 
-    class Damaging(Stream):
+    class Damaging(LiveStream):
         connections = 0
 
         def _decode(self, packet: av.Packet[VideoStream]) -> bool:
             return super()._decode(cast("av.Packet[VideoStream]", Damaged()) if damaged.is_set() else packet)
 
-        def _read(self, opened: Opened) -> bool:
+        def _read(self, opened: OpenedVideo) -> bool:
             self.connections += 1
             return super()._read(opened)
 
@@ -279,7 +279,7 @@ def test_a_mistake_while_reading_ends_the_connection_and_not_the_camera(
 ) -> None:
     monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
 
-    class Stumbling(LiveSound):
+    class Stumbling(LiveAudioSource):
         connections = 0
 
         def opened(self, stream: AudioStream | None) -> None:
@@ -289,7 +289,7 @@ def test_a_mistake_while_reading_ends_the_connection_and_not_the_camera(
             super().opened(stream)
 
     listener = Stumbling(SoundSettings(source="c0"), 25)
-    source = Stream(f"http://127.0.0.1:{camera.plug_in()}/", {}, listener)
+    source = LiveStream(f"http://127.0.0.1:{camera.plug_in()}/", {}, listener)
     try:
         until(lambda: shown(source) == 0)
     finally:
@@ -300,7 +300,7 @@ def test_a_mistake_while_reading_ends_the_connection_and_not_the_camera(
 
 
 def test_closing_ends_the_thread(camera: MotionJpeg) -> None:
-    source = Stream(f"http://127.0.0.1:{camera.plug_in()}/", {})
+    source = LiveStream(f"http://127.0.0.1:{camera.plug_in()}/", {})
     source.close()
     assert not source._thread.is_alive()
 
@@ -324,7 +324,7 @@ def test_a_password_is_in_no_error(login: str) -> None:
 
 def test_options_are_passed_on(camera: MotionJpeg) -> None:
     port = camera.plug_in()
-    source = Stream(f"http://127.0.0.1:{port}/", {"user_agent": "MyView"})
+    source = LiveStream(f"http://127.0.0.1:{port}/", {"user_agent": "MyView"})
     source.close()
 
 

@@ -20,11 +20,11 @@ from PIL import Image as Pillow
 
 from fakes.command_line import Run, myview
 from fakes.media.videos import frame_in, write_timed, write_video
-from server.camera.passthrough.compatibility import MisfitError, Wanted
-from server.camera.passthrough.recording_source import OwnRecording
-from server.camera.passthrough.stream_source import OwnStream
-from server.camera.sources import Folder, Recording
-from server.camera.sources.live_stream import Stream
+from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
+from server.camera.passthrough.recording_source import PassthroughRecording
+from server.camera.passthrough.stream_source import PassthroughStream
+from server.camera.sources import ImageFolder, Recording
+from server.camera.sources.live_stream import LiveStream
 from server.cli.generated_config import config_for_videos
 from server.cli.render.video_info import read_video_info
 from tracking.motchallenge import MotRow, read_rows, write_rows
@@ -34,7 +34,7 @@ __all__ = ["myview"]
 WIDE, HIGH = 96, 64
 WAYS = [(turn, flip) for turn in (0, 90, 180, 270) for flip in (False, True)]
 """Quarter turns to the left, in degrees, and whether left and right change places after that."""
-SITE = Wanted((WIDE, HIGH), 25.0, 10, None)
+SITE = RequiredFormat((WIDE, HIGH), 25.0, 10, None)
 
 Picture = NDArray[np.uint8]
 
@@ -122,14 +122,14 @@ def test_what_is_turned_or_stretched_does_not_pass_through(
     tmp_path: Path, served: str, turn: int, aspect: str, why: str
 ) -> None:
     path = film(tmp_path / "own.mkv", turn, aspect=aspect, frames=40)
-    with pytest.raises(MisfitError, match=why):
-        OwnRecording(str(path), 0, "stop", SITE)
-    with pytest.raises(MisfitError, match=why):
-        OwnStream(f"{served}/own.mkv", {}, None, SITE)
+    with pytest.raises(IncompatibleStreamError, match=why):
+        PassthroughRecording(str(path), 0, "stop", SITE)
+    with pytest.raises(IncompatibleStreamError, match=why):
+        PassthroughStream(f"{served}/own.mkv", {}, None, SITE)
 
 
 def test_what_lies_as_it_is_passes_through(tmp_path: Path) -> None:
-    OwnRecording(str(film(tmp_path / "own.mp4")), 0, "stop", SITE).close()
+    PassthroughRecording(str(film(tmp_path / "own.mp4")), 0, "stop", SITE).close()
 
 
 @pytest.fixture
@@ -153,7 +153,7 @@ def served(tmp_path: Path) -> Iterator[str]:
 def test_a_stream_is_shown_upright_from_its_first_picture_on(tmp_path: Path, served: str, turn: int) -> None:
     film(tmp_path / "camera.mkv", turn)
     meant = turned(corners(), turn, flip=False)
-    source = Stream(f"{served}/camera.mkv", {})
+    source = LiveStream(f"{served}/camera.mkv", {})
     try:
         assert source.size == (meant.shape[1], meant.shape[0])
         assert same(source.take(0), meant)
@@ -234,7 +234,7 @@ def test_an_image_is_upright_as_exif_says(tmp_path: Path, suffix: str, orientati
     exif[274] = orientation
     Pillow.fromarray(corners()).save(tmp_path / f"0.{suffix}", exif=exif)
     meant = turned(corners(), {1: 0, 3: 180, 6: 270, 8: 90}[orientation], flip=False)
-    folder = Folder(str(tmp_path), 0, "stop")
+    folder = ImageFolder(str(tmp_path), 0, "stop")
     assert folder.size == (meant.shape[1], meant.shape[0])
     assert same(folder.take(0), meant)
     assert read_video_info(tmp_path).size == folder.size
@@ -250,7 +250,7 @@ def test_images_of_any_depth_and_kind_are_pictures(tmp_path: Path) -> None:
     for name, image in kinds.items():
         cv2.imwrite(str(tmp_path / f"{name}.png"), image)
     Pillow.fromarray(grey).convert("P").save(tmp_path / "palette.png")
-    folder = Folder(str(tmp_path), 0, "stop")
+    folder = ImageFolder(str(tmp_path), 0, "stop")
     for number in range(4):
         assert same(folder.take(number), np.dstack([grey, grey, grey]))
 
@@ -260,7 +260,7 @@ def test_images_of_several_sizes_are_fitted_into_the_first_and_it_is_said(
 ) -> None:
     for number, (high, wide) in enumerate([(HIGH, WIDE), (WIDE, HIGH), (HIGH, WIDE)]):
         cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((high, wide, 3), 200, np.uint8))
-    folder = Folder(str(tmp_path), 0, "stop")
+    folder = ImageFolder(str(tmp_path), 0, "stop")
     images = [folder.take(number) for number in range(3)]
     assert [None if it is None else it.shape for it in images] == 3 * [(HIGH, WIDE, 3)]
     upright = images[1]
@@ -278,7 +278,7 @@ def test_images_that_cannot_be_read_are_counted_and_named(
         cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((HIGH, WIDE, 3), 200, np.uint8))
     for number in (1, 2, 4):
         (tmp_path / f"{number}.png").write_bytes(b"no image")
-    folder = Folder(str(tmp_path), 0, "loop")
+    folder = ImageFolder(str(tmp_path), 0, "loop")
     for number in range(12):
         folder.take(number)
     folder.close()

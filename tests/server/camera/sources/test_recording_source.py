@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.media.videos import HEIGHT, STEP, WIDTH, damage, frame_in, write_video
-from server.camera.sources import SourceEnded, open_source
-from server.camera.sources.base import Source
-from server.camera.sources.image_folder import Folder
+from server.camera.sources import SourceEndedError, open_source
+from server.camera.sources.base import PictureSource
+from server.camera.sources.image_folder import ImageFolder
 from server.camera.sources.recording import Recording
 from server.config.sections import CameraSettings, SiteSettings
 from server.system.errors import UserError
@@ -38,14 +38,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def shown(source: Source, pulse: int) -> int | None:
+def shown(source: PictureSource, pulse: int) -> int | None:
     picture = source.take(pulse)
     return None if picture is None else frame_in(picture)
 
 
-def all_shown(source: Source) -> list[int | None]:
+def all_shown(source: PictureSource) -> list[int | None]:
     frames: list[int | None] = []
-    with suppress(SourceEnded):
+    with suppress(SourceEndedError):
         while True:
             frames.append(shown(source, len(frames)))
     source.close()
@@ -92,7 +92,7 @@ def test_looking_ahead_in_a_folder_leaves_out_what_cannot_be_read(folder: Path, 
     for file in folder.iterdir():
         (tmp_path / file.name).write_bytes(file.read_bytes())
     (tmp_path / "002.png").write_text("no image")
-    source = Folder(str(tmp_path), 2, "loop")
+    source = ImageFolder(str(tmp_path), 2, "loop")
     assert [frame_in(picture) for picture in source.ahead(range(0, 500, 2))] == [0, 4]
     assert shown(source, 2) == 0
 
@@ -100,7 +100,7 @@ def test_looking_ahead_in_a_folder_leaves_out_what_cannot_be_read(folder: Path, 
 def test_a_skip_to_beyond_the_end_is_the_end(video: str) -> None:
     recording = Recording(video, 0, "stop")
     for _ in range(2):
-        with pytest.raises(SourceEnded):
+        with pytest.raises(SourceEndedError):
             recording.take(1000)
     recording.close()
 
@@ -174,8 +174,8 @@ def test_sound_alone_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_folder_is_a_recording_of_its_images(folder: Path) -> None:
-    assert all_shown(Folder(str(folder), 2, "stop")) == [None, None, 0, 1, 2, 3, 4]
-    repeated = Folder(str(folder), 0, "loop")
+    assert all_shown(ImageFolder(str(folder), 2, "stop")) == [None, None, 0, 1, 2, 3, 4]
+    repeated = ImageFolder(str(folder), 0, "loop")
     assert [shown(repeated, pulse) for pulse in (0, 4, 5, 13)] == [0, 4, 0, 3]
 
 
@@ -183,7 +183,7 @@ def test_an_image_that_cannot_be_read_shows_as_the_one_before_it(tmp_path: Path,
     for file in folder.glob("*.png"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
     (tmp_path / "002.png").write_bytes(b"")
-    assert all_shown(Folder(str(tmp_path), 0, "stop")) == [0, 1, 1, 3, 4]
+    assert all_shown(ImageFolder(str(tmp_path), 0, "stop")) == [0, 1, 1, 3, 4]
 
 
 def test_a_folder_without_a_readable_image_is_refused(tmp_path: Path) -> None:

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 from fakes.command_line import Run, myview
 from fakes.media.videos import STEP, damage, frame_in, write_timed, write_video
-from server.camera.passthrough.compatibility import MisfitError, Wanted
-from server.camera.passthrough.recording_source import OwnRecording
-from server.camera.sources import SourceEnded
+from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
+from server.camera.passthrough.recording_source import PassthroughRecording
+from server.camera.sources import SourceEndedError
 from server.camera.sources.recording import Recording
 from tracking.motchallenge import MotRow, read_rows, write_rows
 
@@ -28,7 +28,7 @@ __all__ = ["myview"]
 def shown(path: Path, fps: float | None = None) -> list[int]:
     """Return which picture of a recording each pulse shows."""
     recording, frames = Recording(str(path), 0, "stop", fps), list[int]()
-    with suppress(SourceEnded):
+    with suppress(SourceEndedError):
         while (image := recording.take(len(frames))) is not None:
             frames.append(frame_in(image))
     recording.close()
@@ -162,9 +162,9 @@ def test_what_is_not_one_picture_a_pulse_does_not_pass_through(tmp_path: Path) -
     times = [n / 25 for n in range(41) if n != 35]
     hole = write_timed(tmp_path / "hole.mp4", times, prepare=of_the_site)
     with pytest.raises(
-        MisfitError, match=r"frame 35 is shown at 1.44 s, which is frame 36 at the site's 25 "
+        IncompatibleStreamError, match=r"frame 35 is shown at 1.44 s, which is frame 36 at the site's 25 "
     ):
-        OwnRecording(str(hole), 0, "stop", Wanted((64, 48), 25.0, 10, None))
+        PassthroughRecording(str(hole), 0, "stop", RequiredFormat((64, 48), 25.0, 10, None))
 
 
 def test_views_of_two_rates_are_rendered_to_one_length(tmp_path: Path, myview: Run) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from server.camera.sources import Recording
 from server.camera.sources.opening import open_video
-from server.camera.sources.synthetic import Stage
+from server.camera.sources.synthetic import SyntheticSource
 from server.config.sections import SiteSettings
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
@@ -23,7 +23,7 @@ SITE = SiteSettings(width=128, height=72)
 
 
 def test_the_address_says_which_camera_of_which_scene() -> None:
-    stage = Stage("scene:room?camera=1&cameras=2&objects=3&seed=5", SITE)
+    stage = SyntheticSource("scene:room?camera=1&cameras=2&objects=3&seed=5", SITE)
     scene = Scene("room", 2, 3, 5, 128, 72, 25.0)
     assert stage.size == (128, 72)
     np.testing.assert_array_equal(stage.take(30), scene.image(1, 30))
@@ -31,7 +31,7 @@ def test_the_address_says_which_camera_of_which_scene() -> None:
 
 def test_defaults_are_the_demos() -> None:
     np.testing.assert_array_equal(
-        Stage("scene:room", SITE).take(0), Scene("room", 3, 4, 1, 128, 72).image(0, 0)
+        SyntheticSource("scene:room", SITE).take(0), Scene("room", 3, 4, 1, 128, 72).image(0, 0)
     )
 
 
@@ -53,7 +53,7 @@ def test_defaults_are_the_demos() -> None:
 )
 def test_a_wrong_address_is_refused_with_the_reason(source: str, why: str) -> None:
     with pytest.raises(UserError) as caught:
-        Stage(source, SITE)
+        SyntheticSource(source, SITE)
     assert why in str(caught.value)
     assert str(caught.value).startswith(source)
 
@@ -101,4 +101,4 @@ def test_a_scene_without_a_floor_gives_its_cameras_none() -> None:
     tank, court = add_scene_ground(site).cameras
     assert tank.ground is None
     assert court.ground is not None
-    assert Stage("scene:fish?camera=1&cameras=2", SITE).take(3) is not None
+    assert SyntheticSource("scene:fish?camera=1&cameras=2", SITE).take(3) is not None

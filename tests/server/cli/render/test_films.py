@@ -17,7 +17,7 @@ from fakes.media.audio import FRAMES as SOUNDING
 from server.cli.render.films import FilmWriter
 from server.cli.render.soundtrack import Soundtrack
 from server.config.sections import SiteSettings
-from server.media.codec import agreement_for
+from server.media.codec import stream_format_for
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
 from server.service.decision_files.decision_writer import DecisionWriter
@@ -57,7 +57,7 @@ def test_the_files_are_these_bytes(tmp_path: Path) -> None:
 
 
 def films(folder: Path, codec: Codec = "h264") -> tuple[FilmWriter, dict[str, FrameBuffer]]:
-    agreement = agreement_for(codec, (WIDTH, HEIGHT))
+    agreement = stream_format_for(codec, (WIDTH, HEIGHT))
     frame_buffers = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, codec=codec):
@@ -133,7 +133,7 @@ def test_what_cannot_be_shown_or_did_not_come_is_bridged_as_it_is_live(
 def test_a_film_has_the_sites_sound_in_step(tmp_path: Path, codec: Literal["aac", "opus"]) -> None:
     recording = write_flashes(tmp_path / "flashes.mkv", SOUNDING)
     config = small_config(sound={"source": str(recording), "codec": codec})
-    agreement, track = agreement_for(config.encode.codec, config.site.size), Soundtrack(config)
+    agreement, track = stream_format_for(config.encode.codec, config.site.size), Soundtrack(config)
     frame_buffers = {camera: FrameBuffer(FPS, SOUNDING, agreement) for camera in CAMERAS}
     for unit in flashing(recording):
         for frame_buffer in frame_buffers.values():

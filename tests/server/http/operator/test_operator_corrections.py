@@ -11,7 +11,7 @@ import pytest
 
 from fakes.cameras import FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, tracks, word
 from fakes.site import A, B, Hall, opened, see
-from server.camera.operator_corrections import Pointed
+from server.camera.operator_corrections import CorrectionInbox
 from server.http.access.csrf import CHANGES
 from server.messaging.inbox import Message
 from server.messaging.operator_messages import OperatorPoints, RiskEvent
@@ -154,7 +154,7 @@ async def test_a_flag_is_raised_followed_answered_and_counted(helped: Hall) -> N
 def test_a_camera_takes_what_is_said_of_its_own_tracks_and_no_more_than_it_can_hold(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    pointed = Pointed("c0", boot=2)
+    pointed = CorrectionInbox("c0", boot=2)
     point = {"track": 1, "x": 1.0, "y": 2.0, "reach": 3.0}
 
     def hear(content: Any) -> None:

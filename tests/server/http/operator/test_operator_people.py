@@ -13,7 +13,7 @@ from fakes.cameras import CAMERAS, LARGE, SMALL
 from fakes.site import A, B, Hall, opened
 from server.cli.watch import run_watch
 from server.http.access.csrf import CHANGES
-from server.service.view_selection.decider import homographies
+from server.service.view_selection.decider import camera_homographies
 
 PEOPLE = "/api/operator/people"
 
@@ -24,7 +24,9 @@ async def real() -> AsyncIterator[Hall]:
     async with aclosing(opened()) as halls:
         hall = await anext(halls)
         config = hall.service.config
-        hall.service.decider.people._registry = IdentityRegistry(config.view.identity, homographies(config))
+        hall.service.decider.people._registry = IdentityRegistry(
+            config.view.identity, camera_homographies(config)
+        )
         hall.service.come(*CAMERAS)
         for epoch in range(3):
             feed(hall, epoch)

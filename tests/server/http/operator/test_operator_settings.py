@@ -17,7 +17,7 @@ from server.config.sections import ViewSettings
 from server.config.site_config import Config
 from server.http.access.csrf import CHANGES
 from server.http.operator.settings import settings_of
-from server.service.view_selection.decider import Decider
+from server.service.view_selection.decider import ViewDecider
 
 CHOOSING = "/api/operator/choosing"
 MINE = {CHANGES: "1"}
@@ -31,7 +31,7 @@ async def put(hall: Hall, json: Any) -> tuple[int, Any]:
 
 def decided(config: Config, tuned: ViewSettings | None = None, after: int = 0) -> list[Any]:
     """Return what is decided of two people who are now large in one camera, now in the other."""
-    decider = Decider(config, dict.fromkeys(CAMERAS), lambda *_: True)
+    decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
     decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     decisions = []
     for number in range(12):
@@ -71,7 +71,7 @@ def test_tuned_meanwhile_holds_from_the_next_gop_on_and_what_was_said_is_weighed
 
 def test_tuned_back_goes_on_as_ever() -> None:
     config = small_config()
-    decider = Decider(config, dict.fromkeys(CAMERAS), lambda *_: True)
+    decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
     decider.choose_by(TRIED)
     assert decider.view.lookahead == config.view.lookahead
     assert decider.view.identity == config.view.identity

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
-from server.media.containers.fmp4 import Sample, fragment, init_segment, rebased, ticks
-from server.media.h264.annexb import NAL_AUD, nal_type, nal_units, parameter_sets, sample, units_of
+from server.media.containers.fmp4 import FragmentSample, fragment, init_segment, shift_fragment, ticks
+from server.media.h264.annexb import NAL_AUD, join_sample, nal_type, nal_units, parameter_sets, split_sample
 
 SITE = SiteSettings(width=64, height=48, fps=25)
 GOP = 4
@@ -33,7 +33,7 @@ def encoded(first: int, frames: int, seed: int = 0, crf: int = 23) -> list[Acces
 
 
 def as_fragment(unit: AccessUnit) -> bytes:
-    return fragment([Sample(sample(nal_units(unit.data)), unit.key)], unit.pulse, SITE.fps)
+    return fragment([FragmentSample(join_sample(nal_units(unit.data)), unit.key)], unit.pulse, SITE.fps)
 
 
 def mp4(units: list[AccessUnit]) -> bytes:
@@ -96,7 +96,7 @@ def test_rebased_fragments_begin_at_time_zero() -> None:
     parameters = parameter_sets(nal_units(units[0].data))
     assert parameters is not None
     head = init_segment(parameters, SITE.width, SITE.height)
-    moved = [rebased(as_fragment(unit), -ticks(200, SITE.fps)) for unit in units]
+    moved = [shift_fragment(as_fragment(unit), -ticks(200, SITE.fps)) for unit in units]
     assert [time for time, _ in decoded_mp4(head + b"".join(moved))] == [Fraction(n, 25) for n in range(4)]
 
 
@@ -113,7 +113,7 @@ def test_nal_units_split_as_they_were_joined(payloads: list[bytes], long_codes: 
 def test_any_bytes_are_split_without_an_error(data: bytes) -> None:
     units = nal_units(data)
     parameter_sets(units)
-    assert len(sample(units)) <= len(data) + len(units)  # a 4-byte length replaces at least 3 bytes
+    assert len(join_sample(units)) <= len(data) + len(units)  # a 4-byte length replaces at least 3 bytes
 
 
 @given(st.floats(1, 120), st.integers(0, 10**9))
@@ -128,5 +128,5 @@ UNITS = st.binary(min_size=1, max_size=9).filter(lambda it: nal_type(it) != NAL_
 def test_a_sample_is_taken_apart_as_it_was_put_together_and_junk_is_left_out(
     units: list[bytes], junk: bytes
 ) -> None:
-    assert units_of(sample(units)) == units
-    assert units_of(sample(units) + junk)[: len(units)] == units
+    assert split_sample(join_sample(units)) == units
+    assert split_sample(join_sample(units) + junk)[: len(units)] == units

@@ -15,18 +15,18 @@ from fakes.cameras import CAMERAS, FPS, GOP, encoded
 from fakes.media.ffprobe import probed
 from fakes.media.mpegts import check_counters, taken_apart
 from fakes.programs import needs_ffprobe
-from server.media.containers.fmp4 import Sample, fragment, ticks
-from server.media.containers.mpegts import Counters, pack, packets
-from server.media.picture import Picture
-from server.media.stream_format import Agreement
+from server.media.containers.fmp4 import FragmentSample, fragment, ticks
+from server.media.containers.mpegts import ContinuityCounters, count_packets, pack
+from server.media.picture import EncodedPicture
+from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 
 CLOCK = 1 << 33
 
 
-def picture(pulse: int, size: int, *, key: bool = False, lasts: int = 1, fps: float = FPS) -> Picture:
+def picture(pulse: int, size: int, *, key: bool = False, lasts: int = 1, fps: float = FPS) -> EncodedPicture:
     data = (size + 1).to_bytes(4, "big") + bytes([0x65 if key else 0x41]) + b"\x80" * size
-    return Picture(pulse, key, fragment([Sample(data, key, lasts)], pulse, fps), 1, lasts)
+    return EncodedPicture(pulse, key, fragment([FragmentSample(data, key, lasts)], pulse, fps), 1, lasts)
 
 
 sizes = st.lists(st.one_of(st.integers(1, 600), st.integers(1, 70_000)), min_size=1, max_size=12)
@@ -40,10 +40,10 @@ def test_packets_are_legal_and_hold_just_what_was_packed(
     data, sent, tables, video = b"", [], 0, 0
     for gop in gops:
         pictures = [picture(pulse + n, size, key=n == 0) for n, size in enumerate(gop)]
-        counters = Counters(tables, video, whole=not live)
+        counters = ContinuityCounters(tables, video, whole=not live)
         data += pack(pictures, FPS, counters)
         pulse, tables = pulse + len(gop), tables + 1
-        video += sum(packets(it) for it in pictures) if live else 0
+        video += sum(count_packets(it) for it in pictures) if live else 0
         sent += pictures
     found = taken_apart(data)
     check_counters(found)
@@ -71,7 +71,7 @@ def test_packets_are_legal_and_hold_just_what_was_packed(
 @given(st.integers(0, 2**34 // 3600), st.sampled_from([4, 7.5, 25, 59.94]))
 def test_the_time_reference_comes_often_and_before_its_picture(pulse: int, fps: float) -> None:
     pictures = [picture(pulse, 50, key=True, fps=fps), picture(pulse + 1, 30, lasts=40, fps=fps)]
-    found = taken_apart(pack(pictures, fps, Counters()))
+    found = taken_apart(pack(pictures, fps, ContinuityCounters()))
     times = [it.pcr // 300 for it in found if it.pcr is not None]
     assert all(0 < (later - earlier) % CLOCK <= 9000 for earlier, later in pairwise(times))
     assert 0 < (ticks(pulse, fps) - times[0]) % CLOCK <= 90_000
@@ -80,21 +80,21 @@ def test_the_time_reference_comes_often_and_before_its_picture(pulse: int, fps: 
 
 def spliced(cameras: list[int]) -> tuple[bytes, list[tuple[int, int]]]:
     """Return a stream of GOPs of these cameras, and which camera and pulse each picture is."""
-    agreement, data, frames = Agreement(), b"", []
+    agreement, data, frames = StreamFormat(), b"", []
     frame_buffers = [FrameBuffer(FPS, 40, agreement) for _ in CAMERAS]
     for seed, frame_buffer in enumerate(frame_buffers):
         for unit in encoded(seed):
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
     for place, camera in enumerate(cameras):
-        data += pack(frame_buffers[camera].pictures(place * GOP, GOP), FPS, Counters(place))
+        data += pack(frame_buffers[camera].pictures(place * GOP, GOP), FPS, ContinuityCounters(place))
         frames += [(camera, pulse) for pulse in range(place * GOP, (place + 1) * GOP)]
     return data, frames
 
 
 def own_pictures(camera: int) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
     decoder = av.CodecContext.create("h264", "r")
-    packets = [*(av.Packet(unit.data) for unit in encoded(camera)), None]
-    return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
+    count_packets = [*(av.Packet(unit.data) for unit in encoded(camera)), None]
+    return [it.to_ndarray(format="yuv420p") for packet in count_packets for it in decoder.decode(packet)]
 
 
 def test_a_decoder_shows_the_cameras_own_pixels_across_cuts() -> None:

@@ -19,14 +19,14 @@ from fakes.parameter_sets import MAKES, sent
 from server.camera.encoding.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment
-from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets, sample
-from server.media.h264.bitstream import BitWriter, unit_of
+from server.media.h264.annexb import ParameterSets, join_sample, nal_units, parameter_sets
+from server.media.h264.bitstream import BitWriter, escape_payload
 from server.media.h264.grey_picture import grey_picture
-from server.media.h264.repeat_picture import UnfitError
-from server.media.picture import Picture
-from server.media.stream_format import Agreement, OwnParameters
+from server.media.h264.repeat_picture import UnsupportedParametersError
+from server.media.picture import EncodedPicture
+from server.media.stream_format import PerCameraStreamFormat, StreamFormat
 from server.media.vp8.grey_frame import grey_frame
-from server.media.vp8.stream_format import Vp8Agreement
+from server.media.vp8.stream_format import Vp8StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 
 Sizes = st.tuples(st.integers(1, 40), st.integers(1, 24))
@@ -43,7 +43,7 @@ def test_it_is_grey_and_what_is_before_and_behind_it_is_as_it_was(
     preset: str, blocks: tuple[int, int]
 ) -> None:
     units = encoded((16 * blocks[0], 16 * blocks[1] + 2), preset, 3)
-    samples = [sample(nal_units(it.data)) for it in units]
+    samples = [join_sample(nal_units(it.data)) for it in units]
     found, writer = parameter_sets(nal_units(units[0].data)), how(units[0])
     assert found is not None
     grey = [grey_picture(found, 0), writer.repeat(1, reference=True), grey_picture(found, 1)]
@@ -76,13 +76,13 @@ def test_so_it_is_in_vp8(blocks: tuple[int, int]) -> None:
 
 @pytest.mark.parametrize("own", [False, True])
 def test_a_grey_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> None:
-    agreement = OwnParameters() if own else Agreement()
+    agreement = PerCameraStreamFormat() if own else StreamFormat()
     cameras = list(MAKES) if own else list(MAKES)[:1] * 2
     frame_buffers = {camera: FrameBuffer(FPS, 99, agreement) for camera in cameras}
     for camera, frame_buffer in frame_buffers.items():
         for unit in sent(camera):
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
-    shown: list[Picture] = agreement.blank(None, 0, GOP, FPS)
+    shown: list[EncodedPicture] = agreement.blank(None, 0, GOP, FPS)
     for gop, camera in enumerate([cameras[0], None, cameras[1], None, cameras[0]], start=1):
         first = gop * GOP
         newest = shown[-1]
@@ -120,13 +120,13 @@ def with_order_said(parameters: ParameterSets) -> ParameterSets:
         sps.u(1, value)
     sps.u(1, 1)
     sps.align(0)
-    return ParameterSets(unit_of(0x67, sps.done()), parameters.pps)
+    return ParameterSets(escape_payload(0x67, sps.done()), parameters.pps)
 
 
 def test_where_no_picture_can_be_repeated_one_grey_picture_lasts_for_all_of_it() -> None:
     parameters = parameter_sets(nal_units(encoded((WIDTH, HEIGHT), "ultrafast", 1)[0].data))
     assert parameters is not None
-    agreement = Agreement()
+    agreement = StreamFormat()
     agreement.check(with_order_said(parameters))
     [grey] = agreement.blank(None, 10, 5, FPS)
     assert (grey.pulse, grey.until, grey.key) == (10, 15, True)
@@ -134,7 +134,7 @@ def test_where_no_picture_can_be_repeated_one_grey_picture_lasts_for_all_of_it()
 
 
 def test_in_a_format_that_cannot_be_written_there_is_none() -> None:
-    agreement = Agreement()
+    agreement = StreamFormat()
     assert agreement.blank(None, 0, 5, FPS) == []
     agreement.check(ParameterSets(b"\x67\x00\x00\x00", b"\x68"))
     assert agreement.blank(None, 0, 5, FPS) == []
@@ -143,11 +143,11 @@ def test_in_a_format_that_cannot_be_written_there_is_none() -> None:
 @settings(deadline=None)  # some say that they are very large
 @given(st.binary(min_size=4, max_size=30), st.binary(min_size=1, max_size=10), st.integers(0, 1))
 def test_parameter_sets_of_any_bytes_are_written_for_or_unfit(sps: bytes, pps: bytes, number: int) -> None:
-    with contextlib.suppress(UnfitError):
+    with contextlib.suppress(UnsupportedParametersError):
         assert grey_picture(ParameterSets(sps, pps), number)
 
 
 def test_a_grey_gop_of_vp8_has_no_hole() -> None:
-    agreement: Any = Vp8Agreement(WIDTH, HEIGHT)
+    agreement: Any = Vp8StreamFormat(WIDTH, HEIGHT)
     pictures = agreement.blank(None, 10, 5, FPS)
     assert [(it.pulse, it.until, it.key) for it in pictures] == [(n, n + 1, n == 10) for n in range(10, 15)]

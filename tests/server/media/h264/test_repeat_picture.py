@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.media.h264 import PRESETS, decoded, encoded, how
-from server.media.h264.annexb import ParameterSets, nal_units, sample
-from server.media.h264.bitstream import BitReader, BitWriter, payload_of, unit_of
-from server.media.h264.repeat_picture import UnfitError, continuing
+from server.media.h264.annexb import ParameterSets, join_sample, nal_units
+from server.media.h264.bitstream import BitReader, BitWriter, escape_payload, unescape_payload
+from server.media.h264.repeat_picture import UnsupportedParametersError, parse_repeatable
 
 
 @settings(max_examples=25, deadline=None)
@@ -28,7 +28,7 @@ def test_the_last_picture_is_shown_for_as_long_as_it_is_repeated(
 ) -> None:
     units = encoded((16 * blocks[0], 16 * blocks[1] + 2), preset, 7)
     writer = how(units[0])
-    samples = [sample(nal_units(unit.data)) for unit in units]
+    samples = [join_sample(nal_units(unit.data)) for unit in units]
     numbers = [writer.frame_num(samples[shown - 1])]
     for _ in range(repeats):
         numbers.append(writer.next_num(numbers[-1]))
@@ -49,10 +49,10 @@ def test_the_last_picture_is_shown_for_as_long_as_it_is_repeated(
 def test_a_picture_can_be_slipped_in_between_two_of_a_camera(preset: str, before: set[int]) -> None:
     units = encoded((64, 48), preset, 6)
     writer = how(units[0])
-    alone = decoded([sample(nal_units(unit.data)) for unit in units])
+    alone = decoded([join_sample(nal_units(unit.data)) for unit in units])
     samples, expected = [], []
     for place, unit in enumerate(units):
-        data = sample(nal_units(unit.data))
+        data = join_sample(nal_units(unit.data))
         if place in before:
             samples.append(writer.repeat(writer.frame_num(data), reference=False))
             expected.append(place - 1)
@@ -65,7 +65,7 @@ def test_a_picture_can_be_slipped_in_between_two_of_a_camera(preset: str, before
 def test_pictures_are_numbered_one_after_the_other_from_each_key_picture_on() -> None:
     units = encoded((64, 48), "ultrafast", 45, gop=40)
     writer = how(units[0])
-    numbers = [writer.frame_num(sample(nal_units(unit.data))) for unit in units]
+    numbers = [writer.frame_num(join_sample(nal_units(unit.data))) for unit in units]
     assert numbers[0] == numbers[40] == 0
     assert all(later == writer.next_num(earlier) for earlier, later in pairwise(numbers[:40]))
 
@@ -77,8 +77,8 @@ def test_a_sample_without_a_picture_has_no_number() -> None:
 
 @given(st.binary(min_size=4, max_size=30), st.binary(min_size=1, max_size=10))
 def test_parameter_sets_of_any_bytes_are_read_or_unfit(sps: bytes, pps: bytes) -> None:
-    with contextlib.suppress(UnfitError):
-        assert continuing(ParameterSets(sps, pps)).macroblocks > 0
+    with contextlib.suppress(UnsupportedParametersError):
+        assert parse_repeatable(ParameterSets(sps, pps)).macroblocks > 0
 
 
 @given(st.lists(st.tuples(st.sampled_from("us"), st.integers(0, 2**20)), max_size=20))
@@ -94,6 +94,6 @@ def test_numbers_are_read_as_they_were_written(numbers: list[tuple[str, int]]) -
 
 @given(st.lists(st.sampled_from(b"\x00\x01\x03\x80"), min_size=1, max_size=40).map(bytes))
 def test_no_payload_has_a_start_code_in_its_unit(payload: bytes) -> None:
-    unit = unit_of(1, payload)
+    unit = escape_payload(1, payload)
     assert not any(code in unit for code in (b"\x00\x00\x00", b"\x00\x00\x01", b"\x00\x00\x02"))
-    assert payload_of(unit) == payload
+    assert unescape_payload(unit) == payload

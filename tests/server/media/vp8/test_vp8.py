@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from fakes.programs import needs_ffprobe
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
-from server.media.containers.webm import cluster, header, rebased
-from server.media.picture import Picture
+from server.media.containers.webm import cluster, header, shift_cluster
+from server.media.picture import EncodedPicture
 from server.media.stream_format import ParameterMismatchError
-from server.media.vp8.repeat_frame import repeat
-from server.media.vp8.stream_format import Vp8Agreement, size_of
+from server.media.vp8.repeat_frame import repeat_frame
+from server.media.vp8.stream_format import Vp8StreamFormat, keyframe_size
 from server.service.rendering.decided_boxes import first_pulse
 from server.service.rendering.worker.demuxers import demux_webm
 from server.service.streaming.frame_buffer import FrameBuffer
@@ -52,7 +52,7 @@ def decoded(frames: list[bytes], decoder: str) -> list[Pixels]:
 def test_a_repeat_shows_the_picture_before_and_nothing_after_it_can_tell(
     width: int, height: int, repeats: list[int]
 ) -> None:
-    units, again = encoded(width, height), repeat(width, height)
+    units, again = encoded(width, height), repeat_frame(width, height)
     plain = decoded([unit.data for unit in units], "vp8")
     told = [n for n, count in enumerate(repeats) for _ in range(1 + count)]
     frames = [
@@ -63,19 +63,19 @@ def test_a_repeat_shows_the_picture_before_and_nothing_after_it_can_tell(
 
 
 def test_a_repeat_is_small() -> None:
-    assert len(repeat(640, 360)) < 100
+    assert len(repeat_frame(640, 360)) < 100
 
 
 @given(st.integers(16, 8192), st.integers(16, 8192))
 def test_the_size_is_read_from_key_frames_alone(width: int, height: int) -> None:
     key = b"\x10\x00\x00\x9d\x01\x2a" + width.to_bytes(2, "little") + height.to_bytes(2, "little")
-    assert size_of(key) == (width, height)
-    assert size_of(b"\x11" + key[1:]) is None
-    assert size_of(key[:9]) is None
+    assert keyframe_size(key) == (width, height)
+    assert keyframe_size(b"\x11" + key[1:]) is None
+    assert keyframe_size(key[:9]) is None
 
 
 def frame_buffer(width: int = 64, height: int = 48) -> FrameBuffer:
-    return FrameBuffer(FPS, FRAMES, Vp8Agreement(width, height))
+    return FrameBuffer(FPS, FRAMES, Vp8StreamFormat(width, height))
 
 
 def test_a_camera_of_another_size_or_codec_is_refused() -> None:
@@ -89,7 +89,7 @@ def test_a_camera_of_another_size_or_codec_is_refused() -> None:
         frame_buffer().put(0, 1, h264.data, key=True)
 
 
-def shelved(units: tuple[AccessUnit, ...], boot: int = 1) -> list[Picture]:
+def shelved(units: tuple[AccessUnit, ...], boot: int = 1) -> list[EncodedPicture]:
     on = frame_buffer()
     return [on.put(unit.pulse, boot, unit.data, key=unit.key) for unit in units]
 
@@ -113,9 +113,9 @@ def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(
     first -= first % GOP
     units = {unit.pulse: unit for unit in encoded(64, 48, missed=frozenset(missed))}
     plain = dict(zip(units, decoded([unit.data for unit in units.values()], "vp8"), strict=True))
-    agreement = Vp8Agreement(64, 48)
+    agreement = Vp8StreamFormat(64, 48)
     time, on = GaplessTimeline(agreement, FPS, GOP), FrameBuffer(FPS, FRAMES, agreement)
-    shown: list[Picture] = []
+    shown: list[EncodedPicture] = []
     seen: list[int] = []
     """The pulse of the picture that is to be seen at each pulse."""
     for pulse in range(FRAMES):
@@ -140,9 +140,11 @@ def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(
 
 
 def test_a_long_hole_is_one_picture_that_lasts() -> None:
-    agreement = Vp8Agreement(64, 48)
+    agreement = Vp8StreamFormat(64, 48)
     time, (first, *_) = GaplessTimeline(agreement, FPS, GOP), encoded(64, 48)
-    shown = time.push(Picture(0, key=True, fragment=agreement.pack(first.data, 0, FPS, key=True), boot=1))
+    shown = time.push(
+        EncodedPicture(0, key=True, fragment=agreement.pack(first.data, 0, FPS, key=True), boot=1)
+    )
     shown += time.fill(1000)
     assert [(picture.pulse, picture.lasts) for picture in shown] == [(0, 1), (1, 999)]
     data = header(64, 48, FPS) + b"".join(picture.fragment for picture in shown)
@@ -156,7 +158,7 @@ def test_a_long_hole_is_one_picture_that_lasts() -> None:
 
 @given(st.integers(0, 2**40), st.integers(-1000, 10**9), st.sampled_from([15, 25, 29.97, 30, 50, 60]))
 def test_a_cluster_is_moved_by_its_time_alone(pulse: int, by: int, fps: float) -> None:
-    moved = rebased(cluster(b"frame", pulse, fps, key=True), max(by, 0))
+    moved = shift_cluster(cluster(b"frame", pulse, fps, key=True), max(by, 0))
     time = round(pulse * 1000 / fps) + max(0, by)
     assert moved[10:18] == time.to_bytes(8, "big")
     assert moved[:10] + moved[18:] == (whole := cluster(b"frame", pulse, fps, key=True))[:10] + whole[18:]

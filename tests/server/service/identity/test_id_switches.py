@@ -11,8 +11,8 @@ from bestview import TrackKey
 from fakes.cameras import HEIGHT, WIDTH, word
 from server.media.letterbox import Letterbox
 from server.service.identity.camera_window import CameraWindow
-from server.service.identity.id_switches import Exchange, exchanged
-from server.service.ingest.window_history import Stretch
+from server.service.identity.id_switches import IdSwitch, find_id_switches
+from server.service.ingest.window_history import HistorySpan
 
 FRAMES, FIRST = 20, 100
 PLACE = np.array([0.0, 0.0, 10.0, 30.0])
@@ -49,27 +49,27 @@ def test_two_who_are_in_each_others_place_from_a_frame_on_have_exchanged_their_p
     now[[one, two], since:] = now[[two, one], since:]
     # Some of the newest frames are spoken of for the first time, and the oldest words may be forgotten.
     known = FRAMES - 1 - newer
-    said = Stretch(window(old, FIRST), FIRST + forgotten, FIRST + known)
-    found = exchanged(window(now, FIRST), [said])
+    said = HistorySpan(window(old, FIRST), FIRST + forgotten, FIRST + known)
+    found = find_id_switches(window(now, FIRST), [said])
     seen = known + 1 - max(since, forgotten)
     if seen < 2:
         assert found == []
         return
     frame = FIRST + (since if since > forgotten else 0)
-    assert found == [Exchange(TrackKey("c0", one + 1), TrackKey("c0", two + 1), frame)]
+    assert found == [IdSwitch(TrackKey("c0", one + 1), TrackKey("c0", two + 1), frame)]
 
 
 def test_who_stays_who_is_hidden_and_who_goes_round_in_a_ring_has_exchanged_nothing() -> None:
     old = paths(3)
-    assert exchanged(window(old, FIRST), [Stretch(window(old, FIRST), FIRST, FIRST + 9)]) == []
-    assert exchanged(window(old, FIRST), []) == []
+    assert find_id_switches(window(old, FIRST), [HistorySpan(window(old, FIRST), FIRST, FIRST + 9)]) == []
+    assert find_id_switches(window(old, FIRST), []) == []
     ring = old.copy()
     ring[:, 5:] = ring[[1, 2, 0], 5:]
-    assert exchanged(window(ring, FIRST), [Stretch(window(old, FIRST), FIRST, FIRST + 9)]) == []
+    assert find_id_switches(window(ring, FIRST), [HistorySpan(window(old, FIRST), FIRST, FIRST + 9)]) == []
     hidden = old.copy()
     hidden[0, 5:] = hidden[1, 5:]
     hidden[1, 5:] = np.nan
-    assert exchanged(window(hidden, FIRST), [Stretch(window(old, FIRST), FIRST, FIRST + 9)]) == []
+    assert find_id_switches(window(hidden, FIRST), [HistorySpan(window(old, FIRST), FIRST, FIRST + 9)]) == []
 
 
 def test_in_a_crowd_nobody_exchanges_with_two_at_once() -> None:
@@ -77,5 +77,5 @@ def test_in_a_crowd_nobody_exchanges_with_two_at_once() -> None:
     old[2] = old[1] + 2.0
     now = old.copy()
     now[[0, 1], 5:] = now[[1, 0], 5:]
-    found = exchanged(window(now, FIRST), [Stretch(window(old, FIRST), FIRST, FIRST + 12)])
-    assert found == [Exchange(TrackKey("c0", 1), TrackKey("c0", 2), FIRST + 5)]
+    found = find_id_switches(window(now, FIRST), [HistorySpan(window(old, FIRST), FIRST, FIRST + 12)])
+    assert found == [IdSwitch(TrackKey("c0", 1), TrackKey("c0", 2), FIRST + 5)]

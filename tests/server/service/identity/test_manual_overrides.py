@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 from bestview import IdentityUpdate, Merge, Split
 from fakes.cameras import CAMERAS, LARGE, SMALL, STRIDE, epoch_of, word
 from fakes.people import Dictated, boxes, people, said
-from server.service.identity.manual_overrides import ByHand
-from server.service.identity.people import People
+from server.service.identity.manual_overrides import ManualOverrides
+from server.service.identity.people import PersonTracker
 
 numbers = st.integers(1, 6)
 
 
 @given(st.lists(st.tuples(st.booleans(), numbers, numbers), max_size=12))
 def test_whoever_is_said_to_be_one_stays_one(steps: list[tuple[bool, int, int]]) -> None:
-    it = ByHand()
+    it = ManualOverrides()
     one: list[set[int]] = [{number} for number in range(1, 7)]
     for by_hand, first, second in steps:
         kept, lost = it.now(first), it.now(second)
@@ -43,13 +43,13 @@ def test_whoever_is_said_to_be_one_stays_one(steps: list[tuple[bool, int, int]])
         assert number in it.worked_out(it.now(number))
 
 
-def dictated(*updates: IdentityUpdate) -> People:
+def dictated(*updates: IdentityUpdate) -> PersonTracker:
     it = people(departed_after=10)
     it._registry = Dictated(*updates)  # type: ignore[assignment]
     return it
 
 
-def seen(it: People, epoch: int) -> None:
+def seen(it: PersonTracker, epoch: int) -> None:
     it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}), word("c1", epoch, {1: LARGE})))
 
 

@@ -14,8 +14,8 @@ from bestview import IdentitySettings, IdentityUpdate, Merge, Split, TrackKey, T
 from fakes.cameras import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
 from fakes.people import Dictated, boxes, people, said
 from server.service.identity.local_numbers import LocalNumbers
-from server.service.identity.people import People
-from server.service.ingest.window_history import History
+from server.service.identity.people import PersonTracker
+from server.service.ingest.window_history import WindowHistory
 
 
 class Heard:
@@ -34,7 +34,7 @@ class Heard:
         return said({})
 
 
-def dictated(*updates: IdentityUpdate) -> People:
+def dictated(*updates: IdentityUpdate) -> PersonTracker:
     it = people()
     it._registry = Dictated(*updates)  # type: ignore[assignment]
     return it
@@ -43,7 +43,7 @@ def dictated(*updates: IdentityUpdate) -> People:
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.tuples(st.integers(0, 12), st.integers(-1, 6)), max_size=6), st.integers(0, 15))
 def test_the_newest_word_on_a_frame_counts(words: list[tuple[int, int]], old: int) -> None:
-    history, expected = History[int](), dict[int, int]()
+    history, expected = WindowHistory[int](), dict[int, int]()
     for number, (first, more) in enumerate(words):
         history.put(number, first, first + more)
         expected |= dict.fromkeys(range(first, first + more + 1), number)
@@ -81,7 +81,7 @@ def test_feet_that_the_lower_edge_cuts_off_do_not_say_where_somebody_stands() ->
 
 
 def test_a_camera_that_could_not_see_anybody_is_not_asked_who_is_there() -> None:
-    it = People(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=STRIDE)
+    it = PersonTracker(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=STRIDE)
     asked = []
     for epoch in range(8):
         it._registry = registry = Heard([])  # type: ignore[assignment]

@@ -32,9 +32,9 @@ from server.config.sections import HttpSettings, ShareSettings
 from server.http.app import make_app, serving
 from server.messaging.bus import Bus
 from server.messaging.messages import Box, ZenohKeys
-from server.service.identity.sharding import index_of, served, server_of
+from server.service.identity.sharding import own_numbers, shard_address, shard_of
 from server.service.service import BestViewService
-from server.service.view_selection.decider import Decider
+from server.service.view_selection.decider import ViewDecider
 from server.system.errors import UserError
 
 
@@ -47,10 +47,10 @@ def shared(index: int, of: int = 2, **more: Any) -> dict[str, Any]:
 def test_together_they_decide_what_one_alone_would(of: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     deciders = [
-        Decider(small_config(**shared(index, of)), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True)
+        ViewDecider(small_config(**shared(index, of)), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True)
         for index in range(of)
     ]
-    alone = Decider(small_config(), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True)
+    alone = ViewDecider(small_config(), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True)
     for it in [*deciders, alone]:
         it.people._registry = TrackNumbers()  # type: ignore[assignment]
     for number in range(6):
@@ -72,10 +72,10 @@ def test_together_they_decide_what_one_alone_would(of: int, seed: int) -> None:
 
 def test_whoever_watches_an_old_number_stays_where_they_are() -> None:
     share = ShareSettings(of=3, index=2)
-    assert served([1, 2, 4, 5], {}, share) == [2, 5]
-    assert served([1, 4], {5: 4}, share) == [4]
-    assert served([1, 2], {8: 7}, share) == [2]
-    assert [index_of(it, share) for it in (3, 4, 5)] == [0, 1, 2]
+    assert own_numbers([1, 2, 4, 5], {}, share) == [2, 5]
+    assert own_numbers([1, 4], {5: 4}, share) == [4]
+    assert own_numbers([1, 2], {8: 7}, share) == [2]
+    assert [shard_of(it, share) for it in (3, 4, 5)] == [0, 1, 2]
 
 
 def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
@@ -128,8 +128,8 @@ def test_a_share_that_cannot_be_is_refused_in_one_line(share: dict[str, Any], wh
 
 def test_addresses_are_bases_however_they_are_written() -> None:
     share = ShareSettings(of=2, servers=["http://a:1", "https://b/myview/"])
-    assert (server_of(2, share), server_of(3, share)) == ("http://a:1/", "https://b/myview/")
-    assert server_of(3, ShareSettings(of=2)) is None
+    assert (shard_address(2, share), shard_address(3, share)) == ("http://a:1/", "https://b/myview/")
+    assert shard_address(3, ShareSettings(of=2)) is None
 
 
 @pytest.fixture(params=[["http://one:1/", "http://two/x"], []])

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.cameras import CAMERAS, FPS, LARGE, SMALL, STRIDE, FedService, small_config, tracks, word
-from server.camera.retained_state import Keeping
+from server.camera.retained_state import RetainedState
 from server.http.app import make_app
 from server.messaging.epochs import end_of_epoch
 from server.messaging.identity_snapshot import (
@@ -24,8 +24,8 @@ from server.messaging.identity_snapshot import (
 )
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
-from server.service.identity.state_recovery import ALONE_MOST, LONGEST_S, Returning, believed
-from server.service.identity.state_replication import PATIENCE_S, Remembering
+from server.service.identity.state_recovery import ALONE_MOST, LONGEST_S, StateRecovery, trusted_first_free
+from server.service.identity.state_replication import PATIENCE_S, StateReplication
 
 A, B = CAMERAS
 KEYS = ZenohKeys("hall")
@@ -39,7 +39,9 @@ class Site:
 
     def __init__(self, **changes: object) -> None:
         self._changes = changes
-        self.cameras = {camera: Keeping(lambda said, it=camera: self._hear(it, said)) for camera in CAMERAS}
+        self.cameras = {
+            camera: RetainedState(lambda said, it=camera: self._hear(it, said)) for camera in CAMERAS
+        }
         self.service = FedService(small_config())
 
     def start(self, *, deaf: str | None = None) -> FedService:
@@ -167,7 +169,7 @@ def test_numbers_have_begun_with_the_first_that_is_given_however_late_a_camera_s
 def test_a_camera_that_remembers_nothing_learns_from_what_the_others_do() -> None:
     site = told()
     ann, other = site.whose(A, 2, 5), site.whose(B, 3, 5)
-    site.cameras[B] = Keeping(lambda said: site._hear(B, said))  # it was started anew, too
+    site.cameras[B] = RetainedState(lambda said: site._hear(B, said))  # it was started anew, too
     site.start()
     site.tell(range(7, 9))
     assert site.whose(A, 2, 8) == ann
@@ -199,7 +201,7 @@ def test_nobody_is_given_a_number_or_name_that_may_be_anothers(epochs: range, bo
 def test_a_camera_that_says_late_what_it_remembers_keeps_numbers_from_being_used_twice() -> None:
     site = told()
     used = max(site.service.decider.people.roll.everybody)
-    site.cameras[A] = Keeping(lambda said: site._hear(A, said))
+    site.cameras[A] = RetainedState(lambda said: site._hear(A, said))
     site.start(deaf=B)
     site.tell(range(7, 8), {A: {}, B: {}})
     site.cameras[B].service(there=True)
@@ -221,7 +223,7 @@ def test_a_camera_that_says_late_what_it_remembers_is_heard_all_the_same() -> No
 def test_of_what_is_said_late_nothing_counts_that_may_be_anothers_by_now() -> None:
     site = told()
     before = [site.whose(A, 1, 5), site.whose(A, 2, 5), site.whose(B, 3, 5)]
-    site.cameras[A] = Keeping(lambda said: site._hear(A, said))
+    site.cameras[A] = RetainedState(lambda said: site._hear(A, said))
     site.start(deaf=B)
     site.tell(range(7, 8), {A: {1: SMALL, 2: LARGE}, B: {}})
     assert site.whose(A, 1, 7) in before, "nobody had said that it was taken"
@@ -285,7 +287,7 @@ class Clock:
 
 def test_nothing_is_decided_before_every_camera_that_is_there_has_had_time_to_say_what_it_remembers() -> None:
     clock, service = Clock(), FedService(small_config())
-    it = Remembering(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
+    it = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
     it.begin(4)
     assert not it.waits, "nobody is there"
     it.alive(KEYS.camera(A, "alive"), there=True)
@@ -339,7 +341,7 @@ def test_what_a_camera_says_that_is_none_is_counted(damage: bytes, caplog: pytes
 
 def test_a_camera_keeps_no_more_than_it_can() -> None:
     said: list[bytes] = []
-    it = Keeping(said.append)
+    it = RetainedState(said.append)
     it.put(Message("", b"one", b""))
     it.put(Message("", b"2" * (SNAPSHOT_BYTES_MAX + 1), b""))
     it.service(there=False)
@@ -439,8 +441,8 @@ def test_large_numbers_that_two_cameras_remember_go_on() -> None:
 
 @given(st.lists(st.integers(1, PERSON_NUMBER_MAX), max_size=6), st.integers(1, PERSON_NUMBER_MAX))
 def test_whatever_one_camera_says_the_others_say_how_far_it_is_believed(others: list[int], lie: int) -> None:
-    most = max([believed(others), ALONE_MOST])
-    assert believed([*others, lie]) <= max(most, max(others, default=0) + 10_000)
+    most = max([trusted_first_free(others), ALONE_MOST])
+    assert trusted_first_free([*others, lie]) <= max(most, max(others, default=0) + 10_000)
 
 
 def remembers(since: float, pulse: int = 90) -> IdentitySnapshot:
@@ -450,20 +452,20 @@ def remembers(since: float, pulse: int = 90) -> IdentitySnapshot:
 @pytest.mark.parametrize("lie", [0.0, 1e12])
 def test_no_camera_alone_says_since_when_numbers_mean_what_they_do(lie: float) -> None:
     said = {"c0": remembers(lie), "c1": remembers(1000.0), "c2": remembers(1000.0)}
-    assert Returning(said, 100, 50).numbered_since == 1000.0
+    assert StateRecovery(said, 100, 50).numbered_since == 1000.0
 
 
 def test_of_two_words_on_when_numbers_began_the_later_counts() -> None:
-    assert Returning({"c0": remembers(900.0), "c1": remembers(1000.0)}, 100, 50).numbered_since == 1000.0
+    assert StateRecovery({"c0": remembers(900.0), "c1": remembers(1000.0)}, 100, 50).numbered_since == 1000.0
     long_ago = {"c0": remembers(900.0, pulse=1), "c1": remembers(900.0, pulse=1)}
-    assert Returning({**long_ago, "c2": remembers(1000.0)}, 100, 50).numbered_since == 1000.0
-    assert Returning(long_ago, 100, 50).numbered_since == 900.0
-    assert Returning({}, 100, 50).numbered_since == float("inf")
+    assert StateRecovery({**long_ago, "c2": remembers(1000.0)}, 100, 50).numbered_since == 1000.0
+    assert StateRecovery(long_ago, 100, 50).numbered_since == 900.0
+    assert StateRecovery({}, 100, 50).numbered_since == float("inf")
 
 
 def test_a_camera_that_comes_and_goes_and_never_says_what_it_remembers_is_waited_for_once() -> None:
     clock, service = Clock(), FedService(small_config())
-    it = Remembering(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
+    it = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
     for _ in range(4):
         it.alive(KEYS.camera(B, "alive"), there=False)
         it.alive(KEYS.camera(B, "alive"), there=True)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from server.service.ingest.backlog import KeepingUp
+from server.service.ingest.backlog import BacklogMonitor
 
 REACH = 100  # pulses
 
@@ -14,7 +14,7 @@ REACH = 100  # pulses
 def lost(behind: Sequence[int], every_s: float = 1.0) -> list[bool]:
     """Return what is said to so many pulses behind, second by second."""
     times = iter(it * every_s for it in range(len(behind)))
-    keeping_up = KeepingUp(REACH, lambda: next(times))
+    keeping_up = BacklogMonitor(REACH, lambda: next(times))
     return [keeping_up.is_lost(it) for it in behind]
 
 

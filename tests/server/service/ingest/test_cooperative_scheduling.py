@@ -12,7 +12,7 @@ from fakes.cameras import (
 )
 from fakes.decisions import EPOCHS, behind, noted
 from server.messaging.inbox import Inbox
-from server.service.ingest.backlog import KeepingUp
+from server.service.ingest.backlog import BacklogMonitor
 from server.service.ingest.epoch_aligner import Epoch
 
 
@@ -61,7 +61,7 @@ async def test_what_can_be_decided_only_after_its_pictures_are_gone_is_left_out(
 ) -> None:
     """Half as fast as the pulses: after each epoch they are two further on."""
     service, now = behind(), itertools.count(0.0, 1.5)
-    service._keeping_up = KeepingUp(2 * STRIDE, lambda: next(now))
+    service._keeping_up = BacklogMonitor(2 * STRIDE, lambda: next(now))
     decided, step = list[int](), service._step
 
     def slow(epoch: Epoch) -> None:

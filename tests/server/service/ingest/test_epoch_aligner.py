@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import CameraTracks
-from server.service.ingest.epoch_aligner import Aligner, Epoch
+from server.service.ingest.epoch_aligner import Epoch, EpochAligner
 
 STRIDE, GRACE = 5, 12
 CAMERAS = ("c0", "c1", "c2")
@@ -30,8 +30,8 @@ def word(camera: str, epoch: int, *, boot: int = 1, ended: bool = False) -> Came
     )
 
 
-def begun(*cameras: str) -> Aligner:
-    aligner = Aligner(CAMERAS, STRIDE, GRACE)
+def begun(*cameras: str) -> EpochAligner:
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE)
     for camera in cameras:
         aligner.come(camera)
         aligner.frame(camera, 1, 0)
@@ -128,13 +128,13 @@ def test_a_camera_whose_word_on_an_epoch_was_lost_is_not_waited_for_and_the_loss
 FAR = 300
 
 
-def taken(aligner: Aligner, now: int, count: int) -> list[Epoch]:
+def taken(aligner: EpochAligner, now: int, count: int) -> list[Epoch]:
     """Take out the next epochs; with nobody to wait for there may be one for each of the last pulses."""
     return [epoch for _ in range(count) if (epoch := aligner.next_ready(now)) is not None]
 
 
 def test_what_nobody_spoke_of_and_is_long_past_is_left_out_at_once() -> None:
-    aligner = Aligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, far=FAR)
     for camera in ("c0", "c1"):
         aligner.frame(camera, 1, 0)
         aligner.tracks(word(camera, 0))
@@ -150,7 +150,7 @@ def test_what_nobody_spoke_of_and_is_long_past_is_left_out_at_once() -> None:
 
 
 def test_with_nobody_left_it_goes_on_with_now() -> None:
-    aligner = Aligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, far=FAR)
     aligner.frame("c0", 1, 0)
     assert aligner.ready(now=0) == []
     aligner.gone("c0")
@@ -160,7 +160,7 @@ def test_with_nobody_left_it_goes_on_with_now() -> None:
 
 
 def test_what_is_not_long_past_and_what_somebody_spoke_of_are_taken_out_one_by_one() -> None:
-    aligner = Aligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, far=FAR)
     aligner.frame("c0", 1, 0)
     assert aligner.ready(now=0) == []
     one_by_one = (FAR - GRACE) // STRIDE
@@ -173,7 +173,7 @@ def test_what_is_not_long_past_and_what_somebody_spoke_of_are_taken_out_one_by_o
 
 
 def test_words_of_another_time_do_not_say_where_to_begin() -> None:
-    aligner = Aligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, far=FAR)
     for camera, epoch in (("c0", 3), ("c1", 1_000_000), ("c2", 9_000_000)):
         aligner.frame(camera, 1, epoch * STRIDE)
         aligner.tracks(word(camera, epoch))
@@ -193,7 +193,7 @@ BEHIND = 50
 
 def test_cameras_that_are_all_behind_are_waited_for_and_nobody_is_left_out() -> None:
     """As on a machine with too much to do: everybody speaks two seconds late."""
-    aligner = Aligner(CAMERAS, STRIDE, GRACE, BEHIND)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, BEHIND)
     for camera in CAMERAS:
         aligner.come(camera)
         aligner.frame(camera, 1, 0)
@@ -209,7 +209,7 @@ def test_cameras_that_are_all_behind_are_waited_for_and_nobody_is_left_out() -> 
 
 
 def test_nobody_is_waited_for_longer_than_they_may_be_behind() -> None:
-    aligner = Aligner(CAMERAS, STRIDE, GRACE, BEHIND)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, BEHIND)
     aligner.come("c0")
     aligner.frame("c0", 1, 0)
     assert aligner.ready(now=4 + GRACE + BEHIND) == []
@@ -220,7 +220,7 @@ def test_nobody_is_waited_for_longer_than_they_may_be_behind() -> None:
 
 
 def test_the_others_are_waited_for_from_the_first_word_on() -> None:
-    aligner = Aligner(CAMERAS, STRIDE, GRACE, BEHIND)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, BEHIND)
     for camera in ("c0", "c1"):
         aligner.come(camera)
         aligner.frame(camera, 1, 0)
@@ -231,7 +231,7 @@ def test_the_others_are_waited_for_from_the_first_word_on() -> None:
 
 
 def test_what_cannot_be_decided_in_time_is_left_out_up_to_the_newest_word_of_now() -> None:
-    aligner = Aligner(CAMERAS, STRIDE, GRACE)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE)
     for camera in CAMERAS:
         aligner.come(camera)
     for epoch in (0, 1, 2, 3, 4, 90):  # the last one is of a camera that has counted too far
@@ -248,7 +248,7 @@ def test_what_cannot_be_decided_in_time_is_left_out_up_to_the_newest_word_of_now
 
 
 def test_who_speaks_of_what_is_to_come_takes_nobody_elses_word_from_them() -> None:
-    aligner = Aligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, far=FAR)
     for camera in ("c0", "c1"):
         aligner.frame(camera, 1, 0)
     for epoch in range(30):

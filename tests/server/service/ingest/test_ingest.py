@@ -27,12 +27,12 @@ from fakes.cameras import (
     video,
     word,
 )
-from server.media.stream_format import Agreement
+from server.media.stream_format import StreamFormat
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
-from server.service.identity.people import People
-from server.service.ingest.epoch_aligner import Aligner
-from server.service.ingest.ingest import Intake
+from server.service.identity.people import PersonTracker
+from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.ingest.ingest import Ingest
 from server.service.streaming.frame_buffer import FrameBuffer
 
 KEYS = ZenohKeys("hall")
@@ -42,11 +42,11 @@ class Hall:
     """An intake and what it fills."""
 
     def __init__(self) -> None:
-        agreement = Agreement()
+        agreement = StreamFormat()
         self.frame_buffers = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
-        self.aligner = Aligner(CAMERAS, STRIDE, grace=5)
+        self.aligner = EpochAligner(CAMERAS, STRIDE, grace=5)
         self.frames: list[tuple[str]] = []
-        self.intake = Intake(self.frame_buffers, self.aligner, lambda *frame: self.frames.append(frame))
+        self.intake = Ingest(self.frame_buffers, self.aligner, lambda *frame: self.frames.append(frame))
         for camera in CAMERAS:
             self.intake.alive(KEYS.camera(camera, "alive"), there=True)
 
@@ -149,7 +149,7 @@ def test_one_wrong_field_raises_neither_here_nor_further_on(data: st.DataObject,
     hall.handle(
         what, Message(good.key, good.payload, changed) if in_head else Message(good.key, changed, b"")
     )
-    people = People(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
+    people = PersonTracker(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
     for epoch in hall.aligner.ready(now=1000):
         people.update(epoch)
 
@@ -244,7 +244,7 @@ def test_small_pictures_are_kept_by_run_and_track_until_they_are_old_or_the_came
 
 def test_what_is_of_pulses_that_nobody_can_have_counted_to_is_counted_and_dropped() -> None:
     hall = Hall()
-    hall.intake = Intake(hall.frame_buffers, hall.aligner, lambda *_: None, now=lambda: 20, ahead=50)
+    hall.intake = Ingest(hall.frame_buffers, hall.aligner, lambda *_: None, now=lambda: 20, ahead=50)
     far = 2**40
     unit = dataclasses.replace(encoded(0)[0], pulse=far)
     hall.handle("video", video("c0", unit))

@@ -9,7 +9,7 @@ from bestview import IdentitySettings
 from fakes.cameras import HEIGHT, STRIDE, WIDTH, epoch_of, word
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, CameraTracks
-from server.service.identity.people import People
+from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 
 LEFT: Box = (10.0, 20.0, 40.0, 110.0)
@@ -29,7 +29,7 @@ def mended(epoch: int) -> CameraTracks:
 
 @pytest.mark.parametrize("late", [1, 2, 3])
 def test_tracks_exchange_their_names_once_however_many_words_say_so(late: int) -> None:
-    people = People(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), 0)
+    people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), 0)
     for epoch in range(4):
         [said] = people.update(epoch_of(epoch, word("c0", epoch, {1: LEFT, 2: RIGHT})))
     left, right = said.keys

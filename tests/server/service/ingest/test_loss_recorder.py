@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from fakes.cameras import CAMERAS, FPS, STRIDE, epoch_of, word
-from server.media.stream_format import Agreement
+from server.media.stream_format import StreamFormat
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.ingest import CameraState
-from server.service.ingest.loss_recorder import Lacking
+from server.service.ingest.loss_recorder import LossRecorder
 from server.service.streaming.frame_buffer import FrameBuffer
 
 A, B = CAMERAS
@@ -19,9 +19,9 @@ class Told:
 
     def __init__(self) -> None:
         self.now = 0.0
-        frame_buffers = {camera: FrameBuffer(FPS, 50, Agreement()) for camera in CAMERAS}
+        frame_buffers = {camera: FrameBuffer(FPS, 50, StreamFormat()) for camera in CAMERAS}
         states = {camera: CameraState() for camera in CAMERAS}
-        self.lacking = Lacking(frame_buffers, states, STRIDE, lambda: self.now)
+        self.lacking = LossRecorder(frame_buffers, states, STRIDE, lambda: self.now)
 
     def epochs(self, numbers: range, late: str | None = None) -> None:
         """Decide epochs, to which all have spoken but one."""

@@ -30,7 +30,7 @@ from fakes.cameras import (
 from server.http.app import make_app
 from server.http.app_keys import METRICS
 from server.http.operator.cameras import _camera
-from server.media.audio.audio_format import SoundFormat
+from server.media.audio.audio_format import AudioFormat
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
@@ -235,7 +235,7 @@ def test_sound_of_more_frames_than_any_is_none_and_takes_no_time() -> None:
     head = {"first": 2**62, "sizes": [1] * (AUDIO_FRAMES_MAX + 1)}
     with pytest.raises(msgspec.ValidationError):
         msgspec.json.decode(json.dumps(head).encode(), type=AudioHeader)
-    frame_buffer = AudioBuffer(SoundFormat(48_000, 2), 25.0, 10.0)
+    frame_buffer = AudioBuffer(AudioFormat(48_000, 2), 25.0, 10.0)
     for first in range(0, 20 * AUDIO_FRAMES_MAX, AUDIO_FRAMES_MAX):
         frame_buffer.put(AudioHeader(first=first, sizes=[1] * AUDIO_FRAMES_MAX), bytes(AUDIO_FRAMES_MAX))
     assert len(frame_buffer._frames) == 469

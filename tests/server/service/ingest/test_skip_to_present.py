@@ -26,7 +26,7 @@ from fakes.decisions import noted
 from fakes.media.decoding import decodes_without_errors
 from fakes.recordings import everything_that_plays
 from server.media.audio.aac import SAMPLES
-from server.media.audio.audio_format import SoundFormat
+from server.media.audio.audio_format import AudioFormat
 from server.messaging.epochs import end_of_epoch
 from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
 from server.service.streaming.media_chunk import MediaChunk
@@ -181,7 +181,7 @@ async def test_a_site_without_a_pulse_server_is_decided_all_the_same(monkeypatch
 
 
 def test_a_camera_that_slept_is_not_followed_by_hours_of_silence() -> None:
-    following = AudioFollower(AudioBuffer(SoundFormat(48_000, 2), FPS, 10.0))
+    following = AudioFollower(AudioBuffer(AudioFormat(48_000, 2), FPS, 10.0))
     following.next_audio(0, FPS)
     hours = 8 * 3600 * FPS
     heard = following.next_audio(hours, hours + FPS)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fakes.cameras import SMALL, word
 from server.messaging.messages import FrameHeader, SolverReport
-from server.service.metrics.camera_metrics import Gauge, Spread
+from server.service.metrics.camera_metrics import CameraMetrics, RecentSeconds
 
 
 def head(pulse: int, late: float, due: float = 100.0) -> FrameHeader:
@@ -18,7 +18,7 @@ def head(pulse: int, late: float, due: float = 100.0) -> FrameHeader:
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=600))
 def test_the_error_is_that_of_the_last_frames(errors: list[float]) -> None:
-    gauge = Gauge()
+    gauge = CameraMetrics()
     assert gauge.sync_error is None
     for pulse, late in enumerate(errors):
         gauge.frame(head(pulse, late, due=0.0))
@@ -30,19 +30,19 @@ def test_the_error_is_that_of_the_last_frames(errors: list[float]) -> None:
 
 
 def test_a_windows_delay_is_from_when_its_last_frame_was_due() -> None:
-    gauge = Gauge()
+    gauge = CameraMetrics()
     said = word("c0", 0, {1: SMALL}, solved_at=100.5)
     gauge.window(said)  # of a frame that did not come
     assert gauge.tracking_delay is None
     gauge.frame(head(said.last, 0.1))
     gauge.window(said)
-    assert gauge.tracking_delay == Spread(0.5, 0.5)
+    assert gauge.tracking_delay == RecentSeconds(0.5, 0.5)
     assert gauge.size == said.size
 
 
 @pytest.mark.parametrize(("gaps", "share"), [([], None), ([0.0], 1.0), ([0.0, 0.1, 1e-12, 0.0], 0.75)])
 def test_a_window_is_certified_where_nothing_can_be_better(gaps: list[float], share: float | None) -> None:
-    gauge = Gauge()
+    gauge = CameraMetrics()
     for gap in gaps:
         solve = SolverReport(objective=-4.0, bound=-4.0, gap=gap, integral=False, rounds=1)
         gauge.window(msgspec.structs.replace(word("c0", 0, {}), solve=solve))
@@ -51,7 +51,7 @@ def test_a_window_is_certified_where_nothing_can_be_better(gaps: list[float], sh
 
 
 def test_another_run_is_measured_anew_but_what_went_wrong_is_remembered() -> None:
-    gauge = Gauge(now=lambda: 7.0)
+    gauge = CameraMetrics(now=lambda: 7.0)
     gauge.frame(head(0, 0.1))
     gauge.trouble("it went\nwrong")
     gauge.begin()

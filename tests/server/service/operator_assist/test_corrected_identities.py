@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from bestview import IdentitySettings, Split
-from server.camera.corrected_windows import mended
-from server.camera.track_messages import Reporter
+from server.camera.corrected_windows import corrected_messages
+from server.camera.track_messages import TrackMessageBuilder
 from server.messaging.messages import CameraTracks
-from server.service.identity.people import People
+from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.operator_assist.corrections import PointedPosition, corrections_for_tracker
 from tracking import CostSettings, Detections, WindowSettings, create_solver
@@ -46,17 +46,17 @@ class Camera:
     def __init__(self) -> None:
         solver = create_solver("columns")
         self._tracker = InteractiveTracker(WINDOW, CostSettings(), solver, ASSIST)
-        self._reporter = Reporter("c0", 1, (WIDTH, HEIGHT), WINDOW.stride)
+        self._reporter = TrackMessageBuilder("c0", 1, (WIDTH, HEIGHT), WINDOW.stride)
 
     def take(self, frame: int, said: Sequence[PositionCorrection] = ()) -> CameraTracks | None:
         result = self._tracker.push(frame, found(frame))
         if result is None:
             return None
         anew = self._tracker.apply_corrections(said) if said else None
-        return self._reporter.regular(result if anew is None else mended(result, anew))
+        return self._reporter.regular(result if anew is None else corrected_messages(result, anew))
 
 
-def at(people: People, pulse: int) -> dict[int, float]:
+def at(people: PersonTracker, pulse: int) -> dict[int, float]:
     """Return where everybody is shown, by number: the left side."""
     [rows] = people.boxes("c0", pulse, 1)
     return {number: left for number, left, *_ in rows}
@@ -64,13 +64,13 @@ def at(people: People, pulse: int) -> dict[int, float]:
 
 def played(
     said_at: int, of: Sequence[int], *, late: bool = False, frames: int = FRAMES
-) -> tuple[People, dict[int, dict[int, float]]]:
+) -> tuple[PersonTracker, dict[int, dict[int, float]]]:
     """Let the two meet; say at a window's end where the first was in some frames.
 
     Returns:
         Who is who, and by pulse who was shown where when that frame was told, 20 frames later.
     """
-    people = People(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), WINDOW.lag)
+    people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), WINDOW.lag)
     people.told.frames = ASSIST.memory_frames
     camera, told, first = Camera(), {}, 0
     held: list[CameraTracks] = []

@@ -31,9 +31,9 @@ from fakes.programs import needs_ffprobe
 from fakes.recordings import AMPLE, PULSE0, ClocksByHand, head, piece
 from fakes.site import A, Hall, opened
 from server.media.audio.aac import SAMPLES as FRAME
-from server.media.audio.audio_chunk import Heard
-from server.media.audio.audio_format import SoundFormat
-from server.media.containers.mp4_audio import sound_fragment
+from server.media.audio.audio_chunk import AudioChunk
+from server.media.audio.audio_format import AudioFormat
+from server.media.containers.mp4_audio import audio_fragment
 from server.messaging.messages import GopChoices
 from server.service.recording.audio_file import read_audio_frames
 from server.service.recording.recording_folder import GopRecord, RecordingFolder
@@ -41,7 +41,7 @@ from server.service.recording.recording_session import InitSegments
 from server.service.recording.retention import RetentionLimits
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
-FORM = SoundFormat(48_000, 2)
+FORM = AudioFormat(48_000, 2)
 PATIENT = {"viewer_queue_gops": 100}  # with who reads slowly
 
 
@@ -209,7 +209,7 @@ async def test_sound_goes_with_the_segments_it_is_of(tmp_path: Path) -> None:
         clocks.now = PULSE0 + gop * GOP / FPS
         it = piece(gop, {1: A})
         begin, end = (FORM.frame_at(pulse, FPS) for pulse in (gop * GOP, (gop + 1) * GOP))
-        heard = Heard(begin, tuple(bytes([number % 251]) * 9 for number in range(begin, end)), FORM)
+        heard = AudioChunk(begin, tuple(bytes([number % 251]) * 9 for number in range(begin, end)), FORM)
         store.write(GopRecord(it.choices, it.cameras, heard), head(), InitSegments(b"pictures", b"sound"))
     run = store.run
     assert run is not None
@@ -258,7 +258,7 @@ def test_a_damaged_file_gives_what_can_be_read_or_nothing(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     path = tmp_path_factory.mktemp("damaged") / "sound.mp4"
-    content = bytearray(b"".join(sound_fragment(FORM, [b"abc", b"de"], 2 * number) for number in range(4)))
+    content = bytearray(b"".join(audio_fragment(FORM, [b"abc", b"de"], 2 * number) for number in range(4)))
     for _ in range(data.draw(st.integers(1, 5))):
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
     path.write_bytes(content[: data.draw(st.integers(0, len(content)))])
@@ -278,7 +278,7 @@ def test_frames_are_found_by_their_numbers(
     path = tmp_path_factory.mktemp("frames") / "sound.mp4"
     content, number, all_of_them = b"junk", first, {}
     for frames in written:
-        content += sound_fragment(FORM, frames, number) if frames else b""
+        content += audio_fragment(FORM, frames, number) if frames else b""
         all_of_them |= dict(enumerate(frames, start=number))
         number += len(frames) + data.draw(st.integers(0, 2))
     path.write_bytes(content + b"junk")

@@ -31,9 +31,9 @@ from fakes.recordings import (
     written,
 )
 from fakes.site import Hall, opened
-from server.media.containers.mpegts import Counters
-from server.media.picture import Picture as Shown
-from server.media.stream_format import Agreement
+from server.media.containers.mpegts import ContinuityCounters
+from server.media.picture import EncodedPicture as Shown
+from server.media.stream_format import StreamFormat
 from server.messaging.identity_snapshot import IdentitySnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
@@ -285,7 +285,7 @@ class OnDisk:
         del pulse
 
 
-def site_of(store: RecordingFolder) -> tuple[Agreement, bytes]:
+def site_of(store: RecordingFolder) -> tuple[StreamFormat, bytes]:
     del store
     frame_buffers, header = filled()
     return frame_buffers[A]._agreement, header
@@ -367,7 +367,7 @@ async def test_who_comes_back_after_the_end_does_not_make_the_past_longer(tmp_pa
     agreement, header = site_of(store)
     channel, back = Broadcaster(), piece(8, {1: A}).cameras[A]
     came = [Shown(back.first + at, not at, it, boot=1) for at, it in enumerate(back.fragments)]
-    channel.publish(MediaChunk(came, FPS, Counters()))
+    channel.publish(MediaChunk(came, FPS, ContinuityCounters()))
     stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: channel)
     data = b"".join([it.data async for it in stream.send(PlaybackRange(0, 5 * GOP))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from fakes.cameras import FPS, GOP, encoded
 from fakes.rendering import CANVAS, fragments, shown
-from server.media.audio.audio_format import SoundFormat
-from server.media.rendering_messages import Drawn, Jpeg, Unit
+from server.media.audio.audio_format import AudioFormat
+from server.media.rendering_messages import EncodedFrame, JpegPicture, RenderResult
 from server.messaging.messages import AudioHeader, GopChoices
 from server.service.rendering.decided_boxes import NO_OVERLAY, DecidedBoxes
 from server.service.rendering.mjpeg_streams import MjpegStreams, MjpegVariant, PicturePacer
@@ -59,8 +59,8 @@ def test_gops_that_come_unevenly_are_shown_evenly_once_the_latest_has_come(
         assert then - at == pytest.approx((following - pulse) / FPS, abs=1e-6)
 
 
-def units(first: int, count: int) -> list[Unit]:
-    return [Unit(it.pulse, it.key, it.data) for it in encoded(0)[first : first + count]]
+def units(first: int, count: int) -> list[EncodedFrame]:
+    return [EncodedFrame(it.pulse, it.key, it.data) for it in encoded(0)[first : first + count]]
 
 
 def pulses_sent(viewer: Subscriber) -> bytes:
@@ -88,7 +88,7 @@ def test_a_film_that_goes_on_with_another_process_has_no_hole_and_never_goes_bac
 
 
 def test_a_film_is_silent_where_its_pictures_are() -> None:
-    form = SoundFormat(48_000, 2)
+    form = AudioFormat(48_000, 2)
     frame_buffer = AudioBuffer(form, FPS, 60.0)
     frame_buffer.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
     film = OverlayVideo(CANVAS, 8, frame_buffer)
@@ -102,7 +102,7 @@ def test_a_film_is_silent_where_its_pictures_are() -> None:
 
 @pytest.mark.parametrize("silent", [False, True])
 def test_the_holes_of_a_film_are_silent_where_nobody_knows_what_was_in_them(*, silent: bool) -> None:
-    form = SoundFormat(48_000, 2)
+    form = AudioFormat(48_000, 2)
     frame_buffer = AudioBuffer(form, FPS, 60.0)
     frame_buffer.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
     film = OverlayVideo(CANVAS, 8, frame_buffer, silent_holes=silent)
@@ -125,7 +125,7 @@ def test_a_viewer_of_pictures_has_the_newest_waiting_and_no_other() -> None:
     viewer = series.join(EVERY)
     slow = series.join(MjpegVariant(1.0, boxed=False))
     for pulse in range(30):
-        series.put(Drawn(newest=pulse, plain=[Jpeg(pulse, b"picture %d." % pulse)]), now=0.0)
+        series.put(RenderResult(newest=pulse, plain=[JpegPicture(pulse, b"picture %d." % pulse)]), now=0.0)
         assert series.show(0.0) is None
     assert [b"picture 29." in piece.data for piece in viewer._queue] == [True]
     assert [b"picture 25." in piece.data for piece in slow._queue] == [True]
@@ -138,7 +138,7 @@ def test_a_viewer_of_pictures_has_the_newest_waiting_and_no_other() -> None:
 def test_pictures_that_come_together_are_passed_on_each_at_its_moment() -> None:
     series = MjpegStreams(CANVAS, live=False)
     series.join(EVERY)
-    series.put(Drawn(newest=4, plain=[Jpeg(pulse, b"") for pulse in range(5)]), now=10.0)
+    series.put(RenderResult(newest=4, plain=[JpegPicture(pulse, b"") for pulse in range(5)]), now=10.0)
     moments = [10.0]
     while (following := series.show(moments[-1])) is not None:
         moments.append(following)
@@ -159,13 +159,13 @@ async def test_who_asks_for_a_newer_picture_than_others_is_given_no_older_one() 
     early, late = (asyncio.create_task(stills.get("plain", pulse)) for pulse in (100, 125))
     await asyncio.sleep(0)
     assert stills.possible(101) == ["plain"]
-    stills.give("plain", Jpeg(101, b""))
-    assert await early == Jpeg(101, b"")
+    stills.give("plain", JpegPicture(101, b""))
+    assert await early == JpegPicture(101, b"")
     await stills.asked.wait()
     await asyncio.sleep(0)
     assert stills.possible(124) == []
-    stills.give("plain", Jpeg(125, b""))
-    assert await late == Jpeg(125, b"")
+    stills.give("plain", JpegPicture(125, b""))
+    assert await late == JpegPicture(125, b"")
 
 
 def test_boxes_are_found_by_the_pulse_of_the_frames() -> None:

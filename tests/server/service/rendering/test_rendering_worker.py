@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from fakes.cameras import FPS, GOP, HEIGHT, WIDTH
 from fakes.rendering import CANVAS, fragments, shown
 from fakes.timeouts import PATIENCE
-from server.media.containers.fmp4 import Sample, fragment
-from server.media.rendering_messages import Draw, Drawn, belongs, framed
+from server.media.containers.fmp4 import FragmentSample, fragment
+from server.media.rendering_messages import RenderRequest, RenderResult, encode_message, is_in_series
 from server.service.rendering.decided_boxes import first_pulse
 from server.service.rendering.worker.__main__ import serve
 from server.service.rendering.worker.box_overlay import CHOSEN_COLOR, OTHER_COLOR, Image, draw_boxes
@@ -34,14 +34,14 @@ def far(jpeg: bytes, image: Image) -> float:
 @given(rates, st.integers(0, 10**6), st.sampled_from([10.0, 12.5, 25.0, 30.0]))
 def test_a_series_has_as_many_pictures_as_its_rate_says(rate: float, first: int, fps: float) -> None:
     seconds = 40
-    count = sum(belongs(pulse, rate, fps) for pulse in range(first, first + round(seconds * fps)))
+    count = sum(is_in_series(pulse, rate, fps) for pulse in range(first, first + round(seconds * fps)))
     assert abs(count - seconds * min(rate, fps)) <= 1.01
 
 
 @given(st.sampled_from([1.0, 2.5, 5.0, 12.5]), st.integers(1, 5), st.integers(0, 10**6))
 def test_a_slower_series_is_part_of_one_that_is_a_multiple(rate: float, times: int, first: int) -> None:
     for pulse in range(first, first + 50):
-        assert not belongs(pulse, rate, FPS) or belongs(pulse, rate * times, FPS)
+        assert not is_in_series(pulse, rate, FPS) or is_in_series(pulse, rate * times, FPS)
 
 
 units_of_a_frame = st.lists(st.binary(min_size=1, max_size=40), min_size=1, max_size=3)
@@ -53,7 +53,11 @@ def test_frames_come_out_of_fragments_as_they_went_in(
 ) -> None:
     data = b"".join(
         fragment(
-            [Sample(b"".join(len(unit).to_bytes(4, "big") + unit for unit in units), key=False, lasts=lasts)],
+            [
+                FragmentSample(
+                    b"".join(len(unit).to_bytes(4, "big") + unit for unit in units), key=False, lasts=lasts
+                )
+            ],
             first + place,
             FPS,
         )
@@ -75,7 +79,9 @@ def test_any_bytes_are_no_frames_or_frames_but_no_error(data: bytes) -> None:
 
 
 def test_every_picture_is_its_own_frames() -> None:
-    drawn = StreamRenderer(CANVAS).draw(Draw(fragments=fragments(0, 2 * GOP), plain=[FPS], still="plain"))
+    drawn = StreamRenderer(CANVAS).draw(
+        RenderRequest(fragments=fragments(0, 2 * GOP), plain=[FPS], still="plain")
+    )
     assert [picture.pulse for picture in drawn.plain] == list(range(2 * GOP))
     for picture in drawn.plain:
         assert far(picture.data, shown(0)[picture.pulse]) < 15
@@ -86,15 +92,15 @@ def test_every_picture_is_its_own_frames() -> None:
 
 def test_what_nobody_wants_is_not_made_and_a_still_is_of_the_frame_before() -> None:
     studio = StreamRenderer(CANVAS)
-    assert studio.draw(Draw(still="boxed")) == Drawn(newest=-1)
-    assert studio.draw(Draw(fragments=fragments(0, GOP))) == Drawn(newest=GOP - 1)
-    still = studio.draw(Draw(still="plain")).still
+    assert studio.draw(RenderRequest(still="boxed")) == RenderResult(newest=-1)
+    assert studio.draw(RenderRequest(fragments=fragments(0, GOP))) == RenderResult(newest=GOP - 1)
+    still = studio.draw(RenderRequest(still="plain")).still
     assert still is not None
     assert still.pulse == GOP - 1
 
 
 def test_frames_before_a_key_frame_are_left_out() -> None:
-    drawn = StreamRenderer(CANVAS).draw(Draw(fragments=fragments(2, 2 * GOP), plain=[FPS]))
+    drawn = StreamRenderer(CANVAS).draw(RenderRequest(fragments=fragments(2, 2 * GOP), plain=[FPS]))
     assert [picture.pulse for picture in drawn.plain] == list(range(GOP, 2 * GOP + 2))
 
 
@@ -102,9 +108,9 @@ def test_frames_before_a_key_frame_are_left_out() -> None:
 @given(st.binary(max_size=60), st.integers(0, GOP - 1))
 def test_a_damaged_frame_spoils_nothing_after_its_gop(damage: bytes, place: int) -> None:
     studio = StreamRenderer(CANVAS)
-    broken = fragment([Sample(len(damage).to_bytes(4, "big") + damage, key=False)], place, FPS)
-    studio.draw(Draw(fragments=fragments(0, place) + broken + fragments(place + 1, GOP - place - 1)))
-    drawn = studio.draw(Draw(fragments=fragments(GOP, GOP), plain=[FPS]))
+    broken = fragment([FragmentSample(len(damage).to_bytes(4, "big") + damage, key=False)], place, FPS)
+    studio.draw(RenderRequest(fragments=fragments(0, place) + broken + fragments(place + 1, GOP - place - 1)))
+    drawn = studio.draw(RenderRequest(fragments=fragments(GOP, GOP), plain=[FPS]))
     assert [picture.pulse for picture in drawn.plain] == list(range(GOP, 2 * GOP))
     assert all(far(picture.data, shown(0)[picture.pulse]) < 15 for picture in drawn.plain)
 
@@ -116,14 +122,14 @@ def test_a_time_that_never_comes_is_damage(ticks: int) -> None:
     start = whole.index(b"tfdt") + len(b"tfdt") + 4
     studio = StreamRenderer(CANVAS)
     broken = whole[:start] + ticks.to_bytes(8, "big") + whole[start + 8 :]
-    assert studio.draw(Draw(fragments=broken, film=True, still="plain")) == Drawn(newest=-1)
-    assert len(studio.draw(Draw(fragments=fragments(GOP, GOP), film=True)).film) == GOP
+    assert studio.draw(RenderRequest(fragments=broken, film=True, still="plain")) == RenderResult(newest=-1)
+    assert len(studio.draw(RenderRequest(fragments=fragments(GOP, GOP), film=True)).film) == GOP
 
 
 def test_the_film_has_the_cameras_gops_and_begins_anew_where_time_goes_back() -> None:
     studio = StreamRenderer(CANVAS)
     keys = [
-        [unit.key for unit in studio.draw(Draw(fragments=fragments(first, GOP), film=True)).film]
+        [unit.key for unit in studio.draw(RenderRequest(fragments=fragments(first, GOP), film=True)).film]
         for first in (0, GOP, GOP)
     ]
     assert keys == [[True] + [False] * (GOP - 1)] * 3
@@ -142,14 +148,18 @@ def test_the_chosen_persons_box_lies_over_the_others() -> None:
 
 
 def test_the_process_answers_until_its_input_ends() -> None:
-    asked = framed(CANVAS) + framed(Draw(fragments=fragments(0, GOP), film=True)) + framed(Draw())
+    asked = (
+        encode_message(CANVAS)
+        + encode_message(RenderRequest(fragments=fragments(0, GOP), film=True))
+        + encode_message(RenderRequest())
+    )
     for cut in (0, 1, 7):
         answers = io.BytesIO()
         serve(io.BytesIO(asked[: len(asked) - cut]), answers)
         data, found = answers.getvalue(), []
         while data:
             size = int.from_bytes(data[:4], "big")
-            found.append(msgspec.msgpack.decode(data[4 : 4 + size], type=Drawn))
+            found.append(msgspec.msgpack.decode(data[4 : 4 + size], type=RenderResult))
             data = data[4 + size :]
         assert len(found) == (1 if cut else 2)
         assert len(found[0].film) == GOP
@@ -162,6 +172,8 @@ def test_the_process_itself_ends_when_nobody_is_left_to_ask() -> None:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )
-    out, _ = process.communicate(framed(CANVAS) + framed(Draw(fragments=fragments(0, 1))), timeout=PATIENCE)
-    assert msgspec.msgpack.decode(out[4:], type=Drawn).newest == 0
+    out, _ = process.communicate(
+        encode_message(CANVAS) + encode_message(RenderRequest(fragments=fragments(0, 1))), timeout=PATIENCE
+    )
+    assert msgspec.msgpack.decode(out[4:], type=RenderResult).newest == 0
     assert process.returncode == 0

@@ -30,7 +30,7 @@ from fakes.media.ffprobe import probed
 from fakes.media.mpegts import check_counters, taken_apart
 from fakes.programs import needs_chromium, needs_ffprobe
 from fakes.site import A, B, Hall, opened
-from server.camera.audio import RecordedSound
+from server.camera.audio import RecordedAudioSource
 from server.config.sections import SoundSettings
 from server.media.audio.aac import SAMPLES as FRAME
 from server.media.containers.fmp4 import init_segment
@@ -176,9 +176,9 @@ async def test_a_site_without_sound_is_as_it_always_was(hall: Hall) -> None:
 async def test_the_site_says_what_sound_it_has_and_passes_over_what_is_none(loud: Hall) -> None:
     assert (await loud.get_json("/api/site"))["sound"] == "mp4a.40.2"
     (good,) = messages(
-        RecordedSound(str(loud.service.config.sound.source), SoundSettings(source="x"), FPS, 0, "stop").until(
-            5
-        )
+        RecordedAudioSource(
+            str(loud.service.config.sound.source), SoundSettings(source="x"), FPS, 0, "stop"
+        ).until(5)
     )
     for bad in (
         b"",

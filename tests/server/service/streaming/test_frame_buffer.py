@@ -6,7 +6,7 @@ import pytest
 
 from fakes.cameras import FPS, encoded
 from server.camera.encoding.encoder import AccessUnit
-from server.media.stream_format import Agreement, ParameterMismatchError
+from server.media.stream_format import ParameterMismatchError, StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 
 
@@ -15,7 +15,7 @@ def put(frame_buffer: FrameBuffer, unit: AccessUnit) -> None:
 
 
 def test_the_oldest_frames_make_room() -> None:
-    frame_buffer = FrameBuffer(FPS, 10, Agreement())
+    frame_buffer = FrameBuffer(FPS, 10, StreamFormat())
     for unit in encoded(0)[:25]:
         put(frame_buffer, unit)
     assert [pulse for pulse in range(30) if frame_buffer.has(pulse)] == list(range(15, 25))
@@ -24,7 +24,7 @@ def test_the_oldest_frames_make_room() -> None:
 
 
 def test_a_gop_is_the_fragments_of_its_frames_in_order() -> None:
-    frame_buffer = FrameBuffer(FPS, 20, Agreement())
+    frame_buffer = FrameBuffer(FPS, 20, StreamFormat())
     for unit in encoded(0)[:10]:
         put(frame_buffer, unit)
     frames = [frame_buffer.get(pulse) for pulse in range(5, 10)]
@@ -33,7 +33,7 @@ def test_a_gop_is_the_fragments_of_its_frames_in_order() -> None:
 
 
 def test_other_parameters_are_refused_and_leave_no_trace() -> None:
-    agreement = Agreement()
+    agreement = StreamFormat()
     first, second = FrameBuffer(FPS, 10, agreement), FrameBuffer(FPS, 10, agreement)
     put(first, encoded(0)[0])
     with pytest.raises(ParameterMismatchError, match="differ from the other cameras'"):
@@ -46,7 +46,7 @@ def test_other_parameters_are_refused_and_leave_no_trace() -> None:
 
 @pytest.mark.parametrize("data", [b"", b"\x00\x00\x01", b"\x00\x00\x01\x67", b"no H.264 at all"])
 def test_a_key_frame_without_parameter_sets_is_refused(data: bytes) -> None:
-    frame_buffer = FrameBuffer(FPS, 10, Agreement())
+    frame_buffer = FrameBuffer(FPS, 10, StreamFormat())
     with pytest.raises(ParameterMismatchError, match="without parameter sets"):
         frame_buffer.put(0, 1, data, key=True)
     assert not frame_buffer.has(0)

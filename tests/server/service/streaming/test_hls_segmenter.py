@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, NO_REASON, WIDTH, encoded, small_config
 from server.media.containers.fmp4 import init_segment
-from server.media.stream_format import Agreement
+from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.hls_segmenter import HlsSegment, HlsSegmenter, segment_layout
 from server.service.streaming.splicer import Splicer
@@ -27,7 +27,7 @@ class Site:
     """A splicer whose decisions a test makes; cameras have all frames but those of the GOPs in ``silent``."""
 
     def __init__(self, silent: frozenset[int] = frozenset(), begin: int = 0) -> None:
-        self.agreement = Agreement()
+        self.agreement = StreamFormat()
         self.frame_buffers = {camera: FrameBuffer(FPS, GOPS * GOP, self.agreement) for camera in CAMERAS}
         self.splicer = Splicer(self.frame_buffers, self.agreement, small_config(http={"hls_segment_s": 0.41}))
         for seed, camera in enumerate(CAMERAS):

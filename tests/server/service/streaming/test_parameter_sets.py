@@ -18,7 +18,7 @@ from fakes.parameter_sets import GOPS, MAKES, OWN, decision, expected, put, sent
 from fakes.programs import needs_chromium, needs_ffmpeg
 from fakes.site import Hall, opened
 from server.config.site_config import Config
-from server.media.codec import agreement_for
+from server.media.codec import stream_format_for
 from server.media.h264.annexb import nal_units, parameter_sets
 from server.media.stream_format import ParameterMismatchError
 from server.service.streaming.frame_buffer import FrameBuffer
@@ -29,7 +29,7 @@ from server.service.streaming.subscriber_queue import Chunk
 
 async def spliced(config: Config) -> tuple[bytes, bytes]:
     """Give a stream that changes camera at every GOP, as MP4 and as a transport stream."""
-    agreement = agreement_for(
+    agreement = stream_format_for(
         config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
     )
     frame_buffers = {camera: FrameBuffer(FPS, GOPS * GOP, agreement) for camera in MAKES}

@@ -9,7 +9,7 @@ import pytest
 
 from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
 from fakes.timeouts import PATIENCE
-from server.media.stream_format import Agreement
+from server.media.stream_format import StreamFormat
 from server.messaging.messages import NumberedBox
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
@@ -23,7 +23,7 @@ class Site:
     """Two cameras whose pictures are all there; a test says whom the first one sees, GOP by GOP."""
 
     def __init__(self) -> None:
-        agreement = Agreement()
+        agreement = StreamFormat()
         self.frame_buffers = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
         for seed, camera in enumerate(CAMERAS):
             for unit in encoded(seed):

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
 from fakes.decisions import choice
 from fakes.timeouts import PATIENCE
-from server.media.stream_format import Agreement
+from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.streaming.subscriber_queue import Subscriber
@@ -18,7 +18,7 @@ A, B = CAMERAS
 
 
 def filled() -> tuple[Splicer, dict[str, FrameBuffer]]:
-    agreement = Agreement()
+    agreement = StreamFormat()
     frame_buffers = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed):

@@ -18,7 +18,7 @@ from fakes.timeouts import PATIENCE
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment
-from server.media.stream_format import Agreement
+from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.streaming.subscriber_queue import Subscriber
@@ -88,7 +88,7 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
     wishes: list[str | None],
     preset: str,
 ) -> None:
-    agreement = Agreement()
+    agreement = StreamFormat()
     frame_buffers = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
     splicer = Splicer(frame_buffers, agreement, small_config())
     sent = {camera: taken(seed, missed, preset) for seed, camera in enumerate(CAMERAS)}
@@ -129,7 +129,7 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
 
 
 def splicing() -> tuple[Splicer, dict[str, FrameBuffer], bytes]:
-    agreement = Agreement()
+    agreement = StreamFormat()
     frame_buffers = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
     splicer = Splicer(frame_buffers, agreement, small_config())
     for unit in taken(0, frozenset(), "ultrafast"):
@@ -162,7 +162,7 @@ async def test_a_camera_that_fell_silent_stands_still_until_it_comes_back() -> N
     splicer, _, head = splicing()
     viewer = splicer.cameras["c0"].subscribe()
     units = taken(0, frozenset(), "ultrafast")
-    frame_buffer = FrameBuffer(FPS, 10, Agreement())
+    frame_buffer = FrameBuffer(FPS, 10, StreamFormat())
     for unit in units[: GOP + 2]:
         splicer.publish_frame("c0", frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key))
     for gop in range(2, 14):

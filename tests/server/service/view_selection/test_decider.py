@@ -14,20 +14,20 @@ from hypothesis import strategies as st
 from fakes.cameras import CAMERAS, GOP, LARGE, SMALL, STRIDE, TrackNumbers, epoch_of, small_config, word
 from server.messaging.messages import Box
 from server.service.decision_state import Board, reason
-from server.service.view_selection.decider import Decider, GopDecision
+from server.service.view_selection.decider import GopDecision, ViewDecider
 
 Seen = Mapping[str, Mapping[int, Box | None]]
 A, B = CAMERAS
 EVERY_FRAME: Callable[[str, int], bool] = lambda _camera, _pulse: True  # noqa: E731 — a default of the tests
 
 
-def decider(has: Callable[[str, int], bool] = EVERY_FRAME, **changes: Any) -> Decider:
-    it = Decider(small_config(**changes), dict.fromkeys(CAMERAS), has)
+def decider(has: Callable[[str, int], bool] = EVERY_FRAME, **changes: Any) -> ViewDecider:
+    it = ViewDecider(small_config(**changes), dict.fromkeys(CAMERAS), has)
     it.people._registry = TrackNumbers()  # type: ignore[assignment]
     return it
 
 
-def decide(it: Decider, story: Sequence[Seen], *, end: int | None = None) -> list[GopDecision]:
+def decide(it: ViewDecider, story: Sequence[Seen], *, end: int | None = None) -> list[GopDecision]:
     """Tell a story epoch by epoch; ``end`` is the last frame when the recordings are over."""
     decisions = []
     for number, seen in enumerate(story):

@@ -25,7 +25,7 @@ from fakes.site import A, B, Hall
 from server.config.sections import ViewSettings
 from server.http.access.csrf import CHANGES
 from server.service.streaming.subscriber_queue import Chunk
-from server.service.view_selection.decider import Decider, GopDecision
+from server.service.view_selection.decider import GopDecision, ViewDecider
 from server.system.errors import UserError
 
 EPOCHS = 8  # as many as there are pictures of
@@ -45,7 +45,7 @@ def test_every_gop_is_decided_once_in_order_and_by_frames_that_are_known(
     changes: Changes, gop: int, min_shot_s: float
 ) -> None:
     config = small_config(encode={"gop": gop}, view={"lookahead": 20, "min_shot_s": min_shot_s})
-    decider = Decider(config, dict.fromkeys(CAMERAS), lambda *_: True)
+    decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
     decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     decided: list[GopDecision] = []
     for number in range(45):
@@ -68,7 +68,7 @@ def test_every_gop_is_decided_once_in_order_and_by_frames_that_are_known(
 def test_a_look_ahead_that_was_changed_and_settled_chooses_as_if_it_had_always_been() -> None:
     def told(*changes: tuple[int, int]) -> list[GopDecision]:
         config = small_config(view={"lookahead": 20})
-        decider = Decider(config, dict.fromkeys(CAMERAS), lambda *_: True)
+        decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
         decider.people._registry = TrackNumbers()  # type: ignore[assignment]
         decided = []
         for number in range(30):

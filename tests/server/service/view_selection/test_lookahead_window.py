@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from bestview import TrackKey
 from fakes.cameras import CAMERAS, STRIDE, TrackNumbers, epoch_of, small_config, word
 from server.messaging.messages import Box, CameraTracks
-from server.service.identity.people import People
+from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.view_selection.lookahead_window import Outlook
-from server.service.view_selection.view_quality_buffer import Sight
+from server.service.view_selection.lookahead_window import LookaheadWindow
+from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 WINDOW, EPOCHS = 3 * STRIDE, 5
 BOX = st.tuples(*(st.integers(1, 20) for _ in "xywh")).map(
@@ -28,7 +28,7 @@ WORD = st.dictionaries(
 STORY = st.lists(st.dictionaries(st.sampled_from(CAMERAS), WORD, max_size=2), min_size=1, max_size=EPOCHS)
 
 
-class Drifting(People):
+class Drifting(PersonTracker):
     """People whose numbers change at a frame, differently in each camera and track."""
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
@@ -59,7 +59,9 @@ def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]
     return word(camera, epoch, {}, first=first, tracks=tracks)
 
 
-def slowly(story: Sequence[Epoch], sight: Sight, people: Drifting) -> dict[tuple[int, str, int], float]:
+def slowly(
+    story: Sequence[Epoch], sight: ViewQualityBuffer, people: Drifting
+) -> dict[tuple[int, str, int], float]:
     """Return the quality of every view by pulse, camera and number, one box after the other."""
     found: dict[tuple[int, str, int], float] = {}
     newest: dict[tuple[int, str], CameraTracks] = {}
@@ -85,7 +87,7 @@ def test_it_holds_every_view_once_and_compares_it_with_the_best(
     config = small_config()
     people = Drifting(config.view.identity, CAMERAS, dict.fromkeys(CAMERAS), (64, 48), lag=0)
     people._registry = TrackNumbers()  # type: ignore[assignment]
-    sight = Sight(config, dict.fromkeys(CAMERAS), people.fits)
+    sight = ViewQualityBuffer(config, dict.fromkeys(CAMERAS), people.fits)
     epochs = [
         epoch_of(number, *(long_word(camera, number, boxes) for camera, boxes in said.items()))
         for number, said in enumerate(story)
@@ -93,7 +95,7 @@ def test_it_holds_every_view_once_and_compares_it_with_the_best(
     for epoch in epochs:
         sight.put(people.update(epoch))
     last = epochs[-1].last
-    outlook = Outlook(
+    outlook = LookaheadWindow(
         CAMERAS,
         sight,
         people,

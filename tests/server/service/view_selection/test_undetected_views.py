@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from fakes.cameras import CAMERAS, STRIDE, TrackNumbers, epoch_of, small_config, word
 from server.messaging.messages import Box
 from server.service.decision_state import reason
-from server.service.view_selection.cross_view_inference import Elsewhere
-from server.service.view_selection.decider import Decider, GopDecision
-from server.service.view_selection.undetected_views import Tested as Looked
-from server.service.view_selection.undetected_views import Unfound
-from server.service.view_selection.view_quality_buffer import Sight
+from server.service.view_selection.cross_view_inference import CrossViewInference
+from server.service.view_selection.decider import GopDecision, ViewDecider
+from server.service.view_selection.undetected_views import TestedViews as Looked
+from server.service.view_selection.undetected_views import UndetectedViews
+from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 A, B = CAMERAS
 GROUND = {A: np.eye(3), B: np.diag([0.5, 0.5, 1.0])}
@@ -33,13 +33,13 @@ def at(x: float, y: float, camera: str = A) -> Box:
     return scale * (x - 2.0), scale * (y - 10.0), scale * (x + 2.0), scale * y
 
 
-def decider(ground: Mapping[str, np.ndarray | None] = GROUND, **view: Any) -> Decider:
-    it = Decider(small_config(view=view), ground, lambda _camera, _pulse: True)
+def decider(ground: Mapping[str, np.ndarray | None] = GROUND, **view: Any) -> ViewDecider:
+    it = ViewDecider(small_config(view=view), ground, lambda _camera, _pulse: True)
     it.people._registry = TrackNumbers()  # type: ignore[assignment]
     return it
 
 
-def decide(it: Decider, story: Sequence[Told]) -> list[GopDecision]:
+def decide(it: ViewDecider, story: Sequence[Told]) -> list[GopDecision]:
     epochs = (
         epoch_of(number, *(word(camera, number, boxes) for camera, boxes in said.items()))
         for number, said in enumerate(story)
@@ -124,11 +124,11 @@ def test_why_says_who_does_not_find_them_and_what_that_view_is_worth() -> None:
 def test_a_look_stands_for_the_frames_to_the_next_one_and_for_none_that_are_decided_later(
     frames: int,
 ) -> None:
-    it = Elsewhere(small_config(), Sight(small_config(), GROUND, {}))
+    it = CrossViewInference(small_config(), ViewQualityBuffer(small_config(), GROUND, {}))
     looks = np.array([0, 10, 20])
     cameras, feet = np.zeros(3, int), np.full((3, 2), 20.0)
     tested = Looked(looks, cameras, feet, np.ones(3, dtype=np.bool_))
-    it.learn(replace(Unfound.nobody(), tested=tested), frames)
+    it.learn(replace(UndetectedViews.nobody(), tested=tested), frames)
     assert it._findable._counts[0].sum() == frames, "the next outlook begins with a look"
 
 
