@@ -151,9 +151,9 @@ def status(camera: str, **changes: Any) -> Message:
 class TrackNumbers:
     """An identity registry for which a track's number is the person's, in every camera."""
 
-    next_number = 1
+    next_id = 1
 
-    def begin_at(self, number: int) -> None:
+    def reserve_below(self, person_id: int) -> None:
         """Give the tracks' numbers all the same."""
 
     def update(

@@ -151,7 +151,7 @@ def test_many_rows_absorbed_at_once_are_as_many_one_after_the_other(data: st.Dat
     one, two = np.triu_indices(len(left), 1)
     for affinity in (simultaneous_pairs, in_turn):
         affinity.set_rows(left)
-    for table in ("score_ground_proximity", "apart", "alike"):
+    for table in ("ground_evidence", "cannot_link", "appearance_evidence"):
         assert (
             getattr(simultaneous_pairs, table)(one, two).tolist()
             == getattr(in_turn, table)(one, two).tolist()

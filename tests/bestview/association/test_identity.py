@@ -149,8 +149,8 @@ def test_evidence_corrects_a_number_and_says_so() -> None:
 @pytest.mark.parametrize("dressed", [True, False], ids=["by looks and ground", "by ground alone"])
 def test_a_track_that_takes_one_for_the_other_in_a_crowd_is_two_episodes(most: int, *, dressed: bool) -> None:
     # Two meet before one camera and part again, and its tracker has exchanged them; another camera sees all.
-    def meeting(camera: str, local: int, start: float, speed: float, begin: int = 0, end: int = 999) -> Stay:
-        return Stay(camera, local, begin, end, (start, 0), (speed, 0), dressed * (1 + 2 * (start > 0)))
+    def meeting(camera: str, local: int, place: float, speed: float, start: int = 0, end: int = 999) -> Stay:
+        return Stay(camera, local, start, end, (place, 0), (speed, 0), dressed * (1 + 2 * (place > 0)))
 
     stays = [
         Stay("west", 1, 0, 999, (-3, 0), (0.03, 0), dressed * 1),

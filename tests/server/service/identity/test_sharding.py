@@ -82,9 +82,9 @@ def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
     class Merging:
         """First two people, then one."""
 
-        next_number = 3
+        next_id = 3
 
-        def begin_at(self, number: int) -> None:
+        def reserve_below(self, number: int) -> None:
             """Nobody remembers more."""
 
         def update(self, given: Sequence[TrackUpdate], last_frame: int, _: object) -> IdentityUpdate:
