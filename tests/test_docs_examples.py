@@ -24,10 +24,13 @@ from fakes.paths import DOCS, ROOT
 from fakes.timeouts import PATIENCE
 from server.cli.main import app as command_line
 from server.config.sections import HttpSettings
-from server.http.api.schema import CameraInfo, Choice, ObjectInfo, SiteInfo
+from server.http.api.schema import ObjectInfo, SiteInfo
 from server.http.app import make_app, serving
-from server.http.app_keys import METRICS
+from server.http.metrics.http_collector import METRICS
 from server.messaging import messages
+from server.service.facade.cameras import CameraInfo
+from server.service.facade.people import ViewSelection
+from server.service.pipeline import BestViewPipeline
 from server.service.service import BestViewService
 
 PAGES = sorted(DOCS.rglob("*.md"))
@@ -77,7 +80,7 @@ async def site(by_hand: Any) -> AsyncIterator[str]:
     """Serve a site in which two people have been seen; give its address."""
     service = by_hand.FedService(by_hand.small_config())
     service.decider.people._registry = by_hand.TrackNumbers()
-    async with serving(make_app(service), HttpSettings(port=0)) as port:
+    async with serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port:
         service.come(*by_hand.CAMERAS)
         for epoch in range(3):
             service.feed(epoch, {"c0": {1: by_hand.SMALL, 2: by_hand.SMALL}, "c1": {1: by_hand.LARGE}})
@@ -169,7 +172,7 @@ def option_rows(command: str) -> str:
 
 
 async def test_every_path_is_described(by_hand: Any) -> None:
-    app = make_app(BestViewService(by_hand.small_config()))
+    app = make_app(BestViewService(BestViewPipeline(by_hand.small_config())))
     paths = {route.resource.canonical for route in app.router.routes() if route.resource is not None}
     assert len(paths) > 10
     described = reference("http-api") + reference("streams")
@@ -178,7 +181,7 @@ async def test_every_path_is_described(by_hand: Any) -> None:
         assert f"`{plain}`" in described, plain
 
 
-@pytest.mark.parametrize("kind", [SiteInfo, ObjectInfo, CameraInfo, Choice])
+@pytest.mark.parametrize("kind", [SiteInfo, ObjectInfo, CameraInfo, ViewSelection])
 def test_every_field_of_an_answer_is_described(kind: type[msgspec.Struct]) -> None:
     http = reference("http-api")
     for field in msgspec.structs.fields(kind):
@@ -197,8 +200,8 @@ def test_every_field_of_a_message_is_described() -> None:
 
 
 async def test_every_metric_is_described(by_hand: Any) -> None:
-    service = BestViewService(by_hand.small_config())
-    metrics: CollectorRegistry = make_app(service)[METRICS]
+    service = BestViewPipeline(by_hand.small_config())
+    metrics: CollectorRegistry = make_app(BestViewService(service))[METRICS]
     names = [f"{it.name}_total" if it.type == "counter" else it.name for it in metrics.collect()]
     for name in [name for name in names if name.startswith("myview_")]:
         assert f"`{name}`" in reference("metrics"), name

@@ -23,7 +23,7 @@ from benchmarks.faults.site import Fault, Inject, Stand
 from benchmarks.surroundings import one_thread_environment
 from client import Gop
 from server.cli.generated_config import free_port
-from server.http.access.csrf import CHANGES
+from server.http.access.csrf import CSRF_HEADER
 
 _GONE_S = 30.0
 _FAULTY_S = 8.0
@@ -89,7 +89,7 @@ async def with_middle(views: Views, folder: Path) -> AsyncIterator[Stand]:
 async def _operate(stand: Stand) -> None:
     """Point at whom viewers watch, once a GOP, where they really are: until cancelled."""
     pointed = 0
-    async with aiohttp.ClientSession(stand.url, headers={CHANGES: "1"}) as session:
+    async with aiohttp.ClientSession(stand.url, headers={CSRF_HEADER: "1"}) as session:
         while True:
             told = stand.told.gops
             if len(told) > pointed:

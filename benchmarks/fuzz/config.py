@@ -19,7 +19,7 @@ from server.config.loader import build_config, change_view_settings, load_config
 from server.config.site_config import Config
 from server.config.tokens_file import read_tokens
 from server.http.operator.settings import settings_of
-from server.service.service import BestViewService
+from server.service.pipeline import BestViewPipeline
 from server.system.errors import UserError
 
 WORDS = (
@@ -71,7 +71,7 @@ def _looked_at(config: Config, *, seldom: bool) -> None:
         for setting in settings_of(config):
             msgspec.json.encode(setting)
     if len(config.cameras) <= _MOST_CAMERAS:
-        BestViewService(config)
+        BestViewPipeline(config)
 
 
 class Text(_Undisturbed):
@@ -187,7 +187,7 @@ class Tried(Target):
     name = "config-tried"
 
     def __init__(self) -> None:
-        self._service = BestViewService(site())
+        self._service = BestViewPipeline(site())
         self._view = self._service.decider.view
 
     def make(self, rng: Random) -> bytes:

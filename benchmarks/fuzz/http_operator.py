@@ -7,7 +7,7 @@ from typing import Any
 
 from benchmarks.fuzz.http_site import Asked
 from benchmarks.fuzz.mutate import as_json, damaged, otherwise
-from server.http.access.csrf import CHANGES
+from server.http.access.csrf import CSRF_HEADER
 
 _ASKED: tuple[tuple[str, str, Any], ...] = (
     ("POST", "/api/operator/people", {"object": 1, "name": "Ada"}),
@@ -48,7 +48,7 @@ class Operator(Asked):
         if rng.random() < 0.15:
             body = damaged(rng, body)
         head = (
-            f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n{CHANGES}: 1\r\nConnection: close\r\n"
+            f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n{CSRF_HEADER}: 1\r\nConnection: close\r\n"
             f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
         )
         return head.encode() + body

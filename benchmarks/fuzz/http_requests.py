@@ -7,7 +7,7 @@ from random import Random
 from benchmarks.fuzz.http_asked import METHODS, WORDS, address, some_range
 from benchmarks.fuzz.http_site import Asked
 from benchmarks.fuzz.mutate import as_json, damaged, otherwise
-from server.http.access.csrf import CHANGES
+from server.http.access.csrf import CSRF_HEADER
 
 _CHANGES_SHARE = 0.8
 _BODIES = (
@@ -60,7 +60,7 @@ class Requests(Asked):
         if rng.random() < 0.1:
             lines.append(rng.choice(_HEADERS) if rng.random() < 0.7 else some_range(rng))
         if rng.random() < _CHANGES_SHARE:
-            lines.append(f"{CHANGES}: 1")  # without it what changes something is refused before it is read
+            lines.append(f"{CSRF_HEADER}: 1")  # or it is refused before it is read
         if body:
             lines += [f"Content-Length: {len(body)}", "Content-Type: application/json"]
         request = "\r\n".join([*lines, "Connection: close", "", ""]).encode("utf-8", "replace") + body

@@ -20,6 +20,7 @@ from benchmarks.fuzz.site import Fed, Word, feed_epoch, site, word
 from benchmarks.fuzz.target import Target
 from server.http.api.openapi import describe
 from server.http.app import make_app, serving
+from server.service.service import BestViewService
 
 _WELL_EVERY = 100
 EPOCHS = 6
@@ -56,7 +57,7 @@ class Served:
         self.service.pulse0 = 1_700_000_000.0
         for epoch in range(EPOCHS):
             feed_epoch(self.service, rng, epoch, EPOCHS, word)
-        self.app = make_app(self.service)
+        self.app = make_app(BestViewService(self.service))
         self._before(self.app)
         self.port = await self._stack.enter_async_context(
             serving(self.app, config.http.model_copy(update={"port": 0}))

@@ -22,7 +22,7 @@ from benchmarks.fuzz.mutate import as_json, damaged
 from benchmarks.fuzz.site import STRIDE, one_each, pictures
 from benchmarks.fuzz.target import Target, folder
 from server.config.tokens_file import token_digest
-from server.http.access.access_control import ACCESS
+from server.http.access.authorization import ACCESS
 from server.http.access.sessions import _Session
 from server.http.app_keys import SERVICE
 
@@ -81,7 +81,7 @@ class Strangers(Target):
         )
         for number, name in _NAMES.items():
             self._served.service.decider.people.roll.call(number, name)
-        self._access = self._served.app[ACCESS]
+        self._authenticator = self._served.app[ACCESS].authenticator
         ends = time.monotonic() + 1e9
         self._sessions = {
             token_digest(_COOKIES[who]): _Session(token_digest(SECRETS[who]), ends) for who in _WHO
@@ -98,7 +98,9 @@ class Strangers(Target):
 
     async def _note(self, request: web.Request, response: web.StreamResponse) -> None:
         resource, names = request.match_info.route.resource, request.match_info
-        number = request.app[SERVICE].board.resolve(int(names["object"])) if "object" in names else None
+        number = (
+            request.app[SERVICE].people.current_number(int(names["object"])) if "object" in names else None
+        )
         self._answered.append(
             _Answered(
                 status=response.status,
@@ -147,9 +149,9 @@ class Strangers(Target):
     def feed(self, data: bytes) -> bool:
         """Ask, and look at what was answered to whom."""
         came_from = _ADDRESSES[data[0] % len(_ADDRESSES)] if data else _ADDRESSES[0]
-        self._access.sessions._sessions = dict(self._sessions)
-        self._access._failures._until = {_ADDRESSES[-1]: time.monotonic() + 1e9}
-        self._access._right.clear()
+        self._authenticator.sessions._sessions = dict(self._sessions)
+        self._authenticator._rate_limit._until = {_ADDRESSES[-1]: time.monotonic() + 1e9}
+        self._authenticator._valid.clear()
         self._answered.clear()
         answer = self._served.ask(data[1:], came_from)
         granted = judged(data[1:], answer)

@@ -28,7 +28,7 @@ from server.messaging.messages import (
     ZenohKeys,
 )
 from server.messaging.operator_messages import RiskEvent
-from server.service.service import BestViewService
+from server.service.pipeline import BestViewPipeline
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 GOP = STRIDE = 5
@@ -178,7 +178,7 @@ def sound(epoch: int) -> Message:
     return Message(KEYS.sound, bytes(_SOUND_BYTES * 9), msgspec.json.encode(head))
 
 
-class Fed(BestViewService):
+class Fed(BestViewPipeline):
     """The best-view service without a bus; ``handle`` is what the bus would call."""
 
     def __init__(self, config: Config) -> None:

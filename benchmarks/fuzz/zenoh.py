@@ -32,9 +32,9 @@ from benchmarks.fuzz.zenoh_wrong import wrong
 from server.camera.operator_corrections import CorrectionInbox as PointedAt
 from server.camera.peers.detection_buffer import PeerDetectionBuffer
 from server.camera.peers.detection_exchange import PeerDetectionExchange
-from server.http.api.responses import cameras_info, choice_info, objects_info, site_info
+from server.http.api.responses import cameras_info, objects_info, site_info
 from server.http.app import make_app
-from server.http.app_keys import METRICS
+from server.http.metrics.http_collector import METRICS
 from server.media.audio.audio_format import AudioFormat
 from server.media.stream_format import StreamFormat
 from server.messaging.epochs import end_of_epoch
@@ -43,6 +43,7 @@ from server.messaging.messages import FrameDetections
 from server.messaging.operator_messages import OPERATOR_POINTS_MAX, OperatorPoint, OperatorPoints
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.ingest import Ingest
+from server.service.service import BestViewService
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.media_chunk import MediaChunk
@@ -235,11 +236,12 @@ class Sessions(Scripts):
 
 def ask(service: Fed) -> None:
     """Ask a service everything that its API tells."""
-    for told in (site_info(service), objects_info(service), cameras_info(service)):
-        msgspec.json.encode(told)
+    facade = BestViewService(service)
+    for content in (site_info(facade), objects_info(facade), cameras_info(facade)):
+        msgspec.json.encode(content)
     for number in [*service.board.standings, 99]:
-        msgspec.json.encode(choice_info(service, number))
-    generate_latest(make_app(service)[METRICS])
+        msgspec.json.encode(facade.people.view_selection_of(number))
+    generate_latest(make_app(facade)[METRICS])
 
 
 def drink(viewer: Any) -> None:

@@ -27,7 +27,7 @@ import yaml
 from benchmarks.report import Report
 from benchmarks.surroundings import ROOT, one_thread_environment, parser
 from server.cli.generated_config import free_port
-from server.http.event_loop_lag import Lag
+from server.http.metrics.event_loop_lag import LoopLag
 from synthetic import Scene, write_recording
 
 _FPS, _WIDTH, _HEIGHT = 25.0, 192, 108
@@ -59,7 +59,7 @@ class Asked:
     frames: list[tuple[float, float]] = field(default_factory=list)
     camera_mb: float = np.nan
     service_mb: float = np.nan
-    own: Lag = field(default_factory=Lag)
+    own: LoopLag = field(default_factory=LoopLag)
 
     @property
     def first(self) -> float:
@@ -187,7 +187,8 @@ def write_site(folder: Path, films: Path, cameras: int) -> tuple[Path, int]:
 
 def row(cameras: int, niceness: int, asked: Asked) -> list[str]:
     """Return a row of the table."""
-    own = [(float(bound), count) for bound, count in asked.own.histogram.buckets]
+    [family] = asked.own.histogram.collect()
+    own = [(float(it.labels["le"]), it.value) for it in family.samples if it.name.endswith("_bucket")]
     seconds = [asked.first, *(asked.wait(it) for it in (50, 95, 100))]
     bounds = [lag_below(0.95, asked.lags), lag_below(1.0, asked.lags), lag_below(0.95, own)]
     return [

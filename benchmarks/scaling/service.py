@@ -25,7 +25,7 @@ from server.service.decision_state import Board
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.ingest import Ingest
-from server.service.service import BestViewService
+from server.service.pipeline import BestViewPipeline
 from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import ViewDecider
 from server.service.view_selection.lookahead_window import LookaheadWindow
@@ -101,7 +101,7 @@ def watch(path: Path) -> None:
         (ViewQualityBuffer, "put", "quality"),
         (LookaheadWindow, "__init__", "costs"),
         (Board, "put", "board"),
-        (BestViewService, "_publish", "publish"),
+        (BestViewPipeline, "_publish", "publish"),
         (Bus, "publish", "publish"),
         (Splicer, "decision", "splice"),
         (Events, "_lists", LISTS),

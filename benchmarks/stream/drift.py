@@ -16,7 +16,7 @@ from server.config.site_config import Config
 from server.media.containers.fmp4 import ticks
 from server.messaging.inbox import Message
 from server.messaging.messages import FrameHeader, GopChoices, ZenohKeys
-from server.service.service import BestViewService
+from server.service.pipeline import BestViewPipeline
 from server.service.streaming.media_chunk import MediaChunk
 from server.service.streaming.subscriber_queue import Chunk
 
@@ -49,7 +49,7 @@ class Drift:
 class Source:
     """Cameras that send at whatever pace they are asked."""
 
-    def __init__(self, service: BestViewService, films: Sequence[Sequence[AccessUnit]], hall: Hall) -> None:
+    def __init__(self, service: BestViewPipeline, films: Sequence[Sequence[AccessUnit]], hall: Hall) -> None:
         self._service, self._films, self._hall = service, films, hall
         self._keys = ZenohKeys(service.config.site.name)
         self._trackers = [Tracker(hall, camera, _BOOT) for camera in range(CAMERAS)]
@@ -83,7 +83,7 @@ async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> Drift:
         CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
         for name, ground in zip(hall.ids, hall.grounds, strict=True)
     ]
-    service = BestViewService(Config(site=SITE, encode=ENCODE, cameras=cameras))
+    service = BestViewPipeline(Config(site=SITE, encode=ENCODE, cameras=cameras))
     source, decided = Source(service, films, hall), list[GopChoices]()
     service.on_decision.append(decided.append)
     viewer = service.splicer.decided_cameras[hall.ids[0]].subscribe().chunks()

@@ -18,6 +18,7 @@ from server.config.sections import CameraSettings, HttpSettings
 from server.config.site_config import Config
 from server.http.app import make_app, serving
 from server.messaging.messages import GopChoices
+from server.service.pipeline import BestViewPipeline
 from server.service.service import BestViewService
 
 _PER_CAMERA = 2
@@ -77,7 +78,7 @@ async def hls_delays(films: Sequence[Sequence[AccessUnit]], seconds: float) -> t
         CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
         for name, ground in zip(hall.ids, hall.grounds, strict=True)
     ]
-    service = BestViewService(Config(site=SITE, encode=ENCODE, cameras=cameras))
+    service = BestViewPipeline(Config(site=SITE, encode=ENCODE, cameras=cameras))
     source, decided, clock = Source(service, films, hall), dict[int, float](), asyncio.get_running_loop().time
 
     def note(choices: GopChoices) -> None:
@@ -96,7 +97,7 @@ async def hls_delays(films: Sequence[Sequence[AccessUnit]], seconds: float) -> t
 
     players = [_Player(clock, decided) for _ in range(2)]
     async with (
-        serving(make_app(service), HttpSettings(port=0)) as port,
+        serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}/cameras/{hall.ids[0]}/hls/") as session,
     ):
         going = asyncio.create_task(go_on())

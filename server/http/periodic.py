@@ -1,4 +1,4 @@
-"""What is done again and again, for as long as the server runs."""
+"""Periodic tasks, for as long as the server runs."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import NoReturn
 log = logging.getLogger(__name__)
 
 
-async def again_and_again(every_s: float, turn: Callable[[], Awaitable[None]], what: str) -> NoReturn:
-    """Take a turn every so many seconds; ``what`` it is says the log where one fails.
+async def run_periodically(every_s: float, step: Callable[[], Awaitable[None]], what: str) -> NoReturn:
+    """Run a step every so many seconds; ``what`` it does is logged where it fails.
 
-    Nobody waits for the task in which this is done: were it to end with the first mistake, nobody would see.
-    So the next turn is taken all the same; one that fails as the one before it is not told of again.
+    Nobody awaits the task that runs this: were it to end with the first error, nobody would see. So the next
+    step is run all the same; one that fails as the one before it is not logged again.
     """
     failed = ""
     while True:
         await asyncio.sleep(every_s)
         try:
-            await turn()
+            await step()
         except Exception as error:
             if repr(error) != failed:
                 log.exception("%s failed; it is tried again", what)

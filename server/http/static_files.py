@@ -1,4 +1,4 @@
-"""The web page's files: they are the client's, and are served as they are."""
+"""Static files: the web page, which the client package owns."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from aiohttp import web
 
-from server.http.api.handlers import problem
+from server.http.json_responses import error_response
 
 routes = web.RouteTableDef()
 
@@ -40,7 +40,7 @@ async def get_file(request: web.Request) -> web.StreamResponse:
     """Give one of the page's files."""
     path = _file(request.match_info["file"])
     if path is None:
-        return problem(404, f"there is nothing at {request.path}")
+        return error_response(404, f"there is nothing at {request.path}")
     return web.FileResponse(path, headers=_HEADERS)
 
 

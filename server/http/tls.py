@@ -7,17 +7,17 @@ import ssl
 from pathlib import Path
 
 from server.config.sections import TlsSettings
-from server.http.periodic import again_and_again
+from server.http.periodic import run_periodically
 from server.system.errors import UserError
 from server.system.file_state import FileState, file_state
 
 log = logging.getLogger(__name__)
 
-_LOOK_EVERY_S = 5.0
+_CHECK_EVERY_S = 5.0
 
 
 class Certificate:
-    """What the server proves itself by. New connections get the newest that could be read."""
+    """A certificate and its key. New connections use the newest that could be read."""
 
     def __init__(self, certificate: Path, key: Path) -> None:
         """Read both files.
@@ -27,17 +27,17 @@ class Certificate:
         """
         self._certificate, self._key = certificate, key
         self._seen = self._state()
-        """As it is in force."""
-        self._trouble = ""
-        """Why what is there now is not."""
+        """The state of the files that are in force."""
+        self._error = ""
+        """Why the files as they are now could not be read; logged once."""
         self._newest = self._load()
         self.context = self._newest
         # A context keeps what it has loaded beside a later key of another kind: each pair has its own.
-        self.context.sni_callback = self._hand_over
+        self.context.sni_callback = self._use_newest
 
     @classmethod
     def of(cls, settings: TlsSettings) -> Certificate | None:
-        """Read what a configuration names; None: it names nothing.
+        """Read the files that a configuration names; None: it names none.
 
         Raises:
             UserError: it cannot be read.
@@ -46,29 +46,29 @@ class Certificate:
             return None
         return cls(settings.certificate, settings.key)
 
-    def look(self) -> None:
+    def reload_if_changed(self) -> None:
         """Read the files again if they have changed; what cannot be read leaves the old one in force."""
         now = self._state()
         if now == self._seen:
             return
         try:
             self._newest = self._load()
-        except UserError as error:  # read again at the next look: it may be half of a renewal
-            if str(error) != self._trouble:
+        except UserError as error:  # read again at the next check: it may be half of a renewal
+            if str(error) != self._error:
                 log.warning("%s; the certificate as it was stays in force", error)
-            self._trouble = str(error)
+            self._error = str(error)
         else:
-            self._seen, self._trouble = now, ""
+            self._seen, self._error = now, ""
             log.info("%s: is in force for new connections", self._certificate)
 
     async def run(self) -> None:
-        """Look again and again."""
-        await again_and_again(_LOOK_EVERY_S, self._look, "looking at the certificate")
+        """Check for changed files again and again."""
+        await run_periodically(_CHECK_EVERY_S, self._reload, "reading the certificate again")
 
-    async def _look(self) -> None:
-        self.look()
+    async def _reload(self) -> None:
+        self.reload_if_changed()
 
-    def _hand_over(self, connection: ssl.SSLObject, _: str | None, __: ssl.SSLContext) -> None:
+    def _use_newest(self, connection: ssl.SSLObject, _: str | None, __: ssl.SSLContext) -> None:
         connection.context = self._newest
 
     def _load(self) -> ssl.SSLContext:

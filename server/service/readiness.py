@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.service.service import BestViewService
+from server.service.pipeline import BestViewPipeline
 
 _SILENT_S = 2.0
 """Pulses that did not come for so long have stopped; slow sites wait for three of theirs."""
@@ -10,7 +10,7 @@ _SLACK_S = 3.0
 """What a busy machine may be behind by, beyond what is waited for by design."""
 
 
-def why_not_ready(service: BestViewService) -> list[str]:
+def why_not_ready(service: BestViewPipeline) -> list[str]:
     """Say what is missing for a best view to be served now; nothing: it can be.
 
     It takes pulses, a camera that delivers, and decisions that keep up with the pulses.
@@ -32,7 +32,7 @@ def why_not_ready(service: BestViewService) -> list[str]:
     return reasons
 
 
-def most_behind(service: BestViewService) -> int:
+def most_behind(service: BestViewPipeline) -> int:
     """Give the pulses by which decisions may be behind at most, while all is well."""
     config, fps = service.config, service.config.site.fps
     waits = config.view.late_after_s + config.track.backlog_s + _SLACK_S

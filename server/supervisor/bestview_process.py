@@ -9,6 +9,7 @@ from pathlib import Path
 from camsync import SyncError
 from server.config.running_config import ActiveConfig
 from server.http.app import make_app, serving
+from server.service.pipeline import BestViewPipeline
 from server.service.service import BestViewService
 from server.supervisor.exposure_checks import check_bus, check_viewers
 from server.supervisor.scene_ground import add_scene_ground
@@ -30,27 +31,27 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     check_viewers(config)
     if config.view.share.index == 0:
         check_bus(config)  # the others are no router
-    service = BestViewService(add_scene_ground(config), out)
-    following = asyncio.create_task(_follow(running, service), name="reload")
+    pipeline = BestViewPipeline(add_scene_ground(config), out)
+    following = asyncio.create_task(_follow(running, pipeline), name="reload")
     try:
-        service.open()
-        async with serving(make_app(service, running.on_disk), config.http) as port:
+        pipeline.open()
+        async with serving(make_app(BestViewService(pipeline), running.on_disk), config.http) as port:
             scheme = "http" if config.http.tls.key is None else "https"
             log.info("page, streams and API on %s://%s:%d/", scheme, config.http.host, port)
             signal_started()
-            await service.run()
+            await pipeline.run()
     except SyncError as error:
         raise UnavailableError(f"bestview: {error}") from error
     finally:
         following.cancel()
-        service.close()
+        pipeline.close()
 
 
-async def _follow(running: ActiveConfig, service: BestViewService) -> None:
+async def _follow(running: ActiveConfig, pipeline: BestViewPipeline) -> None:
     """Go by a configuration that is read again, as far as a running service can."""
     async for reload in reloads(running):
         try:
-            service.go_by(reload.now)
+            pipeline.go_by(reload.now)
         except UserError as error:
             log.warning("%s: %s; the configuration as it was stays in force", running.path, error)
         except Exception:

@@ -10,7 +10,7 @@ from fakes.timeouts import PATIENCE
 from server.camera.process import CameraProcess
 from server.config.pulse_access import bestview_client_name, pulse_users
 from server.config.site_config import Config
-from server.service.service import BestViewService
+from server.service.pipeline import BestViewPipeline
 
 FPS = 50
 
@@ -20,7 +20,7 @@ class Running:
 
     def __init__(self, config: Config, out: Path | None = None) -> None:
         self.config = config
-        self.service = BestViewService(config, out)
+        self.service = BestViewPipeline(config, out)
         self._tasks: list[asyncio.Task[None]] = []
         expect = {*config.camera_ids, bestview_client_name(0)}
         self.pulses = PulseServer(

@@ -28,7 +28,7 @@ from server.messaging.messages import (
     ZenohKeys,
 )
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.service import BestViewService
+from server.service.pipeline import BestViewPipeline
 from server.service.view_selection.explanation import SelectionReasons
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
@@ -164,7 +164,7 @@ class TrackNumbers:
         return IdentityUpdate({TrackletKey(*it.key, 0): it.local_id for it in tracks}, (), (), (), (), ())
 
 
-class FedService(BestViewService):
+class FedService(BestViewPipeline):
     """The best-view service without a bus: a test hands it what cameras would send."""
 
     frames = 40

@@ -21,6 +21,7 @@ from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, GopChoices, TrackMessage
+from server.service.service import BestViewService
 from synthetic import Scene
 
 SIZE = (320, 180)
@@ -99,7 +100,7 @@ async def drawn_room(**changes: object) -> AsyncIterator[Drawn]:
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     told: dict[int, GopChoices] = {}
     service.on_decision.append(lambda choices: told.update({choices.first: choices}))
-    app = make_app(service)
+    app = make_app(BestViewService(service))
     async with (
         asyncio.timeout(2 * PATIENCE),
         serving(app, HttpSettings(port=0)) as port,

@@ -13,6 +13,7 @@ from fakes.cameras import CAMERAS, LARGE, SMALL, FedService, TrackNumbers, small
 from fakes.timeouts import PATIENCE
 from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
+from server.service.service import BestViewService
 
 A, B = CAMERAS
 
@@ -38,7 +39,7 @@ async def opened(*, patience: float = PATIENCE, **changes: Any) -> AsyncIterator
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     async with (
         asyncio.timeout(patience),
-        serving(make_app(service), HttpSettings(port=0, **changes.get("http", {}))) as port,
+        serving(make_app(BestViewService(service)), HttpSettings(port=0, **changes.get("http", {}))) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
     ):
         yield Hall(service, session, port)

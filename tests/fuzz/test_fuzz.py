@@ -14,8 +14,8 @@ from benchmarks.fuzz.__main__ import PARTS, side_by_side, targets_of
 from benchmarks.fuzz.http_strangers import SECRETS, Strangers
 from benchmarks.fuzz.run import Attempt, Crash, Plan, Runner, numbered
 from benchmarks.fuzz.target import Scripts, Target, UnclearError, refused
-from server.http.access import access_control
-from server.http.access.grants import Need
+from server.http.access import authorization
+from server.http.access.permissions import Permission
 from server.service.calibration import floor_plan
 
 SECONDS = 0.25
@@ -190,7 +190,7 @@ def test_a_site_that_lets_anybody_in_is_found_out(
     token = f"Authorization: Bearer {SECRETS[who]}\r\n" if who else ""
     request = f"\0GET {asked} HTTP/1.1\r\nHost: x\r\n{token}Connection: close\r\n\r\n".encode()
     assert strangers.feed(request) is False
-    monkeypatch.setattr(access_control, "need_of", lambda *_: Need.NOTHING)
+    monkeypatch.setattr(authorization, "permission_for", lambda *_: Permission.PUBLIC)
     with pytest.raises(AssertionError, match=who or r"\[\]"):
         strangers.feed(request)
 

@@ -33,6 +33,7 @@ from server.service.recording.playlist_file import RecordingPlaylist
 from server.service.recording.recording_folder import RecordingFolder
 from server.service.recording.recording_session import InitSegments, RecordingSession, SessionInfo
 from server.service.recording.retention import RetentionLimits
+from server.service.service import BestViewService
 from server.system.errors import UserError
 
 CAMERA = {"id": "c0", "source": "scene:room"}
@@ -295,7 +296,7 @@ async def test_what_is_no_request_leaves_no_traceback_in_the_log(
     service = Fed(site())
     settings: Any = service.config.http.model_copy(update={"port": 0})
     with caplog.at_level(logging.DEBUG):
-        async with serving(make_app(service), settings) as port:
+        async with serving(make_app(BestViewService(service)), settings) as port:
             reader, writer = await asyncio.open_connection("127.0.0.1", port)
             writer.write(request_bytes)
             writer.write_eof()

@@ -1,6 +1,6 @@
-"""Pages of other origins may read everything that a token is given for by themselves, or that needs none.
+"""Cross-origin requests: pages of other origins may read what is public or what they send a token for.
 
-A sign-in does not help them: its cookie is not sent from another site's page, and reads nothing there.
+A session does not help them: its cookie is not sent from another site's page.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ _DAY_S = 86_400
 
 
 @web.middleware
-async def preflight(
+async def answer_preflight(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
-    """Answer OPTIONS of whatever there is: what a page of another origin may ask for (Fetch, 3.2.2)."""
+    """Answer OPTIONS of every route: what a page of another origin may request (Fetch, 3.2.2)."""
     try:
         return await handler(request)
     except web.HTTPMethodNotAllowed as error:

@@ -1,47 +1,48 @@
-"""What a page of another site can make a browser do at the addresses that change something: nothing.
+"""Cross-site request forgery: pages of other sites can change nothing through a browser that is signed in.
 
-They are ``/api/session`` and what is below ``/api/operator/``. What changes anything needs the head
-``X-MyView-Changes``, which a page of another site cannot send: browsers ask beforehand (Fetch, 3.2.2), and
-are not answered. Who may operate is asked where it is asked of every address: see ``access.py``.
+Protected are ``/api/session`` and all below ``/api/operator/``. Requests that change something need the
+header ``X-MyView-Changes``, which pages of other origins cannot send: browsers ask beforehand (Fetch, 3.2.2),
+and are refused.
 """
 
 from __future__ import annotations
 
 from aiohttp import web
 
-from server.http.access.grants import OPERATING, SESSION
-from server.http.api.handlers import problem
+from server.http.access.permissions import OPERATOR_PATH, SESSION_PATH
+from server.http.json_responses import error_response
 
-CHANGES = "X-MyView-Changes"
-"""The head of a request that changes something."""
+CSRF_HEADER = "X-MyView-Changes"
+"""The header of a request that changes something."""
 
 
-def refused_to_other_sites(request: web.Request) -> web.Response | None:
-    """Say why a request that another site's page may have sent is not answered; None: it may be."""
-    if not _changes_something(path_of(request)):
+def check_csrf(request: web.Request) -> web.Response | None:
+    """Return why a request that another site's page may have sent is refused; None: it is not."""
+    if not _is_protected(route_pattern(request)):
         return None
     if request.method == "OPTIONS":
-        return problem(403, "this address answers no page of another origin")
-    if request.headers.get("Sec-Fetch-Site", "none") not in {"none", "same-origin"}:
-        return problem(403, "this is not possible from another site's page")
-    if request.method not in {"GET", "HEAD"} and CHANGES not in request.headers:
-        return problem(
-            403, f"{request.method} needs the head {CHANGES}: 1, which other sites' pages cannot send"
+        return error_response(403, "this address answers no page of another origin")
+    if request.headers.get("Sec-Fetch-SiteSettings", "none") not in {"none", "same-origin"}:
+        return error_response(403, "this is not possible from another site's page")
+    if request.method not in {"GET", "HEAD"} and CSRF_HEADER not in request.headers:
+        return error_response(
+            403,
+            f"{request.method} needs the header {CSRF_HEADER}: 1, which other sites' pages cannot send",
         )
     return None
 
 
-async def tell_no_other_origin(request: web.Request, response: web.StreamResponse) -> None:
-    """Take back that pages of other origins may read an answer, before any of it is sent."""
-    if _changes_something(path_of(request)):
+async def forbid_cross_origin_reads(request: web.Request, response: web.StreamResponse) -> None:
+    """Remove the header that lets pages of other origins read an answer."""
+    if _is_protected(route_pattern(request)):
         response.headers.popall("Access-Control-Allow-Origin", None)
 
 
-def path_of(request: web.Request) -> str:
-    """Give the pattern of the address that is asked, or the address where there is none."""
+def route_pattern(request: web.Request) -> str:
+    """Return the pattern of the requested route, or the path where there is no such route."""
     resource = request.match_info.route.resource
     return request.path if resource is None else resource.canonical
 
 
-def _changes_something(path: str) -> bool:
-    return path in {OPERATING, SESSION} or path.startswith(f"{OPERATING}/")
+def _is_protected(path: str) -> bool:
+    return path in {OPERATOR_PATH, SESSION_PATH} or path.startswith(f"{OPERATOR_PATH}/")

@@ -9,34 +9,34 @@ from yarl import URL
 
 from server.http.access.networks import is_loopback
 
-_FROM_A_PROXY = re.compile(
+_PROXY_HEADER = re.compile(
     r"via|cdn-loop|front-end-https|(x-)?(url-)?scheme|x-(proto|ssl|host|varnish|proxied|proxyuser-ip)|x-azure-ref"
     r"|x-(amzn-trace-id|cloud-trace-context)|(x-(envoy|original|appengine|vercel|arr)|cf|wl-proxy)-.*"
     r"|.*forwarded.*|.*(client|real|remote|connecting|user|cluster)-?(ip|addr)"
 )
-"""Heads by which proxies say that they are there. Each sends some of them, and hardly two the same ones."""
+"""Headers that proxies add. Each sends some of them, and hardly two the same ones."""
 
 
-def is_from_here(request: web.Request) -> bool:
-    """Tell whether a request comes from this machine: by its address, by no proxy, and by a name of it.
+def is_local_request(request: web.Request) -> bool:
+    """Tell whether a request comes from this machine: from its address, by no proxy, under its name.
 
-    The name is looked at since a page's own name can be made to lead here (DNS rebinding).
+    The name is checked since another page's host name can be made to resolve to this machine (DNS rebinding).
     """
-    if request.version < HttpVersion11 or any(map(_is_of_a_proxy, request.headers)):
-        return False  # HTTP/1.0 is what some proxies speak; no browser does
+    if request.version < HttpVersion11 or any(map(_is_proxy_header, request.headers)):
+        return False  # some proxies speak HTTP/1.0; no browser does
     named = [f"http://{request.host}"]
     named += [request.headers[it] for it in ("Origin", "Referer") if it in request.headers]
-    return is_loopback(request.remote or "") and all(_names_this_machine(it) for it in named)
+    return is_loopback(request.remote or "") and all(map(_names_this_machine, named))
 
 
-def _is_of_a_proxy(head: str) -> bool:
-    """Tell whether a head is one that proxies add; some write _ for -."""
-    return _FROM_A_PROXY.fullmatch(head.lower().replace("_", "-")) is not None
+def _is_proxy_header(name: str) -> bool:
+    """Tell whether proxies add a header; some write _ for -."""
+    return _PROXY_HEADER.fullmatch(name.lower().replace("_", "-")) is not None
 
 
-def _names_this_machine(address: str) -> bool:
+def _names_this_machine(url: str) -> bool:
     try:
-        host = URL(address).host or ""
+        host = URL(url).host or ""
     except ValueError:
         return False
     return host == "localhost" or is_loopback(host)

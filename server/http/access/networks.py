@@ -1,28 +1,28 @@
-"""Whose an address is: what one customer of a provider has counts as one."""
+"""Client networks: the addresses that one customer of a provider has count as one."""
 
 from __future__ import annotations
 
 import ipaddress
 
-_CUSTOMER = 64
-"""Bits of an IPv6 address that a network is told apart by: of the others each host has all (RFC 6177)."""
+_IPV6_PREFIX = 64
+"""Bits of an IPv6 address that tell customers apart; each has all addresses of such a network (RFC 6177)."""
 
 
 def is_loopback(address: str) -> bool:
     """Tell whether an address is this machine's own."""
-    ip = _parsed(address)
+    ip = _parse(address)
     return ip is not None and ip.is_loopback
 
 
 def network_of(address: str) -> str:
-    """Return what is counted as one address: of IPv6 a whole network, which one host may have all of."""
-    ip = _parsed(address)
+    """Return what an address counts as: an IPv4 address itself, an IPv6 address its /64 network."""
+    ip = _parse(address)
     if ip is None or ip.version == 4:  # noqa: PLR2004 — it is the version's name
         return address if ip is None else str(ip)
-    return str(ipaddress.ip_network((int(ip), _CUSTOMER), strict=False))
+    return str(ipaddress.ip_network((int(ip), _IPV6_PREFIX), strict=False))
 
 
-def _parsed(address: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+def _parse(address: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
     try:
         ip = ipaddress.ip_address(address)
     except ValueError:

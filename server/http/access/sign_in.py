@@ -1,17 +1,31 @@
-"""Signing in: a token for a cookie, which no script can read."""
+"""``/api/session``: signing in exchanges a token for a session cookie, which no script can read."""
 
 from __future__ import annotations
 
 import msgspec
 from aiohttp import web
 
-from server.http.access.access_control import ACCESS, Access
-from server.http.access.grants import SESSION, Grant
-from server.http.access.sessions import SESSION_S
-from server.http.api.handlers import answer, asked_for, problem
-from server.http.api.schema import SessionInfo
+from server.http.access.authorization import ACCESS, AccessControl
+from server.http.access.permissions import SESSION_PATH, Grant
+from server.http.access.sessions import SESSION_LIFETIME_S
+from server.http.json_responses import error_response, json_response, read_json
 
 routes = web.RouteTableDef()
+
+
+class SessionInfo(msgspec.Struct, frozen=True):
+    """What somebody may."""
+
+    by_token: bool
+    """By a token; else anybody may watch, and who is at the server's own machine may operate."""
+    name: str | None
+    """Of the token; null: there are none."""
+    role: str
+    """watch or operate."""
+    object: int | None
+    """This person's views alone; null: everybody's."""
+    camera: str | None
+    """This camera alone; null: all."""
 
 
 class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -20,33 +34,34 @@ class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     token: str
 
 
-@routes.get(SESSION)
+@routes.get(SESSION_PATH)
 async def get_session(request: web.Request) -> web.Response:
     """Say what whoever asks may."""
     access = request.app[ACCESS]
-    return answer(_told(access, access.grant(request)))
+    return json_response(_session_info(access, access.grant(request)))
 
 
-@routes.post(SESSION)
+@routes.post(SESSION_PATH)
 async def post_session(request: web.Request) -> web.StreamResponse:
     """Sign in."""
     access = request.app[ACCESS]
-    if not access.by_token:
-        return problem(400, "there are no tokens (access.tokens): there is nothing to sign in to")
-    asked = await asked_for(request, SignIn)
-    holder = access.known(request, asked.token.strip())
-    if isinstance(holder, web.Response):
-        return holder
-    held = access.held(holder)
-    if not isinstance(held, Grant):
-        return problem(403, held or "there is no such token any more")
-    access.sessions.close(access.session_of(request))
-    response = answer(_told(access, held))
+    authenticator = access.authenticator
+    if not access.needs_token:
+        return error_response(400, "there are no tokens (access.tokens): there is nothing to sign in to")
+    sign_in = await read_json(request, SignIn)
+    credential = authenticator.check_token(request, sign_in.token.strip())
+    if isinstance(credential, web.Response):
+        return credential
+    grant = authenticator.grant_of(credential)
+    if not isinstance(grant, Grant):
+        return error_response(403, grant or "there is no such token any more")
+    authenticator.sessions.close(authenticator.session_of(request))
+    response = json_response(_session_info(access, grant))
     encrypted = "https" in (request.scheme, request.headers.get("X-Forwarded-Proto"))
     response.set_cookie(
-        access.cookie,
-        access.sessions.open(holder.token),
-        max_age=SESSION_S,
+        authenticator.cookie,
+        authenticator.sessions.open(credential.token),
+        max_age=SESSION_LIFETIME_S,
         httponly=True,
         samesite="Strict",
         secure=encrypted,
@@ -54,22 +69,23 @@ async def post_session(request: web.Request) -> web.StreamResponse:
     return response
 
 
-@routes.delete(SESSION)
+@routes.delete(SESSION_PATH)
 async def delete_session(request: web.Request) -> web.Response:
-    """Sign out; what the sign-in holds open is ended."""
+    """Sign out; what the session holds open is ended."""
     access = request.app[ACCESS]
-    access.sessions.close(access.session_of(request))
-    access.end_what_is_over()
+    authenticator = access.authenticator
+    authenticator.sessions.close(authenticator.session_of(request))
+    access.end_expired()
     response = web.Response(status=204)
-    response.del_cookie(access.cookie, samesite="Strict", httponly=True)
+    response.del_cookie(authenticator.cookie, samesite="Strict", httponly=True)
     return response
 
 
-def _told(access: Access, grant: Grant) -> SessionInfo:
+def _session_info(access: AccessControl, grant: Grant) -> SessionInfo:
     return SessionInfo(
-        by_token=access.by_token,
+        by_token=access.needs_token,
         name=grant.name,
-        role="operate" if grant.operates else "watch",
-        object=grant.sees.object,
-        camera=grant.sees.camera,
+        role="operate" if grant.is_operator else "watch",
+        object=grant.scope.object,
+        camera=grant.scope.camera,
     )

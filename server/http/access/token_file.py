@@ -14,7 +14,7 @@ log = logging.getLogger(__name__)
 
 
 class TokenFile:
-    """The tokens in force. A file that cannot be read, or makes no sense, leaves them as they are."""
+    """The tokens in force. A file that cannot be read, or has a mistake in it, leaves them as they are."""
 
     def __init__(self, path: Path) -> None:
         """Read the file.
@@ -23,15 +23,15 @@ class TokenFile:
             UserError: it cannot be read, or something in it is wrong.
         """
         self._path = path
-        self._read = self._seen = file_state(path)
+        self._loaded = self._seen = file_state(path)
         self._tokens = _by_digest(path)
 
-    def look(self) -> None:
-        """Read the file again if it has changed, once it is still: it may be half-written."""
+    def reload_if_changed(self) -> None:
+        """Read the file again if it has changed, once it stays the same: it may be half-written."""
         before, self._seen = self._seen, file_state(self._path)
-        if self._seen == self._read or self._seen != before:
+        if self._seen == self._loaded or self._seen != before:
             return
-        self._read = self._seen
+        self._loaded = self._seen
         try:
             self._tokens = _by_digest(self._path)
         except UserError as error:
@@ -40,15 +40,15 @@ class TokenFile:
             log.info("%s: %d tokens are in force", self._path, len(self._tokens))
 
     def find(self, digest: str) -> Token | None:
-        """Give the token of a SHA-256; all are compared, each in the same time: that tells nothing."""
-        found = None
+        """Return the token of a SHA-256 in constant time: all are compared, none ends early."""
+        match = None
         for token in self._tokens.values():
             if hmac.compare_digest(token.sha256, digest):
-                found = token
-        return found
+                match = token
+        return match
 
-    def still(self, digest: str) -> Token | None:
-        """Give the token of a SHA-256 that was found before, if it is in force now."""
+    def get(self, digest: str) -> Token | None:
+        """Return the token of a SHA-256 that was found before; None: it is revoked."""
         return self._tokens.get(digest)
 
 

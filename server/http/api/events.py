@@ -1,157 +1,166 @@
-"""Server-sent events (WHATWG HTML, 9.2): what changes, as it changes."""
+"""Server-sent events (WHATWG HTML, 9.2): GOPs as they are decided, and people and cameras as they change."""
 
 from __future__ import annotations
 
-import logging
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
+from aiohttp import web
 
-from server.http.access.grants import Scope
-from server.http.access.scope_filter import cameras_for, choices_for, flag_for, objects_for, site_for
+from server.http.access.permissions import Scope
 from server.http.api.responses import cameras_info, objects_info, site_info
-from server.http.periodic import again_and_again
+from server.http.api.scope_filter import (
+    filter_cameras,
+    filter_choices,
+    filter_flag,
+    filter_objects,
+    filter_site,
+)
+from server.http.periodic import run_periodically
 from server.messaging.messages import GopChoices
-from server.service.operator_assist.flags import Flag
+from server.service.facade.assist import Flag
+from server.service.facade.streams import Broadcaster, BytesChunk, Subscriber
 from server.service.service import BestViewService
-from server.service.streaming.broadcaster import Broadcaster
-from server.service.streaming.subscriber_queue import BytesChunk, Subscriber
 
-log = logging.getLogger(__name__)
-
-_LIST_EVERY_S = 1.0
+_LISTS_EVERY_S = 1.0
 _GOPS_KEPT = 4
-"""GOP events that whoever comes is given: they cover what the streams start with."""
+"""GOP events that a new subscriber is sent: they cover what the streams start with."""
 _QUEUE = 64
-"""Events a reader may fall behind."""
-_FLAGS_AGAIN = 16
-"""Flags that are over, and that whoever fell behind is told of: they may have seen them open."""
+"""Events that a subscriber may fall behind."""
+_ENDED_FLAGS_RESENT = 16
+"""Ended flags that are sent again to who fell behind: they may have been sent those while open."""
 
 
 def event(name: str, content: Any, event_id: int | None = None) -> bytes:
-    """Write one event."""
+    """Encode one event."""
     head = f"event: {name}\n" + (f"id: {event_id}\n" if event_id is not None else "")
     return head.encode() + b"data: " + msgspec.json.encode(content) + b"\n\n"
 
 
 @dataclass(slots=True)
-class _Line:
-    """What readers are told who may see the same."""
+class _ScopedEvents:
+    """The events for all subscribers of one scope."""
 
     channel: Broadcaster
-    told: dict[str, bytes] = field(default_factory=dict)
+    last_sent: dict[str, bytes] = field(default_factory=dict)
+    """By event name, the lists as they were sent last."""
 
 
 class Events:
-    """Tells all readers about GOPs at once, and about people and cameras when something has changed.
+    """Publishes GOPs at once, and people and cameras when something about them has changed.
 
-    Each is told what they may see: whoever may see the same hears the same bytes, written once.
+    Subscribers of one scope share the same bytes, filtered and encoded once.
     """
 
     def __init__(self, service: BestViewService) -> None:
         self._service = service
-        self._lines: dict[Scope, _Line] = {}
+        self._by_scope: dict[Scope, _ScopedEvents] = {}
         self._recent: deque[GopChoices] = deque(maxlen=_GOPS_KEPT)
         self._closed = False
-        service.on_decision.append(self._on_decision)
-        service.assist.flags.on_flag.append(self._on_flag)
+        service.people.subscribe_decisions(self._on_decision)
+        service.assist.subscribe_flags(self._on_flag)
 
     @property
     def viewers(self) -> int:
-        """How many are told."""
-        return sum(line.channel.viewers for line in self._lines.values())
+        """How many subscribers there are."""
+        return sum(it.channel.viewers for it in self._by_scope.values())
 
-    def join(self, sees: Scope) -> Subscriber:
-        """Let a reader in; what it should know first comes first."""
-        line = self._lines.get(sees) or self._new_line(sees)
-        viewer = line.channel.subscribe()
-        for flag in self._service.assist.flags.open:
-            chunk = self._flag(sees, flag)
+    def join(self, scope: Scope) -> Subscriber:
+        """Add a subscriber, who is sent the present lists and open flags first."""
+        scoped = self._by_scope.get(scope) or self._add_scope(scope)
+        subscriber = scoped.channel.subscribe()
+        for flag in self._service.assist.open_flags:
+            chunk = self._flag_event(scope, flag)
             if chunk is not None:
-                viewer.put_first(chunk)
-        for name, content in self._lists(sees).items():
-            viewer.put_first(BytesChunk(event(name, content), random_access=True))
-        return viewer
+                subscriber.put_first(chunk)
+        for name, content in self._lists(scope).items():
+            subscriber.put_first(BytesChunk(event(name, content), random_access=True))
+        return subscriber
 
-    def leave(self, sees: Scope, viewer: Subscriber) -> None:
-        """Let a reader go."""
-        line = self._lines[sees]
-        line.channel.unsubscribe(viewer)
-        if not line.channel.viewers:
-            del self._lines[sees]
+    def leave(self, scope: Scope, subscriber: Subscriber) -> None:
+        """Remove a subscriber."""
+        scoped = self._by_scope[scope]
+        scoped.channel.unsubscribe(subscriber)
+        if not scoped.channel.viewers:
+            del self._by_scope[scope]
 
     async def run(self) -> None:
-        """Tell about people and cameras, and keep silent connections alive."""
-        await again_and_again(_LIST_EVERY_S, self._tell_all, "telling about people and cameras")
+        """Publish lists as they change, and keep silent connections alive."""
+        await run_periodically(_LISTS_EVERY_S, self._publish_lists, "publishing people and cameras")
 
     def close(self) -> None:
-        """End all readers' streams."""
+        """End all subscribers' streams."""
         self._closed = True
-        for line in self._lines.values():
-            line.channel.close()
+        for scoped in self._by_scope.values():
+            scoped.channel.close()
 
-    def _new_line(self, sees: Scope) -> _Line:
-        line = self._lines[sees] = _Line(Broadcaster(backlog_gops=_GOPS_KEPT, queue_gops=_QUEUE))
+    def _add_scope(self, scope: Scope) -> _ScopedEvents:
+        scoped = self._by_scope[scope] = _ScopedEvents(
+            Broadcaster(backlog_gops=_GOPS_KEPT, queue_gops=_QUEUE)
+        )
         for choices in self._recent:
-            line.channel.publish(self._gop(sees, choices))
+            scoped.channel.publish(self._gop_event(scope, choices))
         if self._closed:
-            line.channel.close()
-        return line
+            scoped.channel.close()
+        return scoped
 
-    async def _tell_all(self) -> None:
-        for sees, line in self._lines.items():
-            self._tell(sees, line)
+    async def _publish_lists(self) -> None:
+        for scope, scoped in self._by_scope.items():
+            self._publish_changed(scope, scoped)
 
-    def _tell(self, sees: Scope, line: _Line) -> None:
-        lists = self._lists(sees)
+    def _publish_changed(self, scope: Scope, scoped: _ScopedEvents) -> None:
+        lists = self._lists(scope)
         for name, content in lists.items():
             if name == "site":
-                continue  # it carries the time of day and so always differs; it is for newcomers
+                continue  # it holds the time of day and so always differs; it is for new subscribers
             data = event(name, content)
-            if line.told.get(name) != data:
-                line.told[name] = data
-                line.channel.publish_once(BytesChunk(data, random_access=True))
-        for viewer in line.channel.subscribers_with_new_loss():
-            for chunk in self._again(sees, lists):
-                viewer.put(chunk)
-        line.channel.publish_once(BytesChunk(b": here\n\n", random_access=False))
+            if scoped.last_sent.get(name) != data:
+                scoped.last_sent[name] = data
+                scoped.channel.publish_once(BytesChunk(data, random_access=True))
+        for subscriber in scoped.channel.subscribers_with_new_loss():
+            for chunk in self._snapshot(scope, lists):
+                subscriber.put(chunk)
+        scoped.channel.publish_once(BytesChunk(b": here\n\n", random_access=False))
 
-    def _again(self, sees: Scope, lists: dict[str, Any]) -> Iterator[BytesChunk]:
-        """Give all that holds, to who fell behind: what is told only once may be among what they lost."""
+    def _snapshot(self, scope: Scope, lists: dict[str, Any]) -> Iterator[BytesChunk]:
+        """Yield the whole state, for who fell behind: they may have lost what is sent only once."""
         for name, content in lists.items():
             yield BytesChunk(event(name, content), random_access=True)
-        flags = self._service.assist.flags
-        for flag in [*reversed(flags.ended[:_FLAGS_AGAIN]), *flags.open]:
-            chunk = self._flag(sees, flag)
+        assist = self._service.assist
+        for flag in [*reversed(assist.ended_flags[:_ENDED_FLAGS_RESENT]), *assist.open_flags]:
+            chunk = self._flag_event(scope, flag)
             if chunk is not None:
                 yield chunk
 
-    def _lists(self, sees: Scope) -> dict[str, Any]:
+    def _lists(self, scope: Scope) -> dict[str, Any]:
         service = self._service
         return {
-            "cameras": cameras_for(cameras_info(service), sees),
-            "objects": objects_for(objects_info(service), sees, service.board.resolve),
-            "site": site_for(site_info(service), sees),
+            "cameras": filter_cameras(cameras_info(service), scope),
+            "objects": filter_objects(objects_info(service), scope, service.people.current_number),
+            "site": filter_site(site_info(service), scope),
         }
 
-    def _gop(self, sees: Scope, choices: GopChoices) -> BytesChunk:
-        content = choices_for(choices, sees, self._service.board.resolve)
+    def _gop_event(self, scope: Scope, choices: GopChoices) -> BytesChunk:
+        content = filter_choices(choices, scope, self._service.people.current_number)
         return BytesChunk(event("gop", content, choices.first), random_access=True)
 
-    def _flag(self, sees: Scope, flag: Flag) -> BytesChunk | None:
-        narrowed = flag_for(flag, sees, self._service.board.resolve)
-        return None if narrowed is None else BytesChunk(event("flag", narrowed), random_access=True)
+    def _flag_event(self, scope: Scope, flag: Flag) -> BytesChunk | None:
+        visible = filter_flag(flag, scope, self._service.people.current_number)
+        return None if visible is None else BytesChunk(event("flag", visible), random_access=True)
 
     def _on_flag(self, flag: Flag) -> None:
-        for sees, line in self._lines.items():
-            chunk = self._flag(sees, flag)
+        for scope, scoped in self._by_scope.items():
+            chunk = self._flag_event(scope, flag)
             if chunk is not None:
-                line.channel.publish_once(chunk)
+                scoped.channel.publish_once(chunk)
 
     def _on_decision(self, choices: GopChoices) -> None:
         self._recent.append(choices)
-        for sees, line in self._lines.items():
-            line.channel.publish(self._gop(sees, choices))
+        for scope, scoped in self._by_scope.items():
+            scoped.channel.publish(self._gop_event(scope, choices))
+
+
+EVENTS = web.AppKey("events", Events)

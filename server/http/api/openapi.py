@@ -1,4 +1,4 @@
-"""The API's own description: OpenAPI 3.1 made from the routes and the schemas, and a page to read it."""
+"""The API's description: OpenAPI 3.1 built from the routes and the schemas, and a page to read it."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
-from server.http.access.grants import Need, need_of
-from server.http.api.query_validation import HELD, OVERLAY, PAST
-from server.http.api.schema import Cameras, Choice, FlagList, Objects, Past, Problem, SessionInfo, SiteInfo
+from server.http.access.permissions import Permission, permission_for
+from server.http.access.sign_in import SessionInfo
+from server.http.api.query_validation import CAMERA_QUERY, OVERLAY, TIME_SHIFT
+from server.http.api.schema import Cameras, FlagList, Objects, Past, SiteInfo
+from server.http.json_responses import Problem
 from server.http.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
+from server.service.facade.people import ViewSelection
 
 routes = web.RouteTableDef()
 
@@ -25,7 +28,7 @@ _JSON: dict[str, type[msgspec.Struct]] = {
     "/api/objects": Objects,
     "/api/cameras": Cameras,
     "/api/flags": FlagList,
-    "/api/objects/{object}/choice": Choice,
+    "/api/objects/{object}/choice": ViewSelection,
     "/api/objects/{object}/past": Past,
     "/api/cameras/{camera}/past": Past,
     **OPERATOR,
@@ -80,14 +83,14 @@ _SCHEMAS: dict[str, Any] = {
     "from": {**_MOMENT, "description": "Begins there: seconds back, a pulse, or a time."},
     "to": {**_MOMENT, "description": "Ends there, likewise; HLS also live: it goes on."},
     "at": {**_MOMENT, "description": "Of the last minute; what was before the first question is not kept."},
-    "held": {"type": "string", "description": "Shows this camera, not the best: held by hand."},
+    "camera_query": {"type": "string", "description": "Shows this camera, not the best: held by hand."},
     "prefer": {"type": "string", "description": "Shows this camera while it sees the person, else the best."},
     "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Pictures a second; the site's at most."},
 }
 
 
-class Described:
-    """What an application tells of itself, made when it is first asked for: anybody may ask, and often."""
+class ApiDescription:
+    """An application's description of itself, built once when it is first requested."""
 
     def __init__(self, app: web.Application) -> None:
         self._app = app
@@ -103,11 +106,11 @@ class Described:
         return msgspec.json.encode(self.document)
 
 
-DESCRIBED = web.AppKey("described", Described)
+DESCRIPTION = web.AppKey("described", ApiDescription)
 
 
 def describe(app: web.Application) -> dict[str, Any]:
-    """Give the OpenAPI document of an application's routes."""
+    """Build the OpenAPI document of an application's routes."""
     _, components = msgspec.json.schema_components(
         [*_JSON.values(), Problem], ref_template="#/components/schemas/{name}"
     )
@@ -137,29 +140,31 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     names = re.findall(r"\{(\w+)\}", path)
     if names or path in OPERATOR_RESULTS:
         responses["404"] = {"description": "There is none of this name.", "content": error}
-    if path in OVERLAY | PAST | HELD | _SPANS or path.endswith("/choice"):
+    if path in OVERLAY | TIME_SHIFT | CAMERA_QUERY | _SPANS or path.endswith("/choice"):
         responses["400"] = {"description": "The query asks for what there is not.", "content": error}
     if path in OPERATOR.keys() | OPERATOR_FILES.keys() | OPERATOR_RESULTS.keys():
         responses["400"] = {"description": "It asks for what there is not.", "content": error}
-    if need_of("GET", path) is not Need.NOTHING:
+    if permission_for("GET", path) is not Permission.PUBLIC:
         responses["401"] = {
             "description": "Where there are tokens: none was given, or a wrong one.",
             "content": error,
         }
         responses["403"] = {"description": "The token is not for this.", "content": error}
         responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
-    if path in PAST | OPERATOR_FILES.keys():
+    if path in TIME_SHIFT | OPERATOR_FILES.keys():
         responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
     if path in _UNAVAILABLE | _OF_PEOPLE | _SPANS or "object" in names:
         responses["503"] = {"description": "Not now; try again later."}
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
-    queries = ["prefer"] * (path in HELD)
+    queries = ["prefer"] * (path in CAMERA_QUERY)
     queries += ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
-    queries += ["from", "to"] * (path in PAST | _SPANS | OPERATOR_FILES.keys())
+    queries += ["from", "to"] * (path in TIME_SHIFT | _SPANS | OPERATOR_FILES.keys())
     queries += ["at"] * path.endswith("/choice")
     queries += ["_HLS_msn", "_HLS_part"] * path.endswith(".m3u8")
-    if path in HELD:
-        parameters.append({"name": "camera", "in": "query", "required": False, "schema": _SCHEMAS["held"]})
+    if path in CAMERA_QUERY:
+        parameters.append(
+            {"name": "camera", "in": "query", "required": False, "schema": _SCHEMAS["camera_query"]}
+        )
     parameters += [
         {
             "name": it,
@@ -175,7 +180,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
 @routes.get("/api/openapi.json")
 async def get_openapi(request: web.Request) -> web.Response:
     """Describe the API to programs."""
-    return web.Response(body=request.app[DESCRIBED].encoded, content_type="application/json")
+    return web.Response(body=request.app[DESCRIPTION].encoded, content_type="application/json")
 
 
 @routes.get("/api")
@@ -184,7 +189,7 @@ async def get_readable(request: web.Request) -> web.Response:
     rows = "".join(
         f"<tr><td><code>GET {html.escape(path)}</code></td>"
         f"<td>{html.escape(item['get']['summary'])}</td></tr>"
-        for path, item in request.app[DESCRIBED].document["paths"].items()
+        for path, item in request.app[DESCRIPTION].document["paths"].items()
     )
     page = (
         "<!doctype html><html lang=en><meta charset=utf-8><title>MyView: the API</title>"

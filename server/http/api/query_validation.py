@@ -1,4 +1,4 @@
-"""What may be asked of a stream after the question mark: nothing that is meant is passed over in silence."""
+"""Query validation: a stream refuses query parameters that it does not support instead of ignoring them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 
 from aiohttp import web
 
-from server.http.api.handlers import problem
+from server.http.json_responses import error_response
 
 OVERLAY = {
     "/objects/{object}/best.mp4",
@@ -15,8 +15,8 @@ OVERLAY = {
     "/cameras/{camera}/live.mjpeg",
     "/cameras/{camera}/live.jpg",
 }
-"""What boxes can be burnt into."""
-PAST = {
+"""Routes that support overlay=: boxes burnt in."""
+TIME_SHIFT = {
     "/objects/{object}/best.mp4",
     "/objects/{object}/best.ts",
     "/cameras/{camera}/live.mp4",
@@ -25,26 +25,26 @@ PAST = {
     "/cameras/{camera}/hls/index.m3u8",
     "/api/past",
 }
-"""What can begin in the past."""
-HELD = {"/objects/{object}/best.mp4", "/objects/{object}/best.webm", "/objects/{object}/best.ts"}
-"""What can be held to one camera, or prefer one."""
+"""Routes that support from= and to=: streams that begin in the past."""
+CAMERA_QUERY = {"/objects/{object}/best.mp4", "/objects/{object}/best.webm", "/objects/{object}/best.ts"}
+"""Routes that support camera= and prefer=: a fixed or a preferred camera."""
 _STREAMS = ("/objects/", "/cameras/")
 
 
 @web.middleware
-async def refuse_what_is_not_there(
+async def validate_query(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
-    """Answer 400 where a stream is asked for boxes, a past or a camera that it does not have."""
+    """Answer 400 where a stream does not support a query parameter."""
     resource = request.match_info.route.resource
     if resource is not None and request.query and request.path.startswith(_STREAMS):
-        complaint = _complaint(request, resource.canonical)
-        if complaint is not None:
-            return problem(400, complaint)
+        error = _query_error(request, resource.canonical)
+        if error is not None:
+            return error_response(400, error)
     return await handler(request)
 
 
-def _complaint(request: web.Request, path: str) -> str | None:
+def _query_error(request: web.Request, path: str) -> str | None:
     overlay = request.query.get("overlay", "0")
     if overlay not in {"0", "1"}:
         return f"overlay={overlay}: must be 0 or 1"
@@ -52,9 +52,9 @@ def _complaint(request: web.Request, path: str) -> str | None:
         return "overlay: boxes are burnt into a person's best.mp4, and into .mjpeg and .jpg; not into this"
     for name, done in (("camera", "be held to one"), ("prefer", "prefer a camera")):
         others = {"overlay", "from", "to", "camera", "prefer"} - {name}
-        if name in request.query and (path not in HELD or request.query.keys() & others):
+        if name in request.query and (path not in CAMERA_QUERY or request.query.keys() & others):
             return f"{name}: a person's live best.mp4, best.ts or best.webm can {done}, and nothing else"
     for name in ("from", "to"):
-        if name in request.query and path not in PAST:
+        if name in request.query and path not in TIME_SHIFT:
             return f"{name}: only .mp4, .ts and HLS can begin in the past"
     return None

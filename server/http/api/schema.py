@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from server.service.operator_assist.flags import Flag
+from server.service.facade.assist import Flag
+from server.service.facade.cameras import CameraInfo
 
 
 class SiteInfo(msgspec.Struct, frozen=True):
@@ -67,70 +68,10 @@ class Objects(msgspec.Struct, frozen=True):
     """Whom other services of the site show; empty where there are none."""
 
 
-class CameraInfo(msgspec.Struct, frozen=True):
-    """One camera."""
-
-    camera: str
-    state: str
-    """starting, live, gone, ended or refused."""
-    pulse: int
-    """The newest frame."""
-    late: int
-    """Epochs whose tracks came too late."""
-    fps: float
-    missed: int
-    shed: int
-    load_level: int
-    """How much is left out because the machine has too much to do; 0: nothing."""
-    in_step: bool
-    """Pulses come from the server; otherwise the camera goes on at its own rate."""
-    message: str
-
-
 class Cameras(msgspec.Struct, frozen=True):
     """All cameras of the site."""
 
     cameras: list[CameraInfo]
-
-
-class Choice(msgspec.Struct, frozen=True):
-    """Why this view."""
-
-    object: int
-    first: int
-    """First pulse of the newest decided GOP."""
-    frames: int
-    camera: str | None
-    since: int
-    """Pulse of the last cut."""
-    costs: dict[str, float | None]
-    """Mean cost a frame of each camera over the look-ahead; null: cannot be shown."""
-    seen: dict[str, float]
-    """Share of the look-ahead in which each camera sees the person."""
-    quality: dict[str, float | None]
-    """How well each camera shows the person where it sees them, 0 to 1; null: it does not."""
-    terms: dict[str, dict[str, float]]
-    """By camera: the terms of that quality, likewise; empty where it does not see the person."""
-    unfound: dict[str, float]
-    """Share of the look-ahead in which each camera does not find the person, who stands before it as the
-    others know."""
-    unfound_quality: dict[str, float | None]
-    """What such a view is taken to be worth: quality, times how surely they show; null: there is none."""
-    weights: dict[str, float]
-    """By term: the share of a view's worth that is lost where the term is 0."""
-    before: str | None
-    """The camera of the GOP before; null: there was none."""
-    lookahead: int
-    """Frames from `first` on that were looked at."""
-    switch_cost: float
-    """What a cut costs, in frames of not seeing the person."""
-    stay: float | None
-    """What the look-ahead costs with `before`, likewise; null: there is none, or it cannot be shown."""
-    cut: float | None
-    """What it costs with the best other camera, the cut included; null: there is none."""
-    cut_to: str | None
-    """That camera."""
-    reason: str
 
 
 class PastSpan(msgspec.Struct, frozen=True):
@@ -166,24 +107,3 @@ class FlagList(msgspec.Struct, frozen=True):
 
     flags: list[Flag]
     """Those that can be answered, the most urgent first, and then those that are over, the newest first."""
-
-
-class SessionInfo(msgspec.Struct, frozen=True):
-    """What somebody may."""
-
-    by_token: bool
-    """By a token; else anybody may watch, and who is at the server's own machine may operate."""
-    name: str | None
-    """Of the token; null: there are none."""
-    role: str
-    """watch or operate."""
-    object: int | None
-    """This person's views alone; null: everybody's."""
-    camera: str | None
-    """This camera alone; null: all."""
-
-
-class Problem(msgspec.Struct, frozen=True):
-    """Why there is no answer."""
-
-    error: str

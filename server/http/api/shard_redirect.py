@@ -1,4 +1,4 @@
-"""Whoever asks one of several best-view services for another's person is sent there."""
+"""Redirects to the best-view service that decides for a person, where several share one site."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from collections.abc import Awaitable, Callable
 
 from aiohttp import web
 
-from server.http.api.handlers import problem
 from server.http.app_keys import SERVICE
-from server.service.identity.sharding import shard_address, shard_of
+from server.http.json_responses import error_response
 
-_ABOUT_SOMEBODY = re.compile(r"/(?:api/)?objects/([0-9]{1,9})/")
+_OBJECT_PATH = re.compile(r"/(?:api/)?objects/([0-9]{1,9})/")
 
 
 @web.middleware
-async def to_the_right_service(
+async def redirect_to_shard(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
-    """Answer 307 with the other's address; 404 where the configuration does not say it."""
-    share = request.app[SERVICE].config.view.share
-    about = _ABOUT_SOMEBODY.match(request.path)
-    if about is None or shard_of(int(about[1]), share) == share.index:
+    """Answer 307 with the other service's address; 404 where the configuration does not name it."""
+    path = _OBJECT_PATH.match(request.path)
+    if path is None:
         return await handler(request)
-    number = int(about[1])
-    server = shard_address(number, share)
-    if server is None:
-        return problem(
+    number = int(path[1])
+    shard = request.app[SERVICE].people.shard_of(number)
+    if shard.is_own:
+        return await handler(request)
+    if shard.server is None:
+        return error_response(
             404,
-            f"object {number} is served by best-view service {shard_of(number, share)} of this site; "
+            f"object {number} is served by best-view service {shard.index} of this site; "
             "view.share.servers does not say where that is",
         )
-    headers = {"Location": server + request.path_qs.lstrip("/"), "Access-Control-Allow-Origin": "*"}
+    headers = {"Location": shard.server + request.path_qs.lstrip("/"), "Access-Control-Allow-Origin": "*"}
     return web.Response(status=307, headers=headers)

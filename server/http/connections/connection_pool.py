@@ -1,8 +1,8 @@
-"""Who has a place among the connections, and who makes way for others: whoever asks for nothing.
+"""Connection pool: which connections are kept, and which are closed in favor of others.
 
-A connection is *silent* until what it asks for has come whole, *busy* while that is answered, then *resting*.
-Busy ones keep their places. Of the others the one that has waited longest makes way where no place is left,
-and each is cut off that waits for too long. Where all are busy, there are a few places beyond, for operators.
+A connection is *receiving* until its request is complete, *busy* while that is answered, then *idle*. Busy
+ones are kept. Of the others the one that has waited longest is closed where the pool is full, and each is
+closed that waits for too long. Where all are busy, a few connections are reserved for operators.
 """
 
 from __future__ import annotations
@@ -16,43 +16,43 @@ from typing import Protocol
 from server.http.access.networks import is_loopback, network_of
 
 _STALLED_S = 60.0
-"""An answer of which nothing was taken for so long is taken by nobody."""
+"""An answer of which the client has taken nothing for so long is given up."""
 
 
-class Wire(Protocol):
-    """What a connection is made of: a transport, or what becomes one."""
+class ConnectionTransport(Protocol):
+    """What a connection sends over: a transport, or a socket that is being accepted."""
 
     def abort(self) -> None:
-        """End it at once."""
+        """Close it at once."""
 
     def get_write_buffer_size(self) -> int:
-        """Return how many bytes the other side has not taken yet."""
+        """Return how many bytes the client has not taken yet."""
 
 
 @dataclass(slots=True, eq=False)
 class Connection:
-    """A connection, from when it is accepted until it is gone."""
+    """A connection, from when it is accepted until it is closed."""
 
-    wire: Wire
+    transport: ConnectionTransport
     network: str
-    beyond: bool = False
-    """It has no place but one of those that are kept for operators."""
-    gone: bool = False
+    is_reserved: bool = False
+    """It holds one of the connections that are reserved for operators."""
+    closed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
-    """How many connections there may be, and for how many seconds they may keep quiet."""
+class ConnectionLimits:
+    """How many connections there may be, and for how many seconds they may do nothing."""
 
     most: int
     per_address: int
     """Of one address, this machine's own excepted."""
     for_operators: int
-    """Beyond ``most``."""
+    """Reserved ones beyond ``most``."""
     request_s: float
-    """Until what is asked for has come whole."""
+    """Until a request is complete."""
     keepalive_s: float
-    """Until something more is asked for."""
+    """Until the next request."""
 
 
 Queue = dict[Connection, float]
@@ -61,134 +61,136 @@ Queue = dict[Connection, float]
 
 @dataclass(slots=True)
 class _Pool:
-    """Places of one kind."""
+    """Connections of one kind: ordinary or reserved ones."""
 
-    taken: int = 0
-    silent: Queue = field(default_factory=dict)
-    resting: Queue = field(default_factory=dict)
+    open: int = 0
+    receiving: Queue = field(default_factory=dict)
+    idle: Queue = field(default_factory=dict)
 
-    def longest(self) -> Connection | None:
-        """Return who makes way: of the larger queue, so that neither kind can be pushed out by the other."""
-        return next(iter(self.silent if len(self.silent) >= len(self.resting) else self.resting), None)
+    def longest_waiting(self) -> Connection | None:
+        """Return the connection to close first: of the longer queue, so that neither crowds out the other."""
+        return next(iter(self.receiving if len(self.receiving) >= len(self.idle) else self.idle), None)
 
 
-class Places:
-    """Gives places to connections; ``clock`` is in seconds, and never steps."""
+class ConnectionPool:
+    """Admits connections and follows their states; ``clock`` is in seconds and never steps."""
 
-    def __init__(self, bounds: Bounds, clock: Callable[[], float] = time.monotonic) -> None:
-        self.bounds = bounds
+    def __init__(self, limits: ConnectionLimits, clock: Callable[[], float] = time.monotonic) -> None:
+        self.limits = limits
         self._clock = clock
-        self._all, self._beyond = _Pool(), _Pool()
-        self._of: Counter[str] = Counter()
-        self._quiet: defaultdict[str, dict[Connection, None]] = defaultdict(dict)
-        """By network, those of them that have a place and are not busy, the longest first."""
-        self._sent: dict[Connection, tuple[int, float]] = {}
-        """To whom an answer is sent: how much of it is left, and since when it is as much."""
+        self._ordinary, self._reserved = _Pool(), _Pool()
+        self._per_network: Counter[str] = Counter()
+        self._waiting: defaultdict[str, dict[Connection, None]] = defaultdict(dict)
+        """By network, its ordinary connections that are not busy, the longest waiting first."""
+        self._sending: dict[Connection, tuple[int, float]] = {}
+        """By connection that is sent an answer: how much of it is left, and since when it is as much."""
 
     @property
-    def taken(self) -> int:
-        """How many there are, those beyond among them."""
-        return self._all.taken + self._beyond.taken
+    def open(self) -> int:
+        """How many connections are open, reserved ones among them."""
+        return self._ordinary.open + self._reserved.open
 
-    def admit(self, address: str, wire: Wire) -> Connection | None:
-        """Give a place to somebody who comes, another's where there is none; None: nobody makes way."""
-        it = Connection(wire, network_of(address))
-        if not is_loopback(address) and self._of[it.network] >= self.bounds.per_address:
-            makes_way = next(iter(self._quiet[it.network]), None)
-            it.beyond = makes_way is None
-        elif self._all.taken >= self.bounds.most:
-            makes_way = self._all.longest()
-            it.beyond = makes_way is None
+    def admit(self, address: str, transport: ConnectionTransport) -> Connection | None:
+        """Admit a connection, closing another where the pool is full; None: all others are busy."""
+        it = Connection(transport, network_of(address))
+        if not is_loopback(address) and self._per_network[it.network] >= self.limits.per_address:
+            evicted = next(iter(self._waiting[it.network]), None)
+            it.is_reserved = evicted is None
+        elif self._ordinary.open >= self.limits.most:
+            evicted = self._ordinary.longest_waiting()
+            it.is_reserved = evicted is None
         else:
-            makes_way = None
-        if it.beyond and self._beyond.taken >= self.bounds.for_operators:
-            makes_way = _of_most(self._beyond.silent, it) or _of_most(self._beyond.resting, it)
-            if makes_way is None:
+            evicted = None
+        if it.is_reserved and self._reserved.open >= self.limits.for_operators:
+            evicted = _of_largest_network(self._reserved.receiving, it) or _of_largest_network(
+                self._reserved.idle, it
+            )
+            if evicted is None:
                 return None
-        if makes_way is not None:
-            self._cut_off(makes_way)
-        self._pool(it).taken += 1
-        if not it.beyond:
-            self._of[it.network] += 1
-        self.waits(it)
+        if evicted is not None:
+            self._close(evicted)
+        self._pool(it).open += 1
+        if not it.is_reserved:
+            self._per_network[it.network] += 1
+        self.receiving(it)
         return it
 
-    def make_way(self) -> None:
-        """Cut somebody off who asks for nothing: the system is short of what connections are made of."""
-        it = self._all.longest()
+    def evict_waiting(self) -> None:
+        """Close a connection that is not busy: the system is short of file descriptors or memory."""
+        it = self._ordinary.longest_waiting()
         if it is not None:
-            self._cut_off(it)
+            self._close(it)
 
-    def waits(self, it: Connection) -> None:
-        """Note that what a connection asks for is yet to come: a head, or what follows it."""
-        self._queue(it, self._pool(it).silent)
+    def receiving(self, it: Connection) -> None:
+        """Note that a connection's request is not complete: its head or its body is to come."""
+        self._queue(it, self._pool(it).receiving)
 
-    def asks(self, it: Connection) -> None:
-        """Note that it is being answered, and keeps its place."""
+    def busy(self, it: Connection) -> None:
+        """Note that a connection's request is complete and being answered."""
         self._unqueue(it)
 
-    def is_sent(self, it: Connection) -> None:
-        """Note that its answer is there, and has to be taken."""
-        if not it.gone:
-            self._sent[it] = it.wire.get_write_buffer_size(), self._clock()
+    def sending(self, it: Connection) -> None:
+        """Note that a connection's answer is being sent, and has to be taken by the client."""
+        if not it.closed:
+            self._sending[it] = it.transport.get_write_buffer_size(), self._clock()
 
-    def rests(self, it: Connection) -> None:
-        """Note that it has its answer."""
-        self._queue(it, self._pool(it).resting)
+    def idle(self, it: Connection) -> None:
+        """Note that a connection's answer is complete."""
+        self._queue(it, self._pool(it).idle)
 
-    def left(self, it: Connection) -> None:
-        """Free its place."""
-        if it.gone:
+    def closed(self, it: Connection) -> None:
+        """Note that a connection is closed."""
+        if it.closed:
             return
         self._unqueue(it)
-        it.gone = True
-        self._pool(it).taken -= 1
-        if not it.beyond:
-            self._of[it.network] -= 1
-            if not self._of[it.network]:
-                del self._of[it.network]
-                self._quiet.pop(it.network, None)
+        it.closed = True
+        self._pool(it).open -= 1
+        if not it.is_reserved:
+            self._per_network[it.network] -= 1
+            if not self._per_network[it.network]:
+                del self._per_network[it.network]
+                self._waiting.pop(it.network, None)
 
-    def cut_off_overdue(self) -> None:
-        """End those that have waited for too long, or take nothing of their answers."""
-        now, bounds = self._clock(), self.bounds
-        for pool in (self._all, self._beyond):
-            for queue, patience in ((pool.silent, bounds.request_s), (pool.resting, bounds.keepalive_s)):
-                while queue and now - next(iter(queue.values())) >= patience:
-                    self._cut_off(next(iter(queue)))
-        for it, (unsent, since) in list(self._sent.items()):
-            left = it.wire.get_write_buffer_size()
+    def close_overdue(self) -> None:
+        """Close connections that have waited for too long, or whose client takes nothing of its answer."""
+        now, limits = self._clock(), self.limits
+        for pool in (self._ordinary, self._reserved):
+            for queue, most in ((pool.receiving, limits.request_s), (pool.idle, limits.keepalive_s)):
+                while queue and now - next(iter(queue.values())) >= most:
+                    self._close(next(iter(queue)))
+        for it, (unsent, since) in list(self._sending.items()):
+            left = it.transport.get_write_buffer_size()
             if left != unsent or not left:
-                self._sent[it] = left, now
+                self._sending[it] = left, now
             elif now - since >= _STALLED_S:
-                self._cut_off(it)
+                self._close(it)
 
-    def _cut_off(self, it: Connection) -> None:
-        self.left(it)
-        it.wire.abort()
+    def _close(self, it: Connection) -> None:
+        self.closed(it)
+        it.transport.abort()
 
     def _pool(self, it: Connection) -> _Pool:
-        return self._beyond if it.beyond else self._all
+        return self._reserved if it.is_reserved else self._ordinary
 
     def _queue(self, it: Connection, queue: Queue) -> None:
         self._unqueue(it)
-        if it.gone:
+        if it.closed:
             return
         queue[it] = self._clock()
-        if not it.beyond:
-            self._quiet[it.network][it] = None
+        if not it.is_reserved:
+            self._waiting[it.network][it] = None
 
     def _unqueue(self, it: Connection) -> None:
         pool = self._pool(it)
-        pool.silent.pop(it, None)
-        pool.resting.pop(it, None)
-        self._sent.pop(it, None)
-        if not it.beyond and it.network in self._quiet:
-            self._quiet[it.network].pop(it, None)
+        pool.receiving.pop(it, None)
+        pool.idle.pop(it, None)
+        self._sending.pop(it, None)
+        if not it.is_reserved and it.network in self._waiting:
+            self._waiting[it.network].pop(it, None)
 
 
-def _of_most(queue: Iterable[Connection], comes: Connection) -> Connection | None:
-    """Return the one that has waited longest, of the network that has the most of them and of who comes."""
+def _of_largest_network(queue: Iterable[Connection], new: Connection) -> Connection | None:
+    """Return the longest waiting connection of the network that has the most of them and of the new one."""
     waiting = list(queue)
-    count = Counter(it.network for it in (*waiting, comes))
+    count = Counter(it.network for it in (*waiting, new))
     return max(waiting, key=lambda it: count[it.network], default=None)  # the first of equals

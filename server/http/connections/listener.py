@@ -1,6 +1,6 @@
-"""Listening: each connection has a place before anything is read of it, and before HTTPS begins.
+"""Listener: accepts connections as far as the pool admits them, before TLS and before anything is read.
 
-Neither asyncio nor aiohttp bounds how many there are, or how long one may take to ask for something.
+Neither asyncio nor aiohttp limits how many there are, or how long one may take to send a request.
 """
 
 from __future__ import annotations
@@ -10,214 +10,210 @@ import errno
 import logging
 import socket
 import ssl
-from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
-from contextlib import ExitStack, asynccontextmanager, contextmanager, suppress
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import ExitStack, asynccontextmanager, suppress
 from typing import Any
 
 from aiohttp import web
 
 from logthrottle import LogThrottle
-from server.http.connections.connection_pool import Connection, Places
-from server.http.periodic import again_and_again
+from server.http.connections.connection_pool import Connection, ConnectionPool
+from server.http.periodic import run_periodically
 from server.system.accept_errors import AcceptErrors
 
 log = logging.getLogger(__name__)
 
 _BACKLOG = 128
-"""Connections that wait in the system to be accepted."""
+"""Connections that the kernel holds until they are accepted."""
 _OVERDUE_EVERY_S = 1.0
 _FAILED_PAUSE_S = 0.5
-"""After one could not be accepted."""
-_NOT_HERE = frozenset({errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT})
-"""What a name may stand for besides: localhost is ::1, too, and not every machine speaks IPv6."""
-_GOODBYE_S = 2.0
-"""How long HTTPS may take to end in good order."""
+"""Pause after a connection could not be accepted."""
+_NO_SUCH_ADDRESS = frozenset({errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT})
+"""Errors of addresses to skip: localhost is ::1, too, and not every machine speaks IPv6."""
+_TLS_SHUTDOWN_S = 2.0
+"""How long TLS may take to shut down."""
 
 
-class Handler(web.RequestHandler):
-    """A connection's protocol, which knows its place."""
+class PooledHandler(web.RequestHandler):
+    """A connection's protocol, which tells the pool of its states."""
 
-    __slots__ = ("connection", "places")
+    __slots__ = ("connection", "pool")
 
-    def __init__(self, places: Places, connection: Connection, server: web.Server, **settings: Any) -> None:
+    def __init__(
+        self, pool: ConnectionPool, connection: Connection, server: web.Server, **settings: Any
+    ) -> None:
         super().__init__(server, loop=asyncio.get_running_loop(), **settings)
-        self.places, self.connection = places, connection
+        self.pool, self.connection = pool, connection
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin (called by asyncio), after HTTPS has."""
+        """Begin (called by asyncio), after the TLS handshake."""
         assert isinstance(transport, asyncio.Transport)  # noqa: S101 — tells mypy that it can be written to
-        self.connection.wire = transport
+        self.connection.transport = transport
         super().connection_made(transport)
 
     def connection_lost(self, exc: BaseException | None) -> None:
-        """Free the place (called by asyncio)."""
+        """Leave the pool (called by asyncio)."""
         super().connection_lost(exc)
-        self.places.left(self.connection)
+        self.pool.closed(self.connection)
 
     async def finish_response(
         self, request: web.BaseRequest, resp: web.StreamResponse, start_time: float | None
     ) -> tuple[web.StreamResponse, bool]:
         """Send an answer (called by aiohttp)."""
-        self.places.is_sent(self.connection)
+        self.pool.sending(self.connection)
         try:
             return await super().finish_response(request, resp, start_time)
         finally:
-            self.places.rests(self.connection)
+            self.pool.idle(self.connection)
+
+    def body_pending(self) -> None:
+        """Note that the body of a request is to come."""
+        self.pool.receiving(self.connection)
+
+    def body_received(self) -> None:
+        """Note that the body of a request has come."""
+        self.pool.busy(self.connection)
 
 
-@contextmanager
-def still_coming(request: web.Request) -> Iterator[None]:
-    """Read what follows a request's head inside: until it has come, the connection asks for nothing yet."""
-    handler = request.protocol
-    if not isinstance(handler, Handler):
-        yield
-        return
-    handler.places.waits(handler.connection)
-    try:
-        yield
-    finally:
-        handler.places.asks(handler.connection)
-
-
-class _Opening:
-    """What becomes a transport: a socket, and the task that makes one of it."""
+class _AcceptedSocket:
+    """A socket that has been accepted, and the task that makes a transport of it."""
 
     def __init__(self, sock: socket.socket) -> None:
         self.socket = sock
         self.task: asyncio.Task[None] | None = None
-        self.begun = False
-        """From then on asyncio closes the socket."""
+        self.started = False
+        """asyncio has taken the socket over and closes it."""
 
     def abort(self) -> None:
-        """Give it up."""
+        """Close it."""
         if self.task is not None:
             self.task.cancel()
-        if not self.begun:
+        if not self.started:
             self.socket.close()
 
     def get_write_buffer_size(self) -> int:
-        """Return that nothing waits."""
+        """Return 0: nothing has been written."""
         return 0
 
 
 class Listener:
-    """Accepts connections for a server, as far as there are places; ``settings`` are its handlers'."""
+    """Accepts connections for a server, as far as the pool admits them; ``settings`` are its handlers'."""
 
     def __init__(
-        self, server: web.Server, places: Places, tls: ssl.SSLContext | None, **settings: Any
+        self, server: web.Server, pool: ConnectionPool, tls: ssl.SSLContext | None, **settings: Any
     ) -> None:
-        self._places, self._tls = places, tls
+        self._pool, self._tls = pool, tls
         self._server, self._settings = server, settings
         self._failing, self._full = AcceptErrors(), LogThrottle()
-        self._opening: set[asyncio.Task[None]] = set()
+        self._accepted: set[asyncio.Task[None]] = set()
 
     @asynccontextmanager
     async def listening(self, host: str, port: int) -> AsyncIterator[int]:
-        """Accept connections inside; give the port.
+        """Accept connections inside; yield the port.
 
         Raises:
             OSError: the address cannot be listened on.
         """
         with ExitStack() as sockets:
-            opened = [sockets.enter_context(it) for it in await _opened(host, port)]
-            turns = [again_and_again(0.0, self._accepting(it), "accepting connections") for it in opened]
-            turns.append(
-                again_and_again(_OVERDUE_EVERY_S, self._look, "looking for connections that ask for nothing")
+            opened = [sockets.enter_context(it) for it in await _listen(host, port)]
+            loops = [run_periodically(0.0, self._accept_from(it), "accepting connections") for it in opened]
+            loops.append(
+                run_periodically(_OVERDUE_EVERY_S, self._close_overdue, "closing overdue connections")
             )
-            tasks = [asyncio.create_task(it, name="connections") for it in turns]
+            tasks = [asyncio.create_task(it, name="connections") for it in loops]
             try:
                 yield int(opened[0].getsockname()[1])
             finally:
-                await _cancelled([*tasks, *self._opening])
+                await _cancel([*tasks, *self._accepted])
 
-    def _accepting(self, listening: socket.socket) -> Callable[[], Coroutine[Any, Any, None]]:
+    def _accept_from(self, listening: socket.socket) -> Callable[[], Coroutine[Any, Any, None]]:
         async def accept() -> None:
             try:
-                # Nothing is awaited until somebody looks after it: else it could be lost at the end.
+                # Nothing is awaited until the socket has an owner: otherwise it could be leaked at shutdown.
                 sock, address = listening.accept()
             except BlockingIOError:
-                await _knocked(listening)
+                await _readable(listening)
                 return
             except ConnectionAbortedError:
-                return  # it has gone again
+                return  # the client has closed it again
             except OSError as error:
                 self._failing.failed(error)
-                self._places.make_way()
+                self._pool.evict_waiting()
                 await asyncio.sleep(_FAILED_PAUSE_S)
                 return
             sock.setblocking(False)  # noqa: FBT003 — the name of the method says it
-            self._take(sock, str(address[0]))
+            self._accept_socket(sock, str(address[0]))
 
         return accept
 
-    def _take(self, sock: socket.socket, address: str) -> None:
-        opening = _Opening(sock)
-        connection = self._places.admit(address, opening)
-        if connection is None or connection.beyond:
-            self._say_full()
+    def _accept_socket(self, sock: socket.socket, address: str) -> None:
+        accepted = _AcceptedSocket(sock)
+        connection = self._pool.admit(address, accepted)
+        if connection is None or connection.is_reserved:
+            self._log_full()
         if connection is None:
             sock.close()
             return
-        opening.task = asyncio.create_task(self._open(opening, connection), name="connection")
-        self._opening.add(opening.task)
-        opening.task.add_done_callback(lambda task: self._opened(task, opening, connection))
+        accepted.task = asyncio.create_task(self._open(accepted, connection), name="connection")
+        self._accepted.add(accepted.task)
+        accepted.task.add_done_callback(lambda task: self._done(task, accepted, connection))
 
-    def _opened(self, task: asyncio.Task[None], opening: _Opening, connection: Connection) -> None:
-        self._opening.discard(task)
-        if not opening.begun:  # it was cancelled before
-            opening.socket.close()
-            self._places.left(connection)
+    def _done(self, task: asyncio.Task[None], accepted: _AcceptedSocket, connection: Connection) -> None:
+        self._accepted.discard(task)
+        if not accepted.started:  # it was cancelled before
+            accepted.socket.close()
+            self._pool.closed(connection)
 
-    async def _open(self, opening: _Opening, connection: Connection) -> None:
-        opening.begun = True
-        patience = self._places.bounds.request_s
-        limits = {"ssl_handshake_timeout": patience, "ssl_shutdown_timeout": min(patience, _GOODBYE_S)}
+    async def _open(self, accepted: _AcceptedSocket, connection: Connection) -> None:
+        accepted.started = True
+        timeout = self._pool.limits.request_s
+        limits = {"ssl_handshake_timeout": timeout, "ssl_shutdown_timeout": min(timeout, _TLS_SHUTDOWN_S)}
         try:
             await asyncio.get_running_loop().connect_accepted_socket(
-                lambda: Handler(self._places, connection, self._server, **self._settings),
-                opening.socket,
+                lambda: PooledHandler(self._pool, connection, self._server, **self._settings),
+                accepted.socket,
                 ssl=self._tls,
                 **({} if self._tls is None else limits),
             )
-        except OSError as error:  # those of HTTPS among them
-            log.debug("a connection did not begin: %s", error)
-            self._places.left(connection)
+        except OSError as error:  # also of the TLS handshake
+            log.debug("connection could not be established: %s", error)
+            self._pool.closed(connection)
         except BaseException:
-            self._places.left(connection)
+            self._pool.closed(connection)
             raise
 
-    async def _look(self) -> None:
-        self._places.cut_off_overdue()
+    async def _close_overdue(self) -> None:
+        self._pool.close_overdue()
 
-    def _say_full(self) -> None:
+    def _log_full(self) -> None:
         if (more := self._full.record()) is not None:
             log.warning(
                 "all connections that are taken (http.connections_max %d, http.connections_per_address %d) "
-                "are busy: operators alone get in%s",
-                self._places.bounds.most,
-                self._places.bounds.per_address,
+                "are busy: operators alone are admitted%s",
+                self._pool.limits.most,
+                self._pool.limits.per_address,
                 more,
             )
 
 
-async def _opened(host: str, port: int) -> list[socket.socket]:
-    """Listen on all addresses that a host's name stands for, as far as this machine has them."""
-    found = await asyncio.get_running_loop().getaddrinfo(
+async def _listen(host: str, port: int) -> list[socket.socket]:
+    """Listen on all addresses that a host name resolves to, as far as this machine has them."""
+    resolved = await asyncio.get_running_loop().getaddrinfo(
         host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
     )
     opened: list[socket.socket] = []
-    lacking: OSError | None = None
-    for family, address in dict.fromkeys((it[0], it[4]) for it in found):
+    skipped: OSError | None = None
+    for family, address in dict.fromkeys((it[0], it[4]) for it in resolved):
         try:
             opened.append(_listening(family, address))
         except OSError as error:
-            if error.errno not in _NOT_HERE:
+            if error.errno not in _NO_SUCH_ADDRESS:
                 for it in opened:
                     it.close()
                 raise
-            lacking = error
-    if not opened and lacking is not None:
-        raise lacking
+            skipped = error
+    if not opened and skipped is not None:
+        raise skipped
     return opened
 
 
@@ -236,18 +232,18 @@ def _listening(family: socket.AddressFamily, address: tuple[Any, ...]) -> socket
     return listening
 
 
-async def _knocked(listening: socket.socket) -> None:
-    """Wait until somebody wants to be let in."""
+async def _readable(listening: socket.socket) -> None:
+    """Wait until a connection can be accepted."""
     loop = asyncio.get_running_loop()
-    knocked = asyncio.Event()
-    loop.add_reader(listening, knocked.set)
+    readable = asyncio.Event()
+    loop.add_reader(listening, readable.set)
     try:
-        await knocked.wait()
+        await readable.wait()
     finally:
         loop.remove_reader(listening)
 
 
-async def _cancelled(tasks: list[asyncio.Task[Any]]) -> None:
+async def _cancel(tasks: list[asyncio.Task[Any]]) -> None:
     for task in tasks:
         task.cancel()
     with suppress(asyncio.CancelledError):

@@ -1,42 +1,43 @@
-"""What strangers send that is no request: how it is answered, and logged, so that it cannot fill a disk."""
+"""Malformed requests: answered by status, and kept out of the log, which anybody could fill with them."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Awaitable, Callable
 
-from aiohttp import ClientError, HttpVersion11, web, web_protocol, web_urldispatcher
+from aiohttp import ClientError, HttpVersion11, web, web_protocol
 from aiohttp.http_exceptions import HttpProcessingError
 
-from server.http.api.handlers import problem
+from server.http.json_responses import error_response
 
-REQUESTS = logging.getLogger(f"{__name__}.requests")
+AIOHTTP_LOG = logging.getLogger(f"{__name__}.requests")
 """What aiohttp logs to."""
 
-_THEIRS = (HttpProcessingError, web_protocol.RequestPayloadError, ClientError)
-"""Mistakes of who asks, which are answered with 400, or by hanging up."""
+_CLIENT_ERRORS = (HttpProcessingError, web_protocol.RequestPayloadError, ClientError)
+"""Mistakes of clients, which are answered with 400, or by closing the connection."""
+
+Handler = Callable[[web.BaseRequest], Awaitable[web.StreamResponse]]
 
 
-def _is_ours(record: logging.LogRecord) -> bool:
-    """Pass on what the server did wrong; aiohttp logs a traceback of what strangers do wrong, too."""
+def _is_server_error(record: logging.LogRecord) -> bool:
+    """Keep records of the server's own errors; aiohttp logs a traceback of clients' mistakes, too."""
     error = record.exc_info[1] if record.exc_info else None
-    return not isinstance(error, _THEIRS)
+    return not isinstance(error, _CLIENT_ERRORS)
 
 
-REQUESTS.addFilter(_is_ours)
+AIOHTTP_LOG.addFilter(_is_server_error)
 
 
-_answer_100_continue = web_urldispatcher._default_expect_handler  # noqa: SLF001 — see below
+def refuse_expectations(handler: Handler) -> Handler:
+    """Return a server's handler that answers 417 to any Expect header but 100-continue.
 
+    aiohttp's own answer repeats the header, and fails with a traceback where that is not text.
+    """
 
-async def _what_is_expected(request: web.Request) -> web.StreamResponse | None:
-    """Answer the head ``Expect``, which aiohttp does before anything of ours is asked."""
-    expected = request.headers.get("Expect", "").lower()
-    if request.version == HttpVersion11 and expected != "100-continue":
-        return problem(417, "Expect: nothing but 100-continue can be expected")
-    await _answer_100_continue(request)
-    return None
+    async def handle(request: web.BaseRequest) -> web.StreamResponse:
+        expected = request.headers.get("Expect", "").lower()
+        if expected and request.version == HttpVersion11 and expected != "100-continue":
+            return error_response(417, "Expect: nothing but 100-continue can be expected")
+        return await handler(request)
 
-
-# aiohttp's own repeats what is expected, and fails where that is no text: 500, and a traceback in the log for
-# whoever sends it. Addresses that are not there can be given another in no other way.
-web_urldispatcher._default_expect_handler = _what_is_expected  # type: ignore[assignment]  # noqa: SLF001
+    return handle

@@ -1,4 +1,4 @@
-"""Playlists of HLS as text (RFC 8216; parts: draft-pantos-hls-rfc8216bis)."""
+"""HLS playlists as text (RFC 8216; parts: draft-pantos-hls-rfc8216bis)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from aiohttp import web
 
 from server.config.sections import SiteSettings
-from server.service.streaming.hls_segmenter import SegmentLayout
+from server.service.facade.streams import SegmentLayout
 
 TYPE = "application/vnd.apple.mpegurl"
 _VERSION = 7
@@ -17,7 +17,7 @@ _VERSION = 7
 
 
 @dataclass(frozen=True, slots=True)
-class Listed:
+class ListedSegment:
     """A segment in a playlist: pulses ``first … until - 1``."""
 
     number: int
@@ -25,7 +25,7 @@ class Listed:
     until: int
     parts: Sequence[ListedPart] = ()
     whole: bool = True
-    """Else only its parts are there."""
+    """Otherwise only its parts are listed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +37,12 @@ class ListedPart:
 
 
 def part_name(segment: int, index: int) -> str:
-    """Name a part of a segment."""
+    """Return the file name of a part of a segment."""
     return f"{segment}.{index}.m4s"
 
 
 def playlist(
-    segments: Iterable[Listed],
+    segments: Iterable[ListedSegment],
     plan: SegmentLayout,
     pulse0: float | None,
     extra: Iterable[str] = (),
@@ -52,8 +52,8 @@ def playlist(
 ) -> str:
     """Write the playlist of a stream; ``pulse0`` is when pulse 0 was due, unix seconds.
 
-    Segments are numbered by their pulses: whoever writes the playlist anew writes the same numbers. ``extra``
-    are further lines about the whole of it, ``hint`` names the part that comes next.
+    Segments are numbered by their pulses, so a restarted service continues the numbers. ``extra`` are further
+    lines about the whole playlist, ``hint`` names the part that comes next.
     """
     listed = list(segments)
     lines = head_lines(plan, listed[0].number if listed else 0, extra)
@@ -65,7 +65,7 @@ def playlist(
 
 
 def head_lines(plan: SegmentLayout, first: int, extra: Iterable[str] = ()) -> list[str]:
-    """Give the lines before the first segment, whose number is ``first``."""
+    """Return the lines before the first segment, whose number is ``first``."""
     return [
         "#EXTM3U",
         f"#EXT-X-VERSION:{_VERSION}",
@@ -77,35 +77,35 @@ def head_lines(plan: SegmentLayout, first: int, extra: Iterable[str] = ()) -> li
     ]
 
 
-def master(address: str, bandwidth: int, codecs: str, site: SiteSettings) -> str:
-    """Write a playlist of playlists that names one; ``bandwidth`` is bits a second at the most."""
-    told = (
+def multivariant_playlist(address: str, bandwidth: int, codecs: str, site: SiteSettings) -> str:
+    """Write a multivariant playlist of one playlist; ``bandwidth`` is its peak in bits a second."""
+    attributes = (
         f'BANDWIDTH={max(1, bandwidth)},CODECS="{codecs}",RESOLUTION={site.width}x{site.height},'
         f"FRAME-RATE={site.fps:.3f}"
     )
     lines = ["#EXTM3U", f"#EXT-X-VERSION:{_VERSION}", "#EXT-X-INDEPENDENT-SEGMENTS"]
-    return "\n".join([*lines, f"#EXT-X-STREAM-INF:{told}", address]) + "\n"
+    return "\n".join([*lines, f"#EXT-X-STREAM-INF:{attributes}", address]) + "\n"
 
 
-def segment_lines(segment: Listed, plan: SegmentLayout, pulse0: float | None) -> list[str]:
-    """Give the lines of a segment, with its time of day where ``pulse0`` is known."""
+def segment_lines(segment: ListedSegment, plan: SegmentLayout, pulse0: float | None) -> list[str]:
+    """Return the lines of a segment, with its time of day where ``pulse0`` is known."""
     lines = [_part_line(segment.number, index, it, plan.fps) for index, it in enumerate(segment.parts)]
     if segment.whole:
         seconds = (segment.until - segment.first) / plan.fps
         lines += [f"#EXTINF:{seconds:.5f},", f"{segment.number}.m4s"]
     if pulse0 is None:
         return lines
-    when = datetime.fromtimestamp(pulse0 + segment.first / plan.fps, UTC)
-    told = when.isoformat(timespec="milliseconds").replace("+00:00", "Z")
-    return [f"#EXT-X-PROGRAM-DATE-TIME:{told}", *lines]
+    begin = datetime.fromtimestamp(pulse0 + segment.first / plan.fps, UTC)
+    time = begin.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    return [f"#EXT-X-PROGRAM-DATE-TIME:{time}", *lines]
 
 
 def _part_line(segment: int, index: int, part: ListedPart, fps: float) -> str:
-    can_begin = ",INDEPENDENT=YES" * part.independent
-    return f'#EXT-X-PART:DURATION={part.pulses / fps:.5f},URI="{part_name(segment, index)}"{can_begin}'
+    independent = ",INDEPENDENT=YES" * part.independent
+    return f'#EXT-X-PART:DURATION={part.pulses / fps:.5f},URI="{part_name(segment, index)}"{independent}'
 
 
-def playlist_answer(text: str) -> web.Response:
-    """Answer with a playlist, which another page may read and nobody may keep."""
+def playlist_response(text: str) -> web.Response:
+    """Return a playlist as an answer that any origin may read and nobody may cache."""
     headers = {"Access-Control-Allow-Origin": "*", "Cache-Control": "no-cache"}
     return web.Response(text=text, content_type=TYPE, charset="utf-8", headers=headers)

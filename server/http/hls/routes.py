@@ -1,4 +1,4 @@
-"""HTTP Live Streaming (RFC 8216): the streams in segments of fragmented MP4, for players that fetch."""
+"""HTTP Live Streaming (RFC 8216): playlists, segments and parts of every stream."""
 
 from __future__ import annotations
 
@@ -7,51 +7,48 @@ from functools import wraps
 
 from aiohttp import web
 
-from server.http.access.access_control import ACCESS, sees_one_person
-from server.http.api.handlers import no_camera, no_object, not_now, problem
-from server.http.app_keys import READERS, SERVICE
-from server.http.connections.viewer_limits import no_place
-from server.http.hls.live_playlist import coming_part, newest
-from server.http.hls.sessions import Reader, of_camera, of_live, of_person
-from server.http.hls.time_shift_playlist import Stream, playlist_of_the_past, segment_of_the_past
+from server.http.access.authorization import ACCESS, is_scoped_to_person
+from server.http.app_keys import SERVICE
+from server.http.hls.live_playlist import live_playlist, wait_for_part
+from server.http.hls.time_shift_playlist import HlsStream, time_shift_playlist, time_shift_segment
 from server.http.hls.token_query import with_token
-from server.http.streams.stream_forms import mp4_head
-from server.http.streams.time_shift import asks_for_the_past, object_past
-from server.service.time_shift.playback import CameraPlayback
+from server.http.json_responses import error_response, unavailable
+from server.http.streams.time_range import is_time_shifted
+from server.http.viewers.hls_sessions import HLS_SESSIONS, HlsClient, of_camera, of_live, of_person
+from server.http.viewers.viewer_limits import refuse_viewer
+from server.service.facade.errors import RefusedError
 
 routes = web.RouteTableDef()
 
-_ANYBODY = {"Access-Control-Allow-Origin": "*"}
+_ANY_ORIGIN = {"Access-Control-Allow-Origin": "*"}
 _OBJECT = "/objects/{object:[0-9]{1,9}}/hls"
 _CAMERA = "/cameras/{camera}/hls"
 _NUMBER = "{segment:[0-9]{1,12}}"
 _AGENT = 200
-"""Letters of a player's name for itself that are looked at."""
+"""Characters of the User-Agent that players are told apart by."""
 
 
 _Handler = Callable[[web.Request], Awaitable[web.Response]]
-_OfStream = Callable[[web.Request, Stream], Awaitable[web.Response]]
+_StreamHandler = Callable[[web.Request, HlsStream], Awaitable[web.Response]]
 
 
-def _counted(awaits: str | None = None) -> Callable[[_OfStream], _Handler]:
-    """Let whoever asks be a viewer, if there is place; ``awaits``: what they may have to wait for."""
+def _counted(awaits: str | None = None) -> Callable[[_StreamHandler], _Handler]:
+    """Count whoever fetches as a viewer, if there is a slot; ``awaits`` is the kind of what may block."""
 
-    def counted(handler: _OfStream) -> _Handler:
+    def counted(handler: _StreamHandler) -> _Handler:
         @wraps(handler)
         async def run(request: web.Request) -> web.Response:
             stream = _stream(request)
-            if stream is None:
-                return _nobody(request)
             if request.method == "HEAD":
                 return await handler(request, stream)
-            readers, reader = request.app[READERS], _reader(request)
-            if readers.is_one_more(reader, awaits):
-                by_channel, connected = _connected(request)
-                counted = connected + readers.of(reader.stream)
-                full = no_place(request, counted, (reader.stream, by_channel))
-                if full is not None:
-                    return full
-            with readers.asking(reader, awaits):
+            sessions, player = request.app[HLS_SESSIONS], _client(request)
+            if sessions.is_new_viewer(player, awaits):
+                slot_name, connected = _connected(request)
+                viewers = connected + sessions.of(player.stream)
+                refused = refuse_viewer(request, viewers, (player.stream, slot_name))
+                if refused is not None:
+                    return refused
+            with sessions.request(player, awaits):
                 return await handler(request, stream)
 
         return run
@@ -62,96 +59,99 @@ def _counted(awaits: str | None = None) -> Callable[[_OfStream], _Handler]:
 @routes.get(_OBJECT + "/index.m3u8")
 @routes.get(_CAMERA + "/index.m3u8")
 @_counted("playlist")
-async def get_playlist(request: web.Request, stream: Stream) -> web.Response:
+async def get_playlist(request: web.Request, stream: HlsStream) -> web.Response:
     """List the newest segments of a stream (HLS), or from a moment on."""
-    if asks_for_the_past(request):
-        return with_token(request, await playlist_of_the_past(request, stream))
-    if stream.reel is None:
-        return _nobody(request)
-    return with_token(request, await newest(request, stream.reel, request.app[SERVICE].pulse0))
+    if is_time_shifted(request):
+        return with_token(request, await time_shift_playlist(request, stream))
+    if stream.live is None:
+        raise _unknown(request)
+    return with_token(request, await live_playlist(request, stream.live, request.app[SERVICE].pulse0))
 
 
 @routes.get(_OBJECT + "/init.mp4")
 @routes.get(_CAMERA + "/init.mp4")
 @_counted()
-async def get_init(request: web.Request, stream: Stream) -> web.Response:
+async def get_init(request: web.Request, stream: HlsStream) -> web.Response:
     """Give what a player needs before the first segment of a stream (HLS)."""
     del stream
-    head = mp4_head(request.app[SERVICE])
-    return not_now("no camera has delivered a picture yet") if head is None else _media(request, head)
+    head = request.app[SERVICE].streams.init_segment()
+    return unavailable("no camera has delivered a picture yet") if head is None else _media(request, head)
 
 
 @routes.get(_OBJECT + f"/{_NUMBER}.m4s")
 @routes.get(_CAMERA + f"/{_NUMBER}.m4s")
 @_counted()
-async def get_segment(request: web.Request, stream: Stream) -> web.Response:
+async def get_segment(request: web.Request, stream: HlsStream) -> web.Response:
     """Give a segment of a stream (HLS), new or past."""
     number = int(request.match_info["segment"])
-    segment = None if stream.reel is None else stream.reel.get(number)
+    segment = None if stream.live is None else stream.live.get(number)
     if segment is None:
-        segment = await segment_of_the_past(request, stream, number)
+        segment = await time_shift_segment(request, stream, number)
     if segment is None:
-        return problem(404, f"there is no segment {number} here, or not any more")
+        return error_response(404, f"there is no segment {number} here, or not any more")
     return _media(request, segment.data)
 
 
 @routes.get(_OBJECT + f"/{_NUMBER}.{{part:[0-9]{{1,6}}}}.m4s")
 @routes.get(_CAMERA + f"/{_NUMBER}.{{part:[0-9]{{1,6}}}}.m4s")
 @_counted("part")
-async def get_part(request: web.Request, stream: Stream) -> web.Response:
+async def get_part(request: web.Request, stream: HlsStream) -> web.Response:
     """Give a part of a segment of a stream (HLS); one that is yet to come is waited for."""
-    if stream.reel is None:
-        return _nobody(request)
+    if stream.live is None:
+        raise _unknown(request)
     number, index = int(request.match_info["segment"]), int(request.match_info["part"])
-    part = await coming_part(stream.reel, number, index)
+    part = await wait_for_part(stream.live, number, index)
     if part is None:
-        return problem(404, f"there is no part {number}.{index} here, or not any more")
+        return error_response(404, f"there is no part {number}.{index} here, or not any more")
     return _media(request, part.data)
 
 
 def _media(request: web.Request, data: bytes) -> web.Response:
-    """Give bytes that never change. A site that starts anew counts anew: they are not kept for long."""
-    plan = request.app[SERVICE].splicer.layout
+    """Return bytes that never change, to be cached briefly: a restarted site numbers its segments anew."""
+    plan = request.app[SERVICE].streams.segment_plan
     kept_s = int(2 * plan.playlist_length * plan.segment_frames / plan.fps)
-    headers = {**_ANYBODY, "Cache-Control": f"public, max-age={kept_s}, immutable"}
+    headers = {**_ANY_ORIGIN, "Cache-Control": f"public, max-age={kept_s}, immutable"}
     return web.Response(body=data, content_type="video/mp4", headers=headers)
 
 
-def _stream(request: web.Request) -> Stream | None:
+def _stream(request: web.Request) -> HlsStream:
+    """Return the stream of a request.
+
+    Raises:
+        RefusedError: there is and was none.
+    """
     service = request.app[SERVICE]
     if "camera" in request.match_info:
         camera = request.match_info["camera"]
-        reel = service.splicer.segmenter_of_camera(camera)
-        return (
-            None if reel is None else Stream(f"camera {camera}", reel, CameraPlayback(service.past, camera))
-        )
-    number = int(request.match_info["object"])
-    reel = service.splicer.segmenter_of_person(service.board.resolve(number), scoped=sees_one_person(request))
-    stream = Stream(f"object {number}", reel, object_past(request, number))
-    return stream if stream.exists else None
+        recorded = service.recordings.of_camera(camera)
+        return HlsStream(service.streams.segments_of_camera(camera), recorded)
+    number, scoped = int(request.match_info["object"]), is_scoped_to_person(request)
+    live = service.streams.segments_of_person(service.people.current_number(number), scoped=scoped)
+    stream = HlsStream(live, service.recordings.of_person(number, scoped=scoped))
+    if not stream.exists:
+        raise _unknown(request)
+    return stream
 
 
-def _reader(request: web.Request) -> Reader:
-    """Tell players apart by address and by what they call themselves, as far as that goes."""
+def _client(request: web.Request) -> HlsClient:
+    """Return the player behind a request: told apart by client, address and User-Agent."""
     service, names = request.app[SERVICE], request.match_info
     if "camera" in names:
         stream = of_camera(names["camera"])
     else:
-        stream = of_person(service.board.resolve(int(names["object"])))
-    holder = request.app[ACCESS].share_holder(request)
-    return Reader(stream, holder, request.remote or "", request.headers.get("User-Agent", "")[:_AGENT])
+        stream = of_person(service.people.current_number(int(names["object"])))
+    client = request.app[ACCESS].client_of(request)
+    return HlsClient(stream, client, request.remote or "", request.headers.get("User-Agent", "")[:_AGENT])
 
 
 def _connected(request: web.Request) -> tuple[str, int]:
-    """Give the same stream's name over connections of their own, and how many are sent it so."""
+    """Return the slot name of the same stream over connections of their own, and how many watch that."""
     service, names = request.app[SERVICE], request.match_info
     if "camera" in names:
-        return of_live(names["camera"]), service.splicer.cameras[names["camera"]].viewers
-    number = service.board.resolve(int(names["object"]))
-    return of_person(number), service.splicer.viewers_of(number)
+        return of_live(names["camera"]), service.streams.of_camera(names["camera"]).viewers
+    number = service.people.current_number(int(names["object"]))
+    return of_person(number), service.streams.viewers_of_person(number)
 
 
-def _nobody(request: web.Request) -> web.Response:
-    if "camera" in request.match_info:
-        return no_camera(request.app[SERVICE], request.match_info["camera"])
-    return no_object(request.app[SERVICE], int(request.match_info["object"]))
+def _unknown(request: web.Request) -> RefusedError:
+    return request.app[SERVICE].people.unknown(int(request.match_info["object"]))

@@ -1,4 +1,4 @@
-"""A playlist names its segments with the token that it was asked for with: players add none."""
+"""Tokens in playlists: segments are named with the token that the playlist was requested with."""
 
 from __future__ import annotations
 
@@ -11,21 +11,23 @@ from aiohttp import web
 _URI = re.compile(r'(?<=URI=")[^"]*')
 
 
-def with_token(request: web.Request, answer: web.Response) -> web.Response:
-    """Write the request's token, where it has one in its address, behind every address in a playlist."""
+def with_token(request: web.Request, response: web.Response) -> web.Response:
+    """Append the token in the request's query, if any, to every address in a playlist: players add none."""
     token = request.query.get("token")
-    if token is not None and answer.status == HTTPStatus.OK and answer.text is not None:
-        told = f"token={quote(token, safe='')}"
-        lines = answer.text.split("\n")  # thousands, and in most there is no address
-        answer.text = "\n".join([it if it.startswith("#EXTINF") else _told(it, told) for it in lines])
-    return answer
+    if token is not None and response.status == HTTPStatus.OK and response.text is not None:
+        query = f"token={quote(token, safe='')}"
+        lines = response.text.split("\n")  # thousands, and in most there is no address
+        response.text = "\n".join(
+            [it if it.startswith("#EXTINF") else _with_query(it, query) for it in lines]
+        )
+    return response
 
 
-def _told(line: str, token: str) -> str:
+def _with_query(line: str, query: str) -> str:
     if line.startswith("#"):
-        return _URI.sub(lambda found: _and(found[0], token), line)
-    return _and(line, token) if line else line
+        return _URI.sub(lambda uri: _append(uri[0], query), line)
+    return _append(line, query) if line else line
 
 
-def _and(address: str, token: str) -> str:
-    return f"{address}{'&' if '?' in address else '?'}{token}"
+def _append(address: str, query: str) -> str:
+    return f"{address}{'&' if '?' in address else '?'}{query}"

@@ -1,4 +1,4 @@
-"""Tracks and choices of a time span as files, from what is kept of the past."""
+"""``/api/operator/tracks.csv`` and ``choices.csv``: recorded decisions of a time range as CSV files."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from collections.abc import AsyncIterator, Callable, Iterator
 import msgspec
 from aiohttp import web
 
-from server.http.access.grants import OPERATING
-from server.http.api.handlers import problem
+from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SERVICE
+from server.http.json_responses import error_response
 from server.http.streams.sending import send_bytes
-from server.http.streams.time_shift import led_by, nothing_said, wish_of
+from server.http.streams.time_range import decisions_in, parse_time_range
 from server.messaging.messages import GopChoices
+from server.service.facade.recordings import TimeReferenceError
 from server.service.service import BestViewService
-from server.service.time_shift.decision_log import read_decision_lines
-from server.service.time_shift.time_reference import TimeReferenceError, utc_time_of_pulse
 
 routes = web.RouteTableDef()
 
@@ -23,66 +22,65 @@ _TRACKS = "frame,time,camera,object,left,top,width,height,run"
 _CHOICES = "frame,time,object,camera,run"
 
 
-class Told(GopChoices, frozen=True, kw_only=True):
-    """A GOP as the past tells it."""
+class RecordedChoices(GopChoices, frozen=True, kw_only=True):
+    """The recorded decisions about a GOP."""
 
     run: str = ""
-    """Of an earlier run of the service: its folder."""
+    """The folder of the earlier run of the service that it is of; empty: of this one."""
 
 
-Rows = Callable[[Told, range, Callable[[int], str]], Iterator[str]]
+RowWriter = Callable[[RecordedChoices, range, Callable[[int], str]], Iterator[str]]
+"""Yields the rows of a GOP for the given pulses, with a function that returns the time of a pulse."""
 
 
-@routes.get(f"{OPERATING}/tracks.csv")
+@routes.get(f"{OPERATOR_PATH}/tracks.csv")
 async def get_tracks(request: web.Request) -> web.StreamResponse:
     """Give who was where from one moment to another, as CSV."""
     return await _send(request, "tracks", _TRACKS, _tracks)
 
 
-@routes.get(f"{OPERATING}/choices.csv")
+@routes.get(f"{OPERATOR_PATH}/choices.csv")
 async def get_choices(request: web.Request) -> web.StreamResponse:
     """Give which camera showed whom from one moment to another, as CSV."""
     return await _send(request, "choices", _CHOICES, _choices)
 
 
-async def _send(request: web.Request, what: str, head: str, rows: Rows) -> web.StreamResponse:
+async def _send(request: web.Request, what: str, head: str, rows: RowWriter) -> web.StreamResponse:
     service = request.app[SERVICE]
-    end = service.past.recent.end
+    end = service.recordings.end
     try:
-        wish = wish_of(request, service, end)
+        playback = parse_time_range(request, service, end)
     except TimeReferenceError as error:
-        return problem(400, str(error))
-    span = range(wish.start, end if wish.end is None else wish.end)
+        return error_response(400, str(error))
+    span = range(playback.start, end if playback.end is None else playback.end)
     name = f"{service.config.site.name}-{what}-p{span.start}-p{span.stop - 1}.csv"
     headers = {"Content-Type": "text/csv", "Content-Disposition": f'attachment; filename="{name}"'}
-    kept = read_decision_lines(service.past, span.start, span.stop)
-    first = await anext(kept, None)
-    if first is None and (missing := nothing_said(service, wish)) is not None:
-        return missing
-    lines = _lines(service, led_by(first, kept), span, rows)
+    decisions = await decisions_in(service, playback)
+    if isinstance(decisions, web.Response):
+        return decisions
+    lines = _csv_lines(service, decisions, span, rows)
     return await send_bytes(request, lines, f"{head}\n".encode(), headers)
 
 
-async def _lines(
-    service: BestViewService, told_lines: AsyncIterator[bytes], span: range, rows: Rows
+async def _csv_lines(
+    service: BestViewService, decisions: AsyncIterator[bytes], span: range, rows: RowWriter
 ) -> AsyncIterator[bytes]:
-    fps, pulse0 = service.config.site.fps, service.pulse0
-    decoder = msgspec.json.Decoder(Told)
-    async for line in told_lines:
+    decoder = msgspec.json.Decoder(RecordedChoices)
+    async for line in decisions:
         gop = decoder.decode(line)
         inside = range(max(gop.first, span.start), min(gop.first + gop.frames, span.stop))
-        yield "".join(rows(gop, inside, lambda pulse: utc_time_of_pulse(pulse, fps, pulse0) or "")).encode()
+        yield "".join(rows(gop, inside, lambda pulse: service.recordings.time_of(pulse) or "")).encode()
 
 
-def _tracks(gop: Told, inside: range, moment: Callable[[int], str]) -> Iterator[str]:
+def _tracks(gop: RecordedChoices, inside: range, time_of: Callable[[int], str]) -> Iterator[str]:
     for pulse in inside:
         for camera, frames in gop.boxes.items():
             for number, left, top, right, bottom in frames[pulse - gop.first]:
                 box = f"{left:.2f},{top:.2f},{right - left:.2f},{bottom - top:.2f}"
-                yield f"{pulse + 1},{moment(pulse)},{camera},{number},{box},{gop.run}\n"
+                yield f"{pulse + 1},{time_of(pulse)},{camera},{number},{box},{gop.run}\n"
 
 
-def _choices(gop: Told, inside: range, moment: Callable[[int], str]) -> Iterator[str]:
+def _choices(gop: RecordedChoices, inside: range, time_of: Callable[[int], str]) -> Iterator[str]:
     for pulse in inside:
         for number, camera in sorted(gop.choices.items()):
-            yield f"{pulse + 1},{moment(pulse)},{number},{camera},{gop.run}\n"
+            yield f"{pulse + 1},{time_of(pulse)},{number},{camera},{gop.run}\n"

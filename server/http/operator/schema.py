@@ -4,128 +4,15 @@ from __future__ import annotations
 
 import msgspec
 
-from server.http.api.schema import CameraInfo
-from server.service.metrics.camera_metrics import CameraProblem, RecentSeconds
-
-
-class OwnPicture(msgspec.Struct, frozen=True):
-    """A camera's own picture, and how it lies in the site's: site = own · scale + (left, top), in pixels."""
-
-    width: int
-    height: int
-    scale: float
-    left: float
-    top: float
-
-
-class OperatorCamera(CameraInfo, frozen=True):
-    """How one camera is, in all that is measured of it: what /api/cameras says, and more."""
-
-    bad_messages: int
-    clock_offset: float | None
-    """Seconds, pulse server's clock minus the camera's; null: not known."""
-    sync_error: RecentSeconds | None
-    """Seconds from the moment a frame was due to the moment it was taken, of the last ten seconds or so."""
-    tracking_delay: RecentSeconds | None
-    """Seconds from the moment a window's last frame was due to the moment the window was solved."""
-    certified: float | None
-    """Share of the windows whose answer is proven to be the optimum."""
-    windows: int
-    """How many windows that is about."""
-    last_trouble: CameraProblem | None
-    """What last went wrong, and when; it stays when the camera is well again."""
-    picture: OwnPicture | None
-    """Null: it has not said."""
+from server.service.facade.calibration import OperatorWalk
+from server.service.facade.cameras import Floor, OperatorCamera
+from server.service.facade.operations import Pulses
 
 
 class OperatorCameras(msgspec.Struct, frozen=True):
     """All cameras of the site."""
 
     cameras: list[OperatorCamera]
-
-
-class PulseListener(msgspec.Struct, frozen=True):
-    """A client of the pulse server."""
-
-    name: str | None
-    """Null: it only listens."""
-    expected: bool
-    """The configuration names it."""
-    behind: int
-    """Pulses that it has just lost because it did not read."""
-
-
-class Pulses(msgspec.Struct, frozen=True):
-    """The pulse server's clients."""
-
-    server: str
-    """Its host and port."""
-    error: str
-    """Why nothing is known; empty: it has answered."""
-    clients: list[PulseListener]
-    missing: list[str]
-    """Who is named in the configuration and not there."""
-
-
-class FloorCamera(msgspec.Struct, frozen=True):
-    """What one camera covers of the floor that all share."""
-
-    camera: str
-    homography: list[list[float]]
-    """3x3, from pixels of the site's picture to the floor; below 0 in the third: above the horizon."""
-    outline: list[list[float]]
-    """Corners, x and y on the floor; empty: it sees none of it."""
-
-
-class Floor(msgspec.Struct, frozen=True):
-    """The floor plan."""
-
-    cameras: list[FloorCamera]
-    """Those that are calibrated and have said how large their own picture is."""
-    uncalibrated: list[str]
-
-
-class WalkCamera(msgspec.Struct, frozen=True):
-    """What one camera has seen of a walk."""
-
-    camera: str
-    feet: int
-    """Feet that were seen while another camera saw somebody, too, some five a second."""
-    thirds: list[float]
-    """What shares of them were in the left, the middle and the right third of the picture."""
-    deep: float | None
-    """How many times as tall the nearest of them appear as the farthest; null: too few were seen."""
-
-
-class WalkPair(msgspec.Struct, frozen=True):
-    """For how many seconds two cameras saw somebody at once."""
-
-    one: str
-    other: str
-    seconds: float
-
-
-class OperatorWalk(msgspec.Struct, frozen=True):
-    """The walk that the cameras are calibrated from."""
-
-    state: str
-    """none, walking, working (it is calibrated from) or done."""
-    seconds: float
-    """For how long was walked."""
-    most: float
-    """Seconds after which nothing more is taken in."""
-    cameras: list[WalkCamera]
-    pairs: list[WalkPair]
-    lacking: list[str]
-    """Where to walk, too, as far as can be told before it is calibrated from."""
-    error: str
-    """Why nothing has come of it; empty: something has, or it is not done."""
-    lines: list[str]
-    """What has come of it, in words."""
-    too_little: str
-    """What was not walked, where the result is a guess for want of that; else empty."""
-    configuration: str
-    """The lines for the configuration; empty: there is no ground file."""
 
 
 class Setting(msgspec.Struct, frozen=True):

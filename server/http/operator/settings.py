@@ -15,9 +15,9 @@ from server.config.loader import change_view_settings
 from server.config.sections import LIVE_VIEW_SETTINGS, ViewSettings
 from server.config.site_config import Config
 from server.config.yaml_file import dump_yaml, dump_yaml_inline
-from server.http.access.grants import OPERATING
-from server.http.api.handlers import answer, asked_for, problem
+from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import ON_DISK, SERVICE
+from server.http.json_responses import error_response, json_response, read_json
 from server.http.operator.schema import Choosing, Setting, Settings
 from server.service.service import BestViewService
 from server.system.address_redaction import HIDDEN, redact_address, redact_endpoint
@@ -30,42 +30,47 @@ _PASSWORD = re.compile(r"cameras[.][^.]+[.]password")
 """The name of a file; but who misunderstands that writes the password itself there."""
 
 
-@routes.get(f"{OPERATING}/config")
+@routes.get(f"{OPERATOR_PATH}/config")
 async def get_config(request: web.Request) -> web.Response:
-    """Give the configuration in force, with what differs from the defaults; passwords are not shown."""
+    """Give the configuration in force, with what differs from the defaults; passwords are hidden."""
     found = request.app[ON_DISK]()
     settings = list(settings_of(request.app[SERVICE].config))
-    return answer(Settings(settings, found.error, list(found.waiting)))
+    return json_response(Settings(settings, found.error, list(found.waiting)))
 
 
-@routes.get(f"{OPERATING}/choosing")
+@routes.get(f"{OPERATOR_PATH}/choosing")
 async def get_choosing(request: web.Request) -> web.Response:
     """Say what views are chosen by now, and what the configuration says."""
-    return answer(_choosing(request.app[SERVICE]))
+    return json_response(_choosing(request.app[SERVICE]))
 
 
-@routes.put(f"{OPERATING}/choosing")
+@routes.put(f"{OPERATOR_PATH}/choosing")
 async def put_choosing(request: web.Request) -> web.Response:
     """Choose views by other settings, to try them out: until they are changed again or the service ends."""
     service = request.app[SERVICE]
-    asked = await asked_for(request, dict[str, float | bool])
-    known = _flat(service.decider.view)
-    for key in asked:
-        if key not in known:
-            return problem(400, f"view.{key}: cannot be changed here; what can is {', '.join(known)}")
+    operations = service.operations
+    changes = await read_json(request, dict[str, float | bool])
+    current = _flat(operations.view_settings)
+    for key in changes:
+        if key not in current:
+            return error_response(
+                400, f"view.{key}: cannot be changed here; what can is {', '.join(current)}"
+            )
     try:
-        service.choose_by(change_view_settings(service.decider.view, _nested(asked), "to try out"))
+        operations.change_view_settings(
+            change_view_settings(operations.view_settings, _nested(changes), "to try out")
+        )
     except UserError as error:
-        return problem(400, str(error))
-    return answer(_choosing(service))
+        return error_response(400, str(error))
+    return json_response(_choosing(service))
 
 
-@routes.delete(f"{OPERATING}/choosing")
+@routes.delete(f"{OPERATOR_PATH}/choosing")
 async def delete_choosing(request: web.Request) -> web.Response:
     """Choose views by what the configuration says again."""
     service = request.app[SERVICE]
-    service.choose_by(service.config.view)
-    return answer(_choosing(service))
+    service.operations.reset_view_settings()
+    return json_response(_choosing(service))
 
 
 def settings_of(config: Config) -> Iterator[Setting]:
@@ -125,10 +130,14 @@ def _shown(value: Any) -> Any:
 
 
 def _choosing(service: BestViewService) -> Choosing:
-    now, file, usual = _flat(service.decider.view), _flat(service.config.view), _flat(ViewSettings())
+    now, file, usual = (
+        _flat(service.operations.view_settings),
+        _flat(service.config.view),
+        _flat(ViewSettings()),
+    )
     lines = {key: value for key, value in now.items() if value != usual[key] or value != file[key]}
     written = "" if not lines else dump_yaml({"view": _nested(lines)})
-    least, most = service.config.least_lookahead, service.most_lookahead
+    least, most = service.config.least_lookahead, service.operations.most_lookahead
     return Choosing(values=now, file=file, lines=written, least_lookahead=least, most_lookahead=most)
 
 

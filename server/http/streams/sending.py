@@ -1,26 +1,22 @@
-"""Endless answers: video and events, each at its viewer's own pace."""
+"""Sending endless answers: video and events, each at its viewer's own pace."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 import socket
-import struct
 from collections.abc import AsyncIterable, Callable, Mapping
 from functools import lru_cache
 
 from aiohttp import web
 
-from server.http.traffic import SENT, Sent
-from server.service.streaming.broadcaster import Broadcaster
-from server.service.streaming.subscriber_queue import Chunk, Subscriber
+from server.http.viewers.traffic import TRAFFIC, Traffic
+from server.service.facade.streams import Broadcaster, Chunk, Subscriber
 
 log = logging.getLogger(__name__)
 
-_WAITING_BYTES = 65_536
-"""What of a stream may wait in the system: else it would keep a minute for who reads too slowly, unseen."""
-_RESET = struct.pack("ii", 1, 0)
-"""Of a connection that is not to be closed in good order: (on, seconds)."""
+_SEND_BUFFER_BYTES = 65_536
+"""What the kernel may buffer of a stream: else it would hold a minute for slow readers, unseen."""
 _STREAM_HEADERS = {
     "Cache-Control": "no-store",
     "Access-Control-Allow-Origin": "*",
@@ -28,61 +24,69 @@ _STREAM_HEADERS = {
 }
 
 
-Form = Callable[[Chunk], bytes]
-"""How the pieces of a stream become bytes."""
+PieceWriter = Callable[[Chunk], bytes]
+"""Writes a piece of a stream in some container."""
 
 
 def plain(piece: Chunk) -> bytes:
-    """Give a piece's own bytes."""
+    """Return a piece's own bytes."""
     return piece.data
 
 
 async def send_stream(
-    request: web.Request, channel: Broadcaster, head: bytes, headers: Mapping[str, str], form: Form = plain
+    request: web.Request,
+    channel: Broadcaster,
+    head: bytes,
+    headers: Mapping[str, str],
+    write_piece: PieceWriter = plain,
 ) -> web.StreamResponse:
     """Send ``head`` and then the channel for as long as both live."""
     viewer = channel.subscribe()
     try:
-        return await send_viewer(request, viewer, head, headers, form)
+        return await send_viewer(request, viewer, head, headers, write_piece)
     finally:
         channel.unsubscribe(viewer)
 
 
 async def send_viewer(
-    request: web.Request, viewer: Subscriber, head: bytes, headers: Mapping[str, str], form: Form = plain
+    request: web.Request,
+    viewer: Subscriber,
+    head: bytes,
+    headers: Mapping[str, str],
+    write_piece: PieceWriter = plain,
 ) -> web.StreamResponse:
-    """Send ``head`` and what a viewer is given, from a place that the caller took and will give up."""
+    """Send ``head`` and what a viewer is sent, who has joined a channel and will leave it."""
 
     def ready(response: web.StreamResponse) -> None:
         if request.transport is not None:
             chunked = response.headers.get("Transfer-Encoding") == "chunked"
-            viewer.direct_send = _at_once(request.transport, form, sent, chunked=chunked)
+            viewer.direct_send = _direct_writer(request.transport, write_piece, traffic, chunked=chunked)
 
-    sent = request.app[SENT]
-    sent.join(viewer)
-    pieces = (form(piece) async for piece in viewer.chunks())
+    traffic = request.app[TRAFFIC]
+    traffic.join(viewer)
+    pieces = (write_piece(piece) async for piece in viewer.chunks())
     try:
         return await send_bytes(request, pieces, head, headers, ready)
     finally:
         viewer.direct_send = None
-        sent.leave(viewer)
+        traffic.leave(viewer)
 
 
-def _at_once(
-    transport: asyncio.Transport, form: Form, sent: Sent, *, chunked: bool
+def _direct_writer(
+    transport: asyncio.Transport, write_piece: PieceWriter, traffic: Traffic, *, chunked: bool
 ) -> Callable[[Chunk], bool]:
-    """Give what writes a piece where nothing of the one before waits; what the system leaves follows.
+    """Return what writes a piece at once where nothing of the one before is buffered.
 
-    It is called for every viewer of every GOP: what it would look up, the last of them waits for.
+    It is called for every viewer of every GOP, so all lookups are done beforehand.
     """
     is_closing, waiting, write = transport.is_closing, transport.get_write_buffer_size, transport.write
 
     def take(piece: Chunk) -> bool:
         if waiting() or is_closing():
             return False
-        data = form(piece)
+        data = write_piece(piece)
         write(_chunk(data) if chunked else data)
-        sent.streams += len(data)
+        traffic.streams += len(data)
         return True
 
     return take
@@ -90,7 +94,7 @@ def _at_once(
 
 @lru_cache(maxsize=8)
 def _chunk(data: bytes) -> bytes:
-    """Give data as a chunk (RFC 9112, 7.1), once for all who are sent them."""
+    """Return data as a chunk (RFC 9112, 7.1), encoded once for all viewers."""
     return b"%x\r\n%b\r\n" % (len(data), data)
 
 
@@ -101,39 +105,30 @@ async def send_bytes(
     headers: Mapping[str, str],
     ready: Callable[[web.StreamResponse], None] = lambda _: None,
 ) -> web.StreamResponse:
-    """Send ``head`` and all of ``data``; of HEAD, neither. ``ready`` is called when the head is written."""
+    """Send ``head`` and all of ``data``; to HEAD, neither. ``ready`` is called when the head is written."""
     response = web.StreamResponse(headers={**_STREAM_HEADERS, **headers})
     await response.prepare(request)
     if request.method == "HEAD":
         return response
-    _keep_little_waiting(request)
-    sent = request.app[SENT]
+    _limit_send_buffer(request)
+    traffic = request.app[TRAFFIC]
     try:
         if head:
             await response.write(head)
-            sent.streams += len(head)
+            traffic.streams += len(head)
         ready(response)
-        async for some in data:
-            await response.write(some)
-            sent.streams += len(some)
+        async for piece in data:
+            await response.write(piece)
+            traffic.streams += len(piece)
         await response.write_eof()
     except (ConnectionError, TimeoutError) as error:
-        log.debug("a viewer has gone: %s", error)
+        log.debug("viewer disconnected: %s", error)
     return response
 
 
-def break_off(request: web.Request) -> None:
-    """End an answer in its middle so that its reader knows: by HTTP/1.0 any other end is a right one."""
-    connection = request.get_extra_info("socket")
-    if connection is not None:
-        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
-    if request.transport is not None:
-        request.transport.abort()
-
-
-def _keep_little_waiting(request: web.Request) -> None:
-    """Let the system take no more than can be sent soon: who is slow is to lose GOPs, not to fall behind."""
+def _limit_send_buffer(request: web.Request) -> None:
+    """Let the kernel buffer no more than can be sent soon: slow viewers lose GOPs and do not fall behind."""
     option = getattr(socket, "TCP_NOTSENT_LOWAT", None)  # not on every system
     connection = request.get_extra_info("socket")
     if option is not None and connection is not None:
-        connection.setsockopt(socket.IPPROTO_TCP, option, _WAITING_BYTES)
+        connection.setsockopt(socket.IPPROTO_TCP, option, _SEND_BUFFER_BYTES)

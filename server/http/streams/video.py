@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from aiohttp import web
 
-from server.http.access.access_control import sees_one_person
-from server.http.api.handlers import no_camera, no_object, not_now
-from server.http.app_keys import READERS, SERVICE
-from server.http.connections.viewer_limits import no_place, watching
-from server.http.hls.sessions import of_camera, of_decided, of_live, of_person
+from server.http.access.authorization import is_scoped_to_person
+from server.http.app_keys import SERVICE
+from server.http.json_responses import unavailable
+from server.http.streams.containers import MP4, TS, WEBM, Container
 from server.http.streams.jpeg import best_with_boxes, wants_boxes
 from server.http.streams.sending import send_stream
-from server.http.streams.stream_forms import MP4, TS, WEBM, Form
-from server.http.streams.time_shift import asks_for_the_past, best_of_the_past, camera_of_the_past
-from server.service.streaming.broadcaster import Broadcaster
+from server.http.streams.time_range import is_time_shifted
+from server.http.streams.time_shift import time_shifted_best, time_shifted_camera
+from server.http.viewers.hls_sessions import HLS_SESSIONS, of_camera, of_decided, of_live, of_person
+from server.http.viewers.viewer_limits import refuse_viewer, viewer_slot
+from server.service.facade.streams import Broadcaster
 
 routes = web.RouteTableDef()
 
@@ -21,7 +22,7 @@ routes = web.RouteTableDef()
 @routes.get("/objects/{object:[0-9]{1,9}}/best.mp4")
 async def get_best(request: web.Request) -> web.StreamResponse:
     """Stream the best view of a person as fragmented MP4; it goes on across every cut."""
-    if wants_boxes(request) and not asks_for_the_past(request):
+    if wants_boxes(request) and not is_time_shifted(request):
         return await best_with_boxes(request)
     return await _best(request, MP4)
 
@@ -56,56 +57,59 @@ async def get_live_webm(request: web.Request) -> web.StreamResponse:
     return await _live(request, WEBM)
 
 
-async def _best(request: web.Request, form: Form) -> web.StreamResponse:
-    if asks_for_the_past(request):
-        return await best_of_the_past(request, form)
-    service = request.app[SERVICE]
-    number = int(request.match_info["object"])
-    person = service.board.resolve(number)
-    scoped, splicer = sees_one_person(request), service.splicer
-    channel = (splicer.scoped_persons if scoped else splicer.persons).get(person)
+async def _best(request: web.Request, container: Container) -> web.StreamResponse:
+    if is_time_shifted(request):
+        return await time_shifted_best(request, container)
+    service, number = request.app[SERVICE], int(request.match_info["object"])
+    streams, scoped = service.streams, is_scoped_to_person(request)
+    person = service.people.current_number(number)
+    channel = streams.of_person(person, scoped=scoped)
     if channel is None:
-        return no_object(service, number)
-    held, preferred = request.query.get("camera"), request.query.get("prefer")
-    for camera in (held, preferred):
-        if camera is not None and camera not in service.frame_buffers:
-            return no_camera(service, camera)
-    by_channel, beside = of_person(person), splicer.viewers_of(person) - channel.viewers
-    fetched: str | None = by_channel
-    if held is not None:
-        channel = splicer.decided_cameras[held]
-        by_channel, fetched, beside = of_decided(held), of_camera(held), 0
+        raise service.people.unknown(number)
+    fixed, preferred = request.query.get("camera"), request.query.get("prefer")
+    for camera in (fixed, preferred):
+        if camera is not None:
+            service.cameras.require(camera)
+    slot_name, others = of_person(person), streams.viewers_of_person(person) - channel.viewers
+    hls_name: str | None = slot_name
+    if fixed is not None:
+        channel = streams.of_camera_decided(fixed)
+        slot_name, hls_name, others = of_decided(fixed), of_camera(fixed), 0
     elif preferred is not None:
-        preferring = splicer.preferred_scoped if scoped else splicer.preferred
-        channel = preferring.broadcaster(person, preferred)
-        by_channel, fetched, beside = f"object {person} preferring {preferred}", None, 0
-    return await _send(request, channel, by_channel, fetched, form, beside)
+        channel = streams.of_person_preferring(person, preferred, scoped=scoped)
+        slot_name, hls_name, others = f"object {person} preferring {preferred}", None, 0
+    return await _send(request, channel, slot_name, hls_name, container, others)
 
 
-async def _live(request: web.Request, form: Form) -> web.StreamResponse:
-    if asks_for_the_past(request):
-        return await camera_of_the_past(request, form)
-    service = request.app[SERVICE]
-    camera = request.match_info["camera"]
-    channel = service.splicer.cameras.get(camera)
-    if channel is None:
-        return no_camera(service, camera)
-    return await _send(request, channel, of_live(camera), of_camera(camera), form)
+async def _live(request: web.Request, container: Container) -> web.StreamResponse:
+    if is_time_shifted(request):
+        return await time_shifted_camera(request, container)
+    service, camera = request.app[SERVICE], request.match_info["camera"]
+    service.cameras.require(camera)
+    channel = service.streams.of_camera(camera)
+    return await _send(request, channel, of_live(camera), of_camera(camera), container)
 
 
 async def _send(
-    request: web.Request, channel: Broadcaster, stream: str, fetched: str | None, form: Form, beside: int = 0
+    request: web.Request,
+    channel: Broadcaster,
+    slot_name: str,
+    hls_name: str | None,
+    container: Container,
+    others: int = 0,
 ) -> web.StreamResponse:
-    """Send a channel, whose viewers hold places by one name, and who fetches the same (HLS) by another.
+    """Send a channel, whose viewers hold slots by one name, and HLS players of the same by another.
 
-    ``beside`` is how many watch the same by another channel.
+    ``others`` is how many watch the same over another channel.
     """
-    head = form.head(request.app[SERVICE])
+    head = container.head(request.app[SERVICE])
     if head is None:
-        return not_now("no camera has delivered a picture yet")
-    readers = 0 if fetched is None else request.app[READERS].of(fetched)
-    full = no_place(request, channel.viewers + beside + readers, (stream, fetched or stream))
-    if full is not None:
-        return full
-    with watching(request, stream):
-        return await send_stream(request, channel, head, {"Content-Type": form.content_type}, form.packed)
+        return unavailable("no camera has delivered a picture yet")
+    players = 0 if hls_name is None else request.app[HLS_SESSIONS].of(hls_name)
+    viewers = channel.viewers + others + players
+    refused = refuse_viewer(request, viewers, (slot_name, hls_name or slot_name))
+    if refused is not None:
+        return refused
+    headers = {"Content-Type": container.content_type}
+    with viewer_slot(request, slot_name):
+        return await send_stream(request, channel, head, headers, container.packed)

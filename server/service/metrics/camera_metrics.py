@@ -8,8 +8,10 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
+from prometheus_client import Histogram
+
 from server.messaging.messages import CameraTracks, FrameHeader
-from server.service.metrics.stage_totals import StageTotals
+from server.service.metrics.stage_timers import SECONDS_BUCKETS
 
 _FRAMES = 250
 """Frames that are measured: ten seconds at 25 a second."""
@@ -20,7 +22,7 @@ _PROVEN = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class RecentSeconds:
-    """Recent durations, in seconds."""
+    """Seconds, as they were lately."""
 
     median: float
     worst: float
@@ -29,14 +31,66 @@ class RecentSeconds:
 
 @dataclass(frozen=True, slots=True)
 class CameraProblem:
-    """A problem of a camera and when it was: unix seconds."""
+    """What went wrong, and when: unix seconds."""
 
     text: str
     at: float
 
 
+class StageTotals:
+    """How long each stage of a camera took, and how well its windows were solved.
+
+    All times are differences of the camera's own clock.
+
+    Attributes:
+        take: from a pulse to its picture.
+        encode: from the picture to its access unit.
+        search: looking for people in a frame: the mean of each window.
+        solve: following everybody to the end of a window, its program solved.
+        track: from the pulse of a window's last frame to its tracks, with all that it waited for.
+        windows: how many programs were solved.
+        certified: how many answers of them are proven to be the best there is.
+        gap: the sum of the gaps of the others.
+        mended: how many windows have changed what was final, as an operator pointed at somebody.
+    """
+
+    def __init__(self) -> None:
+        self.take, self.encode = _histogram(), _histogram()
+        self.search, self.solve, self.track = _histogram(), _histogram(), _histogram()
+        self.windows = self.certified = self.mended = 0
+        self.gap = 0.0
+
+    @property
+    def stages(self) -> dict[str, Histogram]:
+        """Return the stages by name, in the order in which a frame goes through them."""
+        return {name: getattr(self, name) for name in ("take", "encode", "search", "solve", "track")}
+
+    def frame(self, head: FrameHeader) -> None:
+        """Count a frame."""
+        self.take.observe(head.taken - head.due)
+        self.encode.observe(head.encoded - head.taken)
+
+    def window(self, tracks: CameraTracks, due: float | None, *, proven: bool) -> None:
+        """Count a window; ``due`` is when its last frame was, None: not known."""
+        self.mended += tracks.revised_from is not None
+        if tracks.search_s is not None:
+            self.search.observe(tracks.search_s)
+        if tracks.solve is not None:
+            self.windows += 1
+            self.certified += proven
+            self.gap += 0.0 if proven else tracks.solve.gap
+            if tracks.solve_s is not None:
+                self.solve.observe(tracks.solve_s)
+        if due is not None and tracks.solved_at > 0:
+            self.track.observe(tracks.solved_at - due)
+
+
+def _histogram() -> Histogram:
+    return Histogram("myview_stage_seconds", "", registry=None, buckets=SECONDS_BUCKETS)
+
+
 class CameraMetrics:
-    """Measures one camera by its frame headers and the reports of its windows.
+    """Measures one camera by the heads of its frames and the reports of its windows.
 
     Frames and windows carry times of the camera's own clock, and are compared with nothing else.
     """

@@ -11,9 +11,9 @@ from functools import partial
 
 from logthrottle import LogThrottle
 from server.media.rendering_messages import Canvas
+from server.service.pipeline import BestViewPipeline
 from server.service.rendering.decided_boxes import NO_OVERLAY, DecidedBoxes, GopOverlay
 from server.service.rendering.rendered_stream import RenderedStream
-from server.service.service import BestViewService
 
 log = logging.getLogger(__name__)
 
@@ -62,7 +62,7 @@ class _RunningStream:
 class RenderPool:
     """Starts what is wanted and lets it end when nobody wants it; at most ``http.pictures_max`` at once."""
 
-    def __init__(self, service: BestViewService, linger_s: float = _LINGER_S) -> None:
+    def __init__(self, service: BestViewPipeline, linger_s: float = _LINGER_S) -> None:
         self._service, self._linger_s = service, linger_s
         config = service.config
         self._queue = config.http.viewer_queue_gops

@@ -10,10 +10,12 @@ import pytest
 
 from fakes.cameras import FedService, small_config
 from fakes.tokens import line_of, write_tokens
-from server.http.access.access_control import Access
+from server.http.access.authentication import Authenticator
+from server.http.access.authorization import AccessControl
 from server.http.api.events import Events
-from server.http.periodic import again_and_again
+from server.http.periodic import run_periodically
 from server.http.tls import Certificate
+from server.service.service import BestViewService
 
 
 class Failing:
@@ -36,7 +38,7 @@ async def test_a_turn_that_fails_is_told_once_and_the_next_is_taken(caplog: pyte
     async def turn() -> None:
         failing()
 
-    task = asyncio.create_task(again_and_again(0.0, turn, "counting"))
+    task = asyncio.create_task(run_periodically(0.0, turn, "counting"))
     await failing.done.wait()
     task.cancel()
     assert failing.times >= 4
@@ -54,11 +56,11 @@ async def runs_on(task: asyncio.Task[None], failing: Failing) -> bool:
 
 
 async def test_what_people_and_cameras_are_is_told_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.http.api.events._LIST_EVERY_S", 0.001)
+    monkeypatch.setattr("server.http.api.events._LISTS_EVERY_S", 0.001)
     service, failing = FedService(small_config()), Failing(RuntimeError("nobody has thought of this"))
-    events = Events(service)
-    events._lines = {None: None}  # type: ignore[dict-item]
-    monkeypatch.setattr(events, "_tell", failing)
+    events = Events(BestViewService(service))
+    events._by_scope = {None: None}  # type: ignore[dict-item]
+    monkeypatch.setattr(events, "_publish_changed", failing)
     assert await runs_on(asyncio.create_task(events.run()), failing)
     service.close()
 
@@ -66,19 +68,20 @@ async def test_what_people_and_cameras_are_is_told_on(monkeypatch: pytest.Monkey
 async def test_tokens_are_looked_at_on_and_what_is_over_ends_meanwhile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.http.access.access_control._LOOK_EVERY_S", 0.001)
+    monkeypatch.setattr("server.http.access.authorization._CHECK_EVERY_S", 0.001)
     failing, over = Failing(RuntimeError("nobody has thought of this")), Failing()
-    access = Access(write_tokens(tmp_path / "tokens.yaml", line_of("desk")), lambda number: number, "hall")
-    monkeypatch.setattr(access._file, "look", failing)
-    monkeypatch.setattr(access, "end_what_is_over", over)
+    tokens = write_tokens(tmp_path / "tokens.yaml", line_of("desk"))
+    access = AccessControl(Authenticator(tokens, "hall"), lambda number: number)
+    monkeypatch.setattr(access.authenticator.file, "reload_if_changed", failing)
+    monkeypatch.setattr(access, "end_expired", over)
     assert await runs_on(asyncio.create_task(access.run()), failing)
     assert over.times >= failing.times > 1
 
 
 async def test_the_certificate_is_looked_at_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.http.tls._LOOK_EVERY_S", 0.001)
+    monkeypatch.setattr("server.http.tls._CHECK_EVERY_S", 0.001)
     certificate, failing = Certificate.__new__(Certificate), Failing(RuntimeError("not thought of"))
-    monkeypatch.setattr(certificate, "look", failing)
+    monkeypatch.setattr(certificate, "reload_if_changed", failing)
     assert await runs_on(asyncio.create_task(certificate.run()), failing)
 
 
@@ -104,11 +107,11 @@ def test_a_renewal_that_is_seen_half_done_is_read_when_it_is_done(
     before = certificate._newest
     files[0].write_text("newer", encoding="utf-8")
     gone.append(True)  # after it was read, before it was loaded
-    certificate.look()
-    certificate.look()
+    certificate.reload_if_changed()
+    certificate.reload_if_changed()
     assert certificate._newest is before
     assert [it for it in caplog.messages if "stays in force" in it] == caplog.messages[:1]
     assert "No such file or directory" in caplog.messages[0]
     gone.clear()
-    certificate.look()
+    certificate.reload_if_changed()
     assert certificate._newest is not before, "though nothing has changed since"

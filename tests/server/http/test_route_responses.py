@@ -13,6 +13,7 @@ from fakes.cameras import status, tracks, word
 from fakes.site import A, B, Hall
 from server.http.api import openapi
 from server.http.app import make_app
+from server.service.service import BestViewService
 from server.service.streaming.subscriber_queue import Subscriber
 
 
@@ -159,7 +160,7 @@ async def test_head_gives_the_headers_and_ends(busy: Hall, path: str, kind: str)
 
 
 async def test_the_description_has_every_route_that_is_not_the_page(busy: Hall) -> None:
-    app = make_app(busy.service)
+    app = make_app(BestViewService(busy.service))
     routes = {route.resource.canonical for route in app.router.routes() if route.resource is not None}
     described = await busy.get_json("/api/openapi.json")
     assert set(described["paths"]) == routes - {"/", "/operator", "/page/{file}", "/api", "/api/openapi.json"}

@@ -22,7 +22,7 @@ from fakes.site import A, B, opened
 from fakes.tokens import line_of, token_of, write_tokens
 from server.config.loader import build_config
 from server.config.sections import TlsSettings
-from server.http.access.csrf import CHANGES
+from server.http.access.csrf import CSRF_HEADER
 from server.http.tls import Certificate
 from server.system.errors import UserError
 
@@ -63,7 +63,7 @@ async def test_it_is_spoken_and_plain_http_is_not(tls: TlsSettings, tmp_path: Pa
             assert answer.status == 200
         body = {"token": token_of("desk")}
         async with session.post(
-            f"{url}/api/session", json=body, headers={CHANGES: "1"}, ssl=trusting(tls)
+            f"{url}/api/session", json=body, headers={CSRF_HEADER: "1"}, ssl=trusting(tls)
         ) as answer:
             [cookie] = answer.cookies.values()
         assert cookie["secure"]
@@ -123,16 +123,16 @@ async def test_a_new_certificate_is_taken_for_new_connections(
     assert tls.key is not None
     assert made[1].key is not None
     tls.key.write_bytes(made[1].key.read_bytes())
-    certificate.look()
+    certificate.reload_if_changed()
     assert "stays in force" in caplog.messages[-1]
     assert "\n" not in caplog.messages[-1]
     assert await is_proven(port, made[0]), "half of a pair changes nothing"
     copied(made[1], tls)
-    certificate.look()
+    certificate.reload_if_changed()
     assert await is_proven(port, made[1])
     assert not await is_proven(port, made[0])
     said = len(caplog.messages)
-    certificate.look()
+    certificate.reload_if_changed()
     assert len(caplog.messages) == said
     server.close()
     await server.wait_closed()

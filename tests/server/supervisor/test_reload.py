@@ -32,6 +32,7 @@ from server.config.running_config import (
 from server.config.sections import HttpSettings
 from server.config.site_config import Config
 from server.http.app import make_app, serving
+from server.service.service import BestViewService
 from server.supervisor.reload import plan_reload
 from server.system.errors import UserError
 
@@ -201,7 +202,7 @@ async def test_the_operator_and_prometheus_are_told(found: ConfigFileState) -> N
     service = FedService(small_config())
     async with (
         asyncio.timeout(PATIENCE),
-        serving(make_app(service, lambda: found), HttpSettings(port=0)) as port,
+        serving(make_app(BestViewService(service), lambda: found), HttpSettings(port=0)) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
     ):
         told = await (await session.get("/api/operator/config")).json()

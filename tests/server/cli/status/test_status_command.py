@@ -26,6 +26,7 @@ from server.cli.status.display import Rates, render_status
 from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
 from server.messaging.messages import SolverReport
+from server.service.pipeline import BestViewPipeline
 from server.service.service import BestViewService
 from server.system.errors import UnavailableError, UserError
 
@@ -140,12 +141,16 @@ async def test_a_server_that_goes_and_comes_back_is_waited_for(
             said.extend(map(json.loads, capsys.readouterr().out.splitlines()))
 
     async with asyncio.timeout(PATIENCE):
-        async with serving(make_app(BestViewService(small_config())), HttpSettings(port=0)) as port:
+        async with serving(
+            make_app(BestViewService(BestViewPipeline(small_config()))), HttpSettings(port=0)
+        ) as port:
             live = asyncio.create_task(status_live(f"http://127.0.0.1:{port}", None, as_json=True))
             await until(lambda it: it.get("name") == "hall")
         await until(lambda it: "away" in it)
         said.clear()
-        async with serving(make_app(BestViewService(small_config())), HttpSettings(port=port)):
+        async with serving(
+            make_app(BestViewService(BestViewPipeline(small_config()))), HttpSettings(port=port)
+        ):
             await until(lambda it: it.get("name") == "hall")
             live.cancel()
             with pytest.raises(asyncio.CancelledError):

@@ -12,9 +12,11 @@ from aiohttp.test_utils import TestClient, TestServer
 from fakes.cameras import LARGE, SMALL
 from fakes.site import A, B, Hall, see
 from fakes.tokens import EVERYBODY, bearer, locked
-from server.http.access.access_control import ACCESS, Access, only_who_may
-from server.http.access.csrf import CHANGES
+from server.http.access.authentication import Authenticator
+from server.http.access.authorization import ACCESS, AccessControl, authorize
+from server.http.access.csrf import CSRF_HEADER
 from server.http.app import make_app
+from server.service.service import BestViewService
 
 ALL = frozenset(EVERYBODY)
 NOBODY = "nobody"
@@ -96,7 +98,7 @@ async def site(tmp_path: Path) -> AsyncIterator[Hall]:
 def all_routes(hall: Hall) -> list[tuple[str, str]]:
     found = {
         (route.method, route.resource.canonical)
-        for route in make_app(hall.service).router.routes()
+        for route in make_app(BestViewService(hall.service)).router.routes()
         if route.resource is not None
     }
     return sorted(found)
@@ -116,7 +118,7 @@ def filled(path: str, number: int = 1, camera: str = A) -> str:
 
 async def status(hall: Hall, method: str, path: str, who: str) -> int:
     """Ask for an answer and do not wait for its body, which may have no end."""
-    heads = {CHANGES: "1", **({} if who == NOBODY else bearer(who))}
+    heads = {CSRF_HEADER: "1", **({} if who == NOBODY else bearer(who))}
     async with hall.session.request(
         method,
         path,
@@ -187,8 +189,8 @@ async def test_a_route_that_nobody_has_decided_about_is_closed() -> None:
     async def handler(_: web.Request) -> web.Response:
         return web.Response()
 
-    app = web.Application(middlewares=[only_who_may])
-    app[ACCESS] = Access(None, lambda it: it)
+    app = web.Application(middlewares=[authorize])
+    app[ACCESS] = AccessControl(Authenticator(None), lambda it: it)
     app.router.add_get("/api/new", handler)
     async with TestClient(TestServer(app)) as client, client.get("/api/new") as answer:
         assert answer.status == 403

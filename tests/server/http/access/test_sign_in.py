@@ -16,15 +16,15 @@ from aiohttp.test_utils import make_mocked_request
 from fakes.site import Hall, opened
 from fakes.tokens import bearer, line_of, locked, token_of, write_tokens
 from server.config.tokens_file import token_digest
-from server.http.access.access_control import COOKIE, Access, Holder
-from server.http.access.csrf import CHANGES
-from server.http.access.local_requests import is_from_here
-from server.http.access.login_failures import Failures
+from server.http.access.authentication import COOKIE_PREFIX, Authenticator, Credential
+from server.http.access.csrf import CSRF_HEADER
+from server.http.access.local_requests import is_local_request
+from server.http.access.login_rate_limit import LoginRateLimit
 from server.http.access.sessions import Sessions
 
 SESSION = "/api/session"
 CAMERAS = "/api/operator/cameras"
-MINE = {CHANGES: "1"}
+MINE = {CSRF_HEADER: "1"}
 HEADS_OF_PROXIES = (
     *("X-Forwarded-Proto", "x-forwarded-proto", "X-Forwarded-Host", "X-Forwarded-Port", "X-Forwarded-Server"),
     *("X-Forwarded-Prefix", "X-Forwarded-Ssl", "X-Forwarded-Scheme", "X-Forwarded", "Forwarded-For"),
@@ -110,9 +110,9 @@ def test_what_browsers_and_programs_send_by_themselves_is_no_proxy() -> None:
         "Last-Event-ID": "4",
         "Icy-MetaData": "1",
         "Content-Type": "application/json",
-        CHANGES: "1",
+        CSRF_HEADER: "1",
     }
-    assert is_from_here(make_mocked_request("GET", CAMERAS, headers=heads).clone(remote="127.0.0.1"))
+    assert is_local_request(make_mocked_request("GET", CAMERAS, headers=heads).clone(remote="127.0.0.1"))
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_what_browsers_and_programs_send_by_themselves_is_no_proxy() -> None:
 )
 def test_which_addresses_are_this_machine(address: str, here: bool) -> None:
     request = make_mocked_request("GET", CAMERAS, headers={"Host": "localhost"})
-    assert is_from_here(request.clone(remote=address)) == here
+    assert is_local_request(request.clone(remote=address)) == here
 
 
 @pytest.mark.parametrize("path", [SESSION, "/api/operator/choosing"])
@@ -142,7 +142,7 @@ async def test_no_page_of_another_site_learns_or_changes_anything(hall: Hall, si
     for method in ("PUT", "POST", "DELETE"):
         status, error = await asked(hall, path, method=method, json={})
         assert status == 403
-        assert CHANGES in error
+        assert CSRF_HEADER in error
     asks = {"Origin": "https://evil.example", "Access_Control_Request_Method": "DELETE"}
     assert (await asked(hall, path, method="OPTIONS", **asks))[0] == 403
 
@@ -254,7 +254,7 @@ def test_a_session_ends_and_so_does_the_oldest_of_very_many_of_one_token() -> No
 
 
 @pytest.mark.parametrize(
-    "head", [b"Authorization: Bearer \xff\xfe", f"Cookie: {COOKIE}_hall_0=".encode() + b"\xff"]
+    "head", [b"Authorization: Bearer \xff\xfe", f"Cookie: {COOKIE_PREFIX}_hall_0=".encode() + b"\xff"]
 )
 async def test_bytes_that_are_no_text_are_no_token_and_no_sign_in(site: Hall, head: bytes) -> None:
     reader, writer = await asyncio.open_connection("127.0.0.1", site.port)
@@ -284,26 +284,26 @@ async def test_wrong_tokens_are_limited_in_rate_and_a_right_one_waits_too_unless
 def test_nobody_is_told_to_wait_for_no_time(tmp_path: Path) -> None:
     now = [0.0]
     tokens = write_tokens(tmp_path / "tokens.yaml", line_of("desk"))
-    access = Access(tokens, lambda it: it, now=lambda: now[0])
+    authenticator = Authenticator(tokens, now=lambda: now[0])
     request = make_mocked_request("GET", "/")
     for _ in range(5):
-        access.known(request, "wrong")
+        authenticator.check_token(request, "wrong")
     now[0] = 12 - 0.1
-    answer = access.known(request, token_of("desk"))
+    answer = authenticator.check_token(request, token_of("desk"))
     assert isinstance(answer, web.Response)
     assert loads(answer.text or "")["error"].endswith("try again in 1 s")
     now[0] = 12.0
-    assert access.known(request, token_of("desk")) == Holder(token_digest(token_of("desk")))
+    assert authenticator.check_token(request, token_of("desk")) == Credential(token_digest(token_of("desk")))
 
 
 async def test_a_cookie_that_has_run_out_is_no_wrong_token(site: Hall) -> None:
-    codes = [(await asked(site, Cookie=f"{COOKIE}_hall_0={it}"))[0] for it in range(9)]
+    codes = [(await asked(site, Cookie=f"{COOKIE_PREFIX}_hall_0={it}"))[0] for it in range(9)]
     assert codes == 9 * [401]
 
 
 def test_failures_are_forgotten_one_by_one_and_each_address_has_its_own() -> None:
     now = [0.0]
-    failures = Failures(lambda: now[0])
+    failures = LoginRateLimit(lambda: now[0])
     for _ in range(6):
         failures.add("10.0.0.7")
     assert failures.wait("10.0.0.7") == pytest.approx(24.0)
@@ -335,7 +335,7 @@ async def test_nothing_is_unpacked_for_who_has_not_shown_a_token(site: Hall, pac
 
 
 async def test_there_is_nothing_to_sign_in_to_without_tokens(hall: Hall) -> None:
-    assert (await asked(hall, method="POST", json={"token": "x"}, **{CHANGES: "1"}))[0] == 400
+    assert (await asked(hall, method="POST", json={"token": "x"}, **{CSRF_HEADER: "1"}))[0] == 400
 
 
 async def test_the_page_itself_is_for_everybody_and_tells_nothing(site: Hall) -> None:

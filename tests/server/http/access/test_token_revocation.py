@@ -18,7 +18,7 @@ from fakes.cameras import CAMERAS, SMALL
 from fakes.site import A, B, Hall
 from fakes.tokens import LATER, bearer, line_of, locked, token_of, write_tokens
 from server.config.tokens_file import token_digest
-from server.http.access.csrf import CHANGES
+from server.http.access.csrf import CSRF_HEADER
 from server.http.access.token_file import TokenFile
 from server.messaging.identity_snapshot import IdentitySnapshot
 from server.messaging.inbox import Message
@@ -27,7 +27,7 @@ from server.messaging.messages import ZenohKeys
 
 @pytest.fixture(autouse=True)
 def _looks_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.http.access.access_control._LOOK_EVERY_S", 0.02)
+    monkeypatch.setattr("server.http.access.authorization._CHECK_EVERY_S", 0.02)
 
 
 @pytest.fixture
@@ -76,13 +76,13 @@ async def test_so_do_those_of_a_sign_in_by_it_and_of_who_signs_out(site: Hall, t
     kept = []
     for name in ("desk", "desk", "lead"):
         async with site.session.post(
-            "/api/session", headers={CHANGES: "1"}, json={"token": token_of(name)}
+            "/api/session", headers={CSRF_HEADER: "1"}, json={"token": token_of(name)}
         ) as answer:
             [cookie] = answer.cookies.values()
         site.session.cookie_jar.clear()
         kept.append(f"{cookie.key}={cookie.value}")
     signed_out, revoked, other = [await stream(site, "/api/events", Cookie=it) for it in kept]
-    async with site.session.delete("/api/session", headers={CHANGES: "1", "Cookie": kept[0]}):
+    async with site.session.delete("/api/session", headers={CSRF_HEADER: "1", "Cookie": kept[0]}):
         await ended(signed_out)
     write_tokens(tmp_path / "tokens.yaml", line_of("lead"))
     await ended(revoked)
@@ -143,11 +143,11 @@ async def test_a_sign_in_ends_in_time_though_the_disk_with_the_tokens_hangs(
         looked.set()
         hangs.wait(30.0)
 
-    sessions = {CHANGES: "1"}
+    sessions = {CSRF_HEADER: "1"}
     async with site.session.post("/api/session", headers=sessions, json={"token": token_of("desk")}) as done:
         [cookie] = done.cookies.values()
     answer = await stream(site, "/api/events", Cookie=f"{cookie.key}={cookie.value}")
-    monkeypatch.setattr(TokenFile, "look", look)
+    monkeypatch.setattr(TokenFile, "reload_if_changed", look)
     try:
         await asyncio.to_thread(looked.wait, 10.0)
         monkeypatch.setattr(
@@ -223,26 +223,26 @@ def test_a_file_that_makes_no_sense_leaves_the_old_one_in_force_and_says_so_once
     else:
         looked.path.write_text(text, encoding="utf-8")
     for _ in range(4):
-        looked.file.look()
+        looked.file.reload_if_changed()
         assert looked.has("desk")
     [line] = caplog.messages
     assert line.endswith("the 1 tokens as they were stay in force")
     assert "\n" not in line
     write_tokens(looked.path, line_of("lead"))
     for _ in range(2):
-        looked.file.look()
+        looked.file.reload_if_changed()
     assert (looked.has("desk"), looked.has("lead")) == (False, True)
 
 
 def test_a_file_that_is_being_written_is_left_until_it_is_still(looked: Looked) -> None:
-    looked.file.look()
+    looked.file.reload_if_changed()
     write_tokens(looked.path)  # as far as it has come: a list of nobody
-    looked.file.look()
+    looked.file.reload_if_changed()
     assert looked.has("desk")
     write_tokens(looked.path, line_of("desk"), line_of("lead"))
-    looked.file.look()
+    looked.file.reload_if_changed()
     assert not looked.has("lead")
-    looked.file.look()
+    looked.file.reload_if_changed()
     assert looked.has("desk")
     assert looked.has("lead")
 
@@ -253,5 +253,5 @@ def test_a_file_that_is_replaced_by_another_of_the_same_size_and_time_is_read(lo
     os.utime(other, ns=(before.st_atime_ns, before.st_mtime_ns))
     other.replace(looked.path)
     for _ in range(2):
-        looked.file.look()
+        looked.file.reload_if_changed()
     assert looked.has("lead")

@@ -11,7 +11,7 @@ import aiohttp
 from fakes.cameras import CAMERAS, GOP, LARGE, SMALL
 from fakes.site import A, B, Hall
 from fakes.timeouts import PATIENCE
-from server.http.access.grants import ALL
+from server.http.access.permissions import ALL
 from server.http.api.events import Events
 
 

@@ -19,9 +19,9 @@ from fakes.programs import needs_openssl
 from fakes.site import A, B, Hall, opened, see
 from fakes.system.few_descriptors import MYVIEW, awaited, connected, running, written
 from fakes.tokens import bearer, locked
-from server.http.access.csrf import CHANGES
+from server.http.access.csrf import CSRF_HEADER
 from server.http.access.networks import network_of
-from server.http.connections.connection_pool import Bounds, Connection, Places
+from server.http.connections.connection_pool import Connection, ConnectionLimits, ConnectionPool
 
 Pair = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
@@ -80,14 +80,14 @@ async def test_a_request_that_does_not_come_whole_is_not_waited_for(begin: str) 
 
 async def test_what_follows_a_head_is_not_waited_for_either(tmp_path: Path) -> None:
     async with locked(tmp_path, http={"request_timeout_s": SOON}) as hall:
-        head = f"POST /api/session HTTP/1.1\r\nHost: hall\r\n{CHANGES}: 1\r\nContent-Length: 99\r\n\r\n{{"
+        head = f"POST /api/session HTTP/1.1\r\nHost: hall\r\n{CSRF_HEADER}: 1\r\nContent-Length: 99\r\n\r\n{{"
         assert await over(await silent(hall, head)) == b""
 
 
 async def test_what_nobody_reads_is_not_kept_either(tmp_path: Path) -> None:
     async with locked(tmp_path) as hall:
         body = b" " * 70_000
-        async with hall.session.post("/api/session", data=body, headers={CHANGES: "1"}) as answer:
+        async with hall.session.post("/api/session", data=body, headers={CSRF_HEADER: "1"}) as answer:
             assert answer.status == 413
 
 
@@ -151,7 +151,7 @@ async def test_where_all_are_busy_who_operates_is_known_by_token_or_sign_in(tmp_
     async with locked(tmp_path, http={"connections_max": 1}) as hall:
         see(hall)
         async with hall.session.post(
-            "/api/session", json={"token": "what-lead-was-given"}, headers={CHANGES: "1"}
+            "/api/session", json={"token": "what-lead-was-given"}, headers={CSRF_HEADER: "1"}
         ) as answer:
             [cookie] = answer.cookies.values()
         desk, lead = bearer("desk"), bearer("lead")
@@ -209,7 +209,7 @@ class Clock:
         return self.now
 
 
-BOUNDS = Bounds(most=6, per_address=3, for_operators=2, request_s=10.0, keepalive_s=100.0)
+BOUNDS = ConnectionLimits(most=6, per_address=3, for_operators=2, request_s=10.0, keepalive_s=100.0)
 ADDRESSES = [
     "127.0.0.1",
     "10.0.0.1",
@@ -232,96 +232,96 @@ ACTS = st.lists(
 @given(ACTS)
 def test_no_more_than_may_be_are_there_and_whoever_is_busy_stays(acts: list[tuple[str, str, int]]) -> None:
     clock, there, busy = Clock(), list[Connection](), set[int]()
-    places = Places(BOUNDS, clock)
+    places = ConnectionPool(BOUNDS, clock)
     for act, address, which in acts:
         it = there[which % len(there)] if there else None
         if act == "comes":
             new = places.admit(address, Fake())
             if new is None:
-                beyond = [it for it in there if it.beyond]
+                beyond = [it for it in there if it.is_reserved]
                 assert len(beyond) == BOUNDS.for_operators
                 assert all(id(it) in busy for it in beyond)
             else:
                 there.append(new)
         elif act == "time":
             clock.now += 5.0
-            places.cut_off_overdue()
+            places.close_overdue()
         elif it is not None and act in {"asks", "is sent"}:
-            places.asks(it)
+            places.busy(it)
             busy.add(id(it))
             if act == "is sent":
-                places.is_sent(it)
+                places.sending(it)
         elif it is not None:
             busy.discard(id(it))
-            {"rests": places.rests, "waits": places.waits, "leaves": places.left}[act](it)
-        assert not any(it.wire.ended for it in there if id(it) in busy)  # type: ignore[attr-defined]
-        there = [it for it in there if not it.gone]
-        assert places.taken == len(there)
-        assert len([it for it in there if not it.beyond]) <= BOUNDS.most
-        assert len([it for it in there if it.beyond]) <= BOUNDS.for_operators
-        placed = Counter(it.network for it in there if not it.beyond)
+            {"rests": places.idle, "waits": places.receiving, "leaves": places.closed}[act](it)
+        assert not any(it.transport.ended for it in there if id(it) in busy)  # type: ignore[attr-defined]
+        there = [it for it in there if not it.closed]
+        assert places.open == len(there)
+        assert len([it for it in there if not it.is_reserved]) <= BOUNDS.most
+        assert len([it for it in there if it.is_reserved]) <= BOUNDS.for_operators
+        placed = Counter(it.network for it in there if not it.is_reserved)
         assert all(count <= BOUNDS.per_address for network, count in placed.items() if network != "127.0.0.1")
     for it in there:
-        places.left(it)
-    assert places.taken == 0
-    assert not places._of
-    assert not any(places._quiet.values())
-    assert not places._sent
+        places.closed(it)
+    assert places.open == 0
+    assert not places._per_network
+    assert not any(places._waiting.values())
+    assert not places._sending
 
 
 def test_of_one_address_the_own_make_way_and_then_it_is_told_to_come_again() -> None:
-    places = Places(BOUNDS)
+    places = ConnectionPool(BOUNDS)
     own = [places.admit("10.0.0.1", Fake()) for _ in range(3)]
     assert all(it is not None for it in own)
     fourth = places.admit("10.0.0.1", Fake())
-    assert [it.gone for it in own if it] == [True, False, False]
+    assert [it.closed for it in own if it] == [True, False, False]
     for it in [*own[1:], fourth]:
         assert it is not None
-        places.asks(it)
+        places.busy(it)
     fifth = places.admit("::ffff:10.0.0.1", Fake())
     other = places.admit("10.0.0.2", Fake())
     assert fifth is not None
     assert other is not None
-    assert (fifth.beyond, other.beyond) == (True, False)
+    assert (fifth.is_reserved, other.is_reserved) == (True, False)
 
 
 def test_this_machine_and_a_proxy_on_it_are_bound_by_all_places_only() -> None:
-    places = Places(BOUNDS)
+    places = ConnectionPool(BOUNDS)
     for _ in range(BOUNDS.most):
         it = places.admit("127.0.0.1", Fake())
         assert it is not None
-        assert not it.beyond
-        places.asks(it)
+        assert not it.is_reserved
+        places.busy(it)
 
 
 def test_who_comes_in_great_numbers_takes_no_operators_place_from_another() -> None:
-    places = Places(BOUNDS)
+    places = ConnectionPool(BOUNDS)
     for number in range(BOUNDS.most):
         it = places.admit(f"10.0.1.{number}", Fake())
         assert it is not None
-        places.asks(it)
+        places.busy(it)
     places.admit("10.0.0.9", Fake())
     operator = places.admit("10.0.0.1", Fake())
     assert operator is not None
     for _ in range(10):
         assert places.admit("10.0.0.9", Fake()) is not None
-    assert not operator.gone
+    assert not operator.closed
 
 
 def test_an_answer_that_nobody_takes_ends_and_one_that_is_taken_slowly_does_not() -> None:
     clock = Clock()
-    places = Places(BOUNDS, clock)
+    places = ConnectionPool(BOUNDS, clock)
     wires = {name: Fake() for name in ("slow", "stalled")}
     for wire in wires.values():
         wire.unsent = 500_000
         it = places.admit("10.0.0.1", wire)
         assert it is not None
-        places.asks(it)
-        places.is_sent(it)
+        places.busy(it)
+        places.sending(it)
     for _ in range(100):
         clock.now += 1.0
         wires["slow"].unsent -= 1000
-        places.cut_off_overdue()
+        places.close_overdue()
     assert {name: wire.ended for name, wire in wires.items()} == {"slow": False, "stalled": True}
 
 

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from fakes.site import Hall, opened, see
 from fakes.tokens import bearer, locked
-from server.http.access.grants import ShareHolder
-from server.http.connections.fair_shares import Place, Shares
+from server.http.access.permissions import ClientIdentity
+from server.http.viewers.fair_share import FairShare, Slot
 
 DOOR = "/cameras/c0/hls/index.m3u8"
 """What the smallest token may see."""
@@ -136,36 +136,36 @@ async def test_without_tokens_it_is_by_address_and_this_machine_operates() -> No
             assert flood[0].goes_on
 
 
-HOLDERS = [ShareHolder("a"), ShareHolder("b"), ShareHolder("c"), ShareHolder("o", operates=True)]
+CLIENTS = [*map(ClientIdentity, "abc"), ClientIdentity("o", is_operator=True)]
 
 
-@given(st.lists(st.tuples(st.sampled_from(HOLDERS), st.sampled_from("xy"), st.integers(1, 2)), max_size=40))
-def test_shares_come_to_be_equal_and_stay_so(comes: list[tuple[ShareHolder, str, int]]) -> None:
-    shares, most, there = Shares(), 6, dict[Place, None]()
+@given(st.lists(st.tuples(st.sampled_from(CLIENTS), st.sampled_from("xy"), st.integers(1, 2)), max_size=40))
+def test_shares_come_to_be_equal_and_stay_so(comes: list[tuple[ClientIdentity, str, int]]) -> None:
+    shares, most, there = FairShare(), 6, dict[Slot, None]()
 
-    def ended(place: Place) -> None:
+    def ended(place: Slot) -> None:
         del there[place]
-        shares.give_up(place)
+        shares.release(place)
 
     for holder, stream, weight in comes:
-        before = Counter({it.key: sum(p.weight for p in there if p.holder == it) for it in HOLDERS})
+        before = Counter({it.key: sum(p.weight for p in there if p.client == it) for it in CLIENTS})
 
-        place = Place(holder, stream, lambda: None, weight)
+        place = Slot(holder, stream, lambda: None, weight)
         place.end = partial(ended, place)
-        if shares.all >= most and not shares.make_room(holder):
+        if shares.all >= most and not shares.evict_for(holder):
             others = {key: count for key, count in before.items() if key != holder.key}
             watching = {key: count for key, count in others.items() if key != "o"}
-            if holder.operates:
+            if holder.is_operator:
                 assert not any(watching.values())
             assert all(count <= before[holder.key] + 1 for count in watching.values())
             continue
         there[place] = None
         shares.take(place)
-        after = Counter({it.key: sum(p.weight for p in there if p.holder == it) for it in HOLDERS})
+        after = Counter({it.key: sum(p.weight for p in there if p.client == it) for it in CLIENTS})
         lost = [key for key in before if after[key] < before[key]]
         assert "o" not in lost
         assert len(lost) <= 1
-        if lost and not holder.operates:
+        if lost and not holder.is_operator:
             assert (
                 before[lost[0]]
                 == max(before[key] for key in "abc" if key != holder.key)
@@ -176,12 +176,12 @@ def test_shares_come_to_be_equal_and_stay_so(comes: list[tuple[ShareHolder, str,
 
 
 def test_of_one_stream_only_its_own_places_are_taken() -> None:
-    shares = Shares()
+    shares = FairShare()
     ended: list[str] = []
     for stream in "xxxyy":
-        shares.take(Place(HOLDERS[0], stream, lambda stream=stream: ended.append(stream)))  # type: ignore[misc]
-    assert shares.make_room(HOLDERS[1], ["y"])
+        shares.take(Slot(CLIENTS[0], stream, lambda stream=stream: ended.append(stream)))  # type: ignore[misc]
+    assert shares.evict_for(CLIENTS[1], ["y"])
     assert (ended, shares.ending("y"), shares.ending("x"), shares.ending()) == (["y"], 1, 0, 1)
-    assert not shares.make_room(HOLDERS[1], ["y"])
-    assert shares.make_room(HOLDERS[1])
+    assert not shares.evict_for(CLIENTS[1], ["y"])
+    assert shares.evict_for(CLIENTS[1])
     assert ended == ["y", "y"]

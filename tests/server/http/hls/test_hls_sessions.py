@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from fakes.cameras import CAMERAS, SMALL
 from fakes.site import A, B, Hall, opened
-from server.http.access.grants import ShareHolder
-from server.http.connections.fair_shares import Shares
-from server.http.hls.sessions import Reader, Readers
+from server.http.access.permissions import ClientIdentity
+from server.http.viewers.fair_share import FairShare
+from server.http.viewers.hls_sessions import HlsClient, HlsSessions
 
 KEPT_S = 6.0
 PATHS = ["init.mp4", "index.m3u8", "0.m4s", "0.0.m4s"]
@@ -29,8 +29,8 @@ class Clock:
         return self.now
 
 
-def reader(stream: int, player: int = 0) -> Reader:
-    return Reader(f"object {stream}", ShareHolder("10.0.0.1"), "10.0.0.1", f"player {player}")
+def reader(stream: int, player: int = 0) -> HlsClient:
+    return HlsClient(f"object {stream}", ClientIdentity("10.0.0.1"), "10.0.0.1", f"player {player}")
 
 
 ACTS = st.lists(
@@ -49,12 +49,12 @@ ACTS = st.lists(
 def test_who_has_asked_lately_or_waits_is_counted(acts: list[tuple[str, int, int, str | None, int]]) -> None:
     """Against a count from the beginning, over all that anybody has asked."""
     clock = Clock()
-    shares = Shares()
-    readers = Readers(KEPT_S / 3, shares, clock)
-    asked: dict[Reader, float] = {}
-    open_ones: list[tuple[Reader, str | None, ExitStack]] = []
+    shares = FairShare()
+    readers = HlsSessions(KEPT_S / 3, shares, clock)
+    asked: dict[HlsClient, float] = {}
+    open_ones: list[tuple[HlsClient, str | None, ExitStack]] = []
 
-    def least(it: Reader) -> int:
+    def least(it: HlsClient) -> int:
         waiting = [kind for who, kind, _ in open_ones if who == it]
         most = max((waiting.count(kind) for kind in ("playlist", "part")), default=0)
         lately = clock.now - asked.get(it, -KEPT_S) < KEPT_S
@@ -63,9 +63,9 @@ def test_who_has_asked_lately_or_waits_is_counted(acts: list[tuple[str, int, int
     for act, stream, player, kind, seconds in acts:
         who = reader(stream, player)
         if act == "asks":
-            before, one_more = readers.of(who.stream), readers.is_one_more(who, kind)
+            before, one_more = readers.of(who.stream), readers.is_new_viewer(who, kind)
             stack = ExitStack()
-            stack.enter_context(readers.asking(who, kind))
+            stack.enter_context(readers.request(who, kind))
             open_ones.append((who, kind, stack))
             asked[who] = clock.now
             assert readers.of(who.stream) - before == one_more
@@ -85,8 +85,8 @@ def test_who_has_asked_lately_or_waits_is_counted(acts: list[tuple[str, int, int
         stack.close()
     clock.now += KEPT_S
     assert readers.all == 0
-    assert not readers._readers
-    assert not readers._of
+    assert not readers._sessions
+    assert not readers._by_stream
     assert not shares._held
 
 

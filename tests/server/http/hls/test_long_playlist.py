@@ -15,7 +15,7 @@ from fakes.hls_recording import GOPS, HTTP, LENGTH, forget, numbers, shows, text
 from fakes.recordings import PULSE0
 from fakes.site import Hall, opened
 from server.http.hls import time_shift_playlist
-from server.http.hls.long_playlist import MOST_GROWING, long_playlist, newest
+from server.http.hls.long_playlist import MOST_GROWING, long_playlist, trimmed
 from server.service.streaming.hls_segmenter import segment_layout
 from server.service.time_shift.hls_time_shift import SegmentList
 
@@ -28,7 +28,7 @@ async def hall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator
     for module in (long_module, time_shift_playlist):
         monkeypatch.setattr(module, "MOST_GROWING", 8)
         monkeypatch.setattr(module, "MOST", 12)
-    monkeypatch.setattr(long_module, "_STEP", 4)
+    monkeypatch.setattr(long_module, "_DATED_EVERY", 4)
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 1.0}, http=HTTP):
         hall.service.past.open()
         hall.service.come(*CAMERAS)
@@ -146,7 +146,7 @@ def test_the_time_of_day_is_told_of_the_first_and_of_some_others() -> None:
 @pytest.mark.parametrize("stop", range(MOST_GROWING + 100, MOST_GROWING + 300, 7))
 def test_what_is_first_after_others_have_gone_was_dated_before(stop: int) -> None:
     whole = SegmentList(range(100, stop), PLAN.segment_frames, 1000, stop * PLAN.segment_frames)
-    left = newest(whole)
+    left = trimmed(whole)
     assert MOST_GROWING - 64 < len(left.numbers) <= MOST_GROWING
     before, after = (entries(long_playlist(it, PLAN, PULSE0, ended=False)) for it in (whole, left))
     assert after.items() <= before.items()

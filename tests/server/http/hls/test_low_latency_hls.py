@@ -19,7 +19,7 @@ from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, video
 from fakes.programs import needs_ffmpeg
 from fakes.site import A, Hall, opened
 from fakes.timeouts import PATIENCE
-from server.http.hls.live_playlist import _newest
+from server.http.hls.live_playlist import _cached
 from server.service.streaming.hls_segmenter import HlsSegmenter
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
@@ -144,13 +144,13 @@ async def test_a_playlist_is_written_once_for_all_who_ask_and_anew_for_the_next_
     shows(hall, range(PARTS))
     reel = hall.service.splicer.segmenter_of_person(1)
     assert reel is not None
-    texts = [_newest(reel, pulse0) for pulse0 in (None, None, 1_800_000_000.0)]
+    texts = [_cached(reel, pulse0) for pulse0 in (None, None, 1_800_000_000.0)]
     assert texts[0] is texts[1]
     assert texts[1] != texts[2], "the time of day is known now"
     shows(hall, range(PARTS, PARTS + 1))
-    assert _newest(reel, 1_800_000_000.0) not in texts
+    assert _cached(reel, 1_800_000_000.0) not in texts
     reel.end()
-    assert _newest(reel, 1_800_000_000.0).endswith("#EXT-X-ENDLIST\n")
+    assert _cached(reel, 1_800_000_000.0).endswith("#EXT-X-ENDLIST\n")
 
 
 async def test_who_asks_for_a_part_is_answered_as_soon_as_it_is_there(hall: Hall) -> None:
@@ -205,7 +205,7 @@ async def test_what_never_comes_is_not_waited_for_for_ever(
     hall: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shows(hall, range(PARTS + 1))
-    monkeypatch.setattr("server.http.hls.live_playlist._WAIT", 0.05)
+    monkeypatch.setattr("server.http.hls.live_playlist._BLOCK_MOST", 0.05)
     async with hall.session.get(f"{STREAM}index.m3u8?_HLS_msn=2") as answer:
         assert (answer.status, bool(answer.headers["Retry-After"])) == (503, True)
 

@@ -12,7 +12,7 @@ import pytest
 from fakes.cameras import FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, tracks, word
 from fakes.site import A, B, Hall, opened, see
 from server.camera.operator_corrections import CorrectionInbox
-from server.http.access.csrf import CHANGES
+from server.http.access.csrf import CSRF_HEADER
 from server.messaging.inbox import Message
 from server.messaging.operator_messages import OperatorPoints, RiskEvent
 
@@ -41,7 +41,7 @@ def sent(hall: Hall) -> list[tuple[str, OperatorPoints]]:
 
 async def say(hall: Hall, *points: Any, **said: Any) -> tuple[int, Any]:
     body = {"object": 1, "camera": A, "points": list(points), **said}
-    async with hall.session.post(POINTING, headers={CHANGES: "1"}, json=body) as answer:
+    async with hall.session.post(POINTING, headers={CSRF_HEADER: "1"}, json=body) as answer:
         return answer.status, await answer.json()
 
 

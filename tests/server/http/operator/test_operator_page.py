@@ -198,7 +198,7 @@ async def test_flags_are_listed_with_what_has_become_of_them(browser: Browser) -
         # Another run of the service knows nothing of it; the page sees that its connection ends.
         hall.service.assist.flags._ended.clear()
         [events] = [tell.__self__ for tell in hall.service.assist.flags.on_flag]  # type: ignore[attr-defined]
-        lines, events._lines = events._lines, {}
+        lines, events._by_scope = events._by_scope, {}
         for it in lines.values():
             it.channel.close()
         await expect(page.locator("#flag-none")).to_have_text("None so far.")

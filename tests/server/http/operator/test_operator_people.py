@@ -12,7 +12,7 @@ from bestview import IdentityRegistry
 from fakes.cameras import CAMERAS, LARGE, SMALL
 from fakes.site import A, B, Hall, opened
 from server.cli.watch import run_watch
-from server.http.access.csrf import CHANGES
+from server.http.access.csrf import CSRF_HEADER
 from server.service.view_selection.decider import camera_homographies
 
 PEOPLE = "/api/operator/people"
@@ -38,7 +38,7 @@ def feed(hall: Hall, epoch: int) -> None:
 
 
 async def say(hall: Hall, **said: Any) -> tuple[int, Any]:
-    async with hall.session.post(PEOPLE, headers={CHANGES: "1"}, json=said) as answer:
+    async with hall.session.post(PEOPLE, headers={CSRF_HEADER: "1"}, json=said) as answer:
         return answer.status, await answer.json()
 
 

@@ -15,12 +15,12 @@ from fakes.cameras import CAMERAS, LARGE, SMALL, TrackNumbers, epoch_of, small_c
 from fakes.site import A, B, Hall, opened
 from server.config.sections import ViewSettings
 from server.config.site_config import Config
-from server.http.access.csrf import CHANGES
+from server.http.access.csrf import CSRF_HEADER
 from server.http.operator.settings import settings_of
 from server.service.view_selection.decider import ViewDecider
 
 CHOOSING = "/api/operator/choosing"
-MINE = {CHANGES: "1"}
+MINE = {CSRF_HEADER: "1"}
 WIDE = {"site": {"width": 128, "height": 96}}
 
 

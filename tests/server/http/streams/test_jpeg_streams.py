@@ -15,7 +15,7 @@ import pytest
 
 from fakes.drawn_site import CAMERAS, GOP, SIZE, Drawn, Image, decoded, drawn_room, parts, read_film
 from fakes.site import B, Hall
-from server.http.app_keys import PICTURES
+from server.http.app_keys import SERVICE
 from server.service.rendering.render_pool import CameraView, PersonView, RenderPool
 from server.service.rendering.worker.box_overlay import CHOSEN_COLOR
 
@@ -161,7 +161,7 @@ async def test_fewer_pictures_are_given_when_fewer_are_wanted(drawn: Drawn) -> N
 
 
 async def test_one_process_draws_for_all_who_watch_one_stream(drawn: Drawn) -> None:
-    pictures: RenderPool = drawn.app[PICTURES]
+    pictures: RenderPool = drawn.app[SERVICE].rendering
     film = f"/objects/{SOMEBODY}/best.mp4?overlay=1"
     async with drawn.session.get(film) as one, drawn.session.get(film) as other:
         async with drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg") as third:
@@ -178,7 +178,7 @@ async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(
     drawn: Drawn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.service.rendering.worker_process._ANSWER_S", 1000.0)  # nobody waits for that
-    pictures: RenderPool = drawn.app[PICTURES]
+    pictures: RenderPool = drawn.app[SERVICE].rendering
     going = asyncio.create_task(drawn.keep_going(GOP / FPS))
     async with (
         drawn.session.get(f"/objects/{SOMEBODY}/best.mp4?overlay=1") as film,
@@ -203,7 +203,7 @@ async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(
 
 
 async def test_a_process_ends_some_time_after_its_last_viewer(drawn: Drawn) -> None:
-    pictures: RenderPool = drawn.app[PICTURES]
+    pictures: RenderPool = drawn.app[SERVICE].rendering
     pictures._linger_s = 0.2
     async with drawn.session.get("/cameras/c0/live.jpg") as answer:
         await answer.read()
@@ -218,7 +218,7 @@ async def test_a_process_ends_some_time_after_its_last_viewer(drawn: Drawn) -> N
 
 
 async def test_a_process_that_hangs_slows_nobody_down(drawn: Drawn) -> None:
-    pictures: RenderPool = drawn.app[PICTURES]
+    pictures: RenderPool = drawn.app[SERVICE].rendering
     async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
         await anext(parts(answer))
         source = pictures.sources[CameraView("c0")]
@@ -243,7 +243,7 @@ async def test_no_more_pictures_are_made_than_the_server_may() -> None:
                 assert "pictures_max" in (await other.json())["error"]
             async with drawn.session.get("/cameras/c0/live.jpg") as same:
                 assert same.status == 200
-        while drawn.app[PICTURES].viewers:  # noqa: ASYNC110 — the server notices when the connection closes
+        while drawn.app[SERVICE].rendering.viewers:  # noqa: ASYNC110 — the server notices when the connection closes
             await asyncio.sleep(0.01)
         async with drawn.session.get("/cameras/c1/live.jpg") as other:
             assert other.status == 200, "one that nobody watches any more makes place"
@@ -277,7 +277,7 @@ async def test_processes_end_with_the_service() -> None:
     async for drawn in drawn_room():
         async with drawn.session.get("/cameras/c0/live.jpg") as answer:
             await answer.read()
-        pids = [source.pid for source in drawn.app[PICTURES].sources.values()]
+        pids = [source.pid for source in drawn.app[SERVICE].rendering.sources.values()]
         assert pids
     for pid in pids:
         assert pid is not None

@@ -16,13 +16,13 @@ from fakes.calibration_walk import HEIGHT, SITE, WIDTH, curved, errors_on_floor,
 from fakes.cameras import FPS, STRIDE
 from fakes.site import A, B, Hall, opened
 from server.config.loader import build_config
-from server.http.access.csrf import CHANGES
+from server.http.access.csrf import CSRF_HEADER
 from server.service.calibration import walk_session as walking_module
 from server.service.calibration.walk_session import WalkSession, WalkState
 from server.service.calibration.worker import CalibrationResult, CalibrationTask, CameraBoxes, run_calibration
 
 WALK = "/api/operator/walk"
-MINE = {CHANGES: "1"}
+MINE = {CSRF_HEADER: "1"}
 
 
 @pytest.fixture

@@ -140,7 +140,7 @@ async def second(request: pytest.FixtureRequest) -> AsyncIterator[str]:
     service.come(*CAMERAS)
     for epoch in range(4):
         service.feed(epoch, {"c0": {1: SMALL, 2: LARGE, 3: SMALL}, "c1": {1: LARGE}})
-    async with serving(make_app(service), HttpSettings(port=0)) as port:
+    async with serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port:
         yield f"http://127.0.0.1:{port}"
     service.close()
 

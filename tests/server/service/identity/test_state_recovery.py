@@ -26,6 +26,7 @@ from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
 from server.service.identity.state_recovery import ALONE_MOST, LONGEST_S, StateRecovery, trusted_first_free
 from server.service.identity.state_replication import PATIENCE_S, StateReplication
+from server.service.service import BestViewService
 
 A, B = CAMERAS
 KEYS = ZenohKeys("hall")
@@ -311,7 +312,7 @@ async def test_who_may_be_found_again_is_not_said_to_be_nobody() -> None:
     site = told()
     number = site.whose(A, 1, 5)
     service = site.start()
-    async with TestClient(TestServer(make_app(service))) as client:
+    async with TestClient(TestServer(make_app(BestViewService(service)))) as client:
         path = f"/objects/{number}/best.mp4"
         for asked in (path, f"/objects/{number}/hls/index.m3u8", f"/api/objects/{number}/choice"):
             answer = await client.get(asked)

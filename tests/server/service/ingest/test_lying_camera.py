@@ -28,8 +28,7 @@ from fakes.cameras import (
     word,
 )
 from server.http.app import make_app
-from server.http.app_keys import METRICS
-from server.http.operator.cameras import _camera
+from server.http.metrics.http_collector import METRICS
 from server.media.audio.audio_format import AudioFormat
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
@@ -42,6 +41,7 @@ from server.messaging.messages import (
     TrackMessage,
     ZenohKeys,
 )
+from server.service.service import BestViewService
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.media_chunk import MediaChunk
 
@@ -185,9 +185,10 @@ class Lived:
 
 def told(service: FedService) -> None:
     """Ask for all that is told of cameras: numbers that are none would take it from everybody."""
-    for camera, state in service.intake.states.items():
-        json.loads(msgspec.json.encode(_camera(service, camera, state)), parse_constant=pytest.fail)
-    for line in generate_latest(make_app(service)[METRICS]).decode().splitlines():
+    facade = BestViewService(service)
+    for camera in facade.cameras.diagnose_cameras():
+        json.loads(msgspec.json.encode(camera), parse_constant=pytest.fail)
+    for line in generate_latest(make_app(facade)[METRICS]).decode().splitlines():
         assert line.startswith("#") or line.rpartition(" ")[2] not in {"NaN", "+Inf", "-Inf"}, line
 
 

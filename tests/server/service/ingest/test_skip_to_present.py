@@ -168,7 +168,7 @@ async def test_who_is_heard_first_and_counts_alone_does_not_say_where_to_begin(o
 
 
 async def test_a_site_without_a_pulse_server_is_decided_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.service.service._FIRST_PULSE_S", 0.0)
+    monkeypatch.setattr("server.service.pipeline._FIRST_PULSE_S", 0.0)
     service = Started()
     decided = noted(service)
     running = asyncio.create_task(service.run())

@@ -23,13 +23,13 @@ from fakes.cameras import (
 )
 from fakes.site import A, B, Hall
 from server.config.sections import ViewSettings
-from server.http.access.csrf import CHANGES
+from server.http.access.csrf import CSRF_HEADER
 from server.service.streaming.subscriber_queue import Chunk
 from server.service.view_selection.decider import GopDecision, ViewDecider
 from server.system.errors import UserError
 
 EPOCHS = 8  # as many as there are pictures of
-MINE = {CHANGES: "1"}
+MINE = {CSRF_HEADER: "1"}
 Changes = Mapping[int, int]
 """By epoch before which it is changed: the look-ahead from then on."""
 CHANGED = st.dictionaries(st.integers(0, 29), st.integers(GOP, 40), max_size=6)

@@ -1,20 +1,27 @@
-"""How long the event loop keeps everybody waiting."""
+"""Event loop lag: how late tasks of the HTTP process are woken."""
 
 from __future__ import annotations
 
 import asyncio
 
-from server.service.metrics.histogram import Histogram
+from prometheus_client import Histogram
+
+from server.service.metrics.stage_timers import SECONDS_BUCKETS
 
 _EVERY_S = 0.25
 
 
-class Lag:
-    """Sleeps again and again, and measures how much later than asked for it wakes."""
+class LoopLag:
+    """Sleeps for ``every_s`` again and again, and measures how much later it wakes."""
 
     def __init__(self, every_s: float = _EVERY_S) -> None:
         self._every_s = every_s
-        self.histogram = Histogram()
+        self.histogram = Histogram(
+            "myview_loop_lag_seconds",
+            "How late the event loop is.",
+            registry=None,
+            buckets=SECONDS_BUCKETS,
+        )
 
     async def run(self) -> None:
         """Measure for as long as the loop runs."""

@@ -1,13 +1,13 @@
-"""How much is sent, and how far behind those are whom it is sent to."""
+"""Traffic: bytes sent, and how far behind viewers are."""
 
 from __future__ import annotations
 
 from aiohttp import web
 
-from server.service.streaming.subscriber_queue import Subscriber
+from server.service.facade.streams import Subscriber
 
 
-class Sent:
+class Traffic:
     """Counts bytes of streams and of other answers, and what viewers lose.
 
     Attributes:
@@ -19,14 +19,14 @@ class Sent:
         self.streams = self.answers = 0
         self._viewers: set[Subscriber] = set()
         self._lost = 0
-        """GOPs of viewers who have gone."""
+        """GOPs lost by viewers who have left."""
 
     def join(self, viewer: Subscriber) -> None:
-        """Look at a viewer from now on; call :meth:`leave` in the end."""
+        """Count a viewer's losses from now on; call :meth:`leave` in the end."""
         self._viewers.add(viewer)
 
     def leave(self, viewer: Subscriber) -> None:
-        """Keep what a viewer has lost."""
+        """Keep what a viewer has lost, who leaves."""
         self._viewers.discard(viewer)
         self._lost += viewer.lost_gops
 
@@ -36,7 +36,7 @@ class Sent:
         return self._lost + sum(viewer.lost_gops for viewer in self._viewers)
 
     @property
-    def longest(self) -> int:
+    def longest_queue(self) -> int:
         """How many pieces wait for the viewer who is furthest behind."""
         return max((viewer.queued for viewer in self._viewers), default=0)
 
@@ -46,4 +46,4 @@ class Sent:
             self.answers += response.content_length or 0
 
 
-SENT = web.AppKey("sent", Sent)
+TRAFFIC = web.AppKey("traffic", Traffic)

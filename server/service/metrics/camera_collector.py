@@ -1,4 +1,4 @@
-"""``/metrics`` of the cameras' stages: how long each takes, how well it is solved, what is lost where."""
+"""Prometheus metrics of the cameras: what arrives, how long each stage takes, what is lost where."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from prometheus_client.registry import Collector
 from server.messaging.messages import CameraStatus
 from server.service.ingest.ingest import CameraState
 from server.service.metrics.camera_metrics import RecentSeconds
-from server.service.service import BestViewService
+from server.service.pipeline import BestViewPipeline
 
 Value = Callable[[str, CameraState], float | None]
 """A camera's number by its id and state; None: it is not known."""
 
 
-class CameraStages(Collector):
-    """Gives what the cameras' messages say of their stages."""
+class CameraCollector(Collector):
+    """Collects what the cameras' messages report."""
 
-    def __init__(self, service: BestViewService) -> None:
-        self._service = service
+    def __init__(self, pipeline: BestViewPipeline) -> None:
+        self._pipeline = pipeline
 
     def collect(self) -> Iterable[Metric]:
-        """Give all metrics as they are now."""
+        """Return all metrics as they are now."""
+        yield from self._cameras()
         yield self._stages()
         yield self._gauge("fps", "Frames taken a second.", _of_status(lambda it: it.fps))
         yield self._gauge(
@@ -42,7 +43,7 @@ class CameraStages(Collector):
         )
         for what, words, spread in _SPREADS:
             yield self._spread(what, words, spread)
-        late, lost = self._service.aligner.late_messages, self._service.lacking.lost_pictures
+        late, lost = self._pipeline.aligner.late_messages, self._pipeline.lacking.lost_pictures
         yield self._counter("late_windows", "Windows that came too late to count.", lambda it, _: late[it])
         yield self._counter(
             "lost_pictures", "Pictures not there when their GOP was decided.", lambda it, _: lost[it]
@@ -65,18 +66,54 @@ class CameraStages(Collector):
         )
         yield self._counter("gap", "Sum of the gaps of all other windows.", lambda _, it: it.gauge.totals.gap)
 
+    def _cameras(self) -> Iterable[Metric]:
+        live = GaugeMetricFamily("myview_camera_live", "The camera delivers frames.", labels=["camera"])
+        frames = CounterMetricFamily("myview_camera_frames", "Frames received.", labels=["camera"])
+        missed = CounterMetricFamily("myview_camera_missed", "Pulses without a frame.", labels=["camera"])
+        shed = CounterMetricFamily("myview_camera_shed", "Frames not searched for people.", labels=["camera"])
+        unheard = CounterMetricFamily(
+            "myview_camera_unheard",
+            "Frames in which people were followed without what some other camera found.",
+            labels=["camera"],
+        )
+        bad = CounterMetricFamily(
+            "myview_camera_bad_messages",
+            "Messages not understood: those that the camera has sent, and those that it has heard.",
+            labels=["camera", "way"],
+        )
+        offset = GaugeMetricFamily(
+            "myview_camera_clock_offset_seconds",
+            "Pulse server's clock minus the camera's.",
+            labels=["camera"],
+        )
+        for camera, state in self._pipeline.intake.states.items():
+            labels = [camera]
+            live.add_metric(labels, float(state.word == "live"))
+            frames.add_metric(labels, state.frames)
+            unheard.add_metric(labels, state.unheard)
+            bad.add_metric([camera, "sent"], state.bad_messages)
+            if state.status is not None:
+                missed.add_metric(labels, state.status.missed)
+                shed.add_metric(labels, state.status.shed)
+                bad.add_metric([camera, "heard"], state.status.bad_messages)
+                offset.add_metric(labels, state.status.clock_offset)
+        return [live, frames, missed, shed, unheard, bad, offset]
+
     def _stages(self) -> Metric:
         family = HistogramMetricFamily(
             "myview_stage_seconds", "How long a camera's stage took.", labels=["camera", "stage"]
         )
-        for camera, state in self._service.intake.states.items():
+        for camera, state in self._pipeline.intake.states.items():
             for stage, took in state.gauge.totals.stages.items():
-                family.add_metric([camera, stage], took.buckets, took.sum)
+                samples = [sample for metric in took.collect() for sample in metric.samples]
+                buckets = [(it.labels["le"], it.value) for it in samples if it.name.endswith("_bucket")]
+                seconds = next(it.value for it in samples if it.name.endswith("_sum"))
+                family.add_metric([camera, stage], buckets, seconds)
         return family
 
     def _spread(self, what: str, words: str, of: Callable[[CameraState], RecentSeconds | None]) -> Metric:
         family = GaugeMetricFamily(f"myview_camera_{what}_seconds", words, labels=["camera", "lately"])
-        for camera, state in self._service.intake.states.items():
+        for camera, state in self._pipeline.intake.states.items():
             spread = of(state)
             if spread is not None:
                 family.add_metric([camera, "median"], spread.median)
@@ -90,7 +127,7 @@ class CameraStages(Collector):
         return self._filled(CounterMetricFamily(f"myview_camera_{what}", words, labels=["camera"]), value)
 
     def _filled(self, family: GaugeMetricFamily | CounterMetricFamily, value: Value) -> Metric:
-        for camera, state in self._service.intake.states.items():
+        for camera, state in self._pipeline.intake.states.items():
             number = value(camera, state)
             if number is not None:
                 family.add_metric([camera], number)

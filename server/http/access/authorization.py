@@ -1,0 +1,184 @@
+"""Authorization: whether a request may have its answer, asked of every route in one place.
+
+Without a file of tokens everybody who reaches the server may watch, and this machine may operate. With one,
+every route that shows anything of the site needs a token. What a revoked or expired token holds open is
+ended.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+from aiohttp import web
+
+from server.http.access.authentication import Authenticator, Credential, challenge
+from server.http.access.csrf import check_csrf, route_pattern
+from server.http.access.local_requests import is_local_request
+from server.http.access.networks import network_of
+from server.http.access.permissions import ClientIdentity, Grant, Permission, permission_for
+from server.http.json_responses import error_response
+from server.http.periodic import run_periodically
+
+HOW_TO_OPERATE = (
+    "operating is possible from the server's own machine, at http://127.0.0.1; to operate from elsewhere, "
+    "`myview token NAME --operate` prints a token and the line for the file that access.tokens names"
+)
+_CHECK_EVERY_S = 0.5
+_BOUND_TO_GRANT = (Permission.ANY_TOKEN, Permission.OBJECT)
+"""Answers to these depend on the grant: they are ended when it changes, not only when it is gone."""
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+@dataclass(frozen=True, slots=True)
+class _OpenRequest:
+    """A request that is being answered."""
+
+    request: web.Request
+    permission: Permission
+    credential: Credential
+    grant: Grant
+
+
+class AccessControl:
+    """Lets permitted requests through, and ends their answers when their credential is no longer valid.
+
+    ``resolve`` returns the number that a merged one goes by now.
+    """
+
+    def __init__(self, authenticator: Authenticator, resolve: Callable[[int], int]) -> None:
+        self.authenticator, self._resolve = authenticator, resolve
+        self._open_requests: dict[int, _OpenRequest] = {}
+        self._file_reader = ThreadPoolExecutor(1, "tokens")
+
+    @property
+    def needs_token(self) -> bool:
+        """Whether there is a file of tokens."""
+        return self.authenticator.file is not None
+
+    def grant(self, request: web.Request) -> Grant:
+        """Return what a request is granted, while it is being answered."""
+        opened = self._open_requests.get(id(request))
+        return Grant(is_operator=is_local_request(request)) if opened is None else opened.grant
+
+    def client_of(self, request: web.Request) -> ClientIdentity:
+        """Return whom a request counts for when slots are shared out, while it is being answered."""
+        opened = self._open_requests.get(id(request))
+        if opened is not None:
+            return ClientIdentity(f"token {opened.credential.token}", opened.grant.is_operator)
+        if is_local_request(request):
+            return ClientIdentity("this machine", is_operator=True)
+        return ClientIdentity(network_of(request.remote or ""))
+
+    def is_operator(self, request: web.Request) -> bool:
+        """Tell whether a request is an operator's, before it is answered."""
+        if not self.needs_token:
+            return is_local_request(request)
+        credential = self.authenticator.credential_of(request)
+        grant = self.authenticator.grant_of(credential) if isinstance(credential, Credential) else None
+        return isinstance(grant, Grant) and grant.is_operator
+
+    async def answer(
+        self, request: web.Request, permission: Permission, handler: Handler
+    ) -> web.StreamResponse:
+        """Answer a request if its credential grants the permission; else with 401, 403 or 429."""
+        if not self.needs_token:
+            grant = Grant(is_operator=is_local_request(request))
+            allowed = grant.allows(permission, request, self._resolve)
+            return await handler(request) if allowed else error_response(403, HOW_TO_OPERATE)
+        credential = self.authenticator.credential_of(request)
+        if isinstance(credential, web.Response):
+            return credential
+        current = None if credential is None else self.authenticator.grant_of(credential)
+        if credential is None or current is None:
+            return _unauthenticated(permission)
+        if isinstance(current, str):
+            return error_response(403, current)
+        if not current.allows(permission, request, self._resolve):
+            return error_response(403, f"the token {current.name!r} is for {current}, and for nothing else")
+        self._open_requests[id(request)] = _OpenRequest(request, permission, credential, current)
+        try:
+            return await handler(request)
+        finally:
+            del self._open_requests[id(request)]
+
+    async def run(self) -> None:
+        """Read the file of tokens again as it changes, and end what is not allowed any more."""
+        if not self.needs_token:
+            return
+        try:
+            async with (
+                asyncio.TaskGroup() as both
+            ):  # sessions expire by themselves, however long the disk takes
+                both.create_task(
+                    run_periodically(_CHECK_EVERY_S, self._reload, "reading the file of tokens again")
+                )
+                both.create_task(run_periodically(_CHECK_EVERY_S, self._end, "ending expired requests"))
+        finally:
+            self._file_reader.shutdown(wait=False)
+
+    def end_expired(self) -> None:
+        """End all answers whose token or session is revoked or expired."""
+        for it in list(self._open_requests.values()):
+            current = self.authenticator.grant_of(it.credential)
+            if (
+                isinstance(current, Grant)
+                and current.allows(it.permission, it.request, self._resolve)
+                and (it.permission not in _BOUND_TO_GRANT or current == it.grant)
+            ):
+                continue
+            if it.request.transport is not None:
+                it.request.transport.abort()
+
+    async def _end(self) -> None:
+        self.end_expired()
+
+    async def _reload(self) -> None:
+        assert self.authenticator.file is not None  # noqa: S101 — nobody reloads where there is none
+        try:
+            # A long file takes longer to read than a frame. The thread is its own: all others may wait for
+            # some other disk.
+            reload = self.authenticator.file.reload_if_changed
+            await asyncio.get_running_loop().run_in_executor(self._file_reader, reload)
+        finally:
+            self.end_expired()
+
+
+ACCESS = web.AppKey("access", AccessControl)
+
+
+def is_scoped_to_person(request: web.Request) -> bool:
+    """Tell whether a request may see one person alone: its streams are blanked where nobody saw them."""
+    return request.app[ACCESS].grant(request).scope.object is not None
+
+
+def _unauthenticated(permission: Permission) -> web.Response:
+    if permission is Permission.OPERATE:
+        return challenge("operating needs an operator's token; sign in at /operator")
+    return challenge("watching needs a token; sign in at /, or send it (docs/how-to/secure.md)")
+
+
+@web.middleware
+async def authorize(request: web.Request, handler: Handler) -> web.StreamResponse:
+    """Answer only what the request's credential permits."""
+    refused = check_csrf(request)
+    if refused is not None:
+        return refused
+    if request.match_info.route.resource is None:
+        return await handler(request)  # 404 or 405
+    permission = permission_for(request.method, route_pattern(request))
+    if permission is None:
+        return error_response(403, "no access rule for this route")
+    if permission is Permission.PUBLIC:
+        return await handler(request)
+    return await request.app[ACCESS].answer(request, permission, handler)
+
+
+async def forbid_shared_caching(request: web.Request, response: web.StreamResponse) -> None:
+    """Forbid caches on the way to keep an answer for others, where a token is needed to have it."""
+    kept = response.headers.get("Cache-Control", "")
+    if kept.startswith("public") and request.app[ACCESS].needs_token:
+        response.headers["Cache-Control"] = kept.replace("public", "private", 1)

@@ -1,0 +1,37 @@
+"""Overload: where all connections are busy, operators and public routes alone are answered."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+
+from aiohttp import web
+
+from server.http.access.authorization import ACCESS
+from server.http.access.csrf import route_pattern
+from server.http.access.permissions import Permission, permission_for
+from server.http.connections.listener import PooledHandler
+from server.http.json_responses import unavailable
+
+
+@web.middleware
+async def limit_connections(
+    request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+) -> web.StreamResponse:
+    """Keep a connection open while it is answered; on a reserved one answer few requests, and one each.
+
+    These are operators', and requests for the page's files, to sign in and for health checks: who is an
+    operator is known after them.
+    """
+    protocol = request.protocol
+    if not isinstance(protocol, PooledHandler):
+        return await handler(request)
+    protocol.pool.busy(protocol.connection)
+    if not protocol.connection.is_reserved:
+        return await handler(request)
+    permission = permission_for(request.method, route_pattern(request))
+    if permission is Permission.PUBLIC or request.app[ACCESS].is_operator(request):
+        response = await handler(request)
+    else:
+        response = unavailable("as many connections as this server takes (http.connections_max) are busy")
+    response.force_close()
+    return response

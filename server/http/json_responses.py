@@ -1,0 +1,83 @@
+"""JSON in and out: answers, one-line errors, and the body of a request."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+import msgspec
+from aiohttp import web
+
+from server.messaging.messages import DECODE_ERRORS
+
+RETRY_AFTER_S = "5"
+
+Body = TypeVar("Body")
+
+
+class Problem(msgspec.Struct, frozen=True):
+    """Why there is no answer."""
+
+    error: str
+
+
+def json_response(content: Any, status: int = 200) -> web.Response:
+    """Return content as a JSON answer that any origin may read and nobody may cache."""
+    return web.Response(
+        body=msgspec.json.encode(content),
+        status=status,
+        content_type="application/json",
+        headers={"Cache-Control": "no-store", "Access-Control-Allow-Origin": "*"},
+    )
+
+
+def error_response(status: int, error: str) -> web.Response:
+    """Return an error as one line of JSON."""
+    return json_response(Problem(error), status)
+
+
+def unavailable(error: str) -> web.Response:
+    """Return 503 with when to try again."""
+    response = error_response(503, error)
+    response.headers["Retry-After"] = RETRY_AFTER_S
+    return response
+
+
+async def read_json(request: web.Request, kind: type[Body]) -> Body:
+    """Read the body of a request.
+
+    Raises:
+        HTTPBadRequest: it is not JSON of that kind.
+    """
+    try:
+        with _reading_body(request):
+            body = await request.read()
+        return msgspec.json.decode(body, type=kind)
+    except DECODE_ERRORS as error:
+        raise web.HTTPBadRequest(reason=f"the request's JSON: {' '.join(str(error).split())}") from error
+
+
+@runtime_checkable
+class TracksBody(Protocol):
+    """A connection's protocol that is told while a body is still being received."""
+
+    def body_pending(self) -> None:
+        """Note that the request is not complete yet."""
+
+    def body_received(self) -> None:
+        """Note that it is."""
+
+
+@contextmanager
+def _reading_body(request: web.Request) -> Iterator[None]:
+    """Let the connection pool know inside that the request is not complete: it may time out."""
+    protocol = request.protocol
+    if not isinstance(protocol, TracksBody):
+        yield
+        return
+    protocol.body_pending()
+    try:
+        yield
+    finally:
+        protocol.body_received()

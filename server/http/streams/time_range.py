@@ -1,0 +1,100 @@
+"""``from=`` and ``to=``: the range of pulses that a request is about, and whether anything is kept of it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import AsyncIterator
+
+from aiohttp import web
+
+from server.http.json_responses import error_response, unavailable
+from server.service.facade.recordings import PlaybackRange, RecordedStream, TimeReferenceError
+from server.service.service import BestViewService
+
+
+def is_time_shifted(request: web.Request) -> bool:
+    """Tell whether a stream is to begin in the past."""
+    return "from" in request.query or "to" in request.query
+
+
+def parse_time_range(
+    request: web.Request,
+    service: BestViewService,
+    now: int,
+    *,
+    start: int | None = None,
+    endless: str | None = None,
+) -> PlaybackRange:
+    """Parse from= and to=; ``now`` is the pulse that seconds back are counted from.
+
+    ``start`` stands where from= is missing; None: it must not be. ``endless`` is a word for to= that means no
+    end.
+
+    Raises:
+        TimeReferenceError: they are no moments, or the second is not after the first.
+    """
+    moments: dict[str, int] = {}
+    for name in ("from", "to"):
+        if name in request.query and (name, request.query[name]) != ("to", endless):
+            try:
+                moments[name] = service.recordings.pulse_at(request.query[name], now)
+            except TimeReferenceError as error:
+                raise TimeReferenceError(f"{name}: {error}") from error
+    start, end = moments.get("from", start), moments.get("to")
+    if start is None:
+        raise TimeReferenceError("from: is missing; it says from when on, such as ?from=-60")
+    if end is not None and end <= start:
+        raise TimeReferenceError(f"to: p{end} is not after from, which is p{start}")
+    return PlaybackRange(start, end)
+
+
+async def refuse_unreadable(
+    stream: RecordedStream, start: int, end: int | None = None
+) -> web.Response | None:
+    """Forget files that have gone at both ends of a range; return 503 where the disk cannot be read."""
+    try:
+        await stream.check_ends(start, end)
+    except OSError as error:
+        return disk_error(error)
+    return None
+
+
+async def refuse_unrecorded(stream: RecordedStream, playback: PlaybackRange) -> web.Response | None:
+    """Return 416 with what is kept where nothing is kept of a range; None: something is."""
+    if (unreadable := await refuse_unreadable(stream, playback.start, playback.end)) is not None:
+        return unreadable
+    first = stream.available_from(playback.start)
+    if first is not None and (playback.end is None or first < playback.end):
+        return None
+    try:
+        await stream.check_all(0, sys.maxsize)
+    except OSError as error:
+        return disk_error(error)
+    spans = stream.spans(0, sys.maxsize)
+    kept = ", ".join(f"p{it.first} to p{it.end - 1}" for it in spans) or "nothing"
+    return error_response(416, f"of {stream.name} nothing is kept from p{playback.start} on; there is {kept}")
+
+
+async def decisions_in(
+    service: BestViewService, playback: PlaybackRange
+) -> AsyncIterator[bytes] | web.Response:
+    """Return the recorded decisions of a range as lines of JSON; 416 where none are kept of it."""
+    end = service.recordings.end if playback.end is None else playback.end
+    lines = service.recordings.decisions(playback.start, end)
+    first = await anext(lines, None)
+    if first is None and playback.start < service.recordings.end:
+        until = "on" if playback.end is None else f"to p{playback.end - 1}"
+        return error_response(416, f"nothing is kept of what was said from p{playback.start} {until}")
+    return _led_by(first, lines)
+
+
+def disk_error(error: OSError) -> web.Response:
+    """Return 503 for a recording that cannot be read."""
+    return unavailable(f"what is recorded cannot be read: {error.strerror or error}")
+
+
+async def _led_by(first: bytes | None, lines: AsyncIterator[bytes]) -> AsyncIterator[bytes]:
+    if first is not None:
+        yield first
+    async for line in lines:
+        yield line

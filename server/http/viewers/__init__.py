@@ -1,0 +1,1 @@
+"""Who watches: limits, fair shares, HLS sessions, and the traffic to all of them."""

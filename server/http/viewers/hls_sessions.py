@@ -1,0 +1,149 @@
+"""HLS sessions: players that fetch hold no connection, so who has fetched lately counts as a viewer."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from aiohttp import web
+
+from server.http.access.permissions import ClientIdentity
+from server.http.viewers.fair_share import FairShare, Slot
+
+_TARGETS = 3
+"""Target durations: a player fetches once in each; who has not for so many has left."""
+
+
+def of_person(number: int) -> str:
+    """Return the slot name of a person's stream."""
+    return f"object {number}"
+
+
+def of_camera(name: str) -> str:
+    """Return the slot name of a camera's HLS stream."""
+    return f"camera {name}"
+
+
+def of_live(camera: str) -> str:
+    """Return the slot name of a camera's live stream over a connection of its own."""
+    return f"live {camera}"
+
+
+def of_decided(camera: str) -> str:
+    """Return the slot name of a person's stream that is fixed to a camera."""
+    return f"decided {camera}"
+
+
+class HlsClient(NamedTuple):
+    """A player that fetches a stream, as far as players can be told apart."""
+
+    stream: str
+    client: ClientIdentity
+    address: str
+    agent: str
+    """Its User-Agent header: there may be several players behind one address."""
+
+
+@dataclass(slots=True)
+class _Session:
+    until: float
+    slot: Slot
+    evicted: bool = False
+    """Its slot was taken away: it needs another one."""
+    waiting: Counter[str] = field(default_factory=Counter)
+    """Requests that block until there is something new and are not answered yet, by kind."""
+
+    @property
+    def weight(self) -> int:
+        """How many players it must be: each blocks on one request of a kind at a time."""
+        return max(1, max(self.waiting.values(), default=0))
+
+
+class HlsSessions:
+    """Counts players, which hold slots; ``clock`` is in seconds and never steps."""
+
+    def __init__(
+        self, target_s: float, slots: FairShare, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._kept_s, self._slots, self._clock = _TARGETS * target_s, slots, clock
+        self._sessions: dict[HlsClient, _Session] = {}
+        """The one that has fetched last is the last."""
+        self._by_stream: Counter[str] = Counter()
+
+    @property
+    def all(self) -> int:
+        """How many players there are, all streams together."""
+        self._expire()
+        return self._by_stream.total()
+
+    def of(self, stream: str) -> int:
+        """Return how many players fetch a stream."""
+        self._expire()
+        return self._by_stream[stream]
+
+    def is_new_viewer(self, client: HlsClient, awaits: str | None) -> bool:
+        """Tell whether a request adds a viewer; ``awaits`` is the kind of what it may block on."""
+        self._expire()
+        known = self._sessions.get(client)
+        return known is None or (awaits is not None and known.waiting[awaits] >= known.weight)
+
+    @contextmanager
+    def request(self, client: HlsClient, awaits: str | None) -> Iterator[None]:
+        """Count a player while a request is answered, and for a while after."""
+        session = self._change(client, self._sessions.get(client), awaits, 1)
+        try:
+            yield
+        finally:
+            if not session.evicted:
+                self._change(client, session, awaits, -1)
+
+    def _change(self, client: HlsClient, known: _Session | None, awaits: str | None, by: int) -> _Session:
+        previous = self._sessions.pop(client, None)
+        before = 0 if previous is None else previous.weight
+        session = previous or known or self._new(client)
+        if awaits is not None:
+            session.waiting[awaits] += by
+        session.until = self._clock() + self._kept_s
+        session.slot.weight = session.weight
+        self._slots.take(session.slot)
+        self._sessions[client] = session
+        self._by_stream[client.stream] += session.weight - before
+        return session
+
+    def _new(self, client: HlsClient) -> _Session:
+        session = _Session(0.0, Slot(client.client, client.stream, lambda: self._evict(client, session)))
+        return session
+
+    def _evict(self, client: HlsClient, session: _Session) -> None:
+        """Count a player no more, though it may still wait for an answer."""
+        session.evicted = True
+        if self._sessions.get(client) is session:
+            self._drop(client)
+
+    def _drop(self, client: HlsClient) -> None:
+        session = self._sessions.pop(client)
+        self._slots.release(session.slot)
+        self._by_stream[client.stream] -= session.weight
+        if not self._by_stream[client.stream]:
+            del self._by_stream[client.stream]
+
+    def _expire(self) -> None:
+        """Drop players that have not fetched for long; one that waits for an answer stays."""
+        now = self._clock()
+        while self._sessions:
+            client, oldest = next(iter(self._sessions.items()))
+            if oldest.until > now:
+                return
+            if not any(oldest.waiting.values()):
+                self._drop(client)
+                continue
+            del self._sessions[client]
+            oldest.until = now + self._kept_s
+            self._sessions[client] = oldest
+
+
+HLS_SESSIONS = web.AppKey("hls sessions", HlsSessions)

@@ -1,0 +1,78 @@
+"""Viewer limits: how many may watch one stream, all streams together, and be sent events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from aiohttp import web
+
+from server.http.access.authorization import ACCESS
+from server.http.app_keys import SERVICE
+from server.http.error_responses import break_off
+from server.http.json_responses import unavailable
+from server.http.viewers.fair_share import FairShare, Slot
+from server.http.viewers.hls_sessions import HLS_SESSIONS
+
+VIEWER_SLOTS = web.AppKey("viewer slots", FairShare)
+"""Who watches which stream."""
+EVENT_SLOTS = web.AppKey("event slots", FairShare)
+"""Who is sent events, or recorded decisions."""
+
+
+def refuse_viewer(
+    request: web.Request, viewers: int = 0, streams: tuple[str, ...] = ()
+) -> web.Response | None:
+    """Return 503 where no more may watch a stream of so many viewers; None: there is a slot, or is one now.
+
+    ``streams`` are the names by which its viewers hold slots. A drawing process counts as a viewer of the
+    stream that it draws, and so does each HLS session.
+    """
+    service, slots = request.app[SERVICE], request.app[VIEWER_SLOTS]
+    limits = service.config.http
+    total = service.streams.viewers.total + service.recordings.viewers
+    total += service.rendering.viewers + request.app[HLS_SESSIONS].all
+    if viewers - slots.ending(streams) >= limits.viewers_per_object:
+        if _evict(request, slots, streams):
+            return None  # one less of all, too
+        return unavailable("as many viewers as one stream takes (http.viewers_per_object) are watching")
+    if total - slots.ending() >= limits.viewers_max and not _evict(request, slots):
+        return unavailable("as many viewers as this server takes (http.viewers_max) are watching")
+    return None
+
+
+@contextmanager
+def viewer_slot(request: web.Request, stream: str) -> Iterator[Slot]:
+    """Hold a viewer's slot inside."""
+    with _slot(request, request.app[VIEWER_SLOTS], stream) as slot:
+        yield slot
+
+
+def refuse_event_listener(request: web.Request) -> web.Response | None:
+    """Return 503 where no more may be sent events; None: there is a slot, or there is one now."""
+    slots, most = request.app[EVENT_SLOTS], request.app[SERVICE].config.http.viewers_max
+    if slots.all < most or _evict(request, slots):
+        return None
+    return unavailable("as many as this server takes (http.viewers_max) are told what happens")
+
+
+@contextmanager
+def event_slot(request: web.Request) -> Iterator[None]:
+    """Hold a slot for events inside."""
+    with _slot(request, request.app[EVENT_SLOTS], ""):
+        yield
+
+
+def _evict(request: web.Request, slots: FairShare, streams: tuple[str, ...] | None = None) -> bool:
+    """Evict whoever holds more than a fair share; HEAD takes no slot and evicts nobody."""
+    return request.method != "HEAD" and slots.evict_for(request.app[ACCESS].client_of(request), streams)
+
+
+@contextmanager
+def _slot(request: web.Request, slots: FairShare, stream: str) -> Iterator[Slot]:
+    client = request.app[ACCESS].client_of(request)
+    slot = slots.take(Slot(client, stream, lambda: break_off(request)))
+    try:
+        yield slot
+    finally:
+        slots.release(slot)

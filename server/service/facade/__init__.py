@@ -1,0 +1,1 @@
+"""The best-view service as HTTP sees it: one class of queries and commands per subject."""

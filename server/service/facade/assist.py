@@ -1,0 +1,134 @@
+"""Operator assistance: flags for what the trackers expect to go wrong, and corrections by pointing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from server.messaging.operator_messages import OPERATOR_POINTS_MAX, TOLERANCE_MIN
+from server.service.facade.errors import (
+    ConflictError,
+    InvalidCommandError,
+    UnknownCameraError,
+    UnknownObjectError,
+)
+from server.service.operator_assist.corrections import PointedPosition
+from server.service.operator_assist.flags import Flag
+from server.service.pipeline import BestViewPipeline
+
+__all__ = [
+    "OPERATOR_POINTS_MAX",
+    "AssistService",
+    "Flag",
+    "PointAtPerson",
+    "Pointed",
+    "PointedPlace",
+]
+
+_REACH = 0.02
+"""How far off a place may be where nothing else is said, as a share of the picture's width."""
+_REACH_MOST = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class PointedPlace:
+    """A place in a frame, in pixels of the site's picture."""
+
+    pulse: int
+    x: float
+    y: float
+    reach: float | None
+    """How far off it may be, in pixels; None: a fiftieth of the picture's width."""
+
+
+@dataclass(frozen=True, slots=True)
+class PointAtPerson:
+    """Command: a person is at these places of a camera's picture."""
+
+    number: int
+    camera: str
+    places: Sequence[PointedPlace]
+
+
+@dataclass(frozen=True, slots=True)
+class Pointed:
+    """What became of a :class:`PointAtPerson`."""
+
+    accepted: int
+    """How many of the places were sent to the camera's tracker."""
+    flags: list[int]
+    """The flags that are being followed by this."""
+
+
+class AssistService:
+    """Queries and commands of operator assistance."""
+
+    def __init__(self, pipeline: BestViewPipeline) -> None:
+        self._pipeline, self._flags = pipeline, pipeline.assist.flags
+
+    @property
+    def open_flags(self) -> list[Flag]:
+        """Flags that can be answered, the most urgent first."""
+        return self._flags.open
+
+    @property
+    def ended_flags(self) -> list[Flag]:
+        """Flags that were answered or have expired, the newest first."""
+        return self._flags.ended
+
+    def subscribe_flags(self, callback: Callable[[Flag], None]) -> None:
+        """Call back with every flag that is raised or changes."""
+        self._flags.on_flag.append(callback)
+
+    @property
+    def memory(self) -> int:
+        """How many frames back a person can be pointed at."""
+        return self._pipeline.config.track.assist.memory_frames
+
+    @property
+    def blocked(self) -> str:
+        """Why nobody can be pointed at here; empty: they can."""
+        config = self._pipeline.config
+        if config.view.share.of > 1:
+            return "several services share this site (view.share): they must agree who is who, by themselves"
+        if not config.track.assist.enabled:
+            return "no camera takes a pointing: track.assist.enabled is off"
+        return ""
+
+    def point_at_person(self, command: PointAtPerson) -> Pointed:
+        """Send a camera's tracker where a person is; it corrects its tracks, also in the past.
+
+        Raises:
+            ConflictError: nobody can be pointed at here, or the camera has not shown the person then.
+            UnknownCameraError: there is no such camera.
+            UnknownObjectError: nobody has this number.
+            InvalidCommandError: a place is outside the picture, or has not come yet.
+        """
+        pipeline, camera = self._pipeline, command.camera
+        if self.blocked:
+            raise ConflictError(self.blocked)
+        if camera not in pipeline.frame_buffers:
+            raise UnknownCameraError(camera, pipeline.frame_buffers)
+        number = pipeline.decider.people.roll.whose(command.number)
+        if number not in pipeline.decider.people.known:
+            is_recovering = pipeline.remembering.awaits(command.number)
+            raise UnknownObjectError(command.number, is_recovering=is_recovering)
+        for place in command.places:
+            self._check(place)
+        accepted, flags = pipeline.assist.point(number, camera, [self._place(it) for it in command.places])
+        if not accepted:
+            raise ConflictError(f"camera {camera} has not shown object {number} then, or it is too long ago")
+        return Pointed(accepted, flags)
+
+    def _check(self, place: PointedPlace) -> None:
+        site = self._pipeline.config.site
+        if not (0 <= place.x <= site.width and 0 <= place.y <= site.height):
+            where = f"{place.x:g}, {place.y:g}"
+            raise InvalidCommandError(f"points: {where} is not in a picture of {site.width}x{site.height}")
+        if place.pulse > self._pipeline.pulse:
+            raise InvalidCommandError(f"points: pulse {place.pulse} has not come yet")
+
+    def _place(self, place: PointedPlace) -> PointedPosition:
+        width = self._pipeline.config.site.width
+        reach = _REACH * width if place.reach is None else min(place.reach, _REACH_MOST * width)
+        return PointedPosition(place.pulse, place.x, place.y, max(reach, TOLERANCE_MIN))

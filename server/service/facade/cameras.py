@@ -1,0 +1,157 @@
+"""Cameras: which there are, how well they work, and what they cover of the floor."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from server.media.letterbox import Letterbox
+from server.service.calibration.floor_map import floor_coverage
+from server.service.facade.errors import UnknownCameraError
+from server.service.ingest.ingest import CameraState
+from server.service.metrics.camera_metrics import CameraProblem, RecentSeconds
+from server.service.pipeline import BestViewPipeline
+
+
+class CameraInfo(msgspec.Struct, frozen=True):
+    """One camera."""
+
+    camera: str
+    state: str
+    """starting, live, gone, ended or refused."""
+    pulse: int
+    """The newest frame."""
+    late: int
+    """Epochs whose tracks came too late."""
+    fps: float
+    missed: int
+    shed: int
+    load_level: int
+    """How much is left out because the machine has too much to do; 0: nothing."""
+    in_step: bool
+    """Pulses come from the server; otherwise the camera goes on at its own rate."""
+    message: str
+
+
+class OwnPicture(msgspec.Struct, frozen=True):
+    """A camera's own picture, and how it lies in the site's: site = own · scale + (left, top), in pixels."""
+
+    width: int
+    height: int
+    scale: float
+    left: float
+    top: float
+
+
+class OperatorCamera(CameraInfo, frozen=True):
+    """How one camera is, in all that is measured of it: what /api/cameras says, and more."""
+
+    bad_messages: int
+    clock_offset: float | None
+    """Seconds, pulse server's clock minus the camera's; null: not known."""
+    sync_error: RecentSeconds | None
+    """Seconds from the moment a frame was due to the moment it was taken, of the last ten seconds or so."""
+    tracking_delay: RecentSeconds | None
+    """Seconds from the moment a window's last frame was due to the moment the window was solved."""
+    certified: float | None
+    """Share of the windows whose answer is proven to be the optimum."""
+    windows: int
+    """How many windows that is about."""
+    last_trouble: CameraProblem | None
+    """What last went wrong, and when; it stays when the camera is well again."""
+    picture: OwnPicture | None
+    """Null: it has not said."""
+
+
+class FloorCamera(msgspec.Struct, frozen=True):
+    """What one camera covers of the floor that all share."""
+
+    camera: str
+    homography: list[list[float]]
+    """3x3, from pixels of the site's picture to the floor; below 0 in the third: above the horizon."""
+    outline: list[list[float]]
+    """Corners, x and y on the floor; empty: it sees none of it."""
+
+
+class Floor(msgspec.Struct, frozen=True):
+    """The floor plan."""
+
+    cameras: list[FloorCamera]
+    """Those that are calibrated and have said how large their own picture is."""
+    uncalibrated: list[str]
+
+
+class CameraService:
+    """Queries about cameras."""
+
+    def __init__(self, pipeline: BestViewPipeline) -> None:
+        self._pipeline = pipeline
+
+    @property
+    def ids(self) -> list[str]:
+        """The cameras' ids, in the order of the configuration."""
+        return list(self._pipeline.frame_buffers)
+
+    def require(self, camera: str) -> None:
+        """Check that a camera exists.
+
+        Raises:
+            UnknownCameraError: it does not.
+        """
+        if camera not in self._pipeline.frame_buffers:
+            raise UnknownCameraError(camera, self._pipeline.frame_buffers)
+
+    def list_cameras(self) -> list[CameraInfo]:
+        """Return how each camera works, as far as any viewer may know."""
+        return [self._info(*it) for it in self._pipeline.intake.states.items()]
+
+    def diagnose_cameras(self) -> list[OperatorCamera]:
+        """Return all that is measured of each camera, for the operator."""
+        return [self._diagnosed(*it) for it in self._pipeline.intake.states.items()]
+
+    def map_floor(self) -> Floor:
+        """Return what each calibrated camera covers of the floor."""
+        config = self._pipeline.config
+        cameras = []
+        for camera in config.cameras:
+            own = self._pipeline.intake.states[camera.id].gauge.size
+            if camera.ground is not None and own is not None:
+                ground = np.array(camera.ground, dtype=np.float64)
+                part = floor_coverage(ground, own, (config.site.width, config.site.height))
+                cameras.append(FloorCamera(camera.id, part.homography.tolist(), part.outline.tolist()))
+        return Floor(cameras, [it.id for it in config.cameras if it.ground is None])
+
+    def _info(self, camera: str, state: CameraState) -> CameraInfo:
+        status = state.status
+        return CameraInfo(
+            camera=camera,
+            state=state.word,
+            pulse=self._pipeline.frame_buffers[camera].newest,
+            late=self._pipeline.aligner.late_messages[camera],
+            fps=status.fps if status else 0.0,
+            missed=status.missed if status else 0,
+            shed=status.shed if status else 0,
+            load_level=status.load_level if status else 0,
+            in_step=status.in_step if status else False,
+            message=state.message,
+        )
+
+    def _diagnosed(self, camera: str, state: CameraState) -> OperatorCamera:
+        status, gauge = state.status, state.gauge
+        return OperatorCamera(
+            **msgspec.structs.asdict(self._info(camera, state)),
+            bad_messages=state.bad_messages,
+            clock_offset=status.clock_offset if status else None,
+            sync_error=gauge.sync_error,
+            tracking_delay=gauge.tracking_delay,
+            certified=gauge.certified,
+            windows=gauge.windows,
+            last_trouble=gauge.last_trouble,
+            picture=None if gauge.size is None else self._picture(gauge.size),
+        )
+
+    def _picture(self, own: tuple[int, int]) -> OwnPicture:
+        site = self._pipeline.config.site
+        fit = Letterbox(own, (site.width, site.height))
+        left, top = fit.to_site(np.zeros(2)).tolist()
+        return OwnPicture(width=own[0], height=own[1], scale=fit.scale, left=left, top=top)

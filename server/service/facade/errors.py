@@ -1,0 +1,35 @@
+"""Why a query or command is refused. HTTP turns each into its status."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class RefusedError(Exception):
+    """A query or command is refused; the text is one line for whoever sent it."""
+
+
+class UnknownObjectError(RefusedError):
+    """No person has this number."""
+
+    def __init__(self, number: int, *, is_recovering: bool = False) -> None:
+        super().__init__(
+            f"object {number} cannot be shown yet" if is_recovering else f"there is no object {number}"
+        )
+        self.is_recovering = is_recovering
+        """Whether the number may come back once the state of an earlier run is recovered."""
+
+
+class UnknownCameraError(RefusedError):
+    """The site has no camera of this name."""
+
+    def __init__(self, camera: str, cameras: Iterable[str]) -> None:
+        super().__init__(f"there is no camera {camera!r}; there are {', '.join(cameras)}")
+
+
+class InvalidCommandError(RefusedError):
+    """A command's content makes no sense."""
+
+
+class ConflictError(RefusedError):
+    """A command makes sense, but not in the state that the service is in."""

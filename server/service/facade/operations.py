@@ -1,0 +1,99 @@
+"""Operations: readiness, the pulse server's clients, and the view settings that can be tried out live."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import msgspec
+
+from camsync import SyncError, query_clients
+from server.config.pulse_access import pulse_clients
+from server.config.sections import ViewSettings
+from server.service.pipeline import BestViewPipeline
+from server.service.readiness import why_not_ready
+
+
+@dataclass(frozen=True, slots=True)
+class Readiness:
+    """Whether a best view can be served now."""
+
+    reasons: list[str]
+    """Why not; empty: it can."""
+    live_cameras: int
+    cameras: int
+
+
+class PulseListener(msgspec.Struct, frozen=True):
+    """A client of the pulse server."""
+
+    name: str | None
+    """Null: it only listens."""
+    expected: bool
+    """The configuration names it."""
+    behind: int
+    """Pulses that it has just lost because it did not read."""
+
+
+class Pulses(msgspec.Struct, frozen=True):
+    """The pulse server's clients."""
+
+    server: str
+    """Its host and port."""
+    error: str
+    """Why nothing is known; empty: it has answered."""
+    clients: list[PulseListener]
+    missing: list[str]
+    """Who is named in the configuration and not there."""
+
+
+class OperationsService:
+    """Queries and commands about the service itself."""
+
+    def __init__(self, pipeline: BestViewPipeline) -> None:
+        self._pipeline = pipeline
+
+    def readiness(self) -> Readiness:
+        """Return whether a best view can be served: pulses and frames arrive, and decisions keep up."""
+        states = self._pipeline.intake.states.values()
+        live = sum(state.word == "live" for state in states)
+        return Readiness(why_not_ready(self._pipeline), live, len(states))
+
+    async def list_pulse_clients(self) -> Pulses:
+        """Ask the pulse server who its clients are."""
+        config = self._pipeline.config
+        sync, expected = config.sync, pulse_clients(config)
+        where = f"{sync.host}:{sync.port}"
+        try:
+            clients = await query_clients(
+                sync.host,
+                sync.port,
+                credentials=self._pipeline.pulse_credentials,
+                tls=self._pipeline.pulse_tls,
+            )
+        except SyncError as error:
+            return Pulses(where, str(error), [], [])
+        listeners = [PulseListener(it.name, it.name in expected, it.behind) for it in clients]
+        connected = {it.name for it in clients}
+        return Pulses(where, "", listeners, [it for it in expected if it not in connected])
+
+    @property
+    def view_settings(self) -> ViewSettings:
+        """The settings that views are selected by now."""
+        return self._pipeline.decider.view
+
+    @property
+    def most_lookahead(self) -> int:
+        """The longest look-ahead that can be set while the service runs, in frames."""
+        return self._pipeline.most_lookahead
+
+    def change_view_settings(self, view: ViewSettings) -> None:
+        """Select views by other settings until they are changed again or the service ends.
+
+        Raises:
+            UserError: the look-ahead is too short, or longer than what is kept.
+        """
+        self._pipeline.choose_by(view)
+
+    def reset_view_settings(self) -> None:
+        """Select views by the configuration's settings again."""
+        self._pipeline.choose_by(self._pipeline.config.view)

@@ -1,0 +1,210 @@
+"""Recordings: what is kept of every stream, played from a moment on, and what was decided then."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Sequence
+from dataclasses import dataclass
+
+from server.service.facade.errors import UnknownCameraError
+from server.service.pipeline import BestViewPipeline
+from server.service.recording.media_files import run_in_reader_thread
+from server.service.recording.segment_index import CameraRange, PulseRange
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.gapless_timeline import GaplessTimeline
+from server.service.streaming.media_chunk import MediaChunk
+from server.service.time_shift.availability import (
+    available_camera_ranges,
+    available_ranges,
+    first_available,
+    forget_missing,
+    forget_missing_ends,
+)
+from server.service.time_shift.decision_log import read_decision_lines
+from server.service.time_shift.hls_time_shift import SegmentList, TimeShift
+from server.service.time_shift.playback import (
+    CameraPlayback,
+    PersonPlayback,
+    PlaybackSource,
+    SessionEntries,
+    recorded_audio,
+)
+from server.service.time_shift.playback_audio import PlaybackAudio
+from server.service.time_shift.presence_history import PresenceHistory
+from server.service.time_shift.time_reference import (
+    TimeReferenceError,
+    parse_time_reference,
+    utc_time_of_pulse,
+)
+from server.service.time_shift.time_shift_stream import PlaybackRange, TimeShiftStream
+
+__all__ = [
+    "PlaybackRange",
+    "RecordedStream",
+    "RecordingService",
+    "RecordingStatus",
+    "SegmentList",
+    "TimeReferenceError",
+    "TimeShift",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingStatus:
+    """Whether streams are recorded to disk."""
+
+    enabled: bool
+    error: str
+    """Why nothing is written at the moment; empty: it is, or recording is off."""
+
+
+class RecordedStream:
+    """All that is kept of one stream, on disk and in memory. ``name`` is for messages, such as object 3."""
+
+    def __init__(self, pipeline: BestViewPipeline, source: PlaybackSource, name: str) -> None:
+        self._pipeline, self._source, self.name = pipeline, source, name
+
+    @property
+    def end(self) -> int:
+        """The pulse after the newest frame."""
+        return self._source.end
+
+    def available_from(self, pulse: int) -> int | None:
+        """Return the first pulse, this one or later, that is kept; None: none is."""
+        return first_available(self._source, pulse)
+
+    def spans(self, start: int, end: int) -> list[PulseRange]:
+        """Return the frames without a gap that are kept of pulses ``start … end - 1``."""
+        return available_ranges(self._source, start, end)
+
+    def views(self, start: int, end: int) -> list[CameraRange]:
+        """Return which camera's frames are kept of pulses ``start … end - 1``, in order."""
+        return available_camera_ranges(self._source, start, end)
+
+    async def check_ends(self, start: int, end: int | None = None) -> None:
+        """Forget files that have gone from the disk at the two ends of a time.
+
+        Raises:
+            OSError: the disk cannot be read.
+        """
+        await run_in_reader_thread(forget_missing_ends, self._source, start, end)
+
+    async def check_all(self, start: int, end: int) -> None:
+        """Forget all files that have gone from the disk of pulses ``start … end - 1``.
+
+        Raises:
+            OSError: the disk cannot be read.
+        """
+        await run_in_reader_thread(forget_missing, self._source, start, end)
+
+    def play(
+        self, playback: PlaybackRange, live: Callable[[], Broadcaster | None]
+    ) -> AsyncGenerator[MediaChunk, None]:
+        """Play GOP after GOP from a moment on; ``live`` returns the stream to go on with at the present."""
+        fps, audio = self._pipeline.config.site.fps, self._pipeline.past.sound
+        hearing = None if audio is None else PlaybackAudio(audio, self._recorded_audio, lambda: self.end)
+        stream = TimeShiftStream(self._source, self._timeline(), fps, live, hearing)
+        return stream.send(playback)
+
+    def time_shift(self, *, over: bool) -> TimeShift:
+        """Return the stream in HLS segments numbered as the live ones; ``over``: nothing will be added."""
+        pipeline = self._pipeline
+        return TimeShift(
+            self._source,
+            pipeline.splicer.layout,
+            self._timeline,
+            self._hearing,
+            gop=pipeline.config.encode.gop,
+            decided=pipeline.past.recent.end,
+            over=over,
+        )
+
+    def peak_bit_rate(self) -> float:
+        """Return the most bits a second of video, by whole files on disk and GOPs in memory."""
+        source = self._source
+        rates = [8 * it.length / it.frames for one in source.recorded for it in one.tape.all]
+        gop = source.recall(0)
+        while gop is not None:
+            rates.append(8 * sum(map(len, gop.fragments)) / len(gop.fragments))
+            gop = source.recall(gop.end)
+        return self._pipeline.config.site.fps * max(rates, default=0.0)
+
+    def _timeline(self) -> GaplessTimeline:
+        config = self._pipeline.config
+        return GaplessTimeline(self._pipeline.agreement, config.site.fps, config.encode.gop)
+
+    def _hearing(self) -> PlaybackAudio | None:
+        audio = self._pipeline.past.sound
+        return None if audio is None else PlaybackAudio(audio, self._recorded_audio)
+
+    def _recorded_audio(self) -> Sequence[SessionEntries]:
+        return recorded_audio(self._pipeline.past)
+
+
+class RecordingService:
+    """Queries about what is kept."""
+
+    def __init__(self, pipeline: BestViewPipeline) -> None:
+        self._pipeline, self._past = pipeline, pipeline.past
+
+    @property
+    def end(self) -> int:
+        """The pulse after the newest decided frame."""
+        return self._past.recent.end
+
+    @property
+    def status(self) -> RecordingStatus:
+        """Whether streams are recorded to disk."""
+        writer = self._past.writer
+        return RecordingStatus(writer is not None, "" if writer is None else writer.stands)
+
+    def of_person(self, number: int, *, scoped: bool) -> RecordedStream:
+        """Return what is kept of a person, ``scoped``: blanked where nobody saw them."""
+        pipeline, past = self._pipeline, self._past
+        now = pipeline.board.resolve(number)
+        numbers = (number,) if number == now else (now, number)
+        presence = None
+        if scoped:
+            fps = pipeline.config.site.fps
+            presence = PresenceHistory(past, numbers, round(pipeline.config.access.unseen_s * fps), fps)
+        return RecordedStream(pipeline, PersonPlayback(past, numbers, presence), f"object {number}")
+
+    def of_camera(self, camera: str) -> RecordedStream:
+        """Return what is kept of a camera.
+
+        Raises:
+            UnknownCameraError: there is no such camera.
+        """
+        if camera not in self._pipeline.frame_buffers:
+            raise UnknownCameraError(camera, self._pipeline.frame_buffers)
+        return RecordedStream(self._pipeline, CameraPlayback(self._past, camera), f"camera {camera}")
+
+    def decisions(self, start: int, end: int) -> AsyncIterator[bytes]:
+        """Return the choices about pulses ``start … end - 1``, each a line of JSON."""
+        return read_decision_lines(self._past, start, end)
+
+    def pulse_at(self, moment: str, now: int) -> int:
+        """Return the pulse that a text names: ``-60`` (seconds before pulse ``now``), ``p1250`` or ISO 8601.
+
+        Raises:
+            TimeReferenceError: it names none.
+        """
+        return parse_time_reference(
+            moment, now=now, fps=self._pipeline.config.site.fps, pulse0=self._pipeline.pulse0
+        )
+
+    def time_of(self, pulse: int) -> str | None:
+        """Return when a pulse is due, UTC in ISO 8601; None before the first pulse."""
+        return utc_time_of_pulse(pulse, self._pipeline.config.site.fps, self._pipeline.pulse0)
+
+    @property
+    def viewers(self) -> int:
+        """How many streams are watched in the past; those that have reached the present are not counted."""
+        return self._past.viewers
+
+    def viewer_joined(self) -> None:
+        """Count a viewer of the past."""
+        self._past.viewers += 1
+
+    def viewer_left(self) -> None:
+        """Count a viewer of the past no more."""
+        self._past.viewers -= 1

@@ -1,0 +1,35 @@
+"""Rendered streams: JPEG pictures and video with boxes burnt in, drawn by worker processes on demand."""
+
+from __future__ import annotations
+
+from server.media.rendering_messages import Still
+from server.service.rendering.mjpeg_streams import (
+    CONTENT_TYPE,
+    FIRST_BOUNDARY,
+    PULSE_HEADER,
+    MjpegVariant,
+    multipart_part,
+)
+from server.service.rendering.render_pool import (
+    CameraView,
+    PersonView,
+    RenderPool,
+    RenderPoolFullError,
+    Subject,
+)
+from server.service.rendering.rendered_stream import PictureTimeoutError
+
+__all__ = [
+    "CONTENT_TYPE",
+    "FIRST_BOUNDARY",
+    "PULSE_HEADER",
+    "CameraView",
+    "MjpegVariant",
+    "PersonView",
+    "PictureTimeoutError",
+    "RenderPool",
+    "RenderPoolFullError",
+    "Still",
+    "Subject",
+    "multipart_part",
+]

@@ -1,0 +1,120 @@
+"""Live streams: the best view of a person and each camera, as broadcasters and as HLS segments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from server.service.pipeline import BestViewPipeline
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.hls_segmenter import HlsPart, HlsSegment, HlsSegmenter, SegmentLayout
+from server.service.streaming.media_chunk import MediaChunk
+from server.service.streaming.subscriber_queue import BytesChunk, Chunk, Subscriber
+
+__all__ = [
+    "Broadcaster",
+    "BytesChunk",
+    "Chunk",
+    "HlsPart",
+    "HlsSegment",
+    "HlsSegmenter",
+    "MediaChunk",
+    "SegmentLayout",
+    "StreamService",
+    "Subscriber",
+    "ViewerCounts",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class ViewerCounts:
+    """How many streams are watched over a connection of their own, by kind."""
+
+    object: int
+    camera: int
+    preferred: int
+
+    @property
+    def total(self) -> int:
+        """All kinds together."""
+        return self.object + self.camera + self.preferred
+
+
+class StreamService:
+    """Queries about live streams."""
+
+    def __init__(self, pipeline: BestViewPipeline) -> None:
+        self._pipeline, self._splicer = pipeline, pipeline.splicer
+
+    @property
+    def codec(self) -> str | None:
+        """RFC 6381 codec string of every stream's video; None before the first keyframe."""
+        return self._pipeline.agreement.codec
+
+    @property
+    def container(self) -> str:
+        """The container of every stream, mp4 or webm, which follows from the codec."""
+        return self._pipeline.agreement.container
+
+    @property
+    def audio_codec(self) -> str | None:
+        """RFC 6381 codec string of the site's audio; None: it has none."""
+        audio = self._pipeline.config.sound.format
+        return None if audio is None else audio.codec
+
+    def init_segment(self) -> bytes | None:
+        """Return the MP4 init segment that all streams share; None before the first keyframe."""
+        config = self._pipeline.config
+        return self._pipeline.agreement.head(config.site.size, config.site.fps, config.sound.format)
+
+    def webm_header(self) -> bytes | None:
+        """Return the header of all WebM streams of a VP8 site; None before the first keyframe."""
+        site = self._pipeline.config.site
+        return self._pipeline.agreement.head(site.size, site.fps)
+
+    @property
+    def segment_plan(self) -> SegmentLayout:
+        """How streams are cut into HLS segments."""
+        return self._splicer.layout
+
+    def of_person(self, number: int, *, scoped: bool) -> Broadcaster | None:
+        """Return the best view of a person, by their current number; None: there is none.
+
+        ``scoped``: blanked while nobody has seen the person lately, for viewers who may see nobody else.
+        """
+        return (self._splicer.scoped_persons if scoped else self._splicer.persons).get(number)
+
+    def of_person_preferring(self, number: int, camera: str, *, scoped: bool) -> Broadcaster:
+        """Return the best view of a person that stays with a camera for as long as it sees them."""
+        preferring = self._splicer.preferred_scoped if scoped else self._splicer.preferred
+        return preferring.broadcaster(number, camera)
+
+    def of_camera(self, camera: str) -> Broadcaster:
+        """Return a camera's stream as its frames arrive."""
+        return self._splicer.cameras[camera]
+
+    def of_camera_decided(self, camera: str) -> Broadcaster:
+        """Return a camera's stream as late as a best view, in whole GOPs."""
+        return self._splicer.decided_cameras[camera]
+
+    def segments_of_person(self, number: int, *, scoped: bool) -> HlsSegmenter | None:
+        """Return the newest HLS segments of a person's stream, for a while even when it has ended."""
+        return self._splicer.segmenter_of_person(number, scoped=scoped)
+
+    def segments_of_camera(self, camera: str) -> HlsSegmenter | None:
+        """Return the newest HLS segments of a camera; None: there is no such camera."""
+        return self._splicer.segmenter_of_camera(camera)
+
+    def viewers_of_person(self, number: int) -> int:
+        """Return how many watch a person's best view over a connection of their own, scoped or not."""
+        return self._splicer.viewers_of(number)
+
+    @property
+    def viewers(self) -> ViewerCounts:
+        """How many streams are watched over a connection of their own."""
+        splicer = self._splicer
+        cameras = sum(it.viewers for it in (*splicer.cameras.values(), *splicer.decided_cameras.values()))
+        return ViewerCounts(splicer.person_viewers, cameras, splicer.preferred_camera_viewers)
+
+    def close(self) -> None:
+        """End all streams."""
+        self._splicer.close()

@@ -1,0 +1,132 @@
+"""Prometheus metrics of the service: decisions, queues, streams, recording, rendering."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from prometheus_client import CollectorRegistry, Metric, ProcessCollector, disable_created_metrics
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
+from prometheus_client.registry import Collector
+
+from server.service.metrics.camera_collector import CameraCollector
+from server.service.readiness import why_not_ready
+
+if TYPE_CHECKING:
+    from server.service.pipeline import BestViewPipeline
+    from server.service.rendering.render_pool import RenderPool
+
+
+class ServiceCollector(Collector):
+    """Collects what the pipeline counts and measures."""
+
+    def __init__(self, pipeline: BestViewPipeline, queues: Mapping[str, Callable[[], int]]) -> None:
+        self._pipeline, self._more_queues = pipeline, queues
+
+    def collect(self) -> Iterable[Metric]:
+        """Return all metrics as they are now."""
+        pipeline, stages = self._pipeline, self._pipeline.stages
+        yield GaugeMetricFamily("myview_pulse", "Newest pulse.", value=pipeline.pulse)
+        yield GaugeMetricFamily("myview_objects", "People known.", value=len(pipeline.board.standings))
+        yield CounterMetricFamily("myview_cuts", "Changes of view.", value=pipeline.board.cuts)
+        yield CounterMetricFamily(
+            "myview_late_epochs",
+            "Windows decided without a camera that was there.",
+            value=pipeline.lacking.late_epochs,
+        )
+        yield CounterMetricFamily(
+            "myview_left_out_epochs",
+            "Windows not decided at all: their pictures would have been gone by then.",
+            value=pipeline.left_out,
+        )
+        yield GaugeMetricFamily(
+            "myview_ready", "A best view can be served now.", value=float(not why_not_ready(pipeline))
+        )
+        yield GaugeMetricFamily(
+            "myview_decided_pulse", "First pulse that nothing is decided about.", value=pipeline.board.end
+        )
+        for histogram in (stages.decide, stages.send, stages.delay):
+            yield from histogram.collect()
+        yield from self._queues()
+        yield from self._flags()
+        yield from self._recording()
+
+    def _queues(self) -> Iterable[Metric]:
+        pipeline, writer = self._pipeline, self._pipeline.past.writer
+        waiting = GaugeMetricFamily("myview_waiting", "What waits, by queue.", labels=["queue"])
+        waiting.add_metric(["messages"], sum(inbox.waiting for inbox in pipeline.inboxes))
+        waiting.add_metric(["windows"], pipeline.aligner.waiting)
+        waiting.add_metric(["recording"], writer.waiting if writer else 0)
+        for queue, length in self._more_queues.items():
+            waiting.add_metric([queue], length())
+        yield waiting
+        yield CounterMetricFamily(
+            "myview_lost_messages",
+            "Messages of the bus that came faster than they could be read.",
+            value=sum(inbox.lost for inbox in pipeline.inboxes),
+        )
+
+    def _flags(self) -> Iterable[Metric]:
+        assist = self._pipeline.assist
+        flags = CounterMetricFamily("myview_flags", "Flags for the operator.", labels=["state"])
+        for state, count in assist.flags.counts.items():
+            flags.add_metric([state], count)
+        yield flags
+        yield GaugeMetricFamily(
+            "myview_flags_open", "Flags that can be answered now.", value=len(assist.flags.open)
+        )
+        yield CounterMetricFamily(
+            "myview_pointings", "Places that the operator pointed at.", value=assist.points
+        )
+
+    def _recording(self) -> Iterable[Metric]:
+        past = self._pipeline.past
+        size, writer = past.store.bytes if past.store else 0, past.writer
+        well = writer is not None and not writer.stands
+        yield GaugeMetricFamily("myview_recording", "What is streamed is being recorded.", value=float(well))
+        yield GaugeMetricFamily("myview_recorded_bytes", "Recorded, on the disk.", value=size)
+        yield CounterMetricFamily(
+            "myview_recorded_gops", "GOPs recorded.", value=writer.written if writer else 0
+        )
+        yield CounterMetricFamily(
+            "myview_unrecorded_gops",
+            "GOPs not recorded though they should be.",
+            value=writer.lost if writer else 0,
+        )
+
+
+class RenderingCollector(Collector):
+    """Collects the numbers of the streams that are decoded and drawn."""
+
+    def __init__(self, rendering: RenderPool) -> None:
+        self._rendering = rendering
+
+    def collect(self) -> Iterable[Metric]:
+        """Return all metrics as they are now."""
+        rendering = self._rendering
+        yield GaugeMetricFamily(
+            "myview_pictures", "People and cameras that are decoded now.", value=len(rendering.sources)
+        )
+        yield GaugeMetricFamily(
+            "myview_pictures_viewers", "Streams of pictures being watched.", value=rendering.viewers
+        )
+        yield CounterMetricFamily(
+            "myview_pictures_restarts", "Drawing processes that died.", value=rendering.restarts
+        )
+        yield CounterMetricFamily(
+            "myview_pictures_lost_gops", "GOPs that came too fast to be drawn.", value=rendering.lost
+        )
+
+
+def register_collectors(
+    registry: CollectorRegistry,
+    pipeline: BestViewPipeline,
+    rendering: RenderPool,
+    queues: Mapping[str, Callable[[], int]],
+) -> None:
+    """Register all collectors of a service and its process; ``queues`` are further ones, by name."""
+    disable_created_metrics()  # type: ignore[no-untyped-call]
+    registry.register(ServiceCollector(pipeline, queues))
+    registry.register(CameraCollector(pipeline))
+    registry.register(RenderingCollector(rendering))
+    ProcessCollector(registry=registry)
