@@ -33,6 +33,7 @@ from server.http.app import make_app, serving
 from server.messaging.bus import Bus
 from server.messaging.messages import Box, ZenohKeys
 from server.service.identity.sharding import own_numbers, shard_address, shard_of
+from server.service.pipeline import BestViewPipeline
 from server.service.service import BestViewService
 from server.service.view_selection.decider import ViewDecider
 from server.system.errors import UserError
@@ -171,11 +172,11 @@ async def test_objects_of_another_service_are_named_and_asking_for_one_leads_the
 
 
 @pytest.fixture
-def pair() -> Iterator[list[BestViewService]]:
+def pair() -> Iterator[list[BestViewPipeline]]:
     """Open two services of one site on a bus of their own."""
     address = f"tcp/127.0.0.1:{free_port()}"
     ways = {"zenoh": {"listen": address, "connect": address}}
-    services = [BestViewService(small_config(**shared(index), **ways)) for index in range(2)]
+    services = [BestViewPipeline(small_config(**shared(index), **ways)) for index in range(2)]
     for service in services:
         service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     yield services
@@ -183,7 +184,7 @@ def pair() -> Iterator[list[BestViewService]]:
         service.close()
 
 
-async def test_both_hear_every_camera_and_tell_under_keys_of_their_own(pair: list[BestViewService]) -> None:
+async def test_both_hear_every_camera_and_tell_under_keys_of_their_own(pair: list[BestViewPipeline]) -> None:
     for service in pair:
         service.open()
     keys, camera = ZenohKeys("hall"), Bus.client(pair[0].config.zenoh)
@@ -202,7 +203,7 @@ async def test_both_hear_every_camera_and_tell_under_keys_of_their_own(pair: lis
         camera.close()
 
 
-async def send(camera: Bus, services: Sequence[BestViewService]) -> None:
+async def send(camera: Bus, services: Sequence[BestViewPipeline]) -> None:
     """Send epoch after epoch: what comes before a subscription has arrived is lost."""
     for epoch in range(1000):
         for name in CAMERAS:
