@@ -13,6 +13,7 @@ from fakes.site import A, B, Hall
 from fakes.timeouts import PATIENCE
 from server.http.access.permissions import ALL
 from server.http.api.events import Events
+from server.service.service import BestViewService
 
 
 async def events(answer: aiohttp.ClientResponse, count: int) -> list[tuple[str, Any]]:
@@ -69,7 +70,7 @@ async def test_the_gop_is_told_before_its_video_is_sent(hall: Hall) -> None:
 
 
 async def test_who_fell_behind_is_told_again_what_goes_on_to_hold(busy: Hall) -> None:
-    told = Events(busy.service)
+    told = Events(BestViewService(busy.service))
     reader = told.join(ALL)
     for epoch in range(3, 120):
         busy.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
