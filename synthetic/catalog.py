@@ -5,41 +5,40 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from synthetic.court.court import COURT, HALL
+from synthetic.court.court import COURT, SPORTS_HALL
 from synthetic.court.game import Game
-from synthetic.drawing.clothing import casual, outfit, shirt
-from synthetic.overhead.studio import FREE, OVERHEAD
-from synthetic.room.gallery import GALLERY
-from synthetic.room.hall import Hall
-from synthetic.room.room import ROOM, Room
-from synthetic.tank import VIEWPOINTS, Tank
+from synthetic.drawing.clothing import choose_casual_outfit, choose_outfit, choose_team_outfit
+from synthetic.room.layouts import GALLERY, OVERHEAD, OVERHEAD_AREA, ROOM
+from synthetic.room.room import Room
+from synthetic.room.room_world import RoomWorld
+from synthetic.tank import VIEWPOINTS, TankWorld
+from synthetic.walking.choreographed_crowd import ChoreographedCrowd
 from synthetic.walking.gatherings import Gatherings
-from synthetic.walking.mingling import Mingle
-from synthetic.walking.walkers import Walkers
-from synthetic.world import Asked, World
+from synthetic.walking.visiting_crowd import VisitingCrowd
+from synthetic.world import SceneParameters, World
 
 _CROWD = 64  # people in a room, at most
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
-    """One scene: how much of it there is, and what makes its world."""
+class CatalogEntry:
+    """One scene: its default and largest numbers of cameras and objects, and how its world is built."""
 
-    about: str
-    cameras: int  # where nobody says how many
-    most_cameras: int
-    objects: int  # where nobody says how many
-    most_objects: int
-    world: Callable[[Asked], World]
+    description: str
+    default_cameras: int  # by default
+    max_cameras: int
+    default_objects: int  # by default
+    max_objects: int
+    build: Callable[[SceneParameters], World]
 
 
 def scene_names() -> tuple[str, ...]:
-    """Give the names that `Scene` knows."""
+    """Return the names that `Scene` accepts."""
     return tuple(_SCENES)
 
 
-def scene_entry(name: str) -> Entry:
-    """Give what is known of a scene.
+def catalog_entry(name: str) -> CatalogEntry:
+    """Return the catalog's entry for a scene.
 
     Raises:
         ValueError: where no scene has that name.
@@ -49,29 +48,33 @@ def scene_entry(name: str) -> Entry:
     return _SCENES[name]
 
 
-def _visited(room: Room) -> Callable[[Asked], World]:
-    def build(asked: Asked) -> World:
-        outfits = [outfit(walker, asked.seed) for walker in range(asked.objects)]
-        return Hall(room, Walkers(room, asked.objects, asked.seed), outfits, asked)
+def _visited(room: Room) -> Callable[[SceneParameters], World]:
+    def build(parameters: SceneParameters) -> World:
+        outfits = [choose_outfit(walker, parameters.seed) for walker in range(parameters.objects)]
+        return RoomWorld(room, VisitingCrowd(room, parameters.objects, parameters.seed), outfits, parameters)
 
     return build
 
 
-def _overhead(asked: Asked) -> World:
-    outfits = [casual(walker, asked.seed) for walker in range(asked.objects)]
-    company = Mingle(Gatherings(FREE, asked.objects, asked.seed), [worn.height for worn in outfits])
-    return Hall(OVERHEAD, company, outfits, asked)
+def _overhead(parameters: SceneParameters) -> World:
+    outfits = [choose_casual_outfit(walker, parameters.seed) for walker in range(parameters.objects)]
+    crowd = ChoreographedCrowd(
+        Gatherings(OVERHEAD_AREA, parameters.objects, parameters.seed), [worn.height for worn in outfits]
+    )
+    return RoomWorld(OVERHEAD, crowd, outfits, parameters)
 
 
-def _court(asked: Asked) -> World:
-    game = Game(COURT, asked.objects, asked.seed)
-    outfits = [shirt(player, game.team(player)) for player in range(asked.objects)]
-    return Hall(HALL, Mingle(game, [worn.height for worn in outfits]), outfits, asked)
+def _court(parameters: SceneParameters) -> World:
+    game = Game(COURT, parameters.objects, parameters.seed)
+    outfits = [choose_team_outfit(player, game.team(player)) for player in range(parameters.objects)]
+    return RoomWorld(
+        SPORTS_HALL, ChoreographedCrowd(game, [worn.height for worn in outfits]), outfits, parameters
+    )
 
 
 _SCENES = {
-    "room": Entry("people come and go in a room", 3, len(ROOM.viewpoints), 4, _CROWD, _visited(ROOM)),
-    "gallery": Entry(
+    "room": CatalogEntry("people come and go in a room", 3, len(ROOM.viewpoints), 4, _CROWD, _visited(ROOM)),
+    "gallery": CatalogEntry(
         "a long room whose cameras have no floor in common",
         3,
         len(GALLERY.viewpoints),
@@ -79,7 +82,7 @@ _SCENES = {
         _CROWD,
         _visited(GALLERY),
     ),
-    "overhead": Entry(
+    "overhead": CatalogEntry(
         "people meet, stand together and part, seen from straight above",
         1,
         len(OVERHEAD.viewpoints),
@@ -87,6 +90,6 @@ _SCENES = {
         8,
         _overhead,
     ),
-    "court": Entry("two teams play on a court", 4, len(HALL.viewpoints), 10, 16, _court),
-    "fish": Entry("fish that all look the same in a murky tank", 1, len(VIEWPOINTS), 9, 16, Tank),
+    "court": CatalogEntry("two teams play on a court", 4, len(SPORTS_HALL.viewpoints), 10, 16, _court),
+    "fish": CatalogEntry("fish that all look the same in a murky tank", 1, len(VIEWPOINTS), 9, 16, TankWorld),
 }

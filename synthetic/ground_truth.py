@@ -1,43 +1,103 @@
-"""Ground truth of a frame, measured on the figures as they are drawn."""
+"""Ground truth of a frame: boxes and visible shares, measured on the figures as they are drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic.cameras.camera_view import Actor, Stage
-from synthetic.cameras.pinhole import Floats
-from synthetic.visibility import Piece, survey
+from synthetic.cameras.camera_view import CameraView, DrawnPerson
+from synthetic.cameras.pinhole import Floats, PinholeCamera
+from synthetic.drawing.figure import Figure, clip_to_image
 
-_GLIMPSE = 0.1  # of a walker in a corridor that must show for it to be part of the truth
+_GLIMPSE = 0.1  # share of a person in a corridor that must be visible to be in the ground truth
+_COVERED = 128  # alpha from which a pixel belongs to a figure
+_SMALLEST = 4.0  # pixels
 
 
 @dataclass(frozen=True, slots=True)
 class CameraTruth:
-    """Who is in one camera's picture. Rows belong together and are in the order of the ids."""
+    """The objects in one camera's picture. Rows belong together and are in the order of the ids."""
 
     ids: NDArray[np.int64]  # (N,) from 1; one person has one id in every camera
     boxes: (
         Floats  # (N, 4) left, top, right, bottom in pixels: the whole figure, hidden or not, cut at the edge
     )
-    visible: Floats  # (N,) share of the whole figure that shows: not hidden, not beyond the edge; 0..1
-    away: Floats  # (N,) metres from the camera
+    visibility: Floats  # (N,) share of the whole figure that shows: not hidden, not beyond the edge; 0..1
+    distances: Floats  # (N,) meters from the camera
 
 
-def judge(stage: Stage, actors: Sequence[Actor]) -> CameraTruth:
-    """Measure boxes and visible shares of the actors, which come furthest first."""
-    found = survey(stage.view, [Piece(actor.walker, actor.figure, actor.curtain) for actor in actors])
+def measure_truth(camera_view: CameraView, people: Sequence[DrawnPerson]) -> CameraTruth:
+    """Measure the ground truth of drawn people, who come furthest first."""
+    found = measure_visibility(
+        camera_view.view,
+        [FigureLayer(person.walker, person.figure, person.visible_mask) for person in people],
+    )
     kept = [
-        actor
-        for actor in sorted(actors, key=lambda actor: actor.walker)
-        if (actor.inside or found[actor.walker].share >= _GLIMPSE) and found[actor.walker].large
+        person
+        for person in sorted(people, key=lambda person: person.walker)
+        if (person.inside or found[person.walker].share >= _GLIMPSE) and found[person.walker].measurable
     ]
     return CameraTruth(
-        np.array([actor.walker + 1 for actor in kept], dtype=np.int64),
-        np.array([found[actor.walker].box for actor in kept], dtype=np.float64).reshape(-1, 4),
-        np.array([found[actor.walker].share for actor in kept], dtype=np.float64),
-        np.array([np.linalg.norm(actor.joints.mean(axis=0) - stage.view.centre) for actor in kept]),
+        np.array([person.walker + 1 for person in kept], dtype=np.int64),
+        np.array([found[person.walker].box for person in kept], dtype=np.float64).reshape(-1, 4),
+        np.array([found[person.walker].share for person in kept], dtype=np.float64),
+        np.array([np.linalg.norm(person.joints.mean(axis=0) - camera_view.view.center) for person in kept]),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class FigureLayer:
+    """One figure of a picture, of an object by its number, or of something that only hides objects (None)."""
+
+    number: int | None
+    figure: Figure
+    visible_mask: (
+        NDArray[np.uint8] | None
+    )  # (h, w) of its part within the picture: visible share; None: all of it
+
+
+@dataclass(frozen=True, slots=True)
+class FigureVisibility:
+    """The box and the visible share of one figure."""
+
+    box: Floats  # (4,) pixels: the whole figure, hidden or not, cut at the edge
+    share: float  # of the whole figure that shows: not hidden, not beyond the edge
+
+    @property
+    def measurable(self) -> bool:
+        """Whether enough of it is in the picture to be ground truth."""
+        return bool((self.box[2:] - self.box[:2] >= _SMALLEST).all())
+
+
+def measure_visibility(view: PinholeCamera, layers: Sequence[FigureLayer]) -> dict[int, FigureVisibility]:
+    """Measure figures, which come furthest first; those beyond the picture's edge are left out."""
+    owner = np.full((view.height, view.width), -1, dtype=np.int16)
+    whole: dict[int, int] = {}
+    boxes: dict[int, Floats] = {}
+    for layer in layers:
+        covered = layer.figure.patch[:, :, 3] >= _COVERED
+        part = clip_to_image(layer.figure, view)
+        if part is None:
+            continue
+        shown = covered[part.patch]
+        if layer.number is not None:
+            whole[layer.number] = max(int(np.count_nonzero(covered)), 1)
+            boxes[layer.number] = _box(shown, part.area)
+        if layer.visible_mask is not None:
+            shown = shown & (layer.visible_mask >= _COVERED)
+        owner[part.area][shown] = -1 if layer.number is None else layer.number
+    counts = np.bincount(owner[owner >= 0], minlength=max(whole, default=0) + 1)
+    return {
+        number: FigureVisibility(boxes[number], float(counts[number]) / area)
+        for number, area in whole.items()
+    }
+
+
+def _box(shown: NDArray[np.bool_], area: tuple[slice, slice]) -> Floats:
+    x, y, width, height = cv2.boundingRect(shown.astype(np.uint8))
+    left, top = area[1].start + x, area[0].start + y
+    return np.array([left, top, left + width, top + height], dtype=np.float64)

@@ -74,7 +74,7 @@ def _write(scene: Scene, folder: Path, frames: int, progress: Progress | None) -
 
 
 def has_ground(scene: Scene) -> bool:
-    """Say whether a scene has a floor, and so a `ground.json`."""
+    """Return whether a scene has a ground plane, and so a `ground.json`."""
     return bool(_homographies(scene))
 
 
@@ -86,7 +86,7 @@ def _homographies(scene: Scene) -> dict[str, list[list[float]]]:
 def _rows(truth: CameraTruth, frame: int) -> list[str]:
     rows = []
     for number, box, visible in zip(
-        truth.ids.tolist(), truth.boxes.tolist(), truth.visible.tolist(), strict=True
+        truth.ids.tolist(), truth.boxes.tolist(), truth.visibility.tolist(), strict=True
     ):
         left, top, right, bottom = box
         place = f"{left:g},{top:g},{right - left:g},{bottom - top:g}"
@@ -95,11 +95,11 @@ def _rows(truth: CameraTruth, frame: int) -> list[str]:
 
 
 class _Video:
-    """One camera's file; closes itself properly, also where an error ends the recording."""
+    """One camera's video file; is closed properly even if an error ends the recording."""
 
     def __init__(self, path: Path, scene: Scene) -> None:
         self._container = av.open(str(path), "w")
-        # x264 starves the bitrate where the rate is not told beside the time base.
+        # x264 starves the bitrate if only the time base is set, without the rate.
         stream = self._container.add_stream("libx264", rate=Fraction(scene.fps).limit_denominator(1001))
         stream.width, stream.height = scene.width, scene.height
         stream.pix_fmt = "yuv420p"

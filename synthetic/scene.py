@@ -1,4 +1,4 @@
-"""A synthetic scene: what its cameras see at any frame, and what is true there."""
+"""A synthetic scene: the pictures of its cameras at any frame, and the ground truth."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthetic.cameras.pinhole import Floats
-from synthetic.cameras.sensor_noise import expose
-from synthetic.catalog import scene_entry
+from synthetic.cameras.sensor_noise import add_sensor_noise
+from synthetic.catalog import catalog_entry
 from synthetic.ground_truth import CameraTruth
-from synthetic.world import Asked
+from synthetic.world import SceneParameters
 
 
 class Scene:
     """Objects that move before several cameras: a pure function of its arguments, endless in time.
 
-    Any frame may be asked for in any order in any process and is equal to the byte. What does not move
-    before a camera is painted when the camera is first asked for.
+    Frames may be drawn in any order and in any process, and are equal to the byte. What does not move
+    before a camera is painted when the camera is first used.
 
     Args:
         name: one of `scene_names()`.
@@ -41,44 +41,44 @@ class Scene:
         height: int = 360,
         fps: float = 25.0,
     ) -> None:
-        entry = scene_entry(name)
-        cameras = entry.cameras if cameras is None else cameras
-        objects = entry.objects if objects is None else objects
-        _check("cameras", cameras, 1, entry.most_cameras)
-        _check("objects", objects, 0, entry.most_objects)
+        entry = catalog_entry(name)
+        cameras = entry.default_cameras if cameras is None else cameras
+        objects = entry.default_objects if objects is None else objects
+        _check("cameras", cameras, 1, entry.max_cameras)
+        _check("objects", objects, 0, entry.max_objects)
         _check("seed", seed, 0, 2**63 - 1)
         _check("width", width, 64, 4096)
         _check("height", height, 36, 4096)
         _check("fps", fps, 1, 240)
         self.name, self.cameras, self.objects, self.seed = name, cameras, objects, seed
         self.width, self.height, self.fps = width, height, float(fps)
-        self.world = entry.world(Asked(cameras, objects, seed, width, height))
+        self.world = entry.build(SceneParameters(cameras, objects, seed, width, height))
 
     def image(self, camera: int, frame: int) -> NDArray[np.uint8]:
-        """Give a camera's picture ``(H, W, 3)``, blue, green, red. Cameras and frames count from 0."""
+        """Return a camera's picture ``(H, W, 3)``, blue, green, red. Cameras and frames count from 0."""
         seconds = self._seconds(frame)
         clean = self.world.picture(self._known(camera), seconds)
-        return expose(clean, camera, frame, seconds, self.seed)
+        return add_sensor_noise(clean, camera, frame, seconds, self.seed)
 
-    def empty(self, camera: int, frame: int = 0) -> NDArray[np.uint8]:
-        """Give a camera's picture ``(H, W, 3)`` without the objects, noise and drift."""
-        return self.world.empty(self._known(camera), self._seconds(frame))
+    def background(self, camera: int, frame: int = 0) -> NDArray[np.uint8]:
+        """Return a camera's picture ``(H, W, 3)`` without the objects, noise and drift."""
+        return self.world.background(self._known(camera), self._seconds(frame))
 
     def truth(self, frame: int) -> tuple[CameraTruth, ...]:
-        """Say for every camera who is in its picture, where, and how much of them shows."""
+        """Return the ground truth of every camera: ids, boxes and visible shares."""
         seconds = self._seconds(frame)
         return tuple(self.world.truth(camera, seconds) for camera in range(self.cameras))
 
-    def ground_position(self, frame: int) -> Floats:
-        """Say where everyone is: ``(objects, 2)`` metres; in a corridor that is off the room's floor."""
+    def ground_positions(self, frame: int) -> Floats:
+        """Return where all objects are: ``(objects, 2)`` meters; a corridor is off the room's floor."""
         return self.world.positions(self._seconds(frame))
 
     def inside(self, frame: int) -> NDArray[np.bool_]:
-        """Say who is in the room: ``(objects,)``."""
+        """Return which objects are in the room: ``(objects,)``."""
         return self.world.inside(self._seconds(frame))
 
     def homography(self, camera: int) -> Floats | None:
-        """Give the ``(3, 3)`` map from a camera's pixels (homogeneous) to the floor, in metres.
+        """Return the homography ``(3, 3)`` from a camera's pixels (homogeneous) to the floor, in meters.
 
         None in a scene without a floor to stand on.
         """
@@ -86,7 +86,7 @@ class Scene:
 
     @property
     def floor(self) -> tuple[float, float]:
-        """The room's extent, west to east and south to north, metres."""
+        """The room's size, west to east and south to north, in meters."""
         return self.world.extent
 
     def _seconds(self, frame: int) -> float:

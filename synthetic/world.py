@@ -1,4 +1,4 @@
-"""What a scene is behind its name: something that cameras look at, and that knows what is true."""
+"""The interface of a scene's world, which cameras look at and which knows the ground truth."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Bytes = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """What somebody wants drawn; the numbers are within their ranges."""
+class SceneParameters:
+    """The size of a scene to draw; the numbers are within their ranges."""
 
     cameras: int
     objects: int
@@ -26,36 +26,36 @@ class Asked:
 
 
 class World(Protocol):
-    """A pure function of what was asked for and of a moment, in seconds; cameras count from 0.
+    """A pure function of the parameters and of a moment, in seconds; cameras count from 0.
 
     Pictures are noiseless: the sensor is the scene's, not the world's.
     """
 
     @property
     def extent(self) -> tuple[float, float]:
-        """How far it reaches from west to east and from south to north, metres."""
+        """Its size from west to east and from south to north, in meters."""
         ...
 
     def picture(self, camera: int, seconds: float) -> Bytes:
-        """Give a camera's picture ``(H, W, 3)``, blue, green, red."""
+        """Return a camera's picture ``(H, W, 3)``, blue, green, red."""
         ...
 
-    def empty(self, camera: int, seconds: float) -> Bytes:
-        """Give a camera's picture ``(H, W, 3)`` without any of the objects."""
+    def background(self, camera: int, seconds: float) -> Bytes:
+        """Return a camera's picture ``(H, W, 3)`` without any of the objects."""
         ...
 
     def truth(self, camera: int, seconds: float) -> CameraTruth:
-        """Say who is in a camera's picture, where, and how much of them shows."""
+        """Return a camera's ground truth: ids, boxes and visible shares."""
         ...
 
     def positions(self, seconds: float) -> Floats:
-        """Say where everybody is, seen from above: ``(objects, 2)`` metres."""
+        """Return where all objects are, seen from above: ``(objects, 2)`` meters."""
         ...
 
     def inside(self, seconds: float) -> NDArray[np.bool_]:
-        """Say who is within the world's extent: ``(objects,)``."""
+        """Return which objects are within the world's extent: ``(objects,)``."""
         ...
 
     def homography(self, camera: int) -> Floats | None:
-        """Give the ``(3, 3)`` map from a camera's pixels to the floor, metres; None: nobody is on a floor."""
+        """Return the homography ``(3, 3)`` from pixels to the floor, in meters; None without a floor."""
         ...

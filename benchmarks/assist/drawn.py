@@ -148,7 +148,7 @@ def drawn(film: Film, seed: int) -> Clip:
         seen.append(detector.detect(played.image(0, t)))
         there = played.truth(t)[0]
         boxes[there.ids - 1, t] = there.boxes
-        visible[there.ids - 1, t] = there.visible
+        visible[there.ids - 1, t] = there.visibility
     return Clip(seed, film.fps, tuple(seen), Truth(boxes, visible))
 
 

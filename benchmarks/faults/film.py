@@ -173,7 +173,7 @@ def _places() -> list[int]:
 
 def _boxes(truth: Any) -> NDArray[np.float64]:
     """Return the boxes ``(N, 4)`` that are whole and to be seen, left, top, width, height in whole pixels."""
-    boxes = np.floor(truth.boxes[truth.visible >= _SHOWS]).reshape(-1, 4)
+    boxes = np.floor(truth.boxes[truth.visibility >= _SHOWS]).reshape(-1, 4)
     inside = (boxes[:, :2] >= 1).all(axis=1) & (boxes[:, 2] < WIDTH - 1) & (boxes[:, 3] < HEIGHT - 1)
     kept = boxes[inside]
     return np.hstack([kept[:, :2], kept[:, 2:] - kept[:, :2]])

@@ -1,4 +1,4 @@
-"""One camera's stage: its view, the empty room, and the figures that stand in it, furthest first."""
+"""One camera's view of a room: the empty room and the people who stand in it, furthest first."""
 
 from __future__ import annotations
 
@@ -9,58 +9,62 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic.cameras.pinhole import Floats, Perspective
-from synthetic.drawing.backdrop import Backdrop, paint
-from synthetic.drawing.body import body
+from synthetic.cameras.pinhole import Floats, PinholeCamera
+from synthetic.drawing.backdrop import Backdrop, paint_backdrop
 from synthetic.drawing.clothing import Outfit
-from synthetic.drawing.figure import Figure, clip, draw_figure
-from synthetic.drawing.skeleton import joints
+from synthetic.drawing.figure import Figure, clip_to_image, draw_figure
+from synthetic.drawing.limbs import build_body
+from synthetic.drawing.skeleton import place_joints
 from synthetic.room.room import Furniture, Room
-from synthetic.room.surface_styles import finish_of
-from synthetic.walking.stroll import Pose
+from synthetic.room.surface_styles import surface_style
+from synthetic.walking.trajectory import Pose
 
-_THRESHOLD = 0.12  # metres behind the wall from which only the doorway shows a walker
-_GONE = 1.6  # metres to the side of a doorway's middle at which nothing of a walker is in it
-_FULL = 1.12  # brings clothes to their own colours in the brightest part of the room
+_THRESHOLD = 0.12  # meters behind the wall from which a person is visible through the doorway only
+_GONE = 1.6  # meters to the side of a doorway's middle at which nothing of a person is in it
+_FULL = 1.12  # brings clothes to their own colors in the brightest part of the room
 
 Bytes = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
-class Actor:
-    """A walker as one camera sees it."""
+class DrawnPerson:
+    """A person as one camera sees them."""
 
     walker: int
-    joints: Floats  # (J, 3) metres
+    joints: Floats  # (J, 3) meters
     figure: Figure
     inside: bool  # in the room, not in a corridor
-    curtain: Bytes | None  # (h, w) of the figure's patch within the picture: share that shows; None: all
+    visible_mask: Bytes | None  # (h, w) of the patch within the picture: visible share; None: all of it
 
 
-class Stage:
-    """Everything that one camera needs to draw or judge a frame."""
+class CameraView:
+    """Everything that one camera needs to draw a frame or to measure its ground truth."""
 
-    def __init__(self, room: Room, view: Perspective) -> None:
+    def __init__(self, room: Room, view: PinholeCamera) -> None:
         self.room = room
         self.view = view
-        self.backdrop: Backdrop = paint(room, view)
+        self.backdrop: Backdrop = paint_backdrop(room, view)
 
-    def actors(self, poses: Sequence[Pose], outfits: Sequence[Outfit]) -> list[Actor]:
-        """Place the walkers that the camera may see, furthest first."""
+    def draw_people(self, poses: Sequence[Pose], outfits: Sequence[Outfit]) -> list[DrawnPerson]:
+        """Draw the people whom the camera may see, furthest first."""
         found = []
         for walker, (pose, outfit) in enumerate(zip(poses, outfits, strict=True)):
             beyond = self.room.outside(pose.x, pose.y)
             if beyond > _THRESHOLD and not self._near_door(pose):
                 continue
-            skeleton = joints(pose, outfit.height)
-            light = _FULL * float(finish_of(self.room).light(self.room, np.array(pose.x), np.array(pose.y)))
-            figure = draw_figure(self.view, body(outfit), skeleton, light)
-            if figure is None or clip(figure, self.view) is None:
+            skeleton = place_joints(pose, outfit.height)
+            light = _FULL * float(
+                surface_style(self.room).light(self.room, np.array(pose.x), np.array(pose.y))
+            )
+            figure = draw_figure(self.view, build_body(outfit), skeleton, light)
+            if figure is None or clip_to_image(figure, self.view) is None:
                 continue
-            found.append(Actor(walker, skeleton, figure, beyond < 0, self._curtain(figure, pose, beyond)))
-        centre = self.view.centre
+            found.append(
+                DrawnPerson(walker, skeleton, figure, beyond < 0, self._visible_mask(figure, pose, beyond))
+            )
+        center = self.view.center
         return sorted(
-            found, key=lambda actor: -float(np.hypot(*(actor.joints[:, :2].mean(axis=0) - centre[:2])))
+            found, key=lambda person: -float(np.hypot(*(person.joints[:, :2].mean(axis=0) - center[:2])))
         )
 
     def _near_door(self, pose: Pose) -> bool:
@@ -70,8 +74,8 @@ class Stage:
             for door in self.room.doors
         )
 
-    def _curtain(self, figure: Figure, pose: Pose, beyond: float) -> Bytes | None:
-        part = clip(figure, self.view)
+    def _visible_mask(self, figure: Figure, pose: Pose, beyond: float) -> Bytes | None:
+        part = clip_to_image(figure, self.view)
         if part is None:
             return None
         hiding = [
@@ -91,14 +95,14 @@ class Stage:
         return shown
 
     def _hides(self, piece: Furniture, pose: Pose) -> bool:
-        """Say whether furniture stands before a walker: not if both are beyond the same side of it.
+        """Return whether furniture can hide a person: not if both are beyond the same side of it.
 
-        From straight above all furniture is beside or below who stands.
+        From straight above, furniture is beside or below a standing person.
         """
-        if self.view.overhead:
+        if self.view.looks_down:
             return False
         west, south, east, north = piece.footprint
-        x, y = self.view.centre[:2].tolist()
+        x, y = self.view.center[:2].tolist()
         apart = (
             (x <= west and pose.x <= west)
             or (x >= east and pose.x >= east)

@@ -16,7 +16,7 @@ _PLUMB = 0.999  # of a direction's length that is vertical: from there on, no ho
 
 @dataclass(frozen=True, slots=True)
 class Viewpoint:
-    """Where a camera hangs and where it looks, in metres; the world's z axis points up."""
+    """Where a camera hangs and where it looks, in meters; the world's z axis points up."""
 
     position: tuple[float, float, float]
     target: tuple[float, float, float]
@@ -24,42 +24,42 @@ class Viewpoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Perspective:
-    """Projection of world points (metres) to picture points (pixels).
+class PinholeCamera:
+    """A pinhole camera: projects world points (meters) to picture points (pixels).
 
     Picture coordinates are continuous: pixel ``(i, j)`` covers ``[i, i + 1) x [j, j + 1)``.
     """
 
-    centre: Floats  # (3,) optical centre, metres
+    center: Floats  # (3,) optical center, meters
     axes: Floats  # (3, 3) rows: right, down, forward
     focal: float  # pixels
     width: int  # pixels
     height: int  # pixels
 
     @classmethod
-    def of(cls, view: Viewpoint, width: int, height: int) -> Perspective:
-        """Hang a camera at a viewpoint, its horizon level; one that looks straight down has north on top."""
-        centre = np.array(view.position, dtype=np.float64)
-        forward = np.array(view.target, dtype=np.float64) - centre
+    def at(cls, view: Viewpoint, width: int, height: int) -> PinholeCamera:
+        """Build the camera at a viewpoint, with a level horizon; looking straight down, north is on top."""
+        center = np.array(view.position, dtype=np.float64)
+        forward = np.array(view.target, dtype=np.float64) - center
         forward /= np.linalg.norm(forward)
         plumb = abs(forward[2]) > _PLUMB
         right = np.cross(forward, (0.0, 1.0, 0.0) if plumb else (0.0, 0.0, 1.0))
         right /= np.linalg.norm(right)
         axes = np.stack([right, np.cross(forward, right), forward])
         focal = 0.5 * width / math.tan(math.radians(view.field_of_view) / 2)
-        return cls(centre, axes, focal, width, height)
+        return cls(center, axes, focal, width, height)
 
     @property
-    def overhead(self) -> bool:
+    def looks_down(self) -> bool:
         """Whether it looks straight down."""
         return bool(self.axes[2, 2] < -_PLUMB)
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
-        """Project ``(N, 3)`` world points to ``(N, 2)`` pixels and their ``(N,)`` depths in metres.
+        """Project ``(N, 3)`` world points to ``(N, 2)`` pixels and their ``(N,)`` depths in meters.
 
         A point at or behind the camera is projected as if it were 5 cm in front of it.
         """
-        local = (points - self.centre) @ self.axes.T
+        local = (points - self.center) @ self.axes.T
         depth = local[:, 2]
         scale = self.focal / np.maximum(depth, 0.05)
         pixels = local[:, :2] * scale[:, None]
@@ -67,7 +67,7 @@ class Perspective:
         return pixels, depth
 
     def rays(self, columns: Floats, rows: Floats) -> Floats:
-        """Give the unit directions ``(R, C, 3)`` of the picture points ``columns x rows``."""
+        """Return the unit directions ``(R, C, 3)`` of the rays through ``columns x rows``."""
         across = (columns - self.width / 2) / self.focal
         down = (rows - self.height / 2) / self.focal
         right, below, forward = self.axes
@@ -76,12 +76,12 @@ class Perspective:
         return unit
 
     def homography(self) -> Floats:
-        """Give the ``(3, 3)`` map from picture points to the floor, in metres; its last entry is 1."""
+        """Return the homography ``(3, 3)`` from picture points to the floor (meters); the last entry is 1."""
         intrinsic = np.array(
             [[self.focal, 0, self.width / 2], [0, self.focal, self.height / 2], [0, 0, 1]], dtype=np.float64
         )
-        shift = -self.axes @ self.centre
+        shift = -self.axes @ self.center
         to_picture = intrinsic @ np.column_stack([self.axes[:, 0], self.axes[:, 1], shift])
         back = np.linalg.inv(to_picture)
-        normalised: Floats = back / back[2, 2]
-        return normalised
+        normalized: Floats = back / back[2, 2]
+        return normalized

@@ -11,36 +11,38 @@ from numpy.typing import NDArray
 
 _BANK = 6  # noise pictures; a frame takes one, shifted by a hash
 _SPARE = 64  # pixels by which a noise picture is larger than a frame
-_GRAIN = 1.7  # standard deviation, grey levels
-_COLOUR = 0.8  # standard deviation of each channel by itself, grey levels
+_GRAIN = 1.7  # standard deviation, gray levels
+_COLOR = 0.8  # standard deviation of each channel by itself, gray levels
 _MIDDLE = 128
 _DRIFT = 0.018  # of the brightness
 _PERIODS = (97.0, 41.0)  # seconds
 
 
 @lru_cache(maxsize=4)
-def _bank(width: int, height: int, seed: int) -> tuple[NDArray[np.uint8], ...]:
+def _noise_images(width: int, height: int, seed: int) -> tuple[NDArray[np.uint8], ...]:
     pictures = []
     for index in range(_BANK):
         rng = np.random.default_rng([seed, 0x0015E, index])
         shape = (height + _SPARE, width + _SPARE)
         grain = rng.standard_normal((*shape, 1), dtype=np.float32) * _GRAIN
-        colour = rng.standard_normal((*shape, 3), dtype=np.float32) * _COLOUR
-        pictures.append(np.rint(grain + colour + _MIDDLE).clip(0, 255).astype(np.uint8))
+        color = rng.standard_normal((*shape, 3), dtype=np.float32) * _COLOR
+        pictures.append(np.rint(grain + color + _MIDDLE).clip(0, 255).astype(np.uint8))
     return tuple(pictures)
 
 
-def _mix(camera: int, frame: int, seed: int) -> int:
+def _hash(camera: int, frame: int, seed: int) -> int:
     value = (frame * 0x9E3779B97F4A7C15 + camera * 0xC2B2AE3D27D4EB4F + seed * 0x165667B19E3779F9) % (1 << 64)
     value = (value ^ (value >> 29)) * 0xBF58476D1CE4E5B9 % (1 << 64)
     return value ^ (value >> 32)
 
 
-def expose(image: NDArray[np.uint8], camera: int, frame: int, seconds: float, seed: int) -> NDArray[np.uint8]:
-    """Give a picture ``(H, W, 3)`` the noise and brightness of a camera's frame."""
+def add_sensor_noise(
+    image: NDArray[np.uint8], camera: int, frame: int, seconds: float, seed: int
+) -> NDArray[np.uint8]:
+    """Return a picture ``(H, W, 3)`` with the sensor noise and the exposure of one camera's frame."""
     height, width = image.shape[:2]
-    mixed = _mix(camera, frame, seed)
-    picture = _bank(width, height, seed)[mixed % _BANK]
+    mixed = _hash(camera, frame, seed)
+    picture = _noise_images(width, height, seed)[mixed % _BANK]
     x, y = mixed // 64 % _SPARE, mixed // 4096 % _SPARE
     waves = (math.sin(2 * math.pi * (seconds / period + 0.31 * camera)) for period in _PERIODS)
     gain = 1.0 + _DRIFT * sum(waves) / 2

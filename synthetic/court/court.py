@@ -1,38 +1,38 @@
 """The court: a hall for basketball under cameras all around it, and how its floor and walls look.
 
-Colours are red, green, blue in 0..1.
+Colors are red, green, blue in 0..1.
 """
 
 from __future__ import annotations
 
 from synthetic.cameras.pinhole import Viewpoint
 from synthetic.court.game import Court
-from synthetic.room.room import Block, Colour, Furniture, Room
+from synthetic.room.room import Block, Color, Furniture, Room
 
-_WIDTH, _DEPTH, _HEIGHT = 24.0, 14.5, 7.6  # metres
+_WIDTH, _DEPTH, _HEIGHT = 24.0, 14.5, 7.6  # meters
 _FIELD = 76.0  # degrees
 
 COURT = Court((2.0, 2.0, 22.0, 12.5), ((3.2, 7.25), (20.8, 7.25)))
 
 
-_GREY, _WHITE, _RED = (0.20, 0.22, 0.25), (0.90, 0.91, 0.92), (0.88, 0.34, 0.14)
+_GRAY, _WHITE, _RED = (0.20, 0.22, 0.25), (0.90, 0.91, 0.92), (0.88, 0.34, 0.14)
 
 
-def _across(ends: tuple[float, float], half: float, heights: tuple[float, float], colour: Colour) -> Block:
-    """Give a box across a basket's axis, from one end to the other along it."""
+def _across(ends: tuple[float, float], half: float, heights: tuple[float, float], color: Color) -> Block:
+    """Return a box across a basket's axis, from one end to the other along it."""
     middle, (low, high) = COURT.baskets[0][1], heights
-    return Block((min(ends), middle - half, low), (max(ends), middle + half, high), colour)
+    return Block((min(ends), middle - half, low), (max(ends), middle + half, high), color)
 
 
 def _hoop(board: float, inwards: float) -> tuple[Furniture, Furniture]:
-    """Give a basket's post, and what hangs from it, by where the board is; it looks east at `inwards` 1."""
+    """Return a basket's post and its board with the hoop; the board faces east where `inwards` is 1."""
     back, rim, middle = board - inwards * 1.9, board + inwards * 0.4, COURT.baskets[0][1]
     post = (
-        _across((back - 0.16, back + 0.16), 0.16, (0.0, 3.1), _GREY),
+        _across((back - 0.16, back + 0.16), 0.16, (0.0, 3.1), _GRAY),
         _across((back - 0.32, back + 0.32), 0.32, (0.0, 0.9), (0.16, 0.27, 0.50)),
     )
     hung = (
-        _across((back + inwards * 0.16, board - inwards * 0.05), 0.07, (3.0, 3.16), _GREY),
+        _across((back + inwards * 0.16, board - inwards * 0.05), 0.07, (3.0, 3.16), _GRAY),
         _across((board - 0.03, board + 0.03), 0.9, (2.9, 3.95), _WHITE),
         _across((board + inwards * 0.031, board + inwards * 0.036), 0.30, (3.05, 3.50), _RED),
         _across((board + inwards * 0.037, board + inwards * 0.040), 0.25, (3.10, 3.45), _WHITE),
@@ -42,7 +42,7 @@ def _hoop(board: float, inwards: float) -> tuple[Furniture, Furniture]:
 
 
 def _seats(x: float, y: float) -> Furniture:
-    """Give a row of seats along the northern wall, by its south-western corner."""
+    """Return a row of seats along the northern wall, by its south-western corner."""
     legs = tuple(
         Block((x + at, y + 0.05, 0.0), (x + at + 0.08, y + 0.4, 0.40), (0.22, 0.23, 0.25))
         for at in (0.3, 2.1, 3.9)
@@ -50,7 +50,7 @@ def _seats(x: float, y: float) -> Furniture:
     return Furniture("seats", (Block((x, y, 0.40), (x + 4.3, y + 0.45, 0.47), (0.62, 0.44, 0.26)), *legs))
 
 
-HALL = Room(
+SPORTS_HALL = Room(
     width=_WIDTH,
     depth=_DEPTH,
     height=_HEIGHT,

@@ -1,4 +1,4 @@
-"""A game: two teams attack by turns, each player of the others marks one of them.
+"""A basketball game: two teams attack in turn, and each defender marks one attacker.
 
 In even rounds the first team attacks the eastern basket, in odd ones the second team the western.
 """
@@ -10,9 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from synthetic.cameras.pinhole import Floats
-from synthetic.walking.paths import BEFORE, ROUND, Way, bend, straight_way, towards
+from synthetic.walking.round_paths import (
+    BEFORE,
+    ROUND,
+    RoundPath,
+    avoid_collisions,
+    heading_to,
+    straight_path,
+)
 
-# Where attackers stand: metres from the basket towards the middle of the court, and to the side.
+# Where attackers stand: meters from the basket towards the middle of the court, and to the side.
 _SPOTS = np.array(
     [(6.9, 0.0), (5.9, 3.6), (5.9, -3.6), (1.2, 4.2), (1.2, -4.2), (3.2, 1.5), (3.4, -1.6), (8.4, 1.9)]
 )
@@ -21,18 +28,18 @@ _TURNS = (
     (3.5, 4.6, 4.9, 6.0),
     (6.0, 7.2, 7.4, 8.8),
 )  # earliest, latest start and arrival
-_OFF = 0.35  # metres: how exactly they know their places
+_OFF = 0.35  # meters: how exactly they know their places
 _MARKING = 0.28  # of the way from an attacker to the basket at which the defender stands
-_CLOSE = 0.95  # metres from an attacker, at least
+_CLOSE = 0.95  # meters from an attacker, at least
 _LATE = 0.25  # seconds by which defenders follow
-_SPRINT = 5.2  # metres per second
-_KEEP = 0.8  # metres between any two, wherever possible
+_SPRINT = 5.2  # meters per second
+_KEEP = 0.8  # meters between any two, wherever possible
 _MOVERS = 0.6  # of a team that change places in a turn
 
 
 @dataclass(frozen=True, slots=True)
 class Court:
-    """Where a game is played, metres."""
+    """Where a game is played, in meters."""
 
     bounds: tuple[float, float, float, float]  # west, south, east and north
     baskets: tuple[tuple[float, float], tuple[float, float]]  # the western and the eastern
@@ -45,30 +52,30 @@ class Game:
         self._court, self._players, self._seed = court, players, seed
 
     def team(self, player: int) -> int:
-        """Say which team a player is in, 0 or 1."""
+        """Return which team a player is in, 0 or 1."""
         return player % 2
 
-    def ways(self, number: int) -> list[Way]:
-        """Play a round: an attack."""
+    def paths(self, number: int) -> list[RoundPath]:
+        """Return all players' paths in a round, which is one attack."""
         if not self._players:
             return []
         start, turns = self._turns(number - 1)[-1], self._turns(number)
         rng = np.random.default_rng([self._seed, 0x6A3E, number + BEFORE])
         basket = self._basket(number)
-        ways = []
+        paths = []
         for player in range(self._players):
             attacks = self.team(player) == number % 2
             spots = [start[player], *(turn[player] for turn in turns)]
             look = np.array(basket if attacks else self._basket(number + 1))
-            ways.append(_run(rng, np.array(spots), look, 0.0 if attacks else _LATE))
-        return list(bend(ways, np.full((self._players, self._players), _KEEP)))
+            paths.append(_run(rng, np.array(spots), look, 0.0 if attacks else _LATE))
+        return list(avoid_collisions(paths, np.full((self._players, self._players), _KEEP)))
 
     def _basket(self, number: int) -> tuple[float, float]:
-        """Give the basket that a round's attackers go for."""
+        """Return the basket that a round's attackers go for."""
         return self._court.baskets[1 - number % 2]
 
     def _turns(self, number: int) -> list[Floats]:
-        """Say where everybody stands after each turn of a round: ``(players, 2)`` metres."""
+        """Return where all players stand after each turn of a round: ``(players, 2)`` meters."""
         rng = np.random.default_rng([self._seed, 0x5B07, number + BEFORE])
         attackers = [player for player in range(self._players) if self.team(player) == number % 2]
         defenders = [player for player in range(self._players) if self.team(player) != number % 2]
@@ -89,7 +96,7 @@ class Game:
 
 
 def _marking(rng: np.random.Generator, attackers: Floats, basket: Floats, count: int) -> Floats:
-    """Place defenders ``(count, 2)`` between attackers and their basket; who marks nobody stays near it."""
+    """Place defenders ``(count, 2)`` between attackers and the basket; those left over stay near it."""
     free = basket + rng.normal(0, 1.2, (count, 2))
     marked = min(count, len(attackers))
     line = basket - attackers[:marked]
@@ -99,9 +106,9 @@ def _marking(rng: np.random.Generator, attackers: Floats, basket: Floats, count:
     return free
 
 
-def _run(rng: np.random.Generator, spots: Floats, look: Floats, late: float) -> Way:
+def _run(rng: np.random.Generator, spots: Floats, look: Floats, late: float) -> RoundPath:
     """Run from spot to spot, each in its turn, and look at a point while standing."""
-    times, places, faces = [0.0], [spots[0]], [towards(spots[0], spots[1])]
+    times, places, facing = [0.0], [spots[0]], [heading_to(spots[0], spots[1])]
     for (soonest, latest, first, last), here, there in zip(_TURNS, spots[:-1], spots[1:], strict=True):
         leave = max(float(rng.uniform(soonest, latest)) + late, times[-1])
         reach = max(
@@ -109,7 +116,7 @@ def _run(rng: np.random.Generator, spots: Floats, look: Floats, late: float) -> 
         )
         times += [leave, min(reach, ROUND - 0.2)]
         places += [here, there]
-        faces += [towards(here, there), towards(there, look)]
-    return straight_way(
-        np.array([*times, ROUND]), np.array([*places, spots[-1]]), np.array([*faces, faces[-1]])
+        facing += [heading_to(here, there), heading_to(there, look)]
+    return straight_path(
+        np.array([*times, ROUND]), np.array([*places, spots[-1]]), np.array([*facing, facing[-1]])
     )

@@ -8,17 +8,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic.cameras.pinhole import Floats, Perspective
-from synthetic.drawing.ray_casting import FAR, hit, may_hit
+from synthetic.cameras.pinhole import Floats, PinholeCamera
+from synthetic.drawing.ray_casting import FAR, intersect, may_intersect
 from synthetic.room import house_surfaces
 from synthetic.room.room import Block, Door, Room
-from synthetic.room.surface_styles import finish_of, surface
+from synthetic.room.surface_styles import surface_color, surface_style
 
 _FINE = 2  # rays per pixel and direction
 _BAND = 24  # picture rows cast at a time: bounds the memory
-_CORRIDOR = 1.5  # metres from a doorway to the wall behind it
+_CORRIDOR = 1.5  # meters from a doorway to the wall behind it
 _FLOOR, _DOOR, _PIECE = 1, 2, 16  # labels: the floor, the first door, the first piece of furniture
-_RAISED = 1.0  # metres above the floor from which a piece does not darken it
+_RAISED = 1.0  # meters above the floor from which a piece does not darken it
 _SUN = np.array([-0.55, -0.45, 0.70])  # towards the light
 
 Bytes = NDArray[np.uint8]
@@ -26,7 +26,7 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Backdrop:
-    """What does not move, in one camera's picture. Shares are 0..255."""
+    """The empty room in one camera's picture, with masks. Shares are 0..255."""
 
     image: Bytes  # (H, W, 3) blue, green, red
     floor: Bytes  # (H, W) share of a pixel that is bare floor: where shadows fall
@@ -34,8 +34,8 @@ class Backdrop:
     furniture: tuple[Bytes, ...]  # (H, W) each: share that the piece covers
 
 
-def paint(room: Room, view: Perspective) -> Backdrop:
-    """Cast the room's picture; about a second for 640 x 360."""
+def paint_backdrop(room: Room, view: PinholeCamera) -> Backdrop:
+    """Ray-cast the empty room; about a second for 640 x 360."""
     image = np.empty((view.height, view.width, 3), dtype=np.uint8)
     kinds = [_FLOOR]
     kinds += [_DOOR + index for index in range(len(room.doors))]
@@ -46,9 +46,9 @@ def paint(room: Room, view: Perspective) -> Backdrop:
         bottom = min(top + _BAND, view.height)
         rows = top + (np.arange((bottom - top) * _FINE) + 0.5) / _FINE
         rays = view.rays(columns, rows)
-        colour, label = _cast(room, view.centre, rays.reshape(-1, 3))
+        color, label = _cast(room, view.center, rays.reshape(-1, 3))
         size = (view.width, bottom - top)
-        fine = np.clip(colour[:, ::-1] * 255, 0, 255).astype(np.float32).reshape(rays.shape)
+        fine = np.clip(color[:, ::-1] * 255, 0, 255).astype(np.float32).reshape(rays.shape)
         image[top:bottom] = np.rint(cv2.resize(fine, size, interpolation=cv2.INTER_AREA)).astype(np.uint8)
         for kind, share in zip(kinds, shares, strict=True):
             mask = ((label == kind) * np.float32(255)).reshape(rays.shape[:2])
@@ -58,47 +58,47 @@ def paint(room: Room, view: Perspective) -> Backdrop:
 
 
 def _cast(room: Room, origin: Floats, rays: Floats) -> tuple[Floats, NDArray[np.int32]]:
-    colour, label, distance = _shell(room, origin, rays)
+    color, label, distance = _shell(room, origin, rays)
     for index, piece in enumerate(room.furniture):
         for block in piece.blocks:
-            near = np.flatnonzero(may_hit(block, origin, rays))
-            reach, normal = hit(block, origin, rays[near])
+            near = np.flatnonzero(may_intersect(block, origin, rays))
+            reach, normal = intersect(block, origin, rays[near])
             seen = reach < distance[near]
             chosen = near[seen]
             distance[chosen] = reach[seen]
             points = origin + rays[chosen] * reach[seen, None]
-            colour[chosen] = _lit(room, block, points, normal[seen])
+            color[chosen] = _lit(room, block, points, normal[seen])
             label[chosen] = _PIECE + index
-    return colour, label
+    return color, label
 
 
 def _shell(room: Room, origin: Floats, rays: Floats) -> tuple[Floats, NDArray[np.int32], Floats]:
-    """Hit the floor, ceiling and walls from within, and what lies behind the doorways."""
+    """Intersect rays with the floor, ceiling and walls, and with what lies behind the doorways."""
     far = np.array([room.width, room.depth, room.height])
     safe = np.where(np.abs(rays) < 1e-9, 1e-9, rays)  # noqa: PLR2004 — a ray along a wall
     planes = np.where(safe > 0, far - origin, -origin) / safe
     side = planes.argmin(axis=1)
     distance = planes.min(axis=1)
     points = origin + rays * distance[:, None]
-    colour = np.zeros_like(rays)
+    color = np.zeros_like(rays)
     label = np.zeros(len(rays), dtype=np.int32)
     for axis in range(3):
         for upper in (False, True):
             mask = (side == axis) & ((rays[:, axis] > 0) == upper)
-            colour[mask] = surface(room, points[mask], axis, upper=upper)
+            color[mask] = surface_color(room, points[mask], axis, upper=upper)
     ground = (side == 2) & (rays[:, 2] < 0)  # noqa: PLR2004 — the z axis
-    colour[ground] *= _contact(room, points[ground])[:, None]
+    color[ground] *= _contact(room, points[ground])[:, None]
     label[ground] = _FLOOR
     for index, door in enumerate(room.doors):
         axis = 1 if door.wall == "north" else 0
         along = points[:, 1 - axis] - door.start
         wall = (side == axis) & (rays[:, axis] > 0)
         rim = wall & (along > -0.09) & (along < door.width + 0.09) & (points[:, 2] < door.height + 0.09)  # noqa: PLR2004 — frame of 9 cm
-        colour[rim] = np.array([0.66, 0.65, 0.63]) * 0.92
+        color[rim] = np.array([0.66, 0.65, 0.63]) * 0.92
         through = wall & (along > 0) & (along < door.width) & (points[:, 2] < door.height)
-        colour[through] = _behind(room, door, origin, rays[through])
+        color[through] = _behind(room, door, origin, rays[through])
         label[through] = _DOOR + index
-    return colour, label, distance
+    return color, label, distance
 
 
 def _behind(room: Room, door: Door, origin: Floats, rays: Floats) -> Floats:
@@ -132,10 +132,10 @@ def _lit(room: Room, block: Block, points: Floats, normals: Floats) -> Floats:
     sun = _SUN / np.linalg.norm(_SUN)
     diffuse = 0.62 + 0.26 * np.clip(normals @ sun, -0.5, 1) + 0.20 * np.clip(normals[:, 2], 0, 1)
     low = 1 - 0.25 * np.exp(-np.maximum(points[:, 2], 0) / 0.2)
-    level = finish_of(room).light(room, points[:, 0], points[:, 1])
-    leaf = house_surfaces.lattice(
+    level = surface_style(room).light(room, points[:, 0], points[:, 1])
+    leaf = house_surfaces.hash_noise(
         np.floor(points[:, 0] * 28), np.floor(points[:, 1] * 28 + points[:, 2] * 31)
     )
     grain = 0.72 + 0.56 * leaf if block.shape == "ball" else np.ones(len(points))
-    colour: Floats = np.array(block.colour) * (diffuse * low * level * grain * 1.15)[:, None]
-    return colour
+    color: Floats = np.array(block.color) * (diffuse * low * level * grain * 1.15)[:, None]
+    return color

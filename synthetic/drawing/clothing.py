@@ -1,4 +1,4 @@
-"""The catalogue of clothing: what tells one walker from another."""
+"""The catalog of clothing, by which people look different."""
 
 from __future__ import annotations
 
@@ -7,32 +7,32 @@ from typing import Literal
 
 import numpy as np
 
-from synthetic.room.room import Colour
+from synthetic.room.room import Color
 
 
-def _rgb(code: int) -> Colour:
+def _rgb(code: int) -> Color:
     return ((code >> 16) / 255, (code >> 8 & 255) / 255, (code & 255) / 255)
 
 
 @dataclass(frozen=True, slots=True)
 class Outfit:
-    """How one walker looks. Colours are red, green, blue in 0..1; the height is in metres."""
+    """Clothes and build of a person. Colors are red, green, blue in 0..1; the height is in meters."""
 
-    upper: Colour
-    lower: Colour
-    hair: Colour
-    skin: Colour
-    shoes: Colour
+    upper: Color
+    lower: Color
+    hair: Color
+    skin: Color
+    shoes: Color
     height: float
     build: float = 1.0  # girth, a factor
     hair_cut: Literal["short", "long", "bun"] = "short"
     sleeves: Literal["long", "short"] = "long"
     legs: Literal["trousers", "shorts", "skirt"] = "trousers"
-    backpack: Colour | None = None
+    backpack: Color | None = None
 
 
 _PALE, _TAN, _BROWN, _DARK = _rgb(0xE9BF9F), _rgb(0xCF9A70), _rgb(0x9A6643), _rgb(0x6B442D)
-_BLACK, _BRUNETTE, _GINGER, _BLOND, _GREY = (
+_BLACK, _BRUNETTE, _GINGER, _BLOND, _GRAY = (
     _rgb(0x1D1917),
     _rgb(0x3A2619),
     _rgb(0x8E4A22),
@@ -51,18 +51,18 @@ _WARDROBE = (
     Outfit(_rgb(0x2458B8), _rgb(0xEEE8DA), _BLOND, _PALE, _LEATHER, 1.75, 1.02, backpack=_rgb(0x2B2D33)),
     Outfit(_rgb(0x2E8F57), _rgb(0xB5562A), _BLACK, _DARK, _INK, 1.88, 1.06),
     Outfit(_rgb(0xECE9E4), _rgb(0x9A1C50), _GINGER, _PALE, _INK, 1.63, 0.93, "bun", "short", "skirt"),
-    Outfit(_rgb(0x9C3FAE), _rgb(0x86BCF0), _GREY, _TAN, _SNOW, 1.70, 1.08),
+    Outfit(_rgb(0x9C3FAE), _rgb(0x86BCF0), _GRAY, _TAN, _SNOW, 1.70, 1.08),
     Outfit(_rgb(0x30B4BE), _rgb(0x17603A), _BRUNETTE, _TAN, _LEATHER, 1.78, 0.98, "short", "short", "shorts"),
     Outfit(_rgb(0x1B1C21), _rgb(0xD6A22C), _BLOND, _PALE, _INK, 1.69, 0.95, "long", backpack=_rgb(0xB53A34)),
     Outfit(_rgb(0xE8762C), _rgb(0x45307A), _BLACK, _BROWN, _SNOW, 1.73, 1.0, "bun"),
     Outfit(_rgb(0xE58AA8), _rgb(0x20304F), _BRUNETTE, _TAN, _SNOW, 1.61, 0.92, "long", "short"),
-    Outfit(_rgb(0x99B83C), _rgb(0x5B2D1D), _GREY, _PALE, _LEATHER, 1.80, 1.1),
+    Outfit(_rgb(0x99B83C), _rgb(0x5B2D1D), _GRAY, _PALE, _LEATHER, 1.80, 1.1),
     Outfit(_rgb(0x7A1F35), _rgb(0xC4C6CA), _BLACK, _DARK, _LEATHER, 1.77, 1.0, backpack=_rgb(0x3F6A4C)),
 )
 
 
-def outfit(walker: int, seed: int) -> Outfit:
-    """Give walker 0, 1, … an outfit; the first twelve are drawn by hand, and no two are alike."""
+def choose_outfit(walker: int, seed: int) -> Outfit:
+    """Return the outfit of walker 0, 1, …; the first twelve are from the catalog, and all of them differ."""
     if walker < len(_WARDROBE):
         return _WARDROBE[walker]
     rng = np.random.default_rng([seed, 0x0C10, walker])
@@ -81,8 +81,8 @@ def outfit(walker: int, seed: int) -> Outfit:
     )
 
 
-def casual(walker: int, seed: int) -> Outfit:
-    """Give walker 0, 1, … any outfit of the catalogue; with some seeds two people dress alike."""
+def choose_casual_outfit(walker: int, seed: int) -> Outfit:
+    """Return an outfit of the catalog for walker 0, 1, …; with some seeds two people dress alike."""
     rng = np.random.default_rng([seed, 0xCA50])
     order = rng.permutation(len(_WARDROBE)).tolist()
     alike = rng.random() < _ALIKE
@@ -93,8 +93,8 @@ def casual(walker: int, seed: int) -> Outfit:
     return worn
 
 
-def shirt(player: int, team: int) -> Outfit:
-    """Give a player what their team plays in: only hair, skin and height tell its players from each other."""
+def choose_team_outfit(player: int, team: int) -> Outfit:
+    """Return a player's outfit in the team's colors: only hair, skin and height tell its players apart."""
     who = _WARDROBE[(player * 5 + team * 3) % len(_WARDROBE)]
     upper, lower = _SHIRTS[team]
     return Outfit(
@@ -102,14 +102,14 @@ def shirt(player: int, team: int) -> Outfit:
     )
 
 
-def _faded(colour: Colour) -> Colour:
-    """Give nearly the same colour: washed more often."""
-    red, green, blue = (0.9 * part + 0.05 for part in colour)
+def _faded(color: Color) -> Color:
+    """Return nearly the same color, slightly faded."""
+    red, green, blue = (0.9 * part + 0.05 for part in color)
     return (red, green, blue)
 
 
-def _dye(rng: np.random.Generator, vivid: float = 0.75) -> Colour:
-    """Mix a colour far from the room's browns and greys: saturated, and either light or dark."""
+def _dye(rng: np.random.Generator, vivid: float = 0.75) -> Color:
+    """Mix a color far from the room's browns and grays: saturated, and either light or dark."""
     hue = rng.uniform(0, 2 * np.pi)
     light = rng.choice([0.24, 0.62])
     wave = 0.5 + 0.5 * np.cos(hue - np.array([0.0, 2.094, 4.189]))

@@ -1,4 +1,4 @@
-"""Drawing one walker: shaded capsules, nearest last, smoothed by drawing large and shrinking."""
+"""Drawn people: shaded capsules, nearest last, antialiased by drawing large and shrinking."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic.cameras.pinhole import Floats, Perspective
-from synthetic.drawing.body import Body
+from synthetic.cameras.pinhole import Floats, PinholeCamera
+from synthetic.drawing.limbs import Body
 
 _ARC = 7  # corners of a capsule's end
 _SHIFT = 4  # fractional bits of cv2's coordinates
@@ -25,7 +25,7 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A drawn walker: a patch whose top left corner is the picture's pixel ``(left, top)``."""
+    """A drawn object: a patch whose top left corner is the picture's pixel ``(left, top)``."""
 
     left: int
     top: int
@@ -33,33 +33,33 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ClipRegion:
     """The part of a figure's patch that lies within the picture."""
 
     area: tuple[slice, slice]  # of the picture
     patch: tuple[slice, slice]  # of the patch
 
 
-def clip(figure: Figure, view: Perspective) -> Part | None:
-    """Cut a figure to the picture, or give None where nothing of it is left."""
+def clip_to_image(figure: Figure, view: PinholeCamera) -> ClipRegion | None:
+    """Clip a figure to the picture; return None if nothing of it is left."""
     high, wide = figure.patch.shape[:2]
     left, top = max(figure.left, 0), max(figure.top, 0)
     right, bottom = min(figure.left + wide, view.width), min(figure.top + high, view.height)
     if left >= right or top >= bottom:
         return None
-    return Part(
+    return ClipRegion(
         (slice(top, bottom), slice(left, right)),
         (slice(top - figure.top, bottom - figure.top), slice(left - figure.left, right - figure.left)),
     )
 
 
-def draw_figure(view: Perspective, body: Body, joints: Floats, light: float) -> Figure | None:
-    """Draw a body by its joints ``(J, 3)`` in metres; `light` scales its colours.
+def draw_figure(view: PinholeCamera, body: Body, joints: Floats, light: float) -> Figure | None:
+    """Draw a body by its joints ``(J, 3)`` in meters; `light` scales its colors.
 
     The patch reaches beyond the picture's edge where the body does. None where the body is behind the camera.
     """
     pixels, depth = view.project(joints)
-    if depth.min() < 0.3:  # noqa: PLR2004 — metres; nobody can stand inside the lens
+    if depth.min() < 0.3:  # noqa: PLR2004 — meters; nobody can stand inside the lens
         return None
     scale = view.focal / depth
     first, last = pixels[body.starts], pixels[body.ends]
@@ -74,12 +74,12 @@ def draw_figure(view: Perspective, body: Body, joints: Floats, light: float) -> 
         (first - corner) * fine - 0.5, (last - corner) * fine - 0.5, radii * fine, _sunward(view)
     )
     middle = (depth[body.starts] + depth[body.ends]) / 2
-    away = np.array([middle[limbs].mean() for limbs in body.members]) - body.nearer
+    away = np.array([middle[limbs].mean() for limbs in body.groups]) - body.depth_offset
     canvas = np.zeros((height * fine, width * fine, 4), dtype=np.uint8)
-    colours = np.clip(body.colours[:, None, ::-1] * _TONES[:, None] * (255 * light), 0, 255)
-    inks = np.concatenate([colours, np.full((*colours.shape[:2], 1), 255.0)], axis=2).tolist()
-    for member in np.argsort(-away, kind="stable").tolist():
-        limbs = body.members[member].tolist()
+    colors = np.clip(body.colors[:, None, ::-1] * _TONES[:, None] * (255 * light), 0, 255)
+    inks = np.concatenate([colors, np.full((*colors.shape[:2], 1), 255.0)], axis=2).tolist()
+    for group in np.argsort(-away, kind="stable").tolist():
+        limbs = body.groups[group].tolist()
         for tone in range(len(_TONES)):
             for limb in limbs:
                 if tone < body.tones[limb]:
@@ -88,15 +88,15 @@ def draw_figure(view: Perspective, body: Body, joints: Floats, light: float) -> 
     return Figure(left, top, np.asarray(patch, dtype=np.uint8))
 
 
-def _sunward(view: Perspective) -> Floats:
-    """Give the light's direction in the picture."""
+def _sunward(view: PinholeCamera) -> Floats:
+    """Return the light's direction in the picture."""
     across = view.axes[:2] @ _SUN
     unit: Floats = across / np.linalg.norm(across)
     return unit
 
 
 def _outlines(first: Floats, last: Floats, radii: Floats, sunward: Floats) -> NDArray[np.int32]:
-    """Give the outlines ``(L, T, 2 * _ARC, 2)`` of capsules in every tone, in cv2's fixed point."""
+    """Return the outlines ``(L, T, 2 * _ARC, 2)`` of capsules in every tone, in cv2's fixed point."""
     span = last - first
     length = np.hypot(span[:, 0], span[:, 1])
     angle = np.arctan2(span[:, 1], span[:, 0])
@@ -107,10 +107,24 @@ def _outlines(first: Floats, last: Floats, radii: Floats, sunward: Floats) -> ND
     front = (angle - tangent)[:, None] + (2 * tangent)[:, None] * turn
     circles = [np.stack([np.cos(arc), np.sin(arc)], axis=-1) for arc in (back, front)]
     ends = []
-    for centre, radius, circle in zip((first, last), radii.T, circles, strict=True):
-        middle = centre[:, None] + radius[:, None, None] * _OFFSETS[:, None] * sunward
+    for center, radius, circle in zip((first, last), radii.T, circles, strict=True):
+        middle = center[:, None] + radius[:, None, None] * _OFFSETS[:, None] * sunward
         rim = radius[:, None, None, None] * _GIRTHS[:, None, None] * circle[:, None]
         ends.append(middle[:, :, None] + rim)
     outline = np.concatenate(ends, axis=2)
     fixed: NDArray[np.int32] = np.rint(outline * (1 << _SHIFT)).astype(np.int32)
     return fixed
+
+
+def paste(image: Bytes, view: PinholeCamera, figure: Figure, visible_mask: Bytes | None = None) -> None:
+    """Blend a figure over a picture ``(H, W, 3)``, in place; the mask is its clipped part's visible share."""
+    part = clip_to_image(figure, view)
+    if part is None:
+        return
+    patch = figure.patch[part.patch]
+    if visible_mask is not None:
+        shown = cv2.multiply(patch, cv2.merge([visible_mask] * 4), scale=1 / 255)
+        patch = np.asarray(shown, dtype=np.uint8)
+    through = cv2.cvtColor(255 - patch[:, :, 3], cv2.COLOR_GRAY2BGR)
+    behind = cv2.multiply(image[part.area], through, scale=1 / 255)
+    image[part.area] = cv2.add(behind, cv2.cvtColor(patch, cv2.COLOR_BGRA2BGR))

@@ -1,4 +1,4 @@
-"""Rays against the blocks of furniture."""
+"""Ray casting: intersections of rays with blocks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from synthetic.cameras.pinhole import Floats
 from synthetic.room.room import Block
 
-FAR = 1e9  # a ray's distance, metres, where it hits nothing
+FAR = 1e9  # a ray's distance, meters, where it hits nothing
 
 
 def _slabs(low: Floats, high: Floats, origin: Floats, rays: Floats) -> tuple[Floats, Floats]:
@@ -25,11 +25,11 @@ def _slabs(low: Floats, high: Floats, origin: Floats, rays: Floats) -> tuple[Flo
 
 
 def _quadric(block: Block, origin: Floats, rays: Floats) -> tuple[Floats, Floats]:
-    """Hit the ellipsoid, or the cylinder with its lid, that touches the block's faces."""
+    """Intersect rays with the ellipsoid, or the cylinder with its lid, that touches the block's faces."""
     low, high = np.array(block.low), np.array(block.high)
-    radii, centre = (high - low) / 2, (high + low) / 2
+    radii, center = (high - low) / 2, (high + low) / 2
     weight = np.array([1.0, 1.0, 1.0 if block.shape == "ball" else 0.0]) / radii**2
-    offset = origin - centre
+    offset = origin - center
     a = (rays**2 * weight).sum(axis=1)
     b = (rays * offset * weight).sum(axis=1)
     root = b * b - a * ((offset**2 * weight).sum() - 1.0)
@@ -53,15 +53,15 @@ def _lid(
     return np.where(inside, top, distance), np.where(inside[:, None], up, normal)
 
 
-def hit(block: Block, origin: Floats, rays: Floats) -> tuple[Floats, Floats]:
-    """Give the distance ``(N,)`` (`FAR` where missed) and the outward normal ``(N, 3)`` of each ray's hit."""
+def intersect(block: Block, origin: Floats, rays: Floats) -> tuple[Floats, Floats]:
+    """Return each ray's distance ``(N,)``, `FAR` if missed, and the outward normal ``(N, 3)`` of its hit."""
     if block.shape == "box":
         return _slabs(np.array(block.low), np.array(block.high), origin, rays)
     return _quadric(block, origin, rays)
 
 
-def may_hit(block: Block, origin: Floats, rays: Floats) -> NDArray[np.bool_]:
-    """Say which rays come near a block at all: the cheap test before the exact one."""
+def may_intersect(block: Block, origin: Floats, rays: Floats) -> NDArray[np.bool_]:
+    """Return which rays may hit a block: the cheap test before the exact one."""
     low, high = np.array(block.low), np.array(block.high)
     toward = (low + high) / 2 - origin
     along = rays @ toward

@@ -1,4 +1,4 @@
-"""The soft shadow of one walker on the floor."""
+"""The soft shadow of a person on the floor."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic.cameras.pinhole import Floats, Perspective
+from synthetic.cameras.pinhole import Floats, PinholeCamera
 from synthetic.drawing.skeleton import Joint
 
 Bytes = NDArray[np.uint8]
 
 _COARSE = 4  # shadows are soft: they are drawn at a quarter of the size
-_SLANT = np.array([0.42, 0.34])  # metres on the floor per metre of height, away from the windows
+_SLANT = np.array([0.42, 0.34])  # meters on the floor per meter of height, away from the windows
 _BODY = 54  # darkness of 255
 _FEET = 112
-_NEAREST = 0.5  # metres; a nearer shadow would reach under the camera
+_NEAREST = 0.5  # meters; a nearer shadow would reach under the camera
 _SHIFT = 4  # fractional bits of cv2's coordinates
 _PARTS = (
     (Joint.ANKLE_L, Joint.KNEE_L, 0.07),
@@ -27,7 +27,7 @@ _PARTS = (
 )
 
 
-def cast_shadow(image: Bytes, floor: Bytes, view: Perspective, joints: Floats) -> None:
+def cast_shadow(image: Bytes, floor: Bytes, view: PinholeCamera, joints: Floats) -> None:
     """Darken a picture ``(H, W, 3)`` in place where a body's shadow falls on bare floor ``(H, W)``."""
     ground = joints.copy()
     ground[:, :2] += joints[:, 2:] * _SLANT
@@ -35,7 +35,7 @@ def cast_shadow(image: Bytes, floor: Bytes, view: Perspective, joints: Floats) -
     points, depth = view.project(ground)
     if depth.min() < _NEAREST:
         return
-    reach = view.focal / depth  # pixels per metre
+    reach = view.focal / depth  # pixels per meter
     margin = 0.5 * float(reach.max())
     limits = (view.width, view.height)
     low = np.clip(points.min(axis=0) - margin, 0, limits).astype(int) // _COARSE * _COARSE
@@ -45,7 +45,7 @@ def cast_shadow(image: Bytes, floor: Bytes, view: Perspective, joints: Floats) -
     wide, tall = (high - low).tolist()
     size = ((tall + _COARSE - 1) // _COARSE, (wide + _COARSE - 1) // _COARSE)
     local, scale = (points - low) / _COARSE, reach / _COARSE
-    dark = np.maximum(_body_shadow(size, local, scale), _contact(size, local, scale, round_=view.overhead))
+    dark = np.maximum(_body_shadow(size, local, scale), _contact(size, local, scale, round_=view.looks_down))
     full = cv2.resize(dark, None, fx=_COARSE, fy=_COARSE, interpolation=cv2.INTER_LINEAR)[:tall, :wide]
     area = (slice(low[1], high[1]), slice(low[0], high[0]))
     kept = cv2.cvtColor(255 - cv2.multiply(full, floor[area], scale=1 / 255), cv2.COLOR_GRAY2BGR)
@@ -63,7 +63,7 @@ def _body_shadow(size: tuple[int, int], points: Floats, scale: Floats) -> Bytes:
 
 
 def _contact(size: tuple[int, int], points: Floats, scale: Floats, *, round_: bool) -> Bytes:
-    """Draw the small dark places under the feet, which make them stand on the floor.
+    """Draw the small dark contact shadows under the feet.
 
     They are `round_` from straight above, and flat from elsewhere.
     """

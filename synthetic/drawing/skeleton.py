@@ -1,4 +1,4 @@
-"""A walking body: joints in space from a pose. All measures are shares of the body's height."""
+"""A walking skeleton: the joints in space for a pose. All measures are shares of the body's height."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from enum import IntEnum
 import numpy as np
 
 from synthetic.cameras.pinhole import Floats
-from synthetic.walking.stroll import Pose
+from synthetic.walking.trajectory import Pose
 
 STRIDE = 0.69  # two steps, of the height
 _THIGH, _SHIN, _ANKLE = 0.243, 0.243, 0.042
@@ -17,8 +17,8 @@ _HIP, _SHOULDER, _NECK, _HEAD = 0.525, 0.790, 0.815, 0.926
 _HIP_SIDE, _SHOULDER_SIDE = 0.050, 0.104
 _UPPER_ARM, _FOREARM, _FOOT = 0.168, 0.165, 0.125
 _STANCE = 0.6  # the share of a stride in which a foot stands
-_BRISK = 0.75  # metres per second: the pace of a full swing
-_RUN = (2.6, 4.6)  # metres per second: from the first on somebody runs, from the second as hard as they can
+_BRISK = 0.75  # meters per second: the pace of a full swing
+_RUN = (2.6, 4.6)  # meters per second: from the first on somebody runs, from the second as hard as they can
 
 
 class Joint(IntEnum):
@@ -60,8 +60,8 @@ class _Step:
     pitch: float  # of the foot, radians; toes down is positive
 
 
-def joints(pose: Pose, height: float) -> Floats:
-    """Give the joints ``(len(Joint), 3)`` in metres of a body of a height in metres."""
+def place_joints(pose: Pose, height: float) -> Floats:
+    """Return the joints ``(len(Joint), 3)``, in meters, of a body of a height in meters."""
     local = _local(pose, height) * height
     cos, sin = math.cos(pose.heading), math.sin(pose.heading)
     world = np.empty_like(local)
@@ -72,7 +72,7 @@ def joints(pose: Pose, height: float) -> Floats:
 
 
 def _local(pose: Pose, height: float) -> Floats:
-    """Pose the body in its own frame: ahead, left, up."""
+    """Return the joints in the body's own frame: ahead, left, up."""
     phase = pose.walked / (STRIDE * height) % 1.0
     swing = min(pose.speed / _BRISK, 1.0)
     bob = -0.015 * swing * (1 + math.cos(4 * math.pi * (phase - 0.05)))
@@ -131,7 +131,7 @@ def _leg(body: Floats, side: int, sign: float, step: _Step, bob: float) -> None:
 
 
 def _arm(body: Floats, side: int, sign: float, turn: float, swing: float, run: float) -> None:
-    """Hang an arm from its shoulder, which is in place, and swing it against its leg; runners bend theirs."""
+    """Set an arm's joints: it swings against its leg, and runners bend it."""
     back = math.cos(2 * math.pi * (turn - 0.05))
     angle = -(0.42 + 0.25 * run) * swing * back + 0.03 - 0.15 * run
     bent = angle + 0.22 + 0.28 * swing * (1 - back) / 2 + 1.15 * run

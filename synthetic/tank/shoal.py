@@ -1,7 +1,7 @@
-"""The shoal: where every fish is, and how it holds itself, at any moment.
+"""A shoal of fish: places, headings and tail beats at any moment.
 
-Time is cut into rounds that begin and end at marks: places and velocities that are a pure function of the
-seed and the round's number. So any moment can be asked for at once, in any process.
+Time is cut into rounds that begin and end at waypoints: places and velocities that are a pure function of
+the seed and the round's number. So any moment can be drawn at once, in any process.
 """
 
 from __future__ import annotations
@@ -13,25 +13,30 @@ import cv2
 import numpy as np
 
 from synthetic.cameras.pinhole import Floats
-from synthetic.tank.steer import CRUISE, HIGH, LOW, RATE, STRAIGHT, Mark, swim
-from synthetic.walking.gait import whole
+from synthetic.tank.steering import CRUISE, HIGH, LOW, RATE, STRAIGHT, Waypoints, swim_between
+from synthetic.walking.trajectory import whole_strides
 
 ROUND = 32.0  # seconds
 _DRAWS = 60  # places of which a fish takes the one that is furthest from the others'
-_PASSING = (-STRAIGHT, -STRAIGHT / 2, 0.0, STRAIGHT / 3)  # seconds around a mark in which it has room
-_BEFORE = 10_000  # rounds before the scene begins have numbers too, and a seed takes none below zero
-_BEAT = 0.42  # metres swum per beat of the tail
-_APART = 1.4  # metres: more room than that nobody needs
-_RING = 0.95  # metres: everybody begins on a circle around the first camera's axis, and swims towards it
-_TURNING = 0.2  # seconds over which a head follows its way
+_PASSING = (
+    -STRAIGHT,
+    -STRAIGHT / 2,
+    0.0,
+    STRAIGHT / 3,
+)  # seconds around a waypoint in which a fish keeps clear of others
+_BEFORE = 10_000  # added to numbers of rounds in seeds, which cannot be negative
+_BEAT = 0.42  # meters swum per beat of the tail
+_APART = 1.4  # meters between two fish that count as far apart
+_RING = 0.95  # meters: all begin on a circle around the first camera's axis, and swims towards it
+_TURNING = 0.2  # seconds over which a head follows its path
 _EASE = 0.8  # seconds at a round's ends in which bodies straighten
 
 
 @dataclass(frozen=True, slots=True)
-class Swimmers:
+class FishState:
     """All fish at one instant."""
 
-    places: Floats  # (P, 3) metres
+    places: Floats  # (P, 3) meters
     ahead: Floats  # (P, 3) unit vectors: where the heads point
     beats: Floats  # (P,) of the tail, counted
     vigour: Floats  # (P,) how far the tail swings, 1 when cruising
@@ -55,39 +60,39 @@ class Shoal:
         self._seed = seed
         self._round = lru_cache(maxsize=3)(self._swim)
 
-    def at(self, seconds: float) -> Swimmers:
-        """Give all fish at a moment of the scene."""
+    def at(self, seconds: float) -> FishState:
+        """Return the state of all fish at a moment of the scene."""
         number = int(seconds // ROUND)
-        way = self._round(number)
+        path = self._round(number)
         position = (seconds - number * ROUND) * RATE
-        index = min(int(position), len(way.places) - 2)
+        index = min(int(position), len(path.places) - 2)
         share = position - index
         places, ahead, beats, vigour, bends = (
             part[index] * (1 - share) + part[index + 1] * share
-            for part in (way.places, way.ahead, way.beats, way.vigour, way.bends)
+            for part in (path.places, path.ahead, path.beats, path.vigour, path.bends)
         )
-        return Swimmers(places, _unit(ahead), beats, vigour, bends)
+        return FishState(places, _unit(ahead), beats, vigour, bends)
 
-    def _mark(self, number: int) -> Mark:
+    def _waypoints(self, number: int) -> Waypoints:
         if number == 0:
             return _ring(self._count)
         rng = np.random.default_rng([self._seed, 0xF154, number + _BEFORE])
-        way = np.array(_PASSING)[:, None]
+        path = np.array(_PASSING)[:, None]
         places, ahead = np.empty((self._count, 3)), np.empty((self._count, 3))
         for fish in range(self._count):
             spots, pace = _spots(rng)
-            ways = spots[:, None] + way * pace[:, None]  # (_DRAWS, moments, 3)
-            others = places[:fish, None] + way * ahead[:fish, None]
-            gaps = np.linalg.norm(ways[:, None] - others[None], axis=3)
-            inner = np.minimum(np.minimum(ways - LOW, HIGH - ways), 0).sum(axis=(1, 2))
+            paths = spots[:, None] + path * pace[:, None]  # (_DRAWS, moments, 3)
+            others = places[:fish, None] + path * ahead[:fish, None]
+            gaps = np.linalg.norm(paths[:, None] - others[None], axis=3)
+            inner = np.minimum(np.minimum(paths - LOW, HIGH - paths), 0).sum(axis=(1, 2))
             best = int((gaps.min(axis=(1, 2), initial=_APART) + inner).argmax())
             places[fish], ahead[fish] = spots[best], pace[best]
-        return Mark(places, ahead)
+        return Waypoints(places, ahead)
 
     def _swim(self, number: int) -> _Round:
         rng = np.random.default_rng([self._seed, 0x5417, number + _BEFORE])
-        start, end = self._mark(number), self._mark(number + 1)
-        places = swim(rng, start, end, ROUND)
+        start, end = self._waypoints(number), self._waypoints(number + 1)
+        places = swim_between(rng, start, end, ROUND)
         velocities = np.gradient(places, 1 / RATE, axis=0)
         velocities[0], velocities[-1] = start.velocities, end.velocities
         clock = np.arange(len(places)) / RATE
@@ -95,29 +100,29 @@ class Shoal:
         velocities = _steady(velocities, ease)
         speeds = np.linalg.norm(velocities, axis=2)
         steps = np.linalg.norm(np.diff(places, axis=0, prepend=places[:1]), axis=2)
-        beats = np.array([whole(fish, _BEAT) / _BEAT for fish in steps.T]).T.reshape(speeds.shape)
+        beats = np.array([whole_strides(fish, _BEAT) / _BEAT for fish in steps.T]).T.reshape(speeds.shape)
         turns = np.unwrap(np.arctan2(velocities[..., 1], velocities[..., 0]), axis=0)
         bends = np.clip(np.gradient(turns, 1 / RATE, axis=0), -2.5, 2.5) * ease[:, None]
         return _Round(places, velocities, beats, np.clip(speeds / CRUISE, 0.4, 1.5), bends)
 
 
 def _spots(rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Draw places and velocities ``(_DRAWS, 3)`` that a fish might pass a mark with."""
+    """Draw candidates ``(_DRAWS, 3)`` for a fish's place and velocity at a waypoint."""
     turn = rng.uniform(0, 2 * np.pi, _DRAWS)
     ahead = np.column_stack([np.cos(turn), np.sin(turn), rng.uniform(-0.15, 0.15, _DRAWS)])
     return rng.uniform(LOW + 0.3, HIGH - 0.3, (_DRAWS, 3)), CRUISE * _unit(ahead)
 
 
-def _ring(count: int) -> Mark:
-    """Set the fish on a circle, heads towards the first camera."""
+def _ring(count: int) -> Waypoints:
+    """Return waypoints on a circle, heads towards the first camera."""
     angles = 2 * np.pi * np.arange(count) / max(count, 1) + np.pi / 2
     middle = (LOW + HIGH) / 2
     spread = _RING * np.column_stack([np.cos(angles) * 1.5, np.zeros(count), np.sin(angles) * 0.9])
-    return Mark(middle + spread, np.tile([0.0, -CRUISE, 0.0], (count, 1)))
+    return Waypoints(middle + spread, np.tile([0.0, -CRUISE, 0.0], (count, 1)))
 
 
 def _steady(velocities: Floats, ease: Floats) -> Floats:
-    """Smooth velocities ``(T, P, 3)``: heads turn less suddenly than ways do, except at a round's ends."""
+    """Smooth velocities ``(T, P, 3)``: heads turn less suddenly than paths do, except at a round's ends."""
     flat = velocities.reshape(len(velocities), -1)
     soft = cv2.GaussianBlur(flat, (1, 13), sigmaX=1, sigmaY=_TURNING * RATE, borderType=cv2.BORDER_REPLICATE)
     steady: Floats = velocities + ease[:, None, None] * (soft - flat).reshape(velocities.shape)

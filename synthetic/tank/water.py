@@ -1,6 +1,6 @@
-"""Light under water: what distance does to colours, the net of light on the ground, and shafts of sun.
+"""Light under water: absorption by distance, caustics on the ground, and shafts of sunlight.
 
-Colours are red, green, blue in 0..1.
+Colors are red, green, blue in 0..1.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic.cameras.pinhole import Floats, Perspective
+from synthetic.cameras.pinhole import Floats, PinholeCamera
 
-_MURK = np.array([0.125, 0.088, 0.084])  # of its light that a colour loses per metre
+_MURK = np.array([0.125, 0.088, 0.084])  # of its light that a color loses per meter
 _DEEP = np.array([0.035, 0.205, 0.265])
 _SHALLOW = np.array([0.30, 0.62, 0.63])
 TILE = 128  # pixels of the net of light, which repeats
-_TILE_METRES = 2.6
+_TILE_METERS = 2.6
 _RAYS = 208  # in a row of the grid that makes the net
 _WAVES = ((1, 2), (2, -1), (-2, 2), (3, 1), (-1, 3), (2, 3), (4, -2), (-3, 3), (1, -5), (5, 2))  # per tile
 _STEEP = 0.115  # of the longest waves
@@ -34,21 +34,21 @@ _SHAFTS = (
 Bytes = NDArray[np.uint8]
 
 
-def through(colours: Floats, metres: Floats, water: Floats) -> Floats:
-    """Look at colours ``(..., 3)`` through so many metres ``(...)`` of water, itself ``(..., 3)``."""
-    left = np.exp(-_MURK * metres[..., None])
-    seen: Floats = colours * left + water * (1 - left)
+def seen_through_water(colors: Floats, meters: Floats, water: Floats) -> Floats:
+    """Return colors ``(..., 3)`` seen through meters ``(...)`` of water of a color ``(..., 3)``."""
+    left = np.exp(-_MURK * meters[..., None])
+    seen: Floats = colors * left + water * (1 - left)
     return seen
 
 
-def kept(metres: Floats) -> Floats:
-    """Say how much of its light a colour keeps through so many metres ``(...)``: ``(..., 3)``."""
-    left: Floats = np.exp(-_MURK * metres[..., None])
+def transmittance(meters: Floats) -> Floats:
+    """Return the share of light ``(..., 3)`` that is left after so many meters ``(...)`` of water."""
+    left: Floats = np.exp(-_MURK * meters[..., None])
     return left
 
 
 def open_water(rays: Floats) -> Floats:
-    """Give the colour of water ``(..., 3)`` that is looked into along unit vectors ``(..., 3)``."""
+    """Return the color ``(..., 3)`` of open water in the directions of unit vectors ``(..., 3)``."""
     rise = np.clip((rays[..., 2] + 0.34) / 0.72, 0, 1)
     share = (rise * rise * (3 - 2 * rise))[..., None]
     water: Floats = _DEEP + (_SHALLOW - _DEEP) * share
@@ -57,7 +57,7 @@ def open_water(rays: Floats) -> Floats:
 
 @lru_cache(maxsize=1)
 def _waves() -> tuple[Floats, NDArray[np.float32], NDArray[np.float32]]:
-    """Give the waves W of the surface: their turns (W,) per second, and slopes on a grid of rays.
+    """Return the waves W of the surface: their turns (W,) per second, and slopes on a grid of rays.
 
     The slopes ``(2 W, 2 R)`` are towards x and y side by side, at the beginning and a quarter turn later; the
     rays' own places ``(2, R)`` are in pixels of the net. All that repeats from tile to tile.
@@ -80,8 +80,8 @@ def _waves() -> tuple[Floats, NDArray[np.float32], NDArray[np.float32]]:
 
 
 @lru_cache(maxsize=2)
-def light_net(seconds: float) -> Bytes:
-    """Give the net of light ``(TILE, TILE)`` at a moment: 0 is shade, 255 the brightest line.
+def caustics(seconds: float) -> Bytes:
+    """Return the caustics ``(TILE, TILE)`` at a moment: 0 is shade, 255 the brightest line.
 
     Rays that fall on a grid of the surface are bent by the waves' slopes; where many come down it is bright.
     """
@@ -96,20 +96,20 @@ def light_net(seconds: float) -> Bytes:
     return np.asarray(np.clip((light - _SHADE) * _LINES, 0, 255), dtype=np.uint8)
 
 
-def net_pixels(points: Floats) -> Floats:
-    """Say where on the net of light world points ``(..., 3)`` lie: ``(..., 2)`` pixels, not wrapped.
+def caustic_pixels(points: Floats) -> Floats:
+    """Return the pixels ``(..., 2)`` of the caustics, not wrapped, for world points ``(..., 3)``.
 
     The sun stands a little aside: light moves on as it falls.
     """
-    metres = points[..., :2] + points[..., 2:] * np.array([0.25, 0.12])
-    pixels: Floats = metres * (TILE / _TILE_METRES)
+    meters = points[..., :2] + points[..., 2:] * np.array([0.25, 0.12])
+    pixels: Floats = meters * (TILE / _TILE_METERS)
     return pixels
 
 
-class Shafts:
-    """The shafts of sunlight in one camera's picture."""
+class LightShafts:
+    """Shafts of sunlight in one camera's picture."""
 
-    def __init__(self, view: Perspective) -> None:
+    def __init__(self, view: PinholeCamera) -> None:
         self._size = (view.width, view.height)
         wide, high = max(view.width // _COARSE, 2), max(view.height // _COARSE, 2)
         x, y = np.meshgrid((np.arange(wide) + 0.5) / wide, (np.arange(high) + 0.5) / high)
@@ -118,7 +118,7 @@ class Shafts:
         self._fade = np.clip(1.05 - y, 0, 1) ** 1.3 * np.exp(-(((x - 0.40) / 0.55) ** 2))
 
     def at(self, seconds: float) -> Bytes:
-        """Give the light ``(H, W, 3)``, blue, green, red, that shafts add to the picture."""
+        """Return the light ``(H, W, 3)``, blue, green, red, that shafts add to the picture."""
         waves = [np.sin(rate * 4 * self._slant + turn * seconds + phase) for rate, turn, phase in _SHAFTS]
         glow = np.clip(0.35 + sum(waves) / 3, 0, 1) ** 1.5 * self._fade
         light = (glow[..., None] * np.array([0.155, 0.165, 0.13]) * 255).astype(np.float32)

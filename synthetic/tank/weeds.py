@@ -1,4 +1,4 @@
-"""Weeds: clumps of blades that grow from the sand, sway, and hide who swims behind them."""
+"""Weeds: clumps of blades that grow from the sand, sway, and hide fish behind them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic.cameras.pinhole import Floats, Perspective
+from synthetic.cameras.pinhole import Floats, PinholeCamera
 from synthetic.drawing.figure import Figure
-from synthetic.tank.water import open_water, through
+from synthetic.tank.water import open_water, seen_through_water
 
 _JOINTS = 11  # of a blade
 _SHARE = np.linspace(0, 1, _JOINTS)  # of the way up
-_SWAY = 0.22  # metres at the tip of a blade of one metre
-_CLUMPS = (  # x, y and height in metres
+_SWAY = 0.22  # meters at the tip of a blade of one meter
+_CLUMPS = (  # x, y and height in meters
     (0.55, 0.8, 1.25),
     (1.75, 3.1, 1.55),
     (2.45, 1.0, 0.95),
@@ -37,11 +37,11 @@ _SHIFT = 4  # fractional bits of cv2's coordinates
 class _Meadow:
     """All blades B, clump after clump."""
 
-    feet: Floats  # (B, 3) metres
-    heights: Floats  # (B,) metres
-    widths: Floats  # (B, _JOINTS) metres, half
+    feet: Floats  # (B, 3) meters
+    heights: Floats  # (B,) meters
+    widths: Floats  # (B, _JOINTS) meters, half
     phases: Floats  # (B,) radians
-    colours: Floats  # (B, 3) red, green, blue in 0..1
+    colors: Floats  # (B, 3) red, green, blue in 0..1
     clumps: tuple[slice, ...]
 
 
@@ -61,8 +61,8 @@ def _grow() -> _Meadow:
         parts.append((feet, heights, widths, phases, greens))
     ends = np.cumsum([0, *(len(part[0]) for part in parts)]).tolist()
     clumps = tuple(slice(first, last) for first, last in pairwise(ends))
-    feet, heights, widths, phases, colours = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return _Meadow(feet, heights, widths, phases, colours, clumps)
+    feet, heights, widths, phases, colors = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return _Meadow(feet, heights, widths, phases, colors, clumps)
 
 
 _MEADOW = _grow()
@@ -70,27 +70,27 @@ _MEADOW = _grow()
 
 @dataclass(frozen=True, slots=True)
 class Clump:
-    """A clump as it is drawn, and how far it is from the camera, in metres."""
+    """A drawn clump, and its distance from the camera in meters."""
 
-    away: float
+    distance: float
     figure: Figure
 
 
 class Weeds:
     """The weeds before one camera."""
 
-    def __init__(self, view: Perspective) -> None:
+    def __init__(self, view: PinholeCamera) -> None:
         self._view = view
         middles = _MEADOW.feet + _MEADOW.heights[:, None] * np.array([0, 0, 0.5])
-        sight = middles - view.centre
-        away = np.linalg.norm(sight, axis=1)
-        self._away = [float(away[clump].mean()) for clump in _MEADOW.clumps]
+        sight = middles - view.center
+        distance = np.linalg.norm(sight, axis=1)
+        self._away = [float(distance[clump].mean()) for clump in _MEADOW.clumps]
         # Of a clump the furthest blades are drawn first.
-        self._order = [np.arange(c.start, c.stop)[np.argsort(-away[c])].tolist() for c in _MEADOW.clumps]
-        water = open_water(sight / away[:, None])
+        self._order = [np.arange(c.start, c.stop)[np.argsort(-distance[c])].tolist() for c in _MEADOW.clumps]
+        water = open_water(sight / distance[:, None])
         self._inks = []
         for tone in _TONES:
-            seen = np.clip(through(_MEADOW.colours * tone, away, water)[:, ::-1] * 255, 0, 255)
+            seen = np.clip(seen_through_water(_MEADOW.colors * tone, distance, water)[:, ::-1] * 255, 0, 255)
             self._inks.append(np.column_stack([seen, np.full(len(seen), 255.0)]).tolist())
 
     def at(self, seconds: float) -> list[Clump]:
@@ -101,12 +101,12 @@ class Weeds:
         along = np.gradient(pixels, axis=1)
         across = np.stack([-along[..., 1], along[..., 0]], axis=-1)
         across /= np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-9)
-        aside = across * (_MEADOW.widths * self._view.focal / np.maximum(depth, 1e-6))[..., None]
-        rims = np.stack([pixels - aside, pixels, pixels + aside])  # (3, B, _JOINTS, 2)
+        offsets = across * (_MEADOW.widths * self._view.focal / np.maximum(depth, 1e-6))[..., None]
+        rims = np.stack([pixels - offsets, pixels, pixels + offsets])  # (3, B, _JOINTS, 2)
         return [
-            Clump(away, self._draw(rims[:, clump], order, clump.start))
-            for clump, order, away in zip(_MEADOW.clumps, self._order, self._away, strict=True)
-            if depth[clump].min() > 0.3  # noqa: PLR2004 — metres
+            Clump(distance, self._draw(rims[:, clump], order, clump.start))
+            for clump, order, distance in zip(_MEADOW.clumps, self._order, self._away, strict=True)
+            if depth[clump].min() > 0.3  # noqa: PLR2004 — meters
         ]
 
     def _draw(self, rims: Floats, order: list[int], first: int) -> Figure:
@@ -125,7 +125,7 @@ class Weeds:
 
 
 def _spines(seconds: float) -> Floats:
-    """Give the joints ``(B, _JOINTS, 3)`` of all blades, metres."""
+    """Return the joints ``(B, _JOINTS, 3)`` of all blades, in meters."""
     reach = _SWAY * _MEADOW.heights[:, None] * _SHARE**1.6
     phase = _MEADOW.phases[:, None] - 2.4 * _SHARE
     x = reach * (np.sin(0.9 * seconds + phase) + 0.45 * np.sin(2.1 * seconds + 2 * phase))

@@ -1,1 +1,1 @@
-"""How people walk: routes, gatherings, collision avoidance."""
+"""Walking people: routes, gatherings, collision avoidance."""

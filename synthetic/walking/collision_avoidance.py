@@ -1,33 +1,39 @@
-"""Giving way: ways of several people, planned together, are bent where they come too near each other."""
+"""Collision avoidance: paths that are planned together are bent apart, and a single path steps aside."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from synthetic.cameras.pinhole import Floats
+from synthetic.room.room import Room
 
 _ROUNDS = 60
-_SMOOTH = 0.45  # seconds over which one bends one's way
+_SMOOTH = 0.45  # seconds over which a path is bent
 _SIDE = np.radians(50.0)  # both turn to the same hand: so they pass, and do not push each other back
 _FIRM = 0.7  # of what is missing is made up for in each round
 _EASE = 0.6  # seconds at either end that stay as they are
+MIN_DISTANCE = 0.8  # meters: nearer than this is a bump
+_RAMP = 1.5  # seconds to step aside, and to come back
+_WALL = 0.45  # meters kept from walls
+_FURNITURE = 0.25  # meters kept from furniture
 
 
-def give_way(ways: Floats, keep: Floats, rate: float) -> Floats:
-    """Bend ways ``(P, T, 2 or 3)``, sampled `rate` times a second, until pairs keep ``(P, P)`` metres apart.
+def separate_paths(paths: Floats, keep: Floats, rate: float) -> Floats:
+    """Bend paths ``(P, T, 2 or 3)``, sampled `rate` times a second, until pairs keep ``(P, P)`` meters apart.
 
-    Ends stay where they are. Where there is no room for all, people come nearer than they should.
+    Ends stay where they are. Without room for all, some pairs come nearer than that.
     """
-    people, count, axes = ways.shape
+    people, count, axes = paths.shape
     if people < 2:  # noqa: PLR2004 — nobody to give way to
-        return ways
+        return paths
     clock = np.arange(count)
     ease = np.clip(np.minimum(clock, count - 1 - clock) / (_EASE * rate), 0, 1)[None, :, None]
     turn = np.eye(axes)
     turn[:2, :2] = [[np.cos(_SIDE), np.sin(_SIDE)], [-np.sin(_SIDE), np.cos(_SIDE)]]
     kernel = 2 * int(3 * _SMOOTH * rate) + 1
-    bent = ways.copy()
+    bent = paths.copy()
     for _ in range(_ROUNDS):
         gaps = bent[:, None] - bent[None]
         far = np.linalg.norm(gaps, axis=3)
@@ -45,3 +51,51 @@ def give_way(ways: Floats, keep: Floats, rate: float) -> Floats:
         )
         bent += _FIRM * ease * (soft * peak).reshape(people, axes, count).transpose(0, 2, 1)
     return bent
+
+
+def proximity_cost(mine: Floats, others: Floats, keep: float = MIN_DISTANCE) -> float:
+    """Compute the cost of a path ``(T, 2)`` that comes nearer than `keep` to others ``(O, T, 2)``."""
+    apart = np.hypot(*(others - mine).transpose(2, 0, 1))
+    return float((np.maximum(keep - apart, 0) ** 2).sum())
+
+
+def sidestep(room: Room, mine: Floats, others: Floats, rate: float) -> Floats:
+    """Move a path ``(T, 2)``, sampled `rate` times a second, aside where it meets others ``(O, T, 2)``.
+
+    At every encounter the path is moved in one direction, away from the other at their closest, and back:
+    as far as walls and furniture allow, so not at all in a doorway.
+    """
+    path = mine.copy()
+    for other in others:
+        apart = np.hypot(*(mine - other).T)
+        near = np.flatnonzero(apart < MIN_DISTANCE)
+        for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1):
+            if len(run):
+                closest = run[apart[run].argmin()]
+                path = _aside(room, path, path[closest] - other[closest], run, rate)
+    return path
+
+
+def _aside(room: Room, path: Floats, away: Floats, run: NDArray[np.intp], rate: float) -> Floats:
+    gap = float(np.hypot(away[0], away[1]))
+    direction = away / gap if gap > 1e-6 else np.array([1.0, 0.0])  # noqa: PLR2004 — exactly on each other
+    clock = np.arange(len(path))
+    rise = np.clip((clock - run[0]) / (_RAMP * rate) + 1, 0, 1)
+    fall = np.clip((run[-1] - clock) / (_RAMP * rate) + 1, 0, 1)
+    share = np.minimum(rise, fall)
+    moving = share > 0
+    step = (share * share * (3 - 2 * share))[:, None] * direction * max(MIN_DISTANCE - gap, 0.0)
+    for part in (1.0, 0.66, 0.33):
+        moved: Floats = path + part * step
+        if _free(room, moved[moving]):
+            return moved
+    return path
+
+
+def _free(room: Room, path: Floats) -> bool:
+    """Return whether a path ``(T, 2)`` keeps off the walls and the furniture."""
+    inner = np.minimum(path, np.array([room.width, room.depth]) - path).min()
+    west, south, east, north = room.footprints().T[:, :, None]
+    dx = np.maximum(np.maximum(west - path[:, 0], path[:, 0] - east), 0)
+    dy = np.maximum(np.maximum(south - path[:, 1], path[:, 1] - north), 0)
+    return bool(inner > _WALL) and bool((dx * dx + dy * dy).min() > _FURNITURE**2)

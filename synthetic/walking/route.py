@@ -1,4 +1,4 @@
-"""One visit to the room: a way drawn at random, then walked at a pace that people have."""
+"""Random routes through a room: in by a door, from place to place, and out by a door."""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from synthetic.cameras.sightlines import Shot, follow, shoot
 from synthetic.room.room import Door, Point, Room
 
-_MARGIN = 1.0  # metres kept from walls
-_CORNER = 2.6  # metres kept from the room's corners: cameras hang there, and see nobody's feet beneath them
-_CLEARANCE = 0.45  # metres kept from furniture
+_MARGIN = 1.0  # meters kept from walls
+_CORNER = 2.6  # meters kept from the room's corners: cameras hang there, and see nobody's feet beneath them
+_CLEARANCE = 0.45  # meters kept from furniture
 _TRIES = 40
 _CHOICE = 6  # places that one chooses from
-_NEAREST = 2.0  # metres from one place to the next
-_CIRCLE = 0.7  # metres from the middle of a meeting to who takes part
+_NEAREST = 2.0  # meters from one place to the next
+_CIRCLE = 0.7  # meters from the middle of a meeting to each participant
+_BETTER = 1.3  # times as large as the best view so far must a view be to become the best
+_ABOVE = 2.1  # meters from a body's middle up to a camera
+_FRAME = 0.4  # seconds from one look at the cameras to the next
+_SOONEST, _LATEST = 7.0, 13.0  # seconds for which one camera should be the best
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,15 +36,15 @@ class Route:
     """The legs of a visit and the seconds that they take at a given pace."""
 
     start: Point
-    pace: float  # metres per second
-    eyes: tuple[Point, ...]  # the cameras before which it is walked
+    pace: float  # meters per second
+    camera_positions: tuple[Point, ...]  # the cameras whose best view should change from time to time
     legs: list[Leg] = field(default_factory=list)
     seconds: float = 0.0
-    shot: Shot = field(init=False)  # which of them sees the walker best when the route has come here
+    best_view: BestView = field(init=False)  # of the person at the end of the route
 
     def __post_init__(self) -> None:
-        """Look at the start."""
-        self.shot = shoot(self.start, self.eyes)
+        """Find the camera that shows the start best."""
+        self.best_view = best_view_at(self.start, self.camera_positions)
 
     @property
     def here(self) -> Point:
@@ -51,8 +54,8 @@ class Route:
     def add(self, leg: Leg) -> None:
         """Append a leg."""
         seconds = math.dist(self.here, leg.end) / self.pace
-        self.shot = follow(self.shot, self.here, leg.end, seconds, self.eyes)
-        self.shot = follow(self.shot, leg.end, leg.end, leg.pause, self.eyes)
+        self.best_view = follow_best_view(self.best_view, self.here, leg.end, seconds, self.camera_positions)
+        self.best_view = follow_best_view(self.best_view, leg.end, leg.end, leg.pause, self.camera_positions)
         self.seconds += seconds + leg.pause
         self.legs.append(leg)
 
@@ -66,8 +69,8 @@ class Meeting:
     end: float
 
 
-def clear(room: Room, start: Point, end: Point) -> bool:
-    """Say whether one can walk straight from a point to another."""
+def is_walkable(room: Room, start: Point, end: Point) -> bool:
+    """Return whether one can walk straight from a point to another."""
     steps = max(int(math.dist(start, end) / 0.1), 1)
     share = np.linspace(0, 1, steps + 1)
     x = start[0] + (end[0] - start[0]) * share
@@ -79,32 +82,32 @@ def clear(room: Room, start: Point, end: Point) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Visit:
-    """What is given before a way is drawn."""
+class VisitPlan:
+    """The constraints of a random route."""
 
     seconds: float  # that it may take
-    pace: float  # metres per second
+    pace: float  # meters per second
     meetings: tuple[Meeting, ...]  # where others gather meanwhile
-    slot: float  # radians: the side from which this walker joins a meeting
-    eyes: tuple[Point, ...]  # of the cameras before which the way is staged
+    slot: float  # radians: the side from which this person joins a meeting
+    camera_positions: tuple[Point, ...]  # the best view should change between these from time to time
     begun: bool = False  # in the room already, walking
     restless: float = 0.0  # seconds from the visit's beginning in which there is no standing
 
 
-def draw(rng: np.random.Generator, room: Room, visit: Visit) -> Route:
-    """Draw a visit: in by one door, about the room, out by a door, away to the side."""
+def draw_route(rng: np.random.Generator, room: Room, visit: VisitPlan) -> Route:
+    """Draw a random route: in by one door, about the room, out by a door, away to the side."""
     way_in, way_out = (room.doors[int(rng.integers(len(room.doors)))] for _ in range(2))
-    hall = _hall(rng, room, way_out)
+    corridor = _corridor_side(rng, room, way_out)
     leave = 3.0 / visit.pace
     exit_point = room.beyond(way_out, 0.0, -0.9)
     if visit.begun:
-        route = _under_way(rng, room, visit, exit_point)
+        route = _begin_inside(rng, room, visit, exit_point)
     else:
-        route = Route(_hall(rng, room, way_in), visit.pace, visit.eyes)
+        route = Route(_corridor_side(rng, room, way_in), visit.pace, visit.camera_positions)
         for out in (0.75, -0.9):
             route.add(Leg(room.beyond(way_in, 0.0, out)))
     while True:
-        leg = _next(rng, room, route, exit_point, visit)
+        leg = _choose_leg(rng, room, route, exit_point, visit)
         cost = (
             math.dist(route.here, leg.end) / visit.pace
             + leg.pause
@@ -115,39 +118,39 @@ def draw(rng: np.random.Generator, room: Room, visit: Visit) -> Route:
         route.add(leg)
     for out in (-0.9, 0.75):
         route.add(Leg(room.beyond(way_out, 0.0, out)))
-    route.add(Leg(hall))
+    route.add(Leg(corridor))
     return route
 
 
-def _hall(rng: np.random.Generator, room: Room, door: Door) -> Point:
+def _corridor_side(rng: np.random.Generator, room: Room, door: Door) -> Point:
     """Choose a side of the corridor, out of sight of the doorway."""
     side = 2.2 if rng.random() < 0.5 else -2.2  # noqa: PLR2004 — even chances
     return room.beyond(door, side, 0.75)
 
 
-def _under_way(rng: np.random.Generator, room: Room, visit: Visit, home: Point) -> Route:
-    """Begin anywhere in the room, on the way to somewhere far."""
-    route = Route(_spot(rng, room), visit.pace, visit.eyes)
+def _begin_inside(rng: np.random.Generator, room: Room, visit: VisitPlan, home: Point) -> Route:
+    """Draw the first leg of a route that begins in the room: from anywhere to somewhere far."""
+    route = Route(_draw_place(rng, room), visit.pace, visit.camera_positions)
     for _ in range(2 * _TRIES):
-        route = Route(_spot(rng, room), visit.pace, visit.eyes)
-        end = _spot(rng, room)
-        far = math.dist(route.here, end) > visit.restless * visit.pace
-        if far and clear(room, route.here, end) and clear(room, end, home):
+        route = Route(_draw_place(rng, room), visit.pace, visit.camera_positions)
+        end = _draw_place(rng, room)
+        distance = math.dist(route.here, end) > visit.restless * visit.pace
+        if distance and is_walkable(room, route.here, end) and is_walkable(room, end, home):
             route.add(Leg(end))
             break
     return route
 
 
-def _next(rng: np.random.Generator, room: Room, route: Route, home: Point, visit: Visit) -> Leg:
+def _choose_leg(rng: np.random.Generator, room: Room, route: Route, home: Point, visit: VisitPlan) -> Leg:
     for meeting in visit.meetings:
         arrival = route.seconds + math.dist(route.here, meeting.place) / route.pace
         due = meeting.begin <= arrival < meeting.end and arrival > visit.restless
         if due and rng.random() < 0.6:  # noqa: PLR2004 — most go and meet
             x, y = meeting.place
             end = (x + _CIRCLE * math.cos(visit.slot), y + _CIRCLE * math.sin(visit.slot))
-            if clear(room, route.here, end) and clear(room, end, home):
+            if is_walkable(room, route.here, end) and is_walkable(room, end, home):
                 return Leg(end, rng.uniform(1.5, meeting.end - arrival + 1.5), meeting.place)
-    end = _way(rng, room, route, home, visit)
+    end = _choose_place(rng, room, route, home, visit)
     arrival = route.seconds + math.dist(route.here, end) / route.pace
     stays = rng.random() < 0.45 and arrival > visit.restless  # noqa: PLR2004 — not at every turn
     pause = rng.uniform(1.5, 4.5) if stays else 0.0
@@ -155,26 +158,67 @@ def _next(rng: np.random.Generator, room: Room, route: Route, home: Point, visit
     return Leg(end, pause, (end[0] + math.cos(turn), end[1] + math.sin(turn)))
 
 
-def _way(rng: np.random.Generator, room: Room, route: Route, home: Point, visit: Visit) -> Point:
-    """Choose where to go next: of some places, one on the way to which the best view changes in good time."""
-    best, least, found = home, np.inf, 0
+def _choose_place(rng: np.random.Generator, room: Room, route: Route, home: Point, visit: VisitPlan) -> Point:
+    """Choose where to go next: a place on the way to which the best view changes in good time."""
+    best, lowest, candidates = home, np.inf, 0
     for _ in range(_TRIES):
-        end = _spot(rng, room)
-        far = math.dist(route.here, end)
+        end = _draw_place(rng, room)
+        distance = math.dist(route.here, end)
         # No pacing on the spot.
-        if far > _NEAREST and clear(room, route.here, end) and clear(room, end, home):
-            fault = follow(route.shot, route.here, end, far / route.pace, visit.eyes).fault
-            if fault < least:
-                best, least = end, fault
-            found += 1
-            if found == _CHOICE or fault == 0:
+        if distance > _NEAREST and is_walkable(room, route.here, end) and is_walkable(room, end, home):
+            penalty = follow_best_view(
+                route.best_view, route.here, end, distance / route.pace, visit.camera_positions
+            ).penalty
+            if penalty < lowest:
+                best, lowest = end, penalty
+            candidates += 1
+            if candidates == _CHOICE or penalty == 0:
                 break
     return best
 
 
-def _spot(rng: np.random.Generator, room: Room) -> Point:
+def _draw_place(rng: np.random.Generator, room: Room) -> Point:
     """Choose a place to go to: off the walls and out of the corners."""
     while True:
         x, y = rng.uniform(_MARGIN, room.width - _MARGIN), rng.uniform(_MARGIN, room.depth - _MARGIN)
         if math.hypot(min(x, room.width - x), min(y, room.depth - y)) > _CORNER:
             return (x, y)
+
+
+@dataclass(frozen=True, slots=True)
+class BestView:
+    """Which camera shows a person largest, and for how long it has."""
+
+    camera: int
+    held_seconds: float  # seconds
+    penalty: float = 0.0  # seconds by which best views changed too early or too late so far
+
+
+def best_view_at(where: Point, camera_positions: tuple[Point, ...]) -> BestView:
+    """Return the best view of a person who begins at a point."""
+    sizes = _sizes(where, camera_positions)
+    return BestView(sizes.index(max(sizes)), 0.0)
+
+
+def follow_best_view(
+    best_view: BestView, start: Point, end: Point, seconds: float, camera_positions: tuple[Point, ...]
+) -> BestView:
+    """Update the best view while a person walks from a point to another."""
+    camera, held_seconds, penalty = best_view.camera, best_view.held_seconds, 0.0
+    steps = max(math.ceil(seconds / _FRAME), 1)
+    for step in range(1, steps + 1):
+        held_seconds += seconds / steps
+        share = step / steps
+        sizes = _sizes(
+            (start[0] + (end[0] - start[0]) * share, start[1] + (end[1] - start[1]) * share), camera_positions
+        )
+        best = max(sizes)
+        if best > _BETTER * sizes[camera]:
+            penalty += max(_SOONEST - held_seconds, held_seconds - _LATEST, 0.0)
+            camera, held_seconds = sizes.index(best), 0.0
+    return BestView(camera, held_seconds, penalty + max(held_seconds - _LATEST, 0.0))
+
+
+def _sizes(where: Point, camera_positions: tuple[Point, ...]) -> list[float]:
+    x, y = where
+    return [1 / ((x - camera[0]) ** 2 + (y - camera[1]) ** 2 + _ABOVE**2) for camera in camera_positions]

@@ -14,8 +14,8 @@ from server.config.site_config import Config
 from server.messaging.messages import Box, CameraTracks, TrackMessage
 from server.service.ingest.epoch_aligner import Epoch
 from synthetic import Scene
-from synthetic.cameras.pinhole import Perspective
-from synthetic.room.hall import Hall
+from synthetic.cameras.pinhole import PinholeCamera
+from synthetic.room.room_world import RoomWorld
 
 Floats = NDArray[np.float64]
 
@@ -73,8 +73,8 @@ def _word(camera: str, boxes: list[Box | None], epoch: int, boot: int) -> Camera
     )
 
 
-def _view(scene: Scene, camera: int) -> Perspective:
-    assert isinstance(scene.world, Hall)
+def _view(scene: Scene, camera: int) -> PinholeCamera:
+    assert isinstance(scene.world, RoomWorld)
     return scene.world.view(camera)
 
 

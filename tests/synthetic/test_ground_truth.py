@@ -8,11 +8,11 @@ import pytest
 from numpy.typing import NDArray
 
 from synthetic import CameraTruth, Scene
-from synthetic.drawing.clothing import outfit
-from synthetic.ground_truth import judge
-from synthetic.room.hall import Hall
-from synthetic.room.room import ROOM
-from synthetic.walking.stroll import Pose
+from synthetic.drawing.clothing import choose_outfit
+from synthetic.ground_truth import measure_truth
+from synthetic.room.layouts import ROOM
+from synthetic.room.room_world import RoomWorld
+from synthetic.walking.trajectory import Pose
 
 SIZE = (320, 180)
 
@@ -22,16 +22,19 @@ def crowd() -> Scene:
     return Scene("room", 3, 4, 0, *SIZE)
 
 
-def hall(scene: Scene) -> Hall:
-    assert isinstance(scene.world, Hall)
+def hall(scene: Scene) -> RoomWorld:
+    assert isinstance(scene.world, RoomWorld)
     return scene.world
 
 
 def stand(scene: Scene, camera: int, *places: tuple[float, float]) -> CameraTruth:
     """Judge people who stand at given places."""
-    stage = hall(scene).stage(camera)
+    camera_view = hall(scene).camera_view(camera)
     poses = [Pose(x, y, 0.0, 0.0, 0.0) for x, y in places]
-    return judge(stage, stage.actors(poses, [outfit(walker, 0) for walker in range(len(places))]))
+    return measure_truth(
+        camera_view,
+        camera_view.draw_people(poses, [choose_outfit(walker, 0) for walker in range(len(places))]),
+    )
 
 
 def overlap(box: NDArray[np.float64], other: NDArray[np.float64]) -> float:
@@ -45,10 +48,10 @@ def test_a_box_is_where_the_picture_differs_from_the_empty_room() -> None:
     single = Scene("room", 2, 1, 4, *SIZE)
     found = []
     for camera in range(2):
-        empty = single.empty(camera).astype(np.int16)
+        empty = single.background(camera).astype(np.int16)
         for frame in range(30, 900, 60):
             truth = single.truth(frame)[camera]
-            if not single.inside(frame)[0] or len(truth.ids) == 0 or truth.visible[0] < 0.99:
+            if not single.inside(frame)[0] or len(truth.ids) == 0 or truth.visibility[0] < 0.99:
                 continue  # hidden in part, or in the corridor's dark
             changed = np.abs(single.image(camera, frame).astype(np.int16) - empty).max(axis=2) > 50
             x, y, width, height = cv2.boundingRect(cv2.medianBlur(changed.astype(np.uint8), 3))
@@ -62,23 +65,23 @@ def test_rows_belong_together_and_boxes_lie_in_the_picture(crowd: Scene) -> None
     for frame in range(0, 3000, 130):
         for truth in crowd.truth(frame):
             assert truth.boxes.shape == (len(truth.ids), 4)
-            assert truth.visible.shape == truth.ids.shape
+            assert truth.visibility.shape == truth.ids.shape
             assert list(truth.ids) == sorted(set(truth.ids.tolist()))
             assert set(truth.ids.tolist()) <= {1, 2, 3, 4}
             assert (truth.boxes[:, :2] >= 0).all()
             assert (truth.boxes[:, 2:] <= SIZE).all()
             assert (truth.boxes[:, 2:] > truth.boxes[:, :2]).all()
-            assert ((truth.visible >= 0) & (truth.visible <= 1)).all()
+            assert ((truth.visibility >= 0) & (truth.visibility <= 1)).all()
 
 
 def test_the_homography_takes_the_feet_to_the_ground_position(crowd: Scene) -> None:
     errors = []
     for frame in range(20, 1500, 70):
-        where = crowd.ground_position(frame)
+        where = crowd.ground_positions(frame)
         for camera, truth in enumerate(crowd.truth(frame)):
             matrix = crowd.homography(camera)
             assert matrix is not None
-            for number, box, visible in zip(truth.ids, truth.boxes, truth.visible, strict=True):
+            for number, box, visible in zip(truth.ids, truth.boxes, truth.visibility, strict=True):
                 if visible < 0.99:
                     continue
                 foot = matrix @ ((box[0] + box[2]) / 2, box[3], 1.0)
@@ -94,24 +97,24 @@ def test_one_person_is_the_same_height_above_the_floor_from_every_side(crowd: Sc
     where = (4.5, 4.0)
     for camera in range(3):
         truth = stand(crowd, camera, where)
-        top, _ = hall(crowd).view(camera).project(np.array([[*where, outfit(0, 0).height]]))
+        top, _ = hall(crowd).view(camera).project(np.array([[*where, choose_outfit(0, 0).height]]))
         assert truth.boxes[0, 1] == pytest.approx(
             top[0, 1], abs=0.06 * (truth.boxes[0, 3] - truth.boxes[0, 1])
         )
 
 
 def test_less_shows_of_someone_the_more_someone_else_stands_in_front(crowd: Scene) -> None:
-    camera = np.array(hall(crowd).view(0).centre[:2])
+    camera = np.array(hall(crowd).view(0).center[:2])
     behind = np.array([4.2, 5.2])
     ahead = (camera - behind) / np.linalg.norm(camera - behind)
-    aside = np.array([-ahead[1], ahead[0]])
+    offsets = np.array([-ahead[1], ahead[0]])
     shares = []
     for distance in (1.2, 0.45, 0.3, 0.15, 0.0):
-        in_front = behind + 0.8 * ahead + distance * aside
+        in_front = behind + 0.8 * ahead + distance * offsets
         truth = stand(crowd, 0, tuple(behind), tuple(in_front))
         assert list(truth.ids) == [1, 2]
-        assert truth.visible[1] == 1.0
-        shares.append(float(truth.visible[0]))
+        assert truth.visibility[1] == 1.0
+        shares.append(float(truth.visibility[0]))
     assert shares[0] == 1.0
     assert shares == sorted(shares, reverse=True)
     assert shares[-1] < 0.5
@@ -120,23 +123,23 @@ def test_less_shows_of_someone_the_more_someone_else_stands_in_front(crowd: Scen
 def test_the_order_of_the_people_does_not_matter_to_what_shows(crowd: Scene) -> None:
     one, other = (4.2, 5.2), (3.85, 4.75)
     forward, swapped = stand(crowd, 0, one, other), stand(crowd, 0, other, one)
-    assert forward.visible[0] < 0.9
-    assert swapped.visible[1] < 0.9
+    assert forward.visibility[0] < 0.9
+    assert swapped.visibility[1] < 0.9
 
 
 def test_furniture_hides_who_stands_behind_it_and_nobody_in_front(crowd: Scene) -> None:
-    camera = hall(crowd).view(0).centre[:2]
+    camera = hall(crowd).view(0).center[:2]
     (piece,) = (piece for piece in ROOM.furniture if piece.name == "pillar")
     west, south, east, north = piece.footprint
     pillar = np.array([(west + east) / 2, (south + north) / 2])
     sight = (pillar - camera) / np.linalg.norm(pillar - camera)
-    assert stand(crowd, 0, tuple(pillar + 0.9 * sight)).visible[0] < 0.4
-    assert stand(crowd, 0, tuple(pillar - 0.9 * sight)).visible[0] == 1.0
+    assert stand(crowd, 0, tuple(pillar + 0.9 * sight)).visibility[0] < 0.4
+    assert stand(crowd, 0, tuple(pillar - 0.9 * sight)).visibility[0] == 1.0
 
 
 def test_the_picture_s_edge_hides_too(crowd: Scene) -> None:
     near = stand(crowd, 1, (8.2, 1.4))
-    assert near.visible[0] < 0.9
+    assert near.visibility[0] < 0.9
     assert near.boxes[0, 3] == SIZE[1]
 
 
@@ -146,4 +149,4 @@ def test_who_has_left_by_the_door_is_in_no_picture(crowd: Scene) -> None:
     assert all(len(stand(crowd, camera, hidden).ids) == 0 for camera in range(3))
     doorway = ROOM.beyond(door, 0.0, 0.3)
     assert list(stand(crowd, 1, doorway).ids) == [1]
-    assert 0 < stand(crowd, 1, doorway).visible[0] <= 1
+    assert 0 < stand(crowd, 1, doorway).visibility[0] <= 1

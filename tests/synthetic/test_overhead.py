@@ -11,26 +11,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synthetic import Scene
-from synthetic.cameras.pinhole import Perspective, Viewpoint
-from synthetic.drawing.clothing import casual
-from synthetic.overhead.studio import FREE, OVERHEAD
-from synthetic.walking.collision_avoidance import give_way
-from synthetic.walking.gatherings import Gatherings, gather
-from synthetic.walking.mingling import Mingle
-from synthetic.walking.paths import ROUND, compared
+from synthetic.cameras.pinhole import PinholeCamera, Viewpoint
+from synthetic.drawing.clothing import choose_casual_outfit
+from synthetic.room.layouts import OVERHEAD, OVERHEAD_AREA
+from synthetic.walking.choreographed_crowd import ChoreographedCrowd
+from synthetic.walking.collision_avoidance import separate_paths
+from synthetic.walking.gatherings import Gatherings, plan_gathering
+from synthetic.walking.round_paths import ROUND, sample_times
 
 RATE = 10  # samples a second
 SIZE = (320, 180)
 
 
-def company(people: int, seed: int) -> Mingle:
-    return Mingle(Gatherings(FREE, people, seed), [1.65 + 0.05 * walker for walker in range(people)])
+def crowd(people: int, seed: int) -> ChoreographedCrowd:
+    return ChoreographedCrowd(
+        Gatherings(OVERHEAD_AREA, people, seed), [1.65 + 0.05 * walker for walker in range(people)]
+    )
 
 
 @cache
-def ways(people: int, seed: int, seconds: int = 120) -> np.ndarray:
+def paths(people: int, seed: int, seconds: int = 120) -> np.ndarray:
     """Sample a company: ``(T, people, 2)`` metres."""
-    those = company(people, seed)
+    those = crowd(people, seed)
     return np.array([[(it.x, it.y) for it in those.poses(t / RATE)] for t in range(seconds * RATE)])
 
 
@@ -43,7 +45,7 @@ def gaps(those: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("people", [2, 3, 4])
 @pytest.mark.parametrize("seed", range(2))
 def test_people_meet_and_part_again_several_times_a_minute(people: int, seed: int) -> None:
-    together = gaps(ways(people, seed)) < 0.6
+    together = gaps(paths(people, seed)) < 0.6
     meetings = (np.diff(together.astype(int), axis=0) == 1).sum()
     partings = (np.diff(together.astype(int), axis=0) == -1).sum()
     assert meetings >= 2 * 4  # in two minutes
@@ -54,17 +56,17 @@ def test_people_meet_and_part_again_several_times_a_minute(people: int, seed: in
 @pytest.mark.parametrize("people", [2, 3, 4])
 @pytest.mark.parametrize("seed", range(2))
 def test_nobody_walks_through_anybody_or_leaves(people: int, seed: int) -> None:
-    those = ways(people, seed)
+    those = paths(people, seed)
     assert gaps(those).min() > 0.2  # metres: bodies are about as deep
     assert np.mean(gaps(those) < 0.4) < 0.02
-    assert (those > (FREE[0] - 0.4, FREE[1] - 0.4)).all()
-    assert (those < (FREE[2] + 0.4, FREE[3] + 0.4)).all()
+    assert (those > (OVERHEAD_AREA[0] - 0.4, OVERHEAD_AREA[1] - 0.4)).all()
+    assert (those < (OVERHEAD_AREA[2] + 0.4, OVERHEAD_AREA[3] + 0.4)).all()
     for west, south, east, north in OVERHEAD.footprints():
         assert not ((those > (west, south)) & (those < (east, north))).all(axis=2).any()
 
 
 def test_the_beginning_of_a_round_joins_the_end_of_the_one_before() -> None:
-    those = company(4, 2)
+    those = crowd(4, 2)
     for number in range(1, 6):
         before, after = those.poses(number * ROUND - 1e-6), those.poses(number * ROUND)
         for one, other, height in zip(before, after, (1.65, 1.7, 1.75, 1.8), strict=True):
@@ -75,43 +77,43 @@ def test_the_beginning_of_a_round_joins_the_end_of_the_one_before() -> None:
 
 
 def test_people_walk_at_people_s_pace() -> None:
-    those = ways(3, 5)
+    those = paths(3, 5)
     speed = np.hypot(*np.diff(those, axis=0).transpose(2, 0, 1)) * RATE
     assert speed.max() < 2.0
     assert 0.3 < np.median(speed) < 1.2
 
 
 def test_everybody_is_apart_at_the_beginning() -> None:
-    assert min(gaps(ways(4, seed, 1))[0].min() for seed in range(5)) > 1.2
+    assert min(gaps(paths(4, seed, 1))[0].min() for seed in range(5)) > 1.2
 
 
 @settings(deadline=None, max_examples=30)
 @given(people=st.integers(0, 8), seed=st.integers(0, 1000))
 def test_a_round_leads_everybody_from_start_to_end(people: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    starts, ends = rng.uniform(FREE[:2], FREE[2:], (2, people, 2))
-    plan = gather(rng, starts, ends, FREE)
+    starts, ends = rng.uniform(OVERHEAD_AREA[:2], OVERHEAD_AREA[2:], (2, people, 2))
+    plan = plan_gathering(rng, starts, ends, OVERHEAD_AREA)
     assert len(plan) == people
-    for way, start, end in zip(plan, starts, ends, strict=True):
-        assert (np.diff(way.times) >= -1e-9).all()
-        assert np.allclose(way.at(compared()[[0, -1]]), [start, end])
+    for path, start, end in zip(plan, starts, ends, strict=True):
+        assert (np.diff(path.times) >= -1e-9).all()
+        assert np.allclose(path.at(sample_times()[[0, -1]]), [start, end])
 
 
 @settings(deadline=None, max_examples=40)
-@given(aside=st.floats(-0.5, 0.5), speed=st.floats(0.4, 1.4))
-def test_two_who_meet_head_on_pass_each_other(aside: float, speed: float) -> None:
+@given(offsets=st.floats(-0.5, 0.5), speed=st.floats(0.4, 1.4))
+def test_two_who_meet_head_on_pass_each_other(offsets: float, speed: float) -> None:
     clock = np.arange(60) / 5 - 6
     one = np.column_stack([speed * clock, np.zeros(60)])
-    other = np.column_stack([-speed * clock, np.full(60, aside)])
+    other = np.column_stack([-speed * clock, np.full(60, offsets)])
     keep = np.full((2, 2), 0.7)
-    bent = give_way(np.array([one, other]), keep, 5.0)
+    bent = separate_paths(np.array([one, other]), keep, 5.0)
     apart = np.linalg.norm(bent[0] - bent[1], axis=1)
     assert apart.min() > 0.6
     assert np.array_equal(bent[:, [0, -1]], np.array([one, other])[:, [0, -1]])
 
 
 def test_a_camera_that_looks_straight_down_has_north_on_top() -> None:
-    view = Perspective.of(Viewpoint((2.0, 3.0, 5.0), (2.0, 3.0, 0.0)), *SIZE)
+    view = PinholeCamera.at(Viewpoint((2.0, 3.0, 5.0), (2.0, 3.0, 0.0)), *SIZE)
     pixels, depth = view.project(np.array([[2.0, 3.0, 0.0], [2.0, 4.0, 0.0], [3.0, 3.0, 0.0]]))
     assert np.allclose(depth, 5.0)
     middle, north, east = pixels
@@ -123,7 +125,7 @@ def test_a_camera_that_looks_straight_down_has_north_on_top() -> None:
 
 def test_boxes_are_where_the_picture_differs_and_people_lean_outwards() -> None:
     scene = Scene("overhead", 1, 1, 4, *SIZE)
-    empty = scene.empty(0).astype(np.int16)
+    empty = scene.background(0).astype(np.int16)
     matrix = scene.homography(0)
     assert matrix is not None
     outwards = []
@@ -138,7 +140,7 @@ def test_boxes_are_where_the_picture_differs_and_people_lean_outwards() -> None:
         assert width * height > 0.5 * (right - left) * (bottom - top)
         floor = matrix @ ((left + right) / 2, (top + bottom) / 2, 1.0)
         middle = np.array(scene.floor) / 2
-        where = scene.ground_position(frame)[0]
+        where = scene.ground_positions(frame)[0]
         outwards.append(np.linalg.norm(floor[:2] - middle) - np.linalg.norm(where - middle))
     assert np.mean(outwards) > 0.1
 
@@ -146,10 +148,10 @@ def test_boxes_are_where_the_picture_differs_and_people_lean_outwards() -> None:
 def test_who_stand_together_are_one_blob_and_who_are_apart_are_several() -> None:
     """Two people: the picture's difference from the empty room, as a background model would see it."""
     scene = Scene("overhead", 1, 2, 1)
-    empty = scene.empty(0).astype(np.int16)
+    empty = scene.background(0).astype(np.int16)
     near, far = [], []
     for frame in range(0, 1500, 15):
-        gap = np.linalg.norm(np.subtract(*scene.ground_position(frame)))
+        gap = np.linalg.norm(np.subtract(*scene.ground_positions(frame)))
         if not (gap < 0.55 or gap > 1.6):
             continue
         changed = np.abs(scene.image(0, frame).astype(np.int16) - empty).max(axis=2) > 25
@@ -163,7 +165,8 @@ def test_who_stand_together_are_one_blob_and_who_are_apart_are_several() -> None
 
 def test_some_people_dress_alike_and_most_do_not() -> None:
     alike = [
-        np.linalg.norm(np.subtract(casual(0, seed).upper, casual(1, seed).upper)) < 0.15
+        np.linalg.norm(np.subtract(choose_casual_outfit(0, seed).upper, choose_casual_outfit(1, seed).upper))
+        < 0.15
         for seed in range(200)
     ]
     assert 0.2 < np.mean(alike) < 0.45

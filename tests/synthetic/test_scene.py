@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synthetic import Scene, scene_names
-from synthetic.room.hall import Hall
+from synthetic.room.room_world import RoomWorld
 
 SIZE = (320, 180)
 
@@ -50,7 +50,7 @@ def test_a_frame_is_the_same_in_another_process(room: Scene) -> None:
 def test_what_one_does_with_a_picture_does_not_change_the_next(room: Scene) -> None:
     before = room.image(0, 40)
     room.image(0, 40)[:] = 0
-    room.empty(0)[:] = 0
+    room.background(0)[:] = 0
     assert np.array_equal(room.image(0, 40), before)
 
 
@@ -59,18 +59,18 @@ def test_cameras_frames_and_seeds_differ(room: Scene) -> None:
     for index, one in enumerate(pictures):
         for other in pictures[index + 1 :]:
             assert not np.array_equal(one, other)
-    assert not np.allclose(room.ground_position(200), scene(seed=1).ground_position(200))
+    assert not np.allclose(room.ground_positions(200), scene(seed=1).ground_positions(200))
 
 
 def test_time_is_in_seconds_whatever_the_frame_rate(room: Scene) -> None:
-    assert np.allclose(room.ground_position(250), scene(fps=10.0).ground_position(100))
+    assert np.allclose(room.ground_positions(250), scene(fps=10.0).ground_positions(100))
 
 
 def test_noise_is_mild_and_new_in_every_frame() -> None:
     nobody = scene(objects=0)
     first, second = (nobody.image(0, frame).astype(float) for frame in (10, 11))
     assert 0.5 < np.abs(first - second).mean() < 4
-    assert np.abs(first - nobody.empty(0)).mean() < 5
+    assert np.abs(first - nobody.background(0)).mean() < 5
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_the_names_are_those_that_can_be_built() -> None:
 @given(camera=st.integers(0, 1), x=st.floats(1.5, 8.0), y=st.floats(1.5, 6.0))
 def test_the_homography_undoes_the_projection_of_the_floor(camera: int, x: float, y: float) -> None:
     world = scene().world
-    assert isinstance(world, Hall)
+    assert isinstance(world, RoomWorld)
     view = world.view(camera)
     pixels, _ = view.project(np.array([[x, y, 0.0]]))
     ground = view.homography() @ (*pixels[0], 1.0)

@@ -64,7 +64,7 @@ def test_the_rows_are_the_truth_of_their_frames(scene: Scene, recording: Path) -
             mine = rows[rows[:, 0] == frame + 1]
             assert mine[:, 1].tolist() == truth.ids.tolist()
             assert np.allclose(mine[:, 2:4] + mine[:, 4:6], truth.boxes[:, 2:])
-            assert np.allclose(mine[:, 8], truth.visible, atol=1e-3)
+            assert np.allclose(mine[:, 8], truth.visibility, atol=1e-3)
             assert (mine[:, 6:8] == 1).all()
 
 

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from synthetic import Scene
-from synthetic.cameras.pinhole import Perspective
+from synthetic.cameras.pinhole import PinholeCamera
 from synthetic.drawing.figure import Figure
+from synthetic.ground_truth import FigureLayer, measure_visibility
 from synthetic.tank import VIEWPOINTS
-from synthetic.tank.fish import LENGTH, shape
-from synthetic.tank.paint import draw_fish
-from synthetic.tank.shoal import ROUND, Shoal, Swimmers
-from synthetic.tank.water import light_net, open_water, through
-from synthetic.visibility import Piece, survey
+from synthetic.tank.fish_drawing import draw_fish
+from synthetic.tank.fish_mesh import LENGTH, fish_vertices
+from synthetic.tank.shoal import ROUND, FishState, Shoal
+from synthetic.tank.water import caustics, open_water, seen_through_water
 
 SIZE = (320, 180)
 RATE = 10  # samples a second
@@ -30,13 +30,13 @@ def tank(cameras: int = 2, objects: int | None = None, seed: int = 1) -> Scene:
 
 
 @pytest.fixture(scope="module", params=range(3))
-def swum(request: pytest.FixtureRequest) -> list[Swimmers]:
+def swum(request: pytest.FixtureRequest) -> list[FishState]:
     """Give seventy seconds of nine fish: two rounds, and the beginning of a third."""
     shoal = Shoal(9, request.param)
     return [shoal.at(t / RATE) for t in range(70 * RATE)]
 
 
-def test_fish_never_swim_into_each_other(swum: list[Swimmers]) -> None:
+def test_fish_never_swim_into_each_other(swum: list[FishState]) -> None:
     along = np.linspace(-0.45, 0.45, 7) * LENGTH
     for it in swum:
         spines = it.places[:, None] + along[:, None] * it.ahead[:, None]
@@ -44,7 +44,7 @@ def test_fish_never_swim_into_each_other(swum: list[Swimmers]) -> None:
         assert gaps[np.triu_indices(9, 1)].min() > 0.15  # metres: bodies are 0.14 broad
 
 
-def test_fish_swim_where_their_heads_point_and_turn_as_fish_do(swum: list[Swimmers]) -> None:
+def test_fish_swim_where_their_heads_point_and_turn_as_fish_do(swum: list[FishState]) -> None:
     turns, slants = [], []
     for one, other in pairwise(swum):
         step = other.places - one.places
@@ -67,11 +67,11 @@ def test_a_round_begins_where_the_one_before_has_ended() -> None:
         assert np.abs(tails - np.rint(tails)).max() < 0.01
 
 
-def test_fish_stay_in_the_first_camera_s_picture(swum: list[Swimmers]) -> None:
-    view = Perspective.of(VIEWPOINTS[0], *SIZE)
+def test_fish_stay_in_the_first_camera_s_picture(swum: list[FishState]) -> None:
+    view = PinholeCamera.at(VIEWPOINTS[0], *SIZE)
     outside = 0
     for it in swum[::5]:
-        pixels, _ = view.project(shape(it).reshape(-1, 3))
+        pixels, _ = view.project(fish_vertices(it).reshape(-1, 3))
         beyond = ((pixels < 0) | (pixels > SIZE)).any(axis=1).reshape(9, -1).any(axis=1)
         outside += int(beyond.sum())
     assert outside < 0.01 * 9 * len(swum[::5])
@@ -84,7 +84,7 @@ def test_all_begin_on_a_circle_and_swim_towards_the_camera() -> None:
     truth, _ = tank(seed=3).truth(0)
     size = truth.boxes[:, 2:] - truth.boxes[:, :2]
     assert np.ptp(size[:, 0]) < 0.35 * size[:, 0].mean()
-    assert np.ptp(truth.away) < 0.3
+    assert np.ptp(truth.distances) < 0.3
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -94,7 +94,7 @@ def test_fish_hide_each_other_in_every_clip_of_twenty_seconds(seed: int) -> None
     for frame in range(0, 500, 10):
         (truth,) = scene.truth(frame)
         assert truth.ids.tolist() == list(range(1, 10))
-        shares.append(truth.visible)
+        shares.append(truth.visibility)
     assert np.mean(np.array(shares) < 0.9) > 0.05
     assert np.mean(np.array(shares) < 0.5) > 0.005
     assert np.mean(np.array(shares) > 0.97) > 0.5
@@ -121,9 +121,9 @@ def test_a_box_is_where_the_picture_differs_from_the_tank_without_fish() -> None
     found = []
     for frame in range(40, 1500, 60):
         for camera, truth in enumerate(scene.truth(frame)):
-            if len(truth.ids) == 0 or truth.visible[0] < 0.99:
+            if len(truth.ids) == 0 or truth.visibility[0] < 0.99:
                 continue
-            empty = scene.world.empty(camera, frame / 25).astype(np.int16)
+            empty = scene.world.background(camera, frame / 25).astype(np.int16)
             changed = np.abs(scene.world.picture(camera, frame / 25).astype(np.int16) - empty).max(axis=2) > 6
             x, y, width, height = cv2.boundingRect(changed.astype(np.uint8))
             found.append(np.abs(truth.boxes[0] - (x, y, x + width, y + height)).max())
@@ -133,16 +133,16 @@ def test_a_box_is_where_the_picture_differs_from_the_tank_without_fish() -> None
 
 
 def test_of_two_fish_in_line_the_further_one_is_hidden() -> None:
-    view = Perspective.of(VIEWPOINTS[0], *SIZE)
+    view = PinholeCamera.at(VIEWPOINTS[0], *SIZE)
     shares = []
-    for aside in (2.0, 0.25, 0.0):
-        places = np.array([[3.0 + aside, 3.6, 1.4], [3.0, 1.0, 1.42]])
+    for offsets in (2.0, 0.25, 0.0):
+        places = np.array([[3.0 + offsets, 3.6, 1.4], [3.0, 1.0, 1.42]])
         side = np.tile([1.0, 0.0, 0.0], (2, 1))
-        two = Swimmers(places, side, np.zeros(2), np.ones(2), np.zeros(2))
-        further, nearer = draw_fish(view, shape(two), light_net(0.0))
+        two = FishState(places, side, np.zeros(2), np.ones(2), np.zeros(2))
+        further, depth_offset = draw_fish(view, fish_vertices(two), caustics(0.0))
         assert further is not None
-        assert nearer is not None
-        seen = survey(view, [Piece(0, further, None), Piece(1, nearer, None)])
+        assert depth_offset is not None
+        seen = measure_visibility(view, [FigureLayer(0, further, None), FigureLayer(1, depth_offset, None)])
         assert seen[1].share == 1.0
         shares.append(seen[0].share)
     assert shares[0] == 1.0
@@ -151,9 +151,11 @@ def test_of_two_fish_in_line_the_further_one_is_hidden() -> None:
 
 
 def test_what_only_hides_takes_its_share_and_has_no_row() -> None:
-    view = Perspective.of(VIEWPOINTS[0], 100, 60)
+    view = PinholeCamera.at(VIEWPOINTS[0], 100, 60)
     block = np.full((20, 40, 4), 255, dtype=np.uint8)
-    seen = survey(view, [Piece(3, Figure(10, 10, block), None), Piece(None, Figure(20, 0, block), None)])
+    seen = measure_visibility(
+        view, [FigureLayer(3, Figure(10, 10, block), None), FigureLayer(None, Figure(20, 0, block), None)]
+    )
     assert list(seen) == [3]
     assert seen[3].box.tolist() == [10, 10, 50, 30]
     assert seen[3].share == pytest.approx(1 - 30 * 10 / (40 * 20))
@@ -161,7 +163,7 @@ def test_what_only_hides_takes_its_share_and_has_no_row() -> None:
 
 def test_murk_takes_a_colour_to_the_water_s_and_red_first() -> None:
     water = open_water(np.array([[0.0, 1.0, 0.0]]))
-    seen = through(np.ones((4, 3)), np.array([0.0, 4.0, 12.0, 200.0]), water)
+    seen = seen_through_water(np.ones((4, 3)), np.array([0.0, 4.0, 12.0, 200.0]), water)
     assert np.allclose(seen[0], 1.0)
     assert np.allclose(seen[3], water, atol=1e-4)
     left = (seen - water) / (1 - water)
@@ -170,7 +172,7 @@ def test_murk_takes_a_colour_to_the_water_s_and_red_first() -> None:
 
 
 def test_the_net_of_light_moves_repeats_and_has_bright_lines() -> None:
-    now, soon, later = (light_net(seconds).astype(int) for seconds in (5.0, 5.04, 7.0))
+    now, soon, later = (caustics(seconds).astype(int) for seconds in (5.0, 5.04, 7.0))
     assert 0 < np.abs(soon - now).mean() < 8  # no flicker
     assert np.abs(later - now).mean() > 15
     assert now.max() > 180
@@ -184,5 +186,5 @@ def test_fish_are_on_no_floor() -> None:
     scene = tank()
     assert scene.objects == 9
     assert scene.homography(0) is None
-    assert scene.ground_position(10).shape == (9, 2)
+    assert scene.ground_positions(10).shape == (9, 2)
     assert scene.inside(10).all()

@@ -11,63 +11,63 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synthetic import Scene
-from synthetic.drawing.clothing import outfit
-from synthetic.drawing.ray_casting import FAR, hit, may_hit
-from synthetic.drawing.skeleton import Joint, joints
-from synthetic.room.room import ROOM
-from synthetic.walking.sidestepping import KEEP, sidestep
-from synthetic.walking.stroll import Pose
-from synthetic.walking.walkers import Walkers
+from synthetic.drawing.clothing import choose_outfit
+from synthetic.drawing.ray_casting import FAR, intersect, may_intersect
+from synthetic.drawing.skeleton import Joint, place_joints
+from synthetic.room.layouts import ROOM
+from synthetic.walking.collision_avoidance import MIN_DISTANCE, sidestep
+from synthetic.walking.trajectory import Pose
+from synthetic.walking.visiting_crowd import VisitingCrowd
 
 RATE = 10  # samples a second
 
 
 @pytest.fixture(scope="module")
-def ways() -> np.ndarray:
+def paths() -> np.ndarray:
     """Three minutes of four people: ``(T, 4, 2)`` metres."""
-    walkers = Walkers(ROOM, 4, 7)
+    walkers = VisitingCrowd(ROOM, 4, 7)
     return np.array([[(pose.x, pose.y) for pose in walkers.poses(t / RATE)] for t in range(180 * RATE)])
 
 
 @cache
-def four(seed: int) -> Walkers:
+def four(seed: int) -> VisitingCrowd:
     """Give four people, whose ways are worked out once for all who ask."""
-    return Walkers(ROOM, 4, seed)
+    return VisitingCrowd(ROOM, 4, seed)
 
 
-def inside(ways: np.ndarray) -> np.ndarray:
-    return (ways[..., 0] < ROOM.width) & (ways[..., 1] < ROOM.depth)
+def inside(paths: np.ndarray) -> np.ndarray:
+    return (paths[..., 0] < ROOM.width) & (paths[..., 1] < ROOM.depth)
 
 
-def test_nobody_jumps_in_anyones_sight(ways: np.ndarray) -> None:
-    speed = np.hypot(*np.diff(ways, axis=0).transpose(2, 0, 1)) * RATE
-    seen = inside(ways)[1:] | inside(ways)[:-1]
+def test_nobody_jumps_in_anyones_sight(paths: np.ndarray) -> None:
+    speed = np.hypot(*np.diff(paths, axis=0).transpose(2, 0, 1)) * RATE
+    seen = inside(paths)[1:] | inside(paths)[:-1]
     assert speed[seen].max() < 2.5
     assert 0.6 < np.median(speed[seen]) < 1.4
 
 
-def test_nobody_walks_through_furniture_or_walls(ways: np.ndarray) -> None:
+def test_nobody_walks_through_furniture_or_walls(paths: np.ndarray) -> None:
     for west, south, east, north in ROOM.footprints():
-        within = (ways > (west - 0.05, south - 0.05)) & (ways < (east + 0.05, north + 0.05))
+        within = (paths > (west - 0.05, south - 0.05)) & (paths < (east + 0.05, north + 0.05))
         assert not within.all(axis=2).any()
-    assert (ways[inside(ways)] > 0.2).all()
-    wall = (np.abs(ways[..., 1] - ROOM.depth) < 0.2) & (ways[..., 0] < ROOM.width)
+    assert (paths[inside(paths)] > 0.2).all()
+    wall = (np.abs(paths[..., 1] - ROOM.depth) < 0.2) & (paths[..., 0] < ROOM.width)
     (middle,) = (door.start + door.width / 2 for door in ROOM.doors if door.wall == "north")
-    assert (np.abs(ways[..., 0] - middle)[wall] < 0.5).all()
+    assert (np.abs(paths[..., 0] - middle)[wall] < 0.5).all()
 
 
-def test_people_keep_apart_but_do_meet(ways: np.ndarray) -> None:
-    apart = np.hypot(*(ways[:, :, None] - ways[:, None]).transpose(3, 0, 1, 2))
+def test_people_keep_apart_but_do_meet(paths: np.ndarray) -> None:
+    apart = np.hypot(*(paths[:, :, None] - paths[:, None]).transpose(3, 0, 1, 2))
     pairs = apart[:, *np.triu_indices(4, 1)]
-    both = (inside(ways)[:, :, None] & inside(ways)[:, None])[:, *np.triu_indices(4, 1)]
+    both = (inside(paths)[:, :, None] & inside(paths)[:, None])[:, *np.triu_indices(4, 1)]
     assert np.mean(pairs[both] < 0.7) < 0.02
     assert np.mean(pairs[both] < 1.5) > 0.02
 
 
-def test_people_leave_and_come_back(ways: np.ndarray) -> None:
-    crossings = np.abs(np.diff(inside(ways).astype(int), axis=0)).sum(axis=0)
+def test_people_leave_and_come_back(paths: np.ndarray) -> None:
+    crossings = np.abs(np.diff(inside(paths).astype(int), axis=0)).sum(axis=0)
     assert (crossings >= 3).all()
-    assert 0.5 < inside(ways).mean() < 0.95
+    assert 0.5 < inside(paths).mean() < 0.95
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -90,20 +90,20 @@ def test_the_room_is_never_left_by_all_at_once_for_long(seed: int) -> None:
 
 
 def test_more_people_do_not_change_the_ways_of_the_first() -> None:
-    few, many = Walkers(ROOM, 2, 3), Walkers(ROOM, 5, 3)
+    few, many = VisitingCrowd(ROOM, 2, 3), VisitingCrowd(ROOM, 5, 3)
     for seconds in (0.0, 33.3, 250.0):
         assert many.poses(seconds)[:2] == few.poses(seconds)
 
 
 def test_no_two_people_dress_alike() -> None:
-    looks = [outfit(walker, 0) for walker in range(40)]
+    looks = [choose_outfit(walker, 0) for walker in range(40)]
     assert len({(look.upper, look.lower) for look in looks}) == len(looks)
 
 
 @pytest.mark.parametrize("part", ["upper", "lower"])
 def test_the_first_eight_differ_clearly_in_every_piece(part: str) -> None:
-    colours = np.array([[getattr(outfit(walker, 0), part) for walker in range(8)]], dtype=np.float32)
-    lab = cv2.cvtColor(colours, cv2.COLOR_RGB2LAB)[0]
+    colors = np.array([[getattr(choose_outfit(walker, 0), part) for walker in range(8)]], dtype=np.float32)
+    lab = cv2.cvtColor(colors, cv2.COLOR_RGB2LAB)[0]
     apart = np.linalg.norm(lab[:, None] - lab[None], axis=2)[np.triu_indices(8, 1)]
     assert apart.min() > 30  # 2.3 is a just noticeable difference
 
@@ -118,7 +118,7 @@ def test_the_first_eight_differ_clearly_in_every_piece(part: str) -> None:
 def test_a_body_stands_on_the_floor_at_its_height(
     walked: float, speed: float, heading: float, height: float
 ) -> None:
-    body = joints(Pose(3.0, 2.0, heading, walked, speed), height)
+    body = place_joints(Pose(3.0, 2.0, heading, walked, speed), height)
     assert np.isfinite(body).all()
     assert (body[:, 2] > 0).all()
     assert body[[Joint.TOE_L, Joint.TOE_R], 2].min() < 0.06 * height
@@ -129,7 +129,9 @@ def test_a_body_stands_on_the_floor_at_its_height(
 def test_feet_that_stand_do_not_slide() -> None:
     """A steady walk: the lower foot's place on the floor hardly moves."""
     speed, step = 1.1, 0.01
-    trail = [joints(Pose(speed * t * step, 0.0, 0.0, speed * t * step, speed), 1.75) for t in range(400)]
+    trail = [
+        place_joints(Pose(speed * t * step, 0.0, 0.0, speed * t * step, speed), 1.75) for t in range(400)
+    ]
     ankles = np.array([[body[Joint.ANKLE_L], body[Joint.ANKLE_R]] for body in trail])
     slide = np.abs(np.diff(ankles[..., 0], axis=0)) / step
     lower = ankles[:-1, :, 2].argmin(axis=1)
@@ -137,14 +139,14 @@ def test_feet_that_stand_do_not_slide() -> None:
 
 
 @settings(deadline=None, max_examples=30)
-@given(aside=st.floats(-0.6, 0.6), speed=st.floats(0.4, 1.5))
-def test_two_who_walk_into_each_other_step_aside(aside: float, speed: float) -> None:
+@given(offsets=st.floats(-0.6, 0.6), speed=st.floats(0.4, 1.5))
+def test_two_who_walk_into_each_other_step_aside(offsets: float, speed: float) -> None:
     clock = np.arange(40) / 5 - 4
     one = np.column_stack([4.5 + speed * clock, np.full(40, 3.5)])
-    other = np.column_stack([4.5 - speed * clock, np.full(40, 3.5 + aside)])
+    other = np.column_stack([4.5 - speed * clock, np.full(40, 3.5 + offsets)])
     polite = sidestep(ROOM, one, other[None], 5.0)
-    before, after = (np.hypot(*(way - other).T).min() for way in (one, polite))
-    assert after >= min(before, KEEP) - 1e-6
+    before, after = (np.hypot(*(path - other).T).min() for path in (one, polite))
+    assert after >= min(before, MIN_DISTANCE) - 1e-6
     assert np.abs(np.diff(polite, axis=0)).max() < 0.5  # metres in a fifth of a second
 
 
@@ -162,9 +164,9 @@ def test_a_ray_that_hits_furniture_ends_on_its_surface(
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     start = np.array(origin)
     for block in ROOM.furniture[index].blocks:
-        distance, normal = hit(block, start, rays)
+        distance, normal = intersect(block, start, rays)
         found = distance < FAR
-        assert (may_hit(block, start, rays) | ~found).all()
+        assert (may_intersect(block, start, rays) | ~found).all()
         points = start + rays[found] * distance[found, None]
         assert (points > np.array(block.low) - 1e-6).all()
         assert (points < np.array(block.high) + 1e-6).all()
@@ -174,5 +176,5 @@ def test_a_ray_that_hits_furniture_ends_on_its_surface(
 def test_positions_and_presence_agree() -> None:
     scene = Scene("room", 1, 4, 0, 64, 36)
     for frame in range(0, 2000, 100):
-        x, y = scene.ground_position(frame).T
+        x, y = scene.ground_positions(frame).T
         assert np.array_equal(scene.inside(frame), (x <= scene.floor[0]) & (y <= scene.floor[1]))

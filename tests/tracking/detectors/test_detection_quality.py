@@ -70,7 +70,7 @@ def test_people_of_the_room_are_tracked_two_seconds_after_the_start() -> None:
     truth = {}
     for frame in range(WARM_UP, FRAMES_OF_SCENE):
         seen = scene.truth(frame)[0]
-        truth[frame] = (seen.boxes, seen.visible >= 0.5)
+        truth[frame] = (seen.boxes, seen.visibility >= 0.5)
     reached = quality(truth, found)
     assert reached.recall >= 0.7, reached
     assert reached.precision >= 0.75, reached

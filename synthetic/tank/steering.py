@@ -1,4 +1,4 @@
-"""Swimming about: random ways in three dimensions that keep clear of each other and of the walls."""
+"""Steering of fish: random paths in three dimensions that keep clear of each other and of the walls."""
 
 from __future__ import annotations
 
@@ -8,69 +8,71 @@ import cv2
 import numpy as np
 
 from synthetic.cameras.pinhole import Floats
-from synthetic.walking.collision_avoidance import give_way
+from synthetic.walking.collision_avoidance import separate_paths
 
 RATE = 10  # samples a second
-LOW = np.array([0.55, 0.55, 0.5])  # metres: where fish swim, corner to corner
+LOW = np.array([0.55, 0.55, 0.5])  # meters: where fish swim, corner to corner
 HIGH = np.array([5.45, 4.45, 2.5])
-CRUISE = 0.55  # metres per second
-_SPEEDS = (0.28, 0.95)  # metres per second
+CRUISE = 0.55  # meters per second
+_SPEEDS = (0.28, 0.95)  # meters per second
 _STEEP = 0.45  # of the speed ahead is the most that a fish climbs or dives
-_WHIM = np.array([0.85, 0.85, 0.22])  # metres per second squared
+_WHIM = np.array([0.85, 0.85, 0.22])  # meters per second squared
 _WHIM_SECONDS = 0.7  # that a whim lasts
-_WALL = 0.7  # metres before the end of the water at which a fish turns away
-_WALL_PUSH = 3.2  # metres per second squared and metre
-_REACH = 1.35  # metres within which fish make way for each other
-_SHY = 6.0  # metres per second squared, where two would be in one place
+_WALL = 0.7  # meters before the end of the water at which a fish turns away
+_WALL_PUSH = 3.2  # meters per second squared and meter
+_REACH = 1.35  # meters within which fish avoid each other
+_SHY = 6.0  # meters per second squared, where two would be in one place
 _FORESEE = 0.45  # seconds that they look ahead
-_SPURT = 0.6  # metres per second squared
+_SPURT = 0.6  # meters per second squared
 _TURN = 1.9  # radians per second, at most
-STRAIGHT = 3.0  # seconds before a mark that are swum straight towards it
-_KEEN = 2.5  # per second: how soon a fish swims as it wants to
-_CLOSING = 0.9  # seconds in which it would be where it wants to be
-_CLEAR = 0.55  # metres between two fish, at least, that land
-_TRIALS = 4  # until all fish end
-_NEAR = 0.75  # metres from their marks
-_LANDING = 4.0  # seconds before the end over which what is still missing is made up for
+STRAIGHT = 3.0  # seconds before a waypoint that are swum straight towards it
+_KEEN = 2.5  # per second: how fast a fish takes up its wanted velocity
+_CLOSING = 0.9  # seconds in which a fish tries to close a gap
+_CLEAR = 0.55  # smallest distance in meters between two fish near the end
+_TRIALS = 4  # to bring all fish near their waypoints
+_NEAR = 0.75  # meters from their waypoints
+_LANDING = 4.0  # seconds before the end over which the remaining error is corrected
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
-    """Where fish are, and where they are going, at a moment that all ways pass through."""
+class Waypoints:
+    """Places and velocities of all fish at a moment that all paths pass through."""
 
-    places: Floats  # (P, 3) metres
-    velocities: Floats  # (P, 3) metres per second
+    places: Floats  # (P, 3) meters
+    velocities: Floats  # (P, 3) meters per second
 
 
-def swim(rng: np.random.Generator, start: Mark, end: Mark, seconds: float) -> Floats:
-    """Swim from one mark to another: ``(T, P, 3)`` metres, `RATE` samples a second, both ends included."""
+def swim_between(rng: np.random.Generator, start: Waypoints, end: Waypoints, seconds: float) -> Floats:
+    """Return paths between waypoints: ``(T, P, 3)`` meters, `RATE` samples a second, both ends included."""
     trials = []
     for _ in range(_TRIALS):
         trials.append(_try(rng, start, end, seconds))
         if trials[-1].missed < _NEAR:
             break
     best = min(trials, key=lambda trial: trial.missed)
-    way = best.way + _landing(end.places - best.way[-1], end.velocities - best.velocities, len(best.way) - 1)
+    path = best.path + _landing(
+        end.places - best.path[-1], end.velocities - best.velocities, len(best.path) - 1
+    )
     last = slice(-round(2 * _LANDING * RATE), None)
-    keep = np.full((way.shape[1], way.shape[1]), _CLEAR)
-    way[last] = give_way(way[last].transpose(1, 0, 2), keep, RATE).transpose(1, 0, 2)
-    return way
+    keep = np.full((path.shape[1], path.shape[1]), _CLEAR)
+    path[last] = separate_paths(path[last].transpose(1, 0, 2), keep, RATE).transpose(1, 0, 2)
+    return path
 
 
 @dataclass(frozen=True, slots=True)
 class _Trial:
-    way: Floats  # (T, P, 3) metres
-    velocities: Floats  # (P, 3) metres per second, at its end
-    missed: float  # metres from the mark, of the fish that ends furthest from its own
+    path: Floats  # (T, P, 3) meters
+    velocities: Floats  # (P, 3) meters per second, at its end
+    missed: float  # meters: the largest error of a fish's place at the end
 
 
-def _try(rng: np.random.Generator, start: Mark, end: Mark, seconds: float) -> _Trial:
-    """Steer from one mark for another; what is missing at the end is a metre at most, as a rule."""
+def _try(rng: np.random.Generator, start: Waypoints, end: Waypoints, seconds: float) -> _Trial:
+    """Steer from the first waypoints towards the second; the error at the end is usually below a meter."""
     steps = round(seconds * RATE)
     whims = _whims(rng, steps, len(start.places))
     place, velocity = start.places.copy(), start.velocities.copy()
-    way = np.empty((steps + 1, *place.shape))
-    way[0] = place
+    path = np.empty((steps + 1, *place.shape))
+    path[0] = place
     for step in range(steps):
         ahead = place + _FORESEE * velocity
         home, urgent = _home(place, velocity, end, seconds - step / RATE)
@@ -78,9 +80,9 @@ def _try(rng: np.random.Generator, start: Mark, end: Mark, seconds: float) -> _T
         push += (1 - urgent) * (whims[step] + _pace(velocity))
         velocity = _bounded(velocity + _agile(push, velocity, step) / RATE)
         place = place + velocity / RATE
-        way[step + 1] = place
+        path[step + 1] = place
     missed = float(np.linalg.norm(end.places - place, axis=1).max(initial=0.0))
-    return _Trial(way, velocity, missed)
+    return _Trial(path, velocity, missed)
 
 
 def _whims(rng: np.random.Generator, steps: int, fish: int) -> Floats:
@@ -93,10 +95,10 @@ def _whims(rng: np.random.Generator, steps: int, fish: int) -> Floats:
     return whims
 
 
-def _home(place: Floats, velocity: Floats, end: Mark, left: float) -> tuple[Floats, Floats]:
-    """Give the pushes ``(P, 3)`` towards a mark, and how much they matter ``(P, 1)``: 0 with time to spare.
+def _home(place: Floats, velocity: Floats, end: Waypoints, left: float) -> tuple[Floats, Floats]:
+    """Return the pushes ``(P, 3)`` towards the waypoints and their weight ``(P, 1)``: 0 with time to spare.
 
-    A fish makes for a point before its mark, and swims the last seconds with what passes the mark on time.
+    A fish aims at a point before its waypoint, and swims the last seconds with the waypoint's velocity.
     """
     straight = min(left, STRAIGHT)
     gap = end.places - end.velocities * straight - place
@@ -110,7 +112,7 @@ def _home(place: Floats, velocity: Floats, end: Mark, left: float) -> tuple[Floa
 
 
 def _agile(push: Floats, velocity: Floats, step: int) -> Floats:
-    """Cut pushes ``(P, 3)`` down to how fast a fish turns and speeds up; at first it swims straight on."""
+    """Limit pushes ``(P, 3)`` to how fast a fish turns and speeds up; at first it swims straight on."""
     speed = np.maximum(np.linalg.norm(velocity, axis=1, keepdims=True), 1e-6)
     ahead = velocity / speed
     along = (push * ahead).sum(axis=1, keepdims=True)
@@ -151,7 +153,7 @@ def _bounded(velocity: Floats) -> Floats:
 
 
 def _landing(place: Floats, velocity: Floats, steps: int) -> Floats:
-    """Give the cubic ``(T, P, 3)`` that ends with what a way misses its mark by, in place and velocity."""
+    """Return the cubic ``(T, P, 3)`` that ends with a path's error in place and velocity."""
     clock = np.arange(steps + 1) / RATE - steps / RATE
     share = np.clip(1 + clock / _LANDING, 0, 1)[:, None, None]
     cubic: Floats = place * share**2 * (3 - 2 * share) + velocity * _LANDING * share**2 * (share - 1)

@@ -1,4 +1,4 @@
-"""The tank: the world of the scene of fish. x runs east, y away from the first camera, z up, in metres."""
+"""The world of the scene `fish`: a tank. x runs east, y away from the first camera, z up, in meters."""
 
 from __future__ import annotations
 
@@ -9,20 +9,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic.cameras.pinhole import Floats, Perspective, Viewpoint
-from synthetic.drawing.compositing import paste
-from synthetic.drawing.figure import Figure
-from synthetic.ground_truth import CameraTruth
-from synthetic.tank.bed import Bed
-from synthetic.tank.fish import shape
-from synthetic.tank.paint import draw_fish
+from synthetic.cameras.pinhole import Floats, PinholeCamera, Viewpoint
+from synthetic.drawing.figure import Figure, paste
+from synthetic.ground_truth import CameraTruth, FigureLayer, measure_visibility
+from synthetic.tank.fish_drawing import draw_fish
+from synthetic.tank.fish_mesh import fish_vertices
+from synthetic.tank.seabed import Seabed
 from synthetic.tank.shoal import Shoal
-from synthetic.tank.water import light_net
+from synthetic.tank.water import caustics
 from synthetic.tank.weeds import Weeds
-from synthetic.visibility import Piece, survey
-from synthetic.world import Asked, Bytes
+from synthetic.world import Bytes, SceneParameters
 
-_EXTENT = (6.0, 5.0)  # metres
+_EXTENT = (6.0, 5.0)  # meters
 VIEWPOINTS = (
     Viewpoint((3.0, -4.4, 1.55), (3.0, 2.5, 1.28), 60.0),
     Viewpoint((10.1, 2.5, 1.55), (3.0, 2.5, 1.28), 60.0),
@@ -31,66 +29,68 @@ VIEWPOINTS = (
 
 @dataclass(frozen=True, slots=True)
 class _Moment:
-    """Everything that stands or swims before a camera at a moment, furthest first."""
+    """All figures before a camera at a moment, furthest first."""
 
     lit: Bytes  # (H, W, 3) the bed
-    layers: tuple[tuple[int | None, Figure], ...]  # a fish's number, or none of a weed or rock
-    away: Floats  # (P,) metres from the camera to every fish
+    layers: tuple[tuple[int | None, Figure], ...]  # a fish's number, None for weeds and rocks
+    distance: Floats  # (P,) meters from the camera to every fish
 
 
-class Tank:
+class TankWorld:
     """Fish that all look the same in a lit, murky tank."""
 
-    def __init__(self, asked: Asked) -> None:
-        self._views = [Perspective.of(view, asked.width, asked.height) for view in VIEWPOINTS]
+    def __init__(self, parameters: SceneParameters) -> None:
+        self._views = [PinholeCamera.at(view, parameters.width, parameters.height) for view in VIEWPOINTS]
         self._weeds = [Weeds(view) for view in self._views]
-        self._shoal = Shoal(asked.objects, asked.seed)
+        self._shoal = Shoal(parameters.objects, parameters.seed)
         self._bed = lru_cache(maxsize=None)(self._lay)
-        # A recording asks for the picture and the truth of a frame: it is drawn once for both.
-        self._moment = lru_cache(maxsize=asked.cameras)(self._draw)
+        # A recording needs the picture and the ground truth of a frame: it is drawn once for both.
+        self._moment = lru_cache(maxsize=parameters.cameras)(self._draw)
 
     @property
     def extent(self) -> tuple[float, float]:
-        """The tank's, from glass to glass."""
+        """The size of the tank, from glass to glass."""
         return _EXTENT
 
     def picture(self, camera: int, seconds: float) -> Bytes:
-        """Paint the tank with all fish in it."""
+        """Return the picture of the tank with all fish."""
         moment = self._moment(camera, seconds)
         return self._paint(camera, moment.lit, moment.layers)
 
-    def empty(self, camera: int, seconds: float) -> Bytes:
-        """Paint the tank without fish, weeds as they sway at the moment."""
+    def background(self, camera: int, seconds: float) -> Bytes:
+        """Return the picture of the tank without fish."""
         lit = self._bed(camera).lit(seconds)
         still = self._still(camera, lit, seconds)
         return self._paint(camera, lit, tuple((None, figure) for _, _, figure in still))
 
     def truth(self, camera: int, seconds: float) -> CameraTruth:
-        """Measure all fish as they are drawn."""
+        """Measure the ground truth on the fish as they are drawn."""
         moment = self._moment(camera, seconds)
-        found = survey(self._views[camera], [Piece(number, figure, None) for number, figure in moment.layers])
-        numbers = [number for number in sorted(found) if found[number].large]
+        found = measure_visibility(
+            self._views[camera], [FigureLayer(number, figure, None) for number, figure in moment.layers]
+        )
+        numbers = [number for number in sorted(found) if found[number].measurable]
         return CameraTruth(
             np.array([number + 1 for number in numbers], dtype=np.int64),
             np.array([found[number].box for number in numbers], dtype=np.float64).reshape(-1, 4),
             np.array([found[number].share for number in numbers], dtype=np.float64),
-            moment.away[numbers],
+            moment.distance[numbers],
         )
 
     def positions(self, seconds: float) -> Floats:
-        """Say above which point of the bed every fish is."""
+        """Return above which point of the seabed every fish is."""
         return self._shoal.at(seconds).places[:, :2].copy()
 
     def inside(self, seconds: float) -> NDArray[np.bool_]:
-        """Say who is in the tank: everybody."""
+        """Return which fish are in the tank: all."""
         return np.ones(len(self._shoal.at(seconds).places), dtype=np.bool_)
 
-    def homography(self, camera: int) -> Floats | None:  # noqa: ARG002 — fish stand nowhere
-        """Fish are on no floor."""
+    def homography(self, camera: int) -> Floats | None:  # noqa: ARG002 — fish are on no floor
+        """Return None: fish are on no floor."""
         return None
 
-    def _lay(self, camera: int) -> Bed:
-        return Bed(self._views[camera])
+    def _lay(self, camera: int) -> Seabed:
+        return Seabed(self._views[camera])
 
     def _paint(self, camera: int, lit: Bytes, layers: tuple[tuple[int | None, Figure], ...]) -> Bytes:
         image = lit.copy()
@@ -102,23 +102,23 @@ class Tank:
         view = self._views[camera]
         lit = self._bed(camera).lit(seconds)
         swimmers = self._shoal.at(seconds)
-        away = np.linalg.norm(swimmers.places - view.centre, axis=1)
-        figures = draw_fish(view, shape(swimmers), light_net(seconds))
+        distance = np.linalg.norm(swimmers.places - view.center, axis=1)
+        figures = draw_fish(view, fish_vertices(swimmers), caustics(seconds))
         layers: list[tuple[float, int | None, Figure]] = self._still(camera, lit, seconds)
         layers += [
             (far, number, figure)
-            for number, (far, figure) in enumerate(zip(away.tolist(), figures, strict=True))
+            for number, (far, figure) in enumerate(zip(distance.tolist(), figures, strict=True))
             if figure is not None
         ]
         layers.sort(key=lambda layer: -layer[0])
-        return _Moment(lit, tuple((number, figure) for _, number, figure in layers), away)
+        return _Moment(lit, tuple((number, figure) for _, number, figure in layers), distance)
 
     def _still(self, camera: int, lit: Bytes, seconds: float) -> list[tuple[float, int | None, Figure]]:
-        """Give what hides fish but is none, furthest first: how far away it is, and how it looks."""
+        """Return weeds and rocks, which hide fish, furthest first: distance, no number, figure."""
         found: list[tuple[float, int | None, Figure]] = []
-        found += [(clump.away, None, clump.figure) for clump in self._weeds[camera].at(seconds)]
+        found += [(clump.distance, None, clump.figure) for clump in self._weeds[camera].at(seconds)]
         for rock in self._bed(camera).rocks:
             seen = cv2.multiply(lit[rock.area], cv2.merge([rock.share] * 3), scale=1 / 255)
             patch = np.dstack([seen, rock.share])
-            found.append((rock.away, None, Figure(rock.area[1].start, rock.area[0].start, patch)))
+            found.append((rock.distance, None, Figure(rock.area[1].start, rock.area[0].start, patch)))
         return sorted(found, key=lambda layer: -layer[0])

@@ -1,4 +1,4 @@
-"""Drawing fish: faces of skin and fins, furthest first, lit, and seen through the murk."""
+"""Drawing of fish: faces of skin and fins, furthest first, lit, and seen through murky water."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic.cameras.pinhole import Floats, Perspective
+from synthetic.cameras.pinhole import Floats, PinholeCamera
 from synthetic.drawing.figure import Figure
-from synthetic.tank.fish import COLOURS, FACES, NEARER, THIN
-from synthetic.tank.water import TILE, Bytes, net_pixels, open_water, through
+from synthetic.tank.fish_mesh import COLORS, FACES, NEARER, THIN
+from synthetic.tank.water import TILE, Bytes, caustic_pixels, open_water, seen_through_water
 
 _FINE = 3  # drawn pixels per pixel
 _SHIFT = 4  # fractional bits of cv2's coordinates
 _AMBIENT, _SUN, _NET = 0.72, 0.36, 1.1  # light from all around, from above, and where the net of light falls
 
 
-def draw_fish(view: Perspective, corners: Floats, net: Bytes) -> list[Figure | None]:
-    """Draw fish by their corners ``(P, V, 3)`` in metres, under a net of light ``(TILE, TILE)``.
+def draw_fish(view: PinholeCamera, corners: Floats, net: Bytes) -> list[Figure | None]:
+    """Draw fish by their corners ``(P, V, 3)`` in meters, under a net of light ``(TILE, TILE)``.
 
     Patches reach beyond the picture's edge where fish do. None where a fish is not before the camera.
     """
@@ -29,27 +29,27 @@ def draw_fish(view: Perspective, corners: Floats, net: Bytes) -> list[Figure | N
     return [_draw(*fish) for fish in zip(pixels, depth, inks, strict=True)]
 
 
-def _inks(view: Perspective, corners: Floats, net: Bytes) -> Floats:
-    """Mix the colours ``(P, F, 4)`` of all faces: blue, green, red and the alpha of what is there."""
-    faces = corners[:, FACES]  # (P, F, 4, 3)
-    normal = np.cross(faces[:, :, 2] - faces[:, :, 0], faces[:, :, 3] - faces[:, :, 1])
+def _inks(view: PinholeCamera, corners: Floats, net: Bytes) -> Floats:
+    """Compute the colors ``(P, F, 4)`` of all faces: blue, green, red and alpha."""
+    facing = corners[:, FACES]  # (P, F, 4, 3)
+    normal = np.cross(facing[:, :, 2] - facing[:, :, 0], facing[:, :, 3] - facing[:, :, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-12)
     rise = np.where(THIN, np.abs(normal[..., 2]) * 0.3 + 0.3, normal[..., 2])
-    middle = faces.mean(axis=2)
-    spot = net_pixels(middle).astype(np.int64) % TILE
+    middle = facing.mean(axis=2)
+    spot = caustic_pixels(middle).astype(np.int64) % TILE
     bright = net[spot[..., 1], spot[..., 0]] / 255.0
     light = _AMBIENT + _SUN * np.clip(rise, -0.6, 1) + _NET * bright * np.clip(rise + 0.15, 0, 1)
-    sight = middle.mean(axis=1) - view.centre
-    away = np.linalg.norm(sight, axis=1)
-    water = open_water(sight / away[:, None])
-    seen = through(COLOURS * light[..., None], away[:, None], water[:, None])
+    sight = middle.mean(axis=1) - view.center
+    distance = np.linalg.norm(sight, axis=1)
+    water = open_water(sight / distance[:, None])
+    seen = seen_through_water(COLORS * light[..., None], distance[:, None], water[:, None])
     inks = np.full((*light.shape, 4), 255.0)
     inks[..., :3] = np.clip(seen[..., ::-1] * 255, 0, 255)
     return inks
 
 
 def _draw(pixels: Floats, depth: Floats, inks: Floats) -> Figure | None:
-    if depth.min() < 0.3:  # noqa: PLR2004 — metres
+    if depth.min() < 0.3:  # noqa: PLR2004 — meters
         return None
     left, top = (np.floor(pixels.min(axis=0)).astype(int) - 1).tolist()
     right, bottom = (np.ceil(pixels.max(axis=0)).astype(int) + 1).tolist()

@@ -1,4 +1,4 @@
-"""What a fish is made of: rings of skin around a spine that bends, and fins.
+"""The mesh of a fish: rings of skin around a spine that bends, and fins.
 
 Measures are shares of its length.
 """
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthetic.cameras.pinhole import Floats
-from synthetic.tank.shoal import Swimmers
+from synthetic.tank.shoal import FishState
 
-LENGTH = 0.8  # metres, all of them, without the tail fin
+LENGTH = 0.8  # meters, all of them, without the tail fin
 _AROUND = 16  # corners of a ring
 # Along the body: where, half its height, half its width, how far its middle is above the axis.
 _RINGS = np.array(
@@ -54,15 +54,15 @@ _FINS = (
     ((0.285, 0.080, -0.035), (0.375, 0.185, -0.020), (0.440, 0.175, -0.115), (0.330, 0.082, -0.095)),
     ((0.285, -0.080, -0.035), (0.375, -0.185, -0.020), (0.440, -0.175, -0.115), (0.330, -0.082, -0.095)),
 )
-_FIN_DARKS = (0.15, 0.35, 0.3, 0.3, 0.5, 0.5, 0.1, 0.1)  # how much of the dark colour is in each
+_FIN_DARKS = (0.15, 0.35, 0.3, 0.3, 0.5, 0.5, 0.1, 0.1)  # how much of the dark color is in each
 _EYE = (0.098, 0.060, 0.030)  # along, to either side, up
 _EYE_RADII = (0.030, 0.018)  # of the white and of the black
 _LIFTS = np.array([0.010, 0.022])  # by which the eye stands out of the skin
 
 
 def _skin() -> tuple[NDArray[np.intp], Floats]:
-    """Give the corners ``(S, 4)`` and the colours ``(S, 3)`` of the skin's faces."""
-    corners, colours = [], []
+    """Return the corners ``(S, 4)`` and the colors ``(S, 3)`` of the skin's faces."""
+    corners, colors = [], []
     for ring in range(len(_RINGS) - 1):
         for step in range(_AROUND):
             after = (step + 1) % _AROUND
@@ -70,40 +70,40 @@ def _skin() -> tuple[NDArray[np.intp], Floats]:
             corners.append((here + step, there + step, there + after, here + after))
             rise = np.sin(2 * np.pi * (step + 0.5) / _AROUND)
             blend = np.clip(rise, 0, 1) ** 0.8, np.clip(-rise, 0, 1) ** 0.8
-            colour = _SIDE + (_BACK - _SIDE) * blend[0] + (_BELLY - _SIDE) * blend[1]
+            color = _SIDE + (_BACK - _SIDE) * blend[0] + (_BELLY - _SIDE) * blend[1]
             for first, last in _PALE:
                 if first <= ring <= last:
-                    colour = _BAND * (1 - 0.12 * blend[0])
+                    color = _BAND * (1 - 0.12 * blend[0])
                 elif ring in (first - 1, last + 1):
-                    colour = colour * 0.45 + _EDGE * 0.55
-            colours.append(colour)
-    return np.array(corners, dtype=np.intp), np.array(colours)
+                    color = color * 0.45 + _EDGE * 0.55
+            colors.append(color)
+    return np.array(corners, dtype=np.intp), np.array(colors)
 
 
-_CORNERS, _COLOURS = _skin()
+_CORNERS, _COLORS = _skin()
 _FIRST_FIN = len(_RINGS) * _AROUND
 _FIRST_EYE = _FIRST_FIN + 4 * len(_FINS)
 FACES = np.concatenate([_CORNERS, _FIRST_FIN + np.arange(4 * (len(_FINS) + 4)).reshape(-1, 4)])
 """The corners ``(F, 4)`` of all faces, by number."""
-COLOURS = np.concatenate(
+COLORS = np.concatenate(
     [
-        _COLOURS,
+        _COLORS,
         [_FIN + (_FIN_DARK - _FIN) * dark for dark in _FIN_DARKS],
         [(0.96, 0.93, 0.86), (0.03, 0.03, 0.04)] * 2,
     ]
 )
-"""The colours ``(F, 3)`` of all faces: red, green, blue in 0..1."""
+"""The colors ``(F, 3)`` of all faces: red, green, blue in 0..1."""
 THIN = np.zeros(len(FACES), dtype=np.bool_)
 """Which faces ``(F,)`` show from both sides: fins."""
 THIN[len(_CORNERS) : len(_CORNERS) + len(_FINS)] = True
 NEARER = np.zeros(len(FACES))
-"""Metres ``(F,)`` that a face is taken nearer by: an eye lies on skin."""
+"""Meters ``(F,)`` nearer for the drawing order: an eye lies on skin."""
 NEARER[len(_CORNERS) + len(_FINS) :] = (0.03, 0.035) * 2
 
 
 @lru_cache(maxsize=1)
 def _rest() -> Floats:
-    """Give the corners ``(V, 3)`` of a fish at rest: along from the nose, left, up."""
+    """Return the vertices ``(V, 3)`` of a fish at rest: along from the nose, left, up."""
     turn = 2 * np.pi * np.arange(_AROUND) / _AROUND
     rings = [
         np.column_stack([np.full(_AROUND, along), wide * np.cos(turn), middle + high * np.sin(turn)])
@@ -114,17 +114,17 @@ def _rest() -> Floats:
 
 
 def _eyes() -> Floats:
-    along, aside, up = _EYE
+    along, offsets, up = _EYE
     found = []
     for side in (1.0, -1.0):
         for radius, lift in zip(_EYE_RADII, _LIFTS, strict=True):
             square = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)][:: -int(side)]) * radius
-            found += [(along + x, side * (aside + lift - 0.35 * x), up + z) for x, z in square.tolist()]
+            found += [(along + x, side * (offsets + lift - 0.35 * x), up + z) for x, z in square.tolist()]
     return np.array(found)
 
 
-def shape(swimmers: Swimmers) -> Floats:
-    """Give every fish's corners ``(P, V, 3)`` in metres, as it bends and beats its tail."""
+def fish_vertices(swimmers: FishState) -> Floats:
+    """Return every fish's vertices ``(P, V, 3)`` in meters, as it bends and beats its tail."""
     rest = _rest()
     along = rest[:, 0]
     beat = 2 * np.pi * (swimmers.beats[:, None] - 0.85 * along)

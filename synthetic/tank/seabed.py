@@ -8,19 +8,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic.cameras.pinhole import Floats, Perspective
-from synthetic.drawing.ray_casting import FAR, hit, may_hit
-from synthetic.room.house_surfaces import lattice
+from synthetic.cameras.pinhole import Floats, PinholeCamera
+from synthetic.drawing.ray_casting import FAR, intersect, may_intersect
+from synthetic.room.house_surfaces import hash_noise
 from synthetic.room.room import Block
 from synthetic.tank.water import (
     TILE,
     Bytes,
-    Shafts,
-    kept,
-    light_net,
-    net_pixels,
+    LightShafts,
+    caustic_pixels,
+    caustics,
     open_water,
-    through,
+    seen_through_water,
+    transmittance,
 )
 
 _FINE = 2  # rays per pixel and direction
@@ -28,7 +28,7 @@ _SAND = np.array([0.74, 0.66, 0.49])
 _STONE = (0.34, 0.33, 0.31)
 _SUN = np.array([0.22, -0.30, 0.93])  # towards the light
 _NET_GAIN = 1.9  # how much brighter than in the shade things are where the net of light falls
-_FADING = 6.0  # metres from which lines of the net are too fine to be seen one by one
+_FADING = 6.0  # meters from which lines of the net are too fine to be seen one by one
 
 
 def _rock(x: float, y: float, wide: float, deep: float, high: float) -> Block:
@@ -44,31 +44,35 @@ ROCKS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Rock:
+class RockOutline:
     """A heap of rocks in the picture, which hides what is behind it."""
 
-    away: float  # metres from the camera
+    distance: float  # meters from the camera
     area: tuple[slice, slice]
     share: Bytes  # (h, w) of the area: how much of a pixel it covers
 
 
-class Bed:
+class Seabed:
     """Everything in a camera's picture that stays in its place."""
 
-    def __init__(self, view: Perspective) -> None:
+    def __init__(self, view: PinholeCamera) -> None:
         columns = (np.arange(view.width * _FINE) + 0.5) / _FINE
         rows = (np.arange(view.height * _FINE) + 0.5) / _FINE
         shape = (len(rows), len(columns))
         rays = view.rays(columns, rows).reshape(-1, 3)
-        cast = _cast(view.centre, rays)
+        cast = _cast(view.center, rays)
         water = open_water(rays)
-        colour = through(cast.colour, cast.away, water)
-        colour[~cast.solid] = water[~cast.solid]
-        gain = cast.colour * kept(cast.away) * (_NET_GAIN / (1 + (cast.away / _FADING) ** 4))[:, None]
+        color = seen_through_water(cast.color, cast.distance, water)
+        color[~cast.solid] = water[~cast.solid]
+        gain = (
+            cast.color
+            * transmittance(cast.distance)
+            * (_NET_GAIN / (1 + (cast.distance / _FADING) ** 4))[:, None]
+        )
         gain *= cast.level[:, None] * cast.solid[:, None]
         size = (view.width, view.height)
-        self._base, self._gain = (_shrink(part, shape, size) for part in (colour, gain))
-        self._shafts = Shafts(view)
+        self._base, self._gain = (_shrink(part, shape, size) for part in (color, gain))
+        self._shafts = LightShafts(view)
         self.rocks = tuple(
             rock
             for index, heap in enumerate(ROCKS)
@@ -76,8 +80,10 @@ class Bed:
         )
         ground = np.flatnonzero(self._gain.any(axis=(1, 2)))
         self._rows = slice(int(ground[0]), int(ground[-1]) + 1) if len(ground) else slice(0, 0)
-        points = view.centre + rays * np.where(cast.solid, cast.away, 0)[:, None]
-        where = net_pixels(points).reshape(*shape, 2)[_FINE // 2 :: _FINE, _FINE // 2 :: _FINE][self._rows]
+        points = view.center + rays * np.where(cast.solid, cast.distance, 0)[:, None]
+        where = caustic_pixels(points).reshape(*shape, 2)[_FINE // 2 :: _FINE, _FINE // 2 :: _FINE][
+            self._rows
+        ]
         # Wrapped here, once: that is several times faster than letting remap wrap.
         column, row = np.moveaxis(where % TILE, -1, 0).astype(np.float32)
         self._places, self._between = cv2.convertMaps(column, row, cv2.CV_16SC2)
@@ -86,7 +92,7 @@ class Bed:
         """Paint the bed ``(H, W, 3)``, blue, green, red, in the light of a moment."""
         image = np.asarray(cv2.add(self._base, self._shafts.at(seconds)), dtype=np.uint8)
         if self._rows.stop:
-            tile = cv2.copyMakeBorder(light_net(seconds), 0, 1, 0, 1, cv2.BORDER_WRAP)
+            tile = cv2.copyMakeBorder(caustics(seconds), 0, 1, 0, 1, cv2.BORDER_WRAP)
             net = cv2.remap(
                 tile, self._places, self._between, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
             )
@@ -97,42 +103,47 @@ class Bed:
 
 @dataclass(frozen=True, slots=True)
 class _Cast:
-    colour: Floats  # (R, 3) in the shade, without water before it
+    color: Floats  # (R, 3) in the shade, without water before it
     level: Floats  # (R,) how much of the sun falls there
-    away: Floats  # (R,) metres
+    distance: Floats  # (R,) meters
     solid: NDArray[np.bool_]  # (R,)
     label: NDArray[np.int32]  # (R,) 0: sand or water; rocks from 1
 
 
 def _cast(origin: Floats, rays: Floats) -> _Cast:
     down = rays[:, 2] < -1e-3  # noqa: PLR2004 — level rays meet the sand nowhere
-    away = np.where(down, -origin[2] / np.minimum(rays[:, 2], -1e-3), FAR)
-    solid = away < 60.0  # noqa: PLR2004 — metres of water: nothing is seen through them
-    colour = np.zeros_like(rays)
-    points = origin + rays * np.where(solid, away, 0)[:, None]
-    colour[solid] = _sand(points[solid])
+    distance = np.where(down, -origin[2] / np.minimum(rays[:, 2], -1e-3), FAR)
+    solid = distance < 60.0  # noqa: PLR2004 — meters of water: nothing is seen through them
+    color = np.zeros_like(rays)
+    points = origin + rays * np.where(solid, distance, 0)[:, None]
+    color[solid] = _sand(points[solid])
     level = np.where(solid, 1.0, 0.0)
     label = np.zeros(len(rays), dtype=np.int32)
     sun = _SUN / np.linalg.norm(_SUN)
     for index, heap in enumerate(ROCKS):
         for block in heap:
-            near = np.flatnonzero(may_hit(block, origin, rays))
-            reach, normal = hit(block, origin, rays[near])
-            seen = (reach < away[near]) & (reach < FAR)
+            near = np.flatnonzero(may_intersect(block, origin, rays))
+            reach, normal = intersect(block, origin, rays[near])
+            seen = (reach < distance[near]) & (reach < FAR)
             chosen = near[seen]
             place = origin + rays[chosen] * reach[seen, None]
             light = np.clip(normal[seen] @ sun, 0, 1)
-            colour[chosen] = _stone(place) * (0.42 + 0.58 * light)[:, None]
-            level[chosen], away[chosen], solid[chosen], label[chosen] = light, reach[seen], True, index + 1
-    return _Cast(colour, level, away, solid, label)
+            color[chosen] = _stone(place) * (0.42 + 0.58 * light)[:, None]
+            level[chosen], distance[chosen], solid[chosen], label[chosen] = (
+                light,
+                reach[seen],
+                True,
+                index + 1,
+            )
+    return _Cast(color, level, distance, solid, label)
 
 
 def _sand(points: Floats) -> Floats:
-    """Colour sand points ``(N, 3)``: ripples, grains, and shade beside the rocks."""
+    """Color sand points ``(N, 3)``: ripples, grains, and shade beside the rocks."""
     x, y = points[:, 0], points[:, 1]
     bend = 0.35 * np.sin(1.3 * x + 0.7 * np.sin(0.9 * y)) + 0.12 * np.sin(3.1 * x + 1.0)
     ripple = 0.05 * np.sin(13.0 * (y + bend)) + 0.03 * np.sin(5.0 * (y + 0.4 * x))
-    grain = 0.07 * (lattice(np.floor(x * 55), np.floor(y * 55)) - 0.5)
+    grain = 0.07 * (hash_noise(np.floor(x * 55), np.floor(y * 55)) - 0.5)
     shade = np.ones(len(points))
     for heap in ROCKS:
         for rock in heap:
@@ -140,32 +151,32 @@ def _sand(points: Floats) -> Floats:
             radii = (np.array(rock.high) - np.array(rock.low)) / 2
             off = np.hypot((x - middle[0] + 0.08) / radii[0], (y - middle[1] + 0.1) / radii[1])
             shade *= 1 - 0.5 * np.exp(-(np.maximum(off - 0.9, 0) ** 2) / 0.12)
-    colour: Floats = _SAND * ((0.72 + ripple + grain) * shade)[:, None]
-    return colour
+    color: Floats = _SAND * ((0.72 + ripple + grain) * shade)[:, None]
+    return color
 
 
 def _stone(points: Floats) -> Floats:
-    """Colour points ``(N, 3)`` of rocks: grey, with moss on some of it."""
+    """Color points ``(N, 3)`` of rocks: gray, with moss on some of it."""
     x, y, z = points.T
     patch = 0.5 + 0.5 * np.sin(7 * x + 3 * np.sin(5 * y)) * np.sin(6 * y + 4 * z + 2 * np.sin(8 * x))
-    grain = 0.88 + 0.24 * lattice(np.floor(x * 34), np.floor(y * 34 + z * 41))
+    grain = 0.88 + 0.24 * hash_noise(np.floor(x * 34), np.floor(y * 34 + z * 41))
     moss = np.array([0.22, 0.33, 0.19])
-    colour: Floats = (np.array(_STONE) + (moss - np.array(_STONE)) * patch[:, None] ** 2) * grain[:, None]
-    return colour
+    color: Floats = (np.array(_STONE) + (moss - np.array(_STONE)) * patch[:, None] ** 2) * grain[:, None]
+    return color
 
 
-def _shrink(colour: Floats, shape: tuple[int, int], size: tuple[int, int]) -> Bytes:
-    fine = np.clip(colour[:, ::-1] * 255, 0, 255).astype(np.float32).reshape(*shape, 3)
+def _shrink(color: Floats, shape: tuple[int, int], size: tuple[int, int]) -> Bytes:
+    fine = np.clip(color[:, ::-1] * 255, 0, 255).astype(np.float32).reshape(*shape, 3)
     return np.asarray(np.rint(cv2.resize(fine, size, interpolation=cv2.INTER_AREA)), dtype=np.uint8)
 
 
 def _outline(
-    view: Perspective, heap: tuple[Block, ...], mask: NDArray[np.bool_], size: tuple[int, int]
-) -> Rock | None:
+    view: PinholeCamera, heap: tuple[Block, ...], mask: NDArray[np.bool_], size: tuple[int, int]
+) -> RockOutline | None:
     share = np.rint(cv2.resize(mask * np.float32(255), size, interpolation=cv2.INTER_AREA)).astype(np.uint8)
     x, y, wide, high = cv2.boundingRect(share)
     if not wide:
         return None
     middle = np.mean([(np.array(block.low) + np.array(block.high)) / 2 for block in heap], axis=0)
-    away = float(np.linalg.norm(middle - view.centre))
-    return Rock(away, (slice(y, y + high), slice(x, x + wide)), share[y : y + high, x : x + wide])
+    distance = float(np.linalg.norm(middle - view.center))
+    return RockOutline(distance, (slice(y, y + high), slice(x, x + wide)), share[y : y + high, x : x + wide])

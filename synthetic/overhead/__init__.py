@@ -1,1 +1,0 @@
-"""A small room under an overhead camera."""

@@ -1,0 +1,95 @@
+"""People in a room: the world of every scene that has a ground plane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synthetic.cameras.camera_view import CameraView, DrawnPerson
+from synthetic.cameras.pinhole import Floats, PinholeCamera
+from synthetic.drawing.clothing import Outfit
+from synthetic.drawing.figure import paste
+from synthetic.drawing.shadow import cast_shadow
+from synthetic.ground_truth import CameraTruth, measure_truth
+from synthetic.room.room import Room
+from synthetic.walking.trajectory import Pose
+from synthetic.world import Bytes, SceneParameters
+
+
+class Crowd(Protocol):
+    """The people of a room: everybody's pose at any moment."""
+
+    def poses(self, seconds: float) -> list[Pose]:
+        """Return everybody's pose at a moment of the scene."""
+        ...
+
+
+class RoomWorld:
+    """A crowd in a room under cameras. A camera's empty room is painted when it is first needed."""
+
+    def __init__(
+        self, room: Room, crowd: Crowd, outfits: Sequence[Outfit], parameters: SceneParameters
+    ) -> None:
+        self.room = room
+        self._crowd = crowd
+        self._outfits = outfits
+        self._size = (parameters.width, parameters.height)
+        self.camera_view = lru_cache(maxsize=None)(self._create_view)
+        # A recording needs the picture and the ground truth of a frame: people are drawn once for both.
+        self._people = lru_cache(maxsize=parameters.cameras)(self._draw_people)
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """The room's floor."""
+        return (self.room.width, self.room.depth)
+
+    def picture(self, camera: int, seconds: float) -> Bytes:
+        """Return the picture of the room with all people."""
+        return compose(self.camera_view(camera), self._people(camera, seconds))
+
+    def background(self, camera: int, seconds: float) -> Bytes:  # noqa: ARG002 — nothing in a room moves by itself
+        """Return the picture of the room without people."""
+        return self.camera_view(camera).backdrop.image.copy()
+
+    def truth(self, camera: int, seconds: float) -> CameraTruth:
+        """Measure the ground truth on the people as they are drawn."""
+        return measure_truth(self.camera_view(camera), self._people(camera, seconds))
+
+    def positions(self, seconds: float) -> Floats:
+        """Return where everybody stands; a corridor is off the room's floor."""
+        poses = self._crowd.poses(seconds)
+        return np.array([(pose.x, pose.y) for pose in poses], dtype=np.float64).reshape(-1, 2)
+
+    def inside(self, seconds: float) -> NDArray[np.bool_]:
+        """Return who is in the room, not in a corridor."""
+        where = self.positions(seconds).tolist()
+        return np.array([self.room.outside(x, y) <= 0 for x, y in where], dtype=np.bool_)
+
+    def homography(self, camera: int) -> Floats:
+        """Return the homography from a camera's pixels to the floor."""
+        return self.view(camera).homography()
+
+    def view(self, camera: int) -> PinholeCamera:
+        """Return a camera's projection."""
+        return PinholeCamera.at(self.room.viewpoints[camera], *self._size)
+
+    def _create_view(self, camera: int) -> CameraView:
+        return CameraView(self.room, self.view(camera))
+
+    def _draw_people(self, camera: int, seconds: float) -> tuple[DrawnPerson, ...]:
+        return tuple(self.camera_view(camera).draw_people(self._crowd.poses(seconds), self._outfits))
+
+
+def compose(camera_view: CameraView, people: Sequence[DrawnPerson]) -> Bytes:
+    """Compose a noiseless picture ``(H, W, 3)``, blue, green, red: empty room, shadows, then people."""
+    image = camera_view.backdrop.image.copy()
+    for person in people:
+        if person.inside:
+            cast_shadow(image, camera_view.backdrop.floor, camera_view.view, person.joints)
+    for person in people:
+        paste(image, camera_view.view, person.figure, person.visible_mask)
+    return image
