@@ -29,7 +29,7 @@ _FIRST_BYTES = 4096
 
 
 def demo_fps(there: float) -> float:
-    """Give the frames a second that so many processors can do."""
+    """Return the frames a second that so many processors can do."""
     return next(rate for least, rate in _RATES.items() if there >= least)
 
 
@@ -69,7 +69,7 @@ def _rate_line(fps: float, there: float) -> str:
 
 
 async def _invite(url: str, *, open_browser: bool) -> None:
-    """Say where to look as soon as there is something to see."""
+    """Print the address of the page as soon as the first stream begins, and open a browser."""
     async with aiohttp.ClientSession() as session:
         while not await _first_picture(session, url):  # noqa: ASYNC110 — another process: there is no event
             await asyncio.sleep(_POLL_S)

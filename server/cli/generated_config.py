@@ -38,7 +38,7 @@ def config_for_videos(
     ground: Path | None = None,
     detections: Sequence[Path] = (),
 ) -> Config:
-    """Give a configuration for recorded views, named after their files; each is played once.
+    """Return a configuration for recorded views, named after their files; each is played once.
 
     ``base`` is the content of a configuration file (in ``folder``): its settings hold, and those of its
     cameras with the same names. Without a site in it, the size is the first view's, and the rate that of the
@@ -73,7 +73,7 @@ def config_for_videos(
 
 
 def camera_name(video: Path) -> str:
-    """Give the name of a view: its file's, with a dash for whatever a camera's name cannot have."""
+    """Return the name of a view: its file's, with a dash for whatever a camera's name cannot have."""
     return re.sub(r"[^A-Za-z0-9_-]+", "-", video.stem).lstrip("-_")[:_NAME_CHARACTERS] or "view"
 
 
@@ -119,7 +119,7 @@ def demo_config(folder: Path, port: int, fps: float) -> tuple[Path, Config]:
 
 
 def free_port(preferred: int = 0) -> int:
-    """Give the preferred port if it is free, else any that is."""
+    """Return the preferred port if it is free, else any that is."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -43,7 +43,7 @@ def _myview(
         typer.Option("--version", help="Say which version this is.", callback=_say_version, is_eager=True),
     ] = False,
 ) -> None:
-    """Take what is said before a command."""
+    """Accept the options that precede a command."""
 
 
 for run in (
@@ -78,7 +78,7 @@ def _end(number: int, _: object) -> None:
 
 
 def _was_cut_short(error: BaseException | None) -> bool:
-    """Tell whether an error comes of a call that a signal has cut short: it is no other than that signal."""
+    """Return whether an error was caused by a call that a signal interrupted."""
     while error is not None:
         if isinstance(error, OSError) and error.errno == errno.EINTR:
             return True
@@ -110,7 +110,7 @@ def main() -> None:
 
 
 def _fail(error: Exception) -> None:
-    """Say in one line what is wrong, and end; what is a mistake here is raised again."""
+    """Print a one-line error and exit; raise again what is a bug."""
     if isinstance(error, UserError):
         say_failure(str(error))
         sys.exit(error.code)

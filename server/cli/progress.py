@@ -32,7 +32,7 @@ def total_frames(videos: list[Path], fps: float | None = None) -> int | None:
 
 
 def bar(unit: str) -> Progress:
-    """Give a progress bar on standard error, where that is a terminal."""
+    """Return a progress bar on standard error, where that is a terminal."""
     console = Console(stderr=True)
     return Progress(
         TextColumn("{task.description}"),

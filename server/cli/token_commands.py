@@ -1,4 +1,4 @@
-"""The command that lets somebody in."""
+"""The command ``token``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A camera's password from a file of its own: it then stands in no configuration that others read."""
+"""A camera's password from a file of its own, so that it is in no configuration that others read."""
 
 from __future__ import annotations
 

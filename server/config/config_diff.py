@@ -1,4 +1,4 @@
-"""In which settings two configurations differ."""
+"""The settings in which two configurations differ."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _RESOLVED = "ground"
 
 
 def changed_keys(one: Config, other: Config) -> tuple[str, ...]:
-    """Name the settings that are not the same, in the order of the reference.
+    """List the settings in which two configurations differ, in the order of the reference.
 
     They are named as ``view.switch_cost_s`` and ``cameras.c0.source``; ``cameras`` alone says that there are
     other cameras, or the same in another order.

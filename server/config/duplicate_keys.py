@@ -1,4 +1,4 @@
-"""Keys that a mapping has twice: readers keep the last one, and drop the first without a word.
+"""Refusal of duplicate keys in YAML and JSON: parsers would silently keep the last one.
 
 Two sections ``access:``, pasted from two documents, would so lose the tokens, and let everybody in.
 """
@@ -33,7 +33,7 @@ class DuplicateKeyError(ValueError):
 
 
 def check_yaml_keys(root: yaml.Node, value_of: Callable[[yaml.Node], Any]) -> None:
-    """Look that no mapping has a key twice; what merges (``<<``) bring may be said anew.
+    """Check that no mapping has a key twice; what merges (``<<``) bring may be said anew.
 
     Keys are the same if they are written the same, or stand for the same: ``1``, ``"1"`` and ``0x1``.
     ``value_of`` gives what a scalar stands for.

@@ -1,4 +1,4 @@
-"""What the environment says of the configuration, looked at before pydantic-settings reads it.
+"""Check environment variables ``MYVIEW_SECTION__KEY`` before pydantic-settings reads them.
 
 It takes names in capitals and in small letters alike, keeps one of two, and drops what it does not know.
 """
@@ -17,7 +17,7 @@ _DELIMITER = "__"
 
 
 def check_environment(where: str) -> None:
-    """Look that the environment's words on settings are understood, and no two of them are on one setting.
+    """Check that the environment's words on settings are understood, and no two of them are on one setting.
 
     Raises:
         UserError: they are not, as in ``MYVIEW_HTP__PORT``, or two are; the text begins with ``where``.
@@ -44,7 +44,7 @@ def check_environment(where: str) -> None:
 
 
 def _place(name: str) -> tuple[str, ...] | None:
-    """Give the way to the setting that a variable is for; None: it is for none, as MYVIEW_LOG."""
+    """Return the way to the setting that a variable is for; None: it is for none, as MYVIEW_LOG."""
     if not name.upper().startswith(PREFIX):
         return None
     place = tuple(name[len(PREFIX) :].lower().split(_DELIMITER))
@@ -70,7 +70,7 @@ def _parsed(text: str) -> Any:
 
 
 def _says(content: Any, place: Sequence[str]) -> bool:
-    """Tell whether a section's content has something at a place, or has no places at all."""
+    """Return whether a section's content has something at a place, or has no places at all."""
     for key in place:
         if not isinstance(content, dict):
             return True

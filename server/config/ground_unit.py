@@ -18,7 +18,7 @@ _CLOSE = 0.8
 
 
 def check_unit(unit: object) -> str:
-    """Give the unit back; any word will do, but not one that was meant for metres and is not taken for them.
+    """Return the unit; any word is accepted, except a misspelling of a metric one.
 
     Raises:
         ValueError: in one line: it is no word, or another way to write m, cm or mm.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -27,6 +26,7 @@ from server.config.sections import (
 )
 from server.config.site_config import Config
 from server.config.source_address import resolve_source
+from server.config.unknown_keys import did_you_mean
 from server.config.values import abbreviate, check_camera_name, check_numbers, check_values
 from server.config.yaml_file import read_yaml
 from server.system.errors import UserError
@@ -126,7 +126,7 @@ def _process_files(section: ProcessSection, folder: Path) -> ProcessSection:
 
 
 def change_view_settings(view: ViewSettings, changes: Mapping[str, Any], where: str) -> ViewSettings:
-    """Give the settings of the choice with some of them changed, checked as those of a file are.
+    """Return the settings of the choice with some of them changed, checked as those of a file are.
 
     Raises:
         UserError: something is wrong; the text begins with ``where``.
@@ -139,7 +139,7 @@ def change_view_settings(view: ViewSettings, changes: Mapping[str, Any], where: 
 
 
 def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Give the content with changes to it, section by section."""
+    """Return the content with changes to it, section by section."""
     merged = dict(content)
     for key, value in changes.items():
         inner = merged.get(key)
@@ -229,8 +229,7 @@ def _plain(detail: ErrorDetails, within: tuple[str, ...]) -> str:
     place = ".".join(abbreviate(str(part)) for part in loc)
     message = detail["msg"].removeprefix("Value error, ")
     if detail["type"] == "extra_forbidden":
-        close = difflib.get_close_matches(str(loc[-1]), _known_keys(loc[:-1]), n=1)
-        message = "unknown key" + (f"; did you mean {close[0]!r}?" if close else "")
+        message = "; ".join(filter(None, ("unknown key", did_you_mean(str(loc[-1]), _known_keys(loc[:-1])))))
     return f"{place}: {message}" if place else message
 
 

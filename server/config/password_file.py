@@ -1,4 +1,4 @@
-"""Files of ``name:password``, one a line: who may come to the bus, and to the pulses."""
+"""Password files (``name:password`` lines) of the bus and the pulse server."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def read_users(path: Path, setting: str) -> dict[str, str]:
 
 
 def password_of(path: Path, name: str, setting: str) -> str:
-    """Give a user's password.
+    """Return a user's password.
 
     Raises:
         UserError: it cannot be read, or there is none.

@@ -1,4 +1,4 @@
-"""The configuration that a process runs by, and its file, which may say something else by now."""
+"""The active configuration of a process, and its file, which may have changed since."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ A process that has to be started again must not go by a file that nobody has sai
 
 @dataclass(frozen=True, slots=True)
 class ConfigFileState:
-    """How the file on the disk is different from what runs."""
+    """The difference between the configuration file and the active configuration."""
 
     error: str
     """Why it cannot be in force; empty: it can."""
@@ -33,12 +33,12 @@ class ConfigFileState:
 
     @property
     def differs(self) -> bool:
-        """Whether the file is not what runs."""
+        """Whether the file differs from the active configuration."""
         return bool(self.error or self.waiting)
 
 
 class ActiveConfig:
-    """What a process runs by. ``now`` is set anew when something else has come into force.
+    """The configuration that a process runs by, ``now``; set again after a reload.
 
     Raises:
         UserError: the file cannot be read, or something in it is wrong.
@@ -62,7 +62,7 @@ class ActiveConfig:
         return build_config(read_content(Path(kept)), where=str(self.path), folder=self.path.parent)
 
     def on_disk(self) -> ConfigFileState:
-        """Say how the file is different from what runs; it is read when it has changed.
+        """Compare the file with the active configuration; it is read again only when it has changed.
 
         One that is wrong is read each time: what it refers to, and may be wrong itself, is not known.
         """
@@ -81,7 +81,7 @@ class ActiveConfig:
 
 
 def is_owned_by_this_user(path: Path) -> bool:
-    """Tell whether a file or folder is there and belongs to this process's user: no other says what runs."""
+    """Return whether a file or folder exists and belongs to this process's user."""
     try:
         found = path.lstat()
     except OSError:

@@ -15,7 +15,6 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
-from server.config.dataclass_section import validated
 from server.config.sections import (
     AccessSettings,
     CameraSettings,
@@ -30,6 +29,7 @@ from server.config.sections import (
     ZenohSettings,
 )
 from server.config.sections.detect import DetectSettings
+from server.config.unknown_keys import no_unknown_keys
 from tracking.registry import TEMPORAL_TRACKER
 
 PREFIX = "MYVIEW_"
@@ -56,7 +56,7 @@ class Config(BaseSettings):
     ground: Path | None = None
     """A JSON file with one homography per camera; a camera's own `ground` goes before it."""
     sound: SoundSettings = SoundSettings()
-    detect: Annotated[DetectSettings, validated(DetectSettings)] = DetectSettings()
+    detect: Annotated[DetectSettings, no_unknown_keys(DetectSettings)] = DetectSettings()
     """Finding people in a picture; by default by background subtraction and box filters (paper, IV.A.2)."""
     track: TrackSettings = TrackSettings()
     view: ViewSettings = ViewSettings()
@@ -73,7 +73,7 @@ class Config(BaseSettings):
         dotenv_settings: PydanticBaseSettingsSource,
         file_secret_settings: PydanticBaseSettingsSource,
     ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """Let the environment go before the file; where it has nothing to say, it is not asked at length."""
+        """Give environment variables precedence over the file; skip them where there are none."""
         del settings_cls, dotenv_settings, file_secret_settings
         told = any(name.upper().startswith(PREFIX) for name in os.environ)
         return (env_settings, init_settings) if told else (init_settings,)
@@ -145,7 +145,7 @@ class Config(BaseSettings):
         return source if source is None or source in self.camera_ids else self.camera_ids[0]
 
     def witnesses(self, camera_id: str) -> Sequence[str]:
-        """Give the cameras that may look at the same ground as this one, if it goes by what others find."""
+        """Return the cameras that may look at the same ground as this one, if it goes by what others find."""
         looks = {it.id for it in self.cameras if it.ground is not None} - self.overhead
         if not self.track.cross_view.enabled or camera_id not in looks:
             return ()
@@ -157,7 +157,7 @@ class Config(BaseSettings):
         return frozenset(it.id for it in self.cameras if it.kind == "overhead")
 
     def camera(self, camera_id: str) -> CameraSettings:
-        """Give one camera.
+        """Return one camera.
 
         Raises:
             KeyError: there is none of this id.

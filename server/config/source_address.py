@@ -1,4 +1,4 @@
-"""How a camera's ``source`` is written, and which kind of source that is."""
+"""A camera's ``source``: its notation and its kind."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class SourceKind(Enum):
 
 
 def source_kind(source: str) -> SourceKind:
-    """Tell the kind of a source from how it is written."""
+    """Return the kind of a source."""
     if source.startswith("scene:"):
         return SourceKind.SCENE
     if has_protocol(source) or is_device(source):
@@ -37,7 +37,7 @@ def source_kind(source: str) -> SourceKind:
 
 
 def is_device(source: str) -> bool:
-    """Tell whether this is a device of this machine, such as ``/dev/video0``, be it there or unplugged."""
+    """Return whether this is a device of this machine, such as ``/dev/video0``, be it there or unplugged."""
     path = Path(source)
     if Path("/dev") not in path.parents:
         return False
@@ -48,7 +48,7 @@ def is_device(source: str) -> bool:
 
 
 def path_is_missing(path: str) -> bool:
-    """Tell whether nothing is at a path; what only cannot be reached is not missing: opening it says why."""
+    """Return whether a path does not exist; one that cannot be accessed is not missing."""
     try:
         Path(path).stat()
     except (FileNotFoundError, NotADirectoryError):

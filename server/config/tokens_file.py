@@ -1,4 +1,4 @@
-"""The file of tokens: who may watch what, and who may operate.
+"""The token file: access rights of viewers and operators.
 
 It knows a token by its SHA-256. A token is 256 random bits: there is nothing to guess, and no need for a slow
 hash. Every request is checked, and by a slow one strangers could keep the server busy.
@@ -22,7 +22,7 @@ Role = Literal["watch", "operate"]
 
 
 class Token(Section):
-    """One token: somebody who may come, and what they may."""
+    """One token and its access rights."""
 
     name: Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f]*$")]
     """Whose it is, for people: it is not secret."""
@@ -50,7 +50,7 @@ class Token(Section):
 
 
 def token_digest(token: str) -> str:
-    """Give what the file knows of a token: its SHA-256, in hex."""
+    """Return what the file knows of a token: its SHA-256, in hex."""
     return hashlib.sha256(token.encode(errors="surrogatepass")).hexdigest()  # heads may hold any bytes
 
 

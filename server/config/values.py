@@ -1,4 +1,4 @@
-"""Values as YAML and JSON have them, before and after somebody has looked at what they mean."""
+"""Checks of values from YAML and JSON: depth, size, printable text, finite numbers."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _HOLDING = (dict, list, tuple, set)
 
 
 def abbreviate(key: str) -> str:
-    """Give a key as a line can name it: it may be as long as its file, or an address by mistake."""
+    """Return a key as a line can name it: it may be as long as its file, or an address by mistake."""
     key = redact_address(key)
     return key if len(key) <= _SHOWN else f"{key[:_SHOWN]}…"
 
 
 def check_camera_name(name: str, where: str) -> None:
-    """Look that a file's name for a camera can be written into a line; it need not be one of the site's.
+    """Check that a file's name for a camera can be written into a line; it need not be one of the site's.
 
     Raises:
         UserError: it cannot; the text begins with ``where``.
@@ -35,7 +35,7 @@ def check_camera_name(name: str, where: str) -> None:
 
 
 def check_values(content: Any, where: str) -> None:
-    """Look that values end somewhere, and that their texts are texts of one line, as what names them is.
+    """Check that values end somewhere, and that their texts are texts of one line, as what names them is.
 
     Raises:
         UserError: they do not, or are not; the text begins with ``where``.
@@ -51,7 +51,7 @@ def check_values(content: Any, where: str) -> None:
 
 
 def check_numbers(content: Any, where: str) -> None:
-    """Look that sums and products of numbers are still numbers.
+    """Check that sums and products of numbers are still numbers.
 
     Raises:
         UserError: one is too large for that; the text begins with ``where`` and names it.
@@ -64,18 +64,18 @@ def check_numbers(content: Any, where: str) -> None:
 
 
 def _named(place: tuple[Any, ...]) -> str:
-    """Give the way to a value as a line begins with it, in a line whatever the keys are."""
+    """Return the way to a value as a line begins with it, in a line whatever the keys are."""
     words = (abbreviate(" ".join(it.split())) if isinstance(it, str) else _short(it) for it in place)
     return f"{'.'.join(words)}: " if place else ""
 
 
 def _short(key: Any) -> str:
-    """Give a key that is no text; Python writes no number of thousands of digits."""
+    """Return a key that is no text; Python writes no number of thousands of digits."""
     return "…" if isinstance(key, int) and abs(key) > _LARGEST else abbreviate(str(key))
 
 
 def _inside(content: Any, where: str) -> Iterator[tuple[tuple[Any, ...], Any]]:
-    """Give all values, keys too, and by what keys they are reached."""
+    """Return all values, keys too, and by what keys they are reached."""
     left: list[tuple[tuple[Any, ...], Any]] = [((), content)] if isinstance(content, _HOLDING) else []
     seen = 0
     while left:

@@ -1,4 +1,4 @@
-"""Reading YAML, whatever is in the file; and writing a value of it."""
+"""Safe reading and writing of YAML."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def read_yaml(path: Path, what: str) -> Any:
 
 
 def _loaded(text: str) -> Any:
-    """Give what a text stands for.
+    """Return what a text stands for.
 
     Raises:
         DuplicateKeyError: a mapping in it has a key twice.
@@ -88,7 +88,7 @@ def _loaded(text: str) -> Any:
 
 
 def _words(error: yaml.YAMLError) -> str:
-    """Say what is wrong and where, without what is in the file: it may be a password."""
+    """Describe a YAML error with its position, without content of the file, which may be a password."""
     if not isinstance(error, yaml.MarkedYAMLError):
         return " ".join(str(error).replace(' in "<unicode string>"', "").split())
     parts = []
@@ -112,7 +112,7 @@ def dump_yaml(content: Any) -> str:
 
 
 def _check_depth(text: str) -> None:
-    """Look that lists in lists end somewhere, before anything is made of them.
+    """Check that lists in lists end somewhere, before anything is made of them.
 
     Raises:
         YAMLError: they do not, or the text is no YAML.

@@ -160,7 +160,7 @@ class Bus:
         return end
 
     def declare_alive(self, key: str) -> None:
-        """Say that this process is there, until it closes its session or is gone."""
+        """Declare a liveliness token, which lasts until this process closes its session or dies."""
         self._undeclare.append(self._session.liveliness().declare_token(key).undeclare)
 
     def watch_alive(self, key: str, handler: Callable[[str, bool], None]) -> None:

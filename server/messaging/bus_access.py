@@ -1,4 +1,4 @@
-"""Who is who on the bus, and what each may send and hear there: zenoh's users and its access control."""
+"""Access control of the bus: what each zenoh user may publish and subscribe."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SERVICES = 64
 
 
 def access_control_of(config: Config) -> dict[str, Any] | None:
-    """Give what each user of a site's bus may; None: whoever reaches it may everything.
+    """Return what each user of a site's bus may; None: whoever reaches it may everything.
 
     Raises:
         UserError: the users cannot be read.
@@ -36,7 +36,7 @@ def access_control_of(config: Config) -> dict[str, Any] | None:
 def build_access_control(
     site: str, cameras: Sequence[str], sounding: str | None, users: Sequence[str]
 ) -> dict[str, Any]:
-    """Give what each user may, as zenoh's ``access_control``: what is not said is denied.
+    """Return what each user may, as zenoh's ``access_control``: what is not said is denied.
 
     A camera sends under its own key, and the site's sound if it is the one. It hears what the others found,
     and what the best-view services alone say to it: where the operator points, and what to remember.

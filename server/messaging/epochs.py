@@ -8,12 +8,12 @@ from __future__ import annotations
 
 
 def epoch_of_window(last: int, stride: int) -> int:
-    """Give the epoch of a window that ends with pulse ``last``, a regular end."""
+    """Return the epoch of a window that ends with pulse ``last``, a regular end."""
     return last // stride
 
 
 def closing_epoch(last: int, stride: int) -> int:
-    """Give the epoch in which a recording with the last pulse ``last`` says that it has ended.
+    """Return the epoch in which a recording with the last pulse ``last`` says that it has ended.
 
     Where ``last`` is a regular end its own epoch is taken, so that the closing one is the next.
     """
@@ -21,5 +21,5 @@ def closing_epoch(last: int, stride: int) -> int:
 
 
 def end_of_epoch(epoch: int, stride: int) -> int:
-    """Give the last pulse of an epoch."""
+    """Return the last pulse of an epoch."""
     return (epoch + 1) * stride - 1

@@ -1,4 +1,4 @@
-"""Who is who, as the cameras remember it for a best-view service that is started anew.
+"""Snapshot of people's identities, which cameras keep for a best-view service that restarts.
 
 A number means nothing to the next run of the service. But the cameras' processes outlast it, and go on
 following: whoever one of their tracks follows before and after is the same person, as far as a track is ever
@@ -29,7 +29,7 @@ PersonNumber = Annotated[int, msgspec.Meta(ge=1, le=PERSON_NUMBER_MAX)]
 
 
 class PersonSnapshot(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Somebody whom the camera follows."""
+    """One person whom the camera tracks."""
 
     number: PersonNumber
     tracks: list[Number]
@@ -42,7 +42,7 @@ class PersonSnapshot(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tr
 
 
 class IdentitySnapshot(msgspec.Struct, frozen=True, kw_only=True):
-    """Whom one camera follows, as of a pulse."""
+    """The people whom one camera tracks, as of a pulse."""
 
     pulse: Pulse
     boot: Number

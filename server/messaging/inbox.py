@@ -1,4 +1,4 @@
-"""From a foreign library's threads to the event loop, bounded."""
+"""A bounded queue from a library's threads to the event loop, fair among senders."""
 
 from __future__ import annotations
 
@@ -68,12 +68,12 @@ class Inbox(Generic[Item]):
 
     @property
     def waiting(self) -> int:
-        """How many items wait."""
+        """The number of items that wait."""
         with self._lock:
             return sum(map(len, self._pending.values()))
 
     def put(self, item: Item) -> None:
-        """Take an item, in any thread."""
+        """Add an item; may be called in any thread."""
         with self._lock:
             self._queue(self._whose(item), item)
             woken, self._woken = self._woken, True

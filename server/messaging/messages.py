@@ -36,7 +36,7 @@ from server.messaging.number_types import PULSE_MAX, Coordinate, Cost, Duration,
 from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
 
 DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
-"""What a decoder raises: it is no JSON or other JSON, it is no text, it is nested without end."""
+"""The exceptions of a decoder: invalid JSON, invalid UTF-8, nested too deeply."""
 
 Box = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
 """Left, top, right, bottom in pixels of the site's picture."""
@@ -46,7 +46,7 @@ NumberedBox = tuple[int, float, float, float, float]
 
 
 class FrameHeader(msgspec.Struct, frozen=True, kw_only=True):
-    """What one access unit is. Times are unix seconds by the camera's clock."""
+    """Header of one access unit. Times are unix seconds by the camera's clock."""
 
     pulse: Pulse
     key: bool
@@ -67,7 +67,7 @@ HISTOGRAM_BINS_MAX = 1024
 
 
 class AppearanceHistogram(msgspec.Struct, frozen=True, kw_only=True):
-    """How a person looks in consecutive frames in which nobody else is in the box."""
+    """Appearance of a person: mean color histogram of consecutive frames without others in the box."""
 
     first: Pulse
     last: Pulse
@@ -107,7 +107,7 @@ class TrackMessage(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SolverReport(msgspec.Struct, frozen=True, kw_only=True):
-    """How well the window's program was solved."""
+    """Objective, bound and gap of a window's solution."""
 
     objective: Cost
     bound: Cost
@@ -121,7 +121,7 @@ TRACKS_MAX = 1000
 
 
 class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
-    """What a camera knows after solving one window."""
+    """Tracks of one camera after solving one window."""
 
     camera: str
     boot: Number
@@ -153,7 +153,7 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     solve_s: Duration | None = None
     """Seconds that it took to follow everybody to the end of the window; null offline."""
     risk_events: Annotated[list[RiskEvent], msgspec.Meta(max_length=RISK_EVENTS_MAX)] = []
-    """What the tracker foresees, where it is set to."""
+    """Predicted tracking failures, where `track.assist` is on."""
     revised_from: Pulse | None = None
     """The first frame, final before, that somebody's pointing has changed; null: none has."""
 
@@ -166,7 +166,7 @@ FRAME_DETECTIONS_MAX = 100
 
 
 class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):
-    """What a camera found in one frame, before it follows anybody: for the other cameras."""
+    """Detections of a camera in one frame, before tracking, for the other cameras."""
 
     camera: str
     boot: Number
@@ -180,11 +180,11 @@ class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):
 
 
 CameraState = Literal["starting", "live", "away", "ended"]
-"""How a camera is; away: its source gives no pictures now."""
+"""State of a camera; away: its source gives no pictures now."""
 
 
 class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """How a camera is, once a second."""
+    """Status of a camera, once a second."""
 
     camera: str
     boot: Number
@@ -269,20 +269,20 @@ class ZenohKeys:
     site: str
 
     def camera(self, camera_id: str, what: str) -> str:
-        """Name a camera's key; ``*`` as the id stands for all cameras."""
+        """Return a camera's key; ``*`` as the id stands for all cameras."""
         return f"myview/{self.site}/camera/{camera_id}/{what}"
 
     @property
     def sound(self) -> str:
-        """Name the key of the site's sound."""
+        """The key of the site's audio."""
         return f"myview/{self.site}/sound"
 
     def bestview(self, what: str, index: int = 0) -> str:
-        """Name a key of the best-view service, of several the one with this index."""
+        """Return a key of the best-view service with this index."""
         return f"myview/{self.site}/bestview/{f'{index}/' if index else ''}{what}"
 
 
 def camera_of_key(key: str) -> str:
-    """Give the camera id inside a camera's key; empty where there is none."""
+    """Return the camera id inside a camera's key; empty where there is none."""
     parts = key.split("/")
     return parts[_CAMERA_PART] if len(parts) > _CAMERA_PART else ""

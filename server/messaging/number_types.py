@@ -1,4 +1,4 @@
-"""What numbers on the bus may be."""
+"""Bounded number types of bus messages."""
 
 from __future__ import annotations
 

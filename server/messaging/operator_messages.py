@@ -1,4 +1,4 @@
-"""What goes between a camera and the operator who helps its tracker: troubles one way, places the other."""
+"""Messages between tracker and operator: predicted failures to the operator, marked positions back."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RISK_EVENTS_MAX = 32
 
 
 class RiskEvent(msgspec.Struct, frozen=True, kw_only=True):
-    """Where a camera's tracker may soon take people for each other, or lose somebody."""
+    """A predicted tracking failure: an identity switch or a lost person."""
 
     reason: RiskReason
     tracks: Annotated[list[Number], msgspec.Meta(max_length=2)]
@@ -36,7 +36,7 @@ TOLERANCE_MIN = 1.0
 
 
 class OperatorPoint(msgspec.Struct, frozen=True, kw_only=True):
-    """Whom a track follows is at this place, says somebody who sees it."""
+    """The position of a tracked person as an operator marked it."""
 
     pulse: Pulse
     track: Number
@@ -48,7 +48,7 @@ class OperatorPoint(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class OperatorPoints(msgspec.Struct, frozen=True, kw_only=True):
-    """What an operator points at in one camera's picture."""
+    """Positions that an operator marked in one camera's picture."""
 
     boot: Number
     """The run of the camera whose tracks are named."""

@@ -1,4 +1,4 @@
-"""A site that other machines can reach is so because the configuration says so, and not by accident."""
+"""Checks that refuse a site which other machines can reach without authentication."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def check_bus(config: Config) -> None:
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether nobody but this machine can reach a host that is listened on."""
+    """Return whether nobody but this machine can reach a host that is listened on."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

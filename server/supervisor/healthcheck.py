@@ -1,4 +1,4 @@
-"""Whether one process of a site in containers is well: its container's health check.
+"""Health check of a container that runs one process of a site.
 
     python -m server.supervisor.healthcheck sync | bestview | camera ID
 
@@ -28,11 +28,11 @@ _TIMEOUT_S = 5.0
 
 
 class UnhealthyError(Exception):
-    """What is wrong, in one line."""
+    """A failed health check; the text is one line."""
 
 
 def check_pulses() -> None:
-    """See whether the pulse server greets.
+    """Check whether the pulse server greets.
 
     Raises:
         UnhealthyError: it does not.
@@ -50,7 +50,7 @@ def check_pulses() -> None:
 
 
 def check_service() -> None:
-    """See whether the best-view service answers.
+    """Check whether the best-view service answers.
 
     Raises:
         OSError: it does not.
@@ -59,7 +59,7 @@ def check_service() -> None:
 
 
 def check_camera(camera: str) -> None:
-    """See whether the best view gets a camera's frames: all the way from its source to the viewers' side.
+    """Check whether the best view gets a camera's frames: all the way from its source to the viewers' side.
 
     Raises:
         UnhealthyError: it does not.
@@ -123,7 +123,7 @@ def check(words: Sequence[str]) -> None:
 
 
 def main(words: Sequence[str]) -> int:
-    """Give the exit code."""
+    """Run the check and return the exit code."""
     try:
         check(words)
     except (UnhealthyError, OSError, ValueError, KeyError, TypeError, http.client.HTTPException) as error:

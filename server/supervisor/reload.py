@@ -1,4 +1,4 @@
-"""What becomes of a site's processes when its configuration is read again."""
+"""Reload plan: what a changed configuration means for the running processes of a site."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from server.config.site_config import Config
 _LIVE = tuple(f"view.{name}" for name in LIVE_VIEW_SETTINGS)
 """The best view takes these over from one GOP to the next."""
 _OF_A_CAMERA = ("source", "password", "offset", "at_end", "h264", "options", "ignore", "detections")
-"""What nobody but the camera's own process goes by."""
+"""Settings that only the camera's own process uses."""
 _TRACK = tuple(name for name in TrackSettings.model_fields if name != "backlog_s")
 _OF_CAMERAS = ("detect", *(f"track.{name}" for name in _TRACK))
-"""What all cameras' processes go by, and nobody else."""
+"""Settings that all camera processes use, and no other."""
 _EPOCHS = ("track.window.window", "track.window.stride")
 """But the best view lines windows up by these."""
 _BY_LAG = ("tracker", "temporal")
@@ -25,7 +25,7 @@ _OF_THE_BEST_VIEW = ("view", "http", "access", "record")
 
 @dataclass(frozen=True, slots=True)
 class ReloadPlan:
-    """What another configuration changes.
+    """The effects of a changed configuration.
 
     Attributes:
         now: what to run by from now on: the old one, with what can be changed in a running site.
@@ -55,7 +55,7 @@ class ReloadPlan:
 
 
 def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
-    """Sort out what another configuration changes in a running site."""
+    """Plan what a changed configuration means for a running site."""
     keys = changed_keys(running, wanted)
     view = running.view.model_copy(update={name: getattr(wanted.view, name) for name in LIVE_VIEW_SETTINGS})
     live = _of(keys, _LIVE)
@@ -88,7 +88,7 @@ def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
 
 
 def _of(keys: Sequence[str], sections: Sequence[str]) -> tuple[str, ...]:
-    """Give those of the keys that are one of the sections, or in one."""
+    """Return those of the keys that are one of the sections, or in one."""
     return tuple(key for key in keys if any(f"{key}.".startswith(f"{section}.") for section in sections))
 
 

@@ -1,4 +1,4 @@
-"""The synthetic scene knows where its floor is: nobody has to calibrate it."""
+"""Homographies of cameras of a synthetic scene, which needs no calibration."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from server.config.source_address import SourceKind, source_kind
 
 
 def add_scene_ground(config: Config) -> Config:
-    """Give the configuration with the floor of every camera of a synthetic scene that has none of its own.
+    """Return the configuration with the floor of every camera of a synthetic scene that has none of its own.
 
     Raises:
         UserError: there is no such scene.

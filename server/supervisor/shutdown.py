@@ -1,4 +1,4 @@
-"""Ending well: on SIGTERM or SIGINT a process lets go of everything and exits with 0."""
+"""Shutdown: on SIGTERM or SIGINT a process releases everything and exits with 0."""
 
 from __future__ import annotations
 

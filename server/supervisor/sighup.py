@@ -1,4 +1,4 @@
-"""SIGHUP: the configuration is to be read again, or the terminal is gone."""
+"""SIGHUP: reload the configuration, or end if the terminal was closed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _early: list[int] = []
 
 
 def record_early_sighups() -> None:
-    """Keep in mind each SIGHUP from now on, for :func:`sighups`; only in the main thread.
+    """Record each SIGHUP from now on, for :func:`sighups`; only in the main thread.
 
     Called before the configuration is read: what is written while the process starts is then read again.
     """
@@ -33,7 +33,7 @@ def record_early_sighups() -> None:
 
 
 async def sighups() -> AsyncGenerator[None, None]:
-    """Give a turn for each time that SIGHUP has come; those that come meanwhile are one.
+    """Return a turn for each time that SIGHUP has come; those that come meanwhile are one.
 
     When it came because the terminal was closed, the process is told to end instead.
     """
@@ -77,7 +77,7 @@ def _read(running: ActiveConfig, check: Check) -> ReloadPlan:
 
 
 def _has_terminal() -> bool:
-    """Tell whether what is said goes to a terminal that is there."""
+    """Return whether what is said goes to a terminal that is there."""
     try:
         termios.tcgetattr(sys.stderr.fileno())
     except (termios.error, OSError, ValueError):

@@ -1,4 +1,4 @@
-"""A whole site on one machine, and what its supervisor makes of a configuration that is read again."""
+"""``myview up``: a whole site on one machine, with its supervisor and reloads."""
 
 from __future__ import annotations
 
@@ -67,16 +67,16 @@ def check_exposure(config: Config) -> None:
 
 
 async def _follow(running: ActiveConfig, supervisor: Supervisor, keep: Callable[[], None]) -> None:
-    """Tell those processes whose settings have changed, whenever the configuration is read again."""
+    """Send SIGHUP to the processes whose settings have changed, at each reload."""
     async for reload in reloads(running, _check):
         log.info("%s", reload.line)
         running.now = reload.now
         keep()
-        supervisor.hang_up("bestview")
+        supervisor.reload("bestview")
         for number, camera in enumerate(reload.cameras):
             if number:
                 await asyncio.sleep(_APART_S)
-            supervisor.hang_up(camera)
+            supervisor.reload(camera)
 
 
 def _folder() -> tempfile.TemporaryDirectory[str]:

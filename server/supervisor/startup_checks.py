@@ -1,4 +1,4 @@
-"""What is checked before anything is started, so that one line says it and nothing is left behind."""
+"""Checks before any process starts: ports are free, recordings can be opened."""
 
 from __future__ import annotations
 

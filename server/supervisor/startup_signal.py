@@ -1,4 +1,4 @@
-"""How a process that has been started says that it has loaded, so that the next one may be.
+"""The signal by which a started process reports that it has loaded, so that the next one can start.
 
 A process loads for a second of a processor's time or two. Forty that do so together keep each other, and
 whoever is to answer meanwhile, from getting anywhere.
@@ -18,7 +18,7 @@ STARTED_FD_VARIABLE = "MYVIEW_STARTED_FD"
 
 
 def signal_started() -> None:
-    """Tell the supervisor, if there is one, that this process has loaded; saying it again does nothing."""
+    """Tell the supervisor, if there is one, that this process has loaded; a second call does nothing."""
     with contextlib.suppress(ValueError, OSError):
         os.close(int(os.environ.pop(STARTED_FD_VARIABLE, "")))
 

@@ -1,4 +1,4 @@
-"""All processes of a configuration on one machine, watched and restarted."""
+"""The supervisor: starts all processes of a site on one machine, and restarts those that die."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _END_S = 1.6
 
 @dataclass(slots=True)
 class Child:
-    """One process and how it fares."""
+    """A supervised process and its state."""
 
     name: str
     arguments: Sequence[str]
@@ -96,8 +96,8 @@ class Supervisor:
         finally:
             await self._end(watchers)
 
-    def hang_up(self, name: str) -> None:
-        """Tell a process that its configuration is another; one that is to be started again will read it."""
+    def reload(self, name: str) -> None:
+        """Send SIGHUP to a running process; one that is restarted reads the configuration anyway."""
         for child in self.children:
             if child.name == name and child.process is not None and child.process.returncode is None:
                 child.process.send_signal(signal.SIGHUP)
@@ -144,7 +144,7 @@ class Supervisor:
         return process
 
     def _arguments(self, child: Child) -> Sequence[str]:
-        """Give a process's arguments; what a restarted best view decides is in files of its own."""
+        """Return a process's arguments; what a restarted best view decides is in files of its own."""
         if self._out is None or child is not self.children[0]:
             return child.arguments
         out = self._out / f"restart-{child.restarts}" if child.restarts else self._out

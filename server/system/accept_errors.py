@@ -1,4 +1,4 @@
-"""That no connection can be accepted: told as one event, not for each that knocks."""
+"""Throttled log of accept(2) errors, such as too many open files."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from logthrottle import LogThrottle
 log = logging.getLogger(__name__)
 
 _OUT_OF_RESOURCES = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
-"""What a listening socket says where the process, or the system, has nothing left to accept by."""
+"""errno of accept(2) where file descriptors or memory are exhausted."""
 
 
 def is_out_of_resources(error: object) -> bool:
-    """Tell whether an error says that there are no descriptors, or no memory, for another connection."""
+    """Return whether an error says that there are no descriptors, or no memory, for another connection."""
     return isinstance(error, OSError) and error.errno in _OUT_OF_RESOURCES
 
 

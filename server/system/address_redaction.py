@@ -32,17 +32,17 @@ _ENDPOINT = re.compile(r"[a-z]+/(?:\[[0-9a-z:.%_-]+\]|[\w.*-]+):[0-9]{1,5}(?![^?
 
 
 def has_protocol(source: str) -> bool:
-    """Tell whether FFmpeg would look for a protocol in this, rather than for a file."""
+    """Return whether FFmpeg would look for a protocol in this, rather than for a file."""
     return "://" in source or _OPENED.match(source) is not None
 
 
 def is_login(source: str) -> bool:
-    """Tell whether this looks like a name and a password for a host, though it has no protocol."""
+    """Return whether this looks like a name and a password for a host, though it has no protocol."""
     return _LOGIN.match(source) is not None
 
 
 def redact_address(source: str) -> str:
-    """Give a source, or another address or path, as it may be shown: of an address its protocol and host.
+    """Return a source, or another address or path, as it may be shown: of an address its protocol and host.
 
     ``rtsp://name:password@10.0.0.1/live`` is shown as ``rtsp://10.0.0.1/...``. Where an @ stands behind what
     looks like the host, that may be the login's beginning, and is not shown. A path is shown as it is.
@@ -59,7 +59,7 @@ def redact_address(source: str) -> str:
 
 
 def _shown_place(rest: str) -> str:
-    """Give host and port of what stands behind ``://``, if they are surely that."""
+    """Return host and port of what stands behind ``://``, if they are surely that."""
     authority = re.split(r"[/?#]", rest, maxsplit=1)[0]
     beyond = rest[len(authority) :]
     login, _, place = authority.rpartition("@")
@@ -69,7 +69,7 @@ def _shown_place(rest: str) -> str:
 
 
 def redact_endpoint(endpoint: str) -> str:
-    """Give zenoh's ``protocol/host:port`` without the settings that may stand behind it: keys, for one."""
+    """Return zenoh's ``protocol/host:port`` without the settings that may stand behind it: keys, for one."""
     found = _ENDPOINT.match(endpoint)
     if found is None:
         return HIDDEN
@@ -77,7 +77,7 @@ def redact_endpoint(endpoint: str) -> str:
 
 
 def redact_addresses(text: str) -> str:
-    """Give others' words, such as a traceback, with each line only up to where an address begins."""
+    """Return others' words, such as a traceback, with each line only up to where an address begins."""
     return "".join(_cut(line) for line in text.splitlines(keepends=True))
 
 
@@ -90,5 +90,5 @@ def _cut(line: str) -> str:
 
 
 def ffmpeg_reason(error: Exception) -> str:
-    """Say why FFmpeg could not, by its error's number: the error's own text repeats the whole address."""
+    """Return FFmpeg's reason by its errno: the error's own text repeats the whole address."""
     return getattr(error, "strerror", None) or "it is no address or path that FFmpeg understands"

@@ -1,4 +1,4 @@
-"""Output that is whole or not there at all."""
+"""Atomic output: a file or folder appears only when it is complete."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def check_new_file(out: Path, *read: Path | None) -> None:
 
 @contextmanager
 def atomic_folder(out: Path) -> Iterator[Path]:
-    """Give a folder to write into; it becomes ``out`` only when all went well.
+    """Return a folder to write into; it becomes ``out`` only when all went well.
 
     Raises:
         UserError: ``out`` is there already and not an empty folder, or cannot be made.
@@ -66,7 +66,7 @@ def atomic_folder(out: Path) -> Iterator[Path]:
 
 @contextmanager
 def atomic_file(out: Path, *read: Path | None) -> Iterator[Path]:
-    """Give a file to write; it becomes ``out``, in place of an older one, only when all went well.
+    """Return a file to write; it becomes ``out``, in place of an older one, only when all went well.
 
     ``read`` are the files that are read meanwhile: none of them is replaced.
 
@@ -92,7 +92,7 @@ def atomic_file(out: Path, *read: Path | None) -> Iterator[Path]:
 
 @contextmanager
 def _cannot_write(out: Path, only: Collection[int] | None = None) -> Iterator[None]:
-    """Say in one line that what is written cannot be; ``only`` if it is one of these errors."""
+    """Turn an OSError into a UserError; with ``only``, just these errno."""
     try:
         yield
     except OSError as error:
@@ -102,7 +102,7 @@ def _cannot_write(out: Path, only: Collection[int] | None = None) -> Iterator[No
 
 
 def _umask() -> int:
-    """Give the process's umask, which can only be read by setting it."""
+    """Return the process's umask, which can only be read by setting it."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

@@ -1,4 +1,4 @@
-"""Whether somebody keeps this machine's clock right."""
+"""Whether this machine's clock is synchronized (NTP)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _TIMEX_BYTES = 512
 
 
 def is_clock_synchronized() -> bool | None:
-    """Tell whether NTP keeps this machine's clock, as the system has it; None: the system does not say."""
+    """Return whether NTP keeps this machine's clock, as the system has it; None: the system does not say."""
     try:
         state: int = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(_TIMEX_BYTES))
     except (OSError, AttributeError):

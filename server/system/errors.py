@@ -1,4 +1,4 @@
-"""What a user sees of errors: a single line that says what, where and what to do."""
+"""Errors that are shown to the user as a single line: what, where, and what to do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a file has changed."""
+"""Detection of changes of a file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ FileState = tuple[int, int, int]
 
 
 def file_state(path: Path) -> FileState | None:
-    """Give what changes when a file does, or is replaced by another; None: there is none."""
+    """Return what changes when a file does, or is replaced by another; None: there is none."""
     try:
         now = path.stat()
     except OSError:

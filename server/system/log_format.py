@@ -1,4 +1,4 @@
-"""How a log line is written: for people, or as an object of JSON for programs.
+"""The format of log lines: text for people, or JSON for programs.
 
     04:31:03 INFO    bestview: camera c1 is gone
     {"time":"2026-11-22T04:31:03.120Z","level":"INFO","process":"bestview","event":"camera c1 is gone",
@@ -31,7 +31,7 @@ class TextLines(logging.Formatter):
     """Writes lines for people, and tracebacks below them, in which errors' own words repeat no address."""
 
     def formatException(self, ei: _ExcInfo) -> str:  # noqa: N802 — as logging calls it
-        """Give a traceback, each line up to where an address begins."""
+        """Return a traceback, each line up to where an address begins."""
         return redact_addresses(super().formatException(ei))
 
 
@@ -43,7 +43,7 @@ class JsonLines(TextLines):
         self._process = process
 
     def format(self, record: logging.LogRecord) -> str:
-        """Give the line, without its end."""
+        """Return the line, without its end."""
         time = datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
         line: dict[str, object] = {
             "time": time.replace("+00:00", "Z"),
@@ -65,7 +65,7 @@ def _sayable(text: str) -> str:
 
 
 def formatter(process: str) -> logging.Formatter:
-    """Give what writes the lines of a process, as MYVIEW_LOG_FORMAT says.
+    """Return what writes the lines of a process, as MYVIEW_LOG_FORMAT says.
 
     Raises:
         UserError: it is no format.
@@ -77,7 +77,7 @@ def formatter(process: str) -> logging.Formatter:
 
 
 def is_json() -> bool:
-    """Tell whether lines are for programs.
+    """Return whether lines are for programs.
 
     Raises:
         UserError: MYVIEW_LOG_FORMAT is no format.
@@ -89,7 +89,7 @@ def is_json() -> bool:
 
 
 def _subjects(record: logging.LogRecord) -> dict[str, object]:
-    """Give whom a record is about: what its template names, and what was put there."""
+    """Return whom a record is about: what its template names, and what was put there."""
     if not isinstance(record.args, tuple) or not isinstance(record.msg, str):
         return {}
     values = iter(record.args)

@@ -36,7 +36,7 @@ def log_to_stderr(name: str) -> None:
 
 
 def say_failure(text: str) -> None:
-    """Say in one line why a command ends: as the log's last line where programs read it."""
+    """Print a one-line error, or log it where the log is JSON."""
     if _logs_json():
         log.error("%s", text)
     else:
@@ -44,7 +44,7 @@ def say_failure(text: str) -> None:
 
 
 def _logs_json() -> bool:
-    """Tell whether this process logs, and for programs."""
+    """Return whether this process logs, and for programs."""
     return any(isinstance(it.formatter, JsonLines) for it in logging.getLogger().handlers)
 
 

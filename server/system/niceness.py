@@ -1,4 +1,4 @@
-"""Who yields to whom where the processors do not do for all (nice(1)). To be nicer takes no privilege.
+"""Process priorities (nice(1)): who yields where processors are scarce. A lower priority takes no privilege.
 
 The disk is yielded likewise: without a priority of its own a process has one by its niceness (ioprio_set(2)).
 """
@@ -11,7 +11,7 @@ _NICEST = 19
 
 
 def lower_own_priority(by: int) -> None:
-    """Make this process nicer by so much than the one that has started it.
+    """Lower the priority of this process below that of its parent by this niceness.
 
     Called before it has threads: each has a niceness of its own, and begins with that of who begins it.
     """
@@ -19,7 +19,7 @@ def lower_own_priority(by: int) -> None:
 
 
 def lower_priority(pid: int, by: int) -> None:
-    """Make a process that this one has just started nicer by so much than this one.
+    """Lower the priority of a child process below that of this one by this niceness.
 
     What it starts with, libraries that load above all, is then as nice; it may be gone already.
     """

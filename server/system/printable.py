@@ -4,5 +4,5 @@ from __future__ import annotations
 
 
 def printable(text: str) -> str:
-    """Give a text as one line in which nothing moves the cursor or changes colours."""
+    """Return a text as one line in which nothing moves the cursor or changes colours."""
     return "".join(it if it.isprintable() else "·" for it in " ".join(text.split()))

@@ -1,4 +1,4 @@
-"""How many processors this process may use."""
+"""The number of processors that this process may use (affinity, cgroups)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _OF_THIS = Path("/proc/self/cgroup")
 
 
 def available_processors(groups: Path = _GROUPS, of_this: Path = _OF_THIS) -> float:
-    """Give their number: those it may run on, or the share of them that a container is given.
+    """Return their number: those it may run on, or the share of them that a container is given.
 
     ``groups`` is where the kernel's control groups are, ``of_this`` says which are this process's.
     """
@@ -22,7 +22,7 @@ def available_processors(groups: Path = _GROUPS, of_this: Path = _OF_THIS) -> fl
 
 
 def _limits(groups: Path, of_this: Path) -> Iterator[float]:
-    """Give the limits of all groups that this process is in, from its own up to the whole machine's."""
+    """Return the limits of all groups that this process is in, from its own up to the whole machine's."""
     with suppress(OSError):
         for line in of_this.read_text(encoding="utf-8").splitlines():
             _, controllers, path = line.split(":", 2)

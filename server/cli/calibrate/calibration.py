@@ -19,7 +19,7 @@ _UNNAMED = "unit"
 
 
 def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> list[str]:
-    """Read the points, fit, and write the file and the plan; give the lines to say.
+    """Read the points, fit, and write the file and the plan; return the lines to say.
 
     Raises:
         UserError: the file is no such file, or its points contradict each other.
@@ -42,7 +42,7 @@ def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> l
 def calibrate_from_walks(
     walked: RecordedWalk, out: Path, plan: Path, settings: WalkSettings, person: float, *, force: bool
 ) -> list[str]:
-    """Lay the cameras on one floor, and write the file and the plan; give the lines to say.
+    """Calibrate from walks, and write the file and the plan; return the lines to print.
 
     Raises:
         UserError: the walk says too little.
@@ -61,7 +61,7 @@ def calibrate_from_walks(
 
 @contextmanager
 def refusing(source: Path | str) -> Iterator[None]:
-    """Say what was given in front of what is wrong with it."""
+    """Turn a CalibrationError into a UserError that names the input."""
     try:
         yield
     except CalibrationError as error:

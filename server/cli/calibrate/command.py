@@ -1,4 +1,4 @@
-"""The command that finds out where the cameras' floor is."""
+"""The command ``calibrate``."""
 
 from __future__ import annotations
 

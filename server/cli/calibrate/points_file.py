@@ -27,7 +27,7 @@ _SHOWN = 40
 
 @dataclass(frozen=True, slots=True)
 class PointFile:
-    """What a file of marked points says."""
+    """The content of a file of marked points."""
 
     unit: str | None
     cameras: tuple[MarkedPoints, ...]

@@ -1,4 +1,4 @@
-"""What the cameras saw of a walk: from files of tracks, or from videos that are tracked first."""
+"""The walks that cameras saw, from files of tracks, or from videos that are tracked first."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SAME_RATE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class VideoFormat:
-    """What is known of the pictures: their size and rate, if the user has said so."""
+    """Size and frame rate of the videos, as far as the options give them."""
 
     size: Size | None
     fps: float | None
@@ -50,7 +50,7 @@ def read_walks(
 
 
 def _is_tracks(path: Path) -> bool:
-    """Tell whether this is a file of tracks, or a folder of such files (or with a folder `tracks/`)."""
+    """Return whether this is a file of tracks, or a folder of such files (or with a folder `tracks/`)."""
     return path.name.endswith(ENDINGS) or (path.is_dir() and bool(_files(path)))
 
 
@@ -102,7 +102,7 @@ def walks_from_videos(
 
 
 def _rate(rates: Mapping[str, float]) -> float:
-    """Give the rate that all cameras have: frame n of all is one moment."""
+    """Return the rate that all cameras have: frame n of all is one moment."""
     first = next(iter(rates), None)
     if first is None:
         return _FPS

@@ -19,7 +19,7 @@ _FRAMES_S = 3.0
 
 @dataclass(frozen=True, slots=True)
 class CameraProbe:
-    """What became of it.
+    """The result of a probe.
 
     Attributes:
         problem: why the camera cannot run; empty: it can.

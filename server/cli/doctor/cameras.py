@@ -16,7 +16,7 @@ from server.system.address_redaction import redact_address
 from server.system.errors import UserError
 
 _GRACE_S = 3.0
-"""What a busy machine takes longer than a camera was given."""
+"""Seconds that a busy machine may take beyond a camera's time limit."""
 _SAME_SPEED = 0.01
 """Part by which a recording's rate may be off the site's without a word: 29.97 for 30."""
 _SAME_RATE = 0.1
@@ -47,13 +47,13 @@ def probe_cameras(config: Config, seconds: float) -> dict[str, CameraProbe]:
 
 
 def _while_busy() -> str:
-    """Say that the machine has more to do than it can, if so: then that may be why."""
+    """Return a remark if the machine is overloaded, since that may be the cause; else an empty text."""
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
     return f", while the machine is busy with other things (load {load:.0f})" if load > 2 * cores else ""
 
 
 def sound_findings(config: Config) -> list[Finding]:
-    """Say whether the site's sound can be opened, where it has one."""
+    """Check that the site's sound can be opened, if it has one."""
     if config.sounding is None:
         return []
     try:
@@ -69,13 +69,13 @@ def sound_findings(config: Config) -> list[Finding]:
 
 
 def camera_findings(config: Config, probes: Mapping[str, CameraProbe], *, runs: bool) -> list[Finding]:
-    """Say of each camera how it is; ``runs``: the site runs, and may hold a device that only one can have."""
+    """Report on each camera; ``runs``: the site is running, and may hold a device exclusively."""
     found = [it for camera, probed in probes.items() for it in _of(config, camera, probed, runs=runs)]
     return found + _shared(config)
 
 
 def _shared(config: Config) -> list[Finding]:
-    """Tell of devices that two cameras are to have."""
+    """Report devices that two cameras share."""
     found, whose = [], dict[str, str]()
     for it in config.cameras:
         if is_device(it.source):

@@ -16,7 +16,7 @@ _READABLE = "name another, or let this user read it"
 
 
 def certificate_finding(check: str, certificate: Path, key: Path) -> Finding:
-    """Say whether a certificate goes with its key, how long it is good, and for which hosts."""
+    """Check that a certificate matches its key; report its days left and its hosts."""
     for path in (certificate, key):
         if unreadable := _unreadable(path):
             return bad(check, f"{path}: cannot be read: {unreadable}", _READABLE)
@@ -34,7 +34,7 @@ def certificate_finding(check: str, certificate: Path, key: Path) -> Finding:
 
 
 def router_finding(check: str, certificate: Path, key: Path, authority: Path, host: str) -> Finding | None:
-    """Say why whoever connects to a host would not take its certificate; None: they would."""
+    """Report why a client would refuse a host's certificate; None if it would not."""
     try:
         handshake(certificate, key, authority, host)
     except ssl.SSLCertVerificationError as error:
@@ -46,7 +46,7 @@ def router_finding(check: str, certificate: Path, key: Path, authority: Path, ho
 
 
 def authority_finding(check: str, authority: Path) -> Finding:
-    """Say whether the certificate by which others are known can be used."""
+    """Check that the file of a certificate authority can be used."""
     if unreadable := _unreadable(authority):
         return bad(check, f"{authority}: cannot be read: {unreadable}", _READABLE)
     try:
@@ -58,7 +58,7 @@ def authority_finding(check: str, authority: Path) -> Finding:
 
 
 def handshake(certificate: Path, key: Path, trusted: Path, host: str | None = None) -> dict[str, Any]:
-    """Give what a client that trusts somebody, and looks for a host (None: whoever), learns of a server.
+    """Return what a client that trusts somebody, and looks for a host (None: whoever), learns of a server.
 
     Raises:
         ssl.SSLCertVerificationError: it does not go on.

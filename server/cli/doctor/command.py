@@ -45,7 +45,7 @@ _MEND = "mend it there; configs/demo.yaml explains every setting"
 
 
 def run_doctor(path: Path, seconds: float, *, as_json: bool) -> bool:
-    """Check a configuration, print what is found as it is found; tell whether nothing is bad."""
+    """Check a configuration, print what is found as it is found; return whether nothing is bad."""
     return asyncio.run(_told(path, seconds, as_json=as_json)).well
 
 
@@ -88,7 +88,7 @@ def _read(path: Path, found: list[Finding]) -> Config | None:
 
 
 async def run_checks(config: Config, seconds: float) -> AsyncIterator[Finding]:
-    """Give all findings about a configuration, as they are found."""
+    """Return all findings about a configuration, as they are found."""
     found: list[Finding] = []
     runs, probes = False, {it: CameraProbe("it was not tried") for it in config.camera_ids}
     with report_failure("ports", found):
@@ -130,7 +130,7 @@ async def _let_go_of(work: Callable[[], T]) -> T:
 
 
 def _last(config: Config, probes: dict[str, CameraProbe], *, runs: bool) -> list[Finding]:
-    """Give what is known once the cameras were tried."""
+    """Return the findings that are known once the cameras were tried."""
     checks: Sequence[tuple[str, Callable[[], list[Finding]]]] = (
         ("cameras", lambda: camera_findings(config, probes, runs=runs)),
         ("sound", lambda: sound_findings(config)),
@@ -146,7 +146,7 @@ def _last(config: Config, probes: dict[str, CameraProbe], *, runs: bool) -> list
 
 
 def _placed(config: Config) -> Config:
-    """Give the configuration with its scenes' floors; where there is no such scene, the camera says so."""
+    """Return the configuration with its scenes' floors; where there is no such scene, the camera says so."""
     try:
         return add_scene_ground(config)
     except (UserError, OSError):

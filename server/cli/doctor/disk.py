@@ -1,4 +1,4 @@
-"""Whether the disk takes what is to be recorded."""
+"""Checks of the disk: can the recording folder be written, and does the recording fit."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def disk_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[Fin
 
 
 def _writable(folder: Path) -> Finding:
-    """Say that a folder can be written, and whether others may look into it: what is made in it is closed."""
+    """Report that a folder can be written, and whether other users can list it."""
     text = f"{folder} can be written"
     with suppress(OSError):  # it is not there yet, and is made for one user alone
         if mode := rights_of_others(folder):
@@ -73,7 +73,7 @@ def _sizes(config: Config, probes: Mapping[str, CameraProbe], free: float, held:
 
 
 def needed_mb(config: Config, probes: Mapping[str, CameraProbe]) -> float:
-    """Give the megabytes that `record.keep_s` of the sound and of all cameras take whose rate is known."""
+    """Return the megabytes that `record.keep_s` of the sound and of all cameras take whose rate is known."""
     known = [it for camera, probe in probes.items() if (it := _kbps(config, camera, probe)) is not None]
     kbps = sum(known) + (config.sound.kbps if config.sound.source is not None else 0)
     index = 8 * _INDEX_BYTES * config.site.fps * len(known) / 1000
@@ -81,7 +81,7 @@ def needed_mb(config: Config, probes: Mapping[str, CameraProbe]) -> float:
 
 
 def _kbps(config: Config, camera: str, probe: CameraProbe) -> float | None:
-    """Give what a camera takes: at most `encode.max_kbps`, or else as much as when it was tried.
+    """Return what a camera takes: at most `encode.max_kbps`, or else as much as when it was tried.
 
     None: it was not, and its rate may be its own.
     """
@@ -96,7 +96,7 @@ def _hours(seconds: float) -> str:
 
 
 def _nearest(folder: Path) -> Path:
-    """Give a folder, or where it will be made: the first above it that is there.
+    """Return a folder, or where it will be made: the first above it that is there.
 
     Raises:
         OSError: nobody can tell.
@@ -109,7 +109,7 @@ def _nearest(folder: Path) -> Path:
 
 
 def _place(folder: Path, error: OSError) -> Path:
-    """Give where writing fails: the first on the way that is closed, or else the folder that was tried."""
+    """Return where writing fails: the first on the way that is closed, or else the folder that was tried."""
     if isinstance(error, PermissionError):
         for it in reversed(folder.absolute().parents):
             if not os.access(it, os.X_OK):

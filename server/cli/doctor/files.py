@@ -23,7 +23,7 @@ _LINES = "name:password, one a line, in a file that this user can read: docs/how
 
 
 def file_findings(config: Config) -> list[Finding]:
-    """Say of each file whether it can be used, and who else may read or write it."""
+    """Check that each file can be used, and that other users cannot read secrets or write access files."""
     found: list[Finding] = []
     for check, find in _checks(config):
         with report_failure(check, found):

@@ -1,4 +1,4 @@
-"""What the doctor finds: one line for each check, how bad it is, and what to do."""
+"""Findings of the doctor: a line per check, with its level and remedy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from server.system.printable import printable
 
 
 class Level(Enum):
-    """How bad it is."""
+    """The severity of a finding."""
 
     OK = "ok"
     WARNING = "warning"
@@ -26,13 +26,13 @@ class Level(Enum):
 
 
 class Finding(msgspec.Struct, frozen=True):
-    """What one check found."""
+    """The result of one check."""
 
     check: str
     level: Level
     text: str
     do: str = ""
-    """What to do about it; empty where nothing is to be done."""
+    """The remedy; empty where none is needed."""
 
 
 class Findings(msgspec.Struct, frozen=True):
@@ -44,17 +44,17 @@ class Findings(msgspec.Struct, frozen=True):
 
 
 def ok(check: str, text: str) -> Finding:
-    """Say that something is as it should be."""
+    """Build a finding for a check that passed."""
     return Finding(check, Level.OK, text)
 
 
 def warning(check: str, text: str, do: str) -> Finding:
-    """Say that something should be looked at."""
+    """Build a finding for something that should be looked at."""
     return Finding(check, Level.WARNING, text, do)
 
 
 def bad(check: str, text: str, do: str = "") -> Finding:
-    """Say that something does not work."""
+    """Build a finding for something that does not work."""
     return Finding(check, Level.BAD, text, do)
 
 
@@ -65,7 +65,7 @@ def collect_findings(findings: Sequence[Finding]) -> Findings:
 
 @contextmanager
 def report_failure(check: str, found: list[Finding]) -> Iterator[None]:
-    """Let it be a finding, too, that a check fails itself: those of the others are still told."""
+    """Turn an exception of a check into a finding, so that the other checks still report."""
     try:
         yield
     except (OSError, UserError) as error:
@@ -75,7 +75,7 @@ def report_failure(check: str, found: list[Finding]) -> Iterator[None]:
 
 
 def reason_of(error: Exception) -> str:
-    """Give an error as a part of a line."""
+    """Return an error as a part of a line."""
     if isinstance(error, OSError) and error.strerror:
         return (
             f"{redact_address(str(error.filename))}: {error.strerror}" if error.filename else error.strerror
@@ -84,7 +84,7 @@ def reason_of(error: Exception) -> str:
 
 
 def describe_bug(error: Exception) -> str:
-    """Say that something failed that should not have; an address in what it says is left out."""
+    """Describe an unexpected exception, with addresses redacted."""
     return f"a mistake in MyView: {type(error).__name__}: {redact_addresses(str(error))}"
 
 

@@ -1,4 +1,4 @@
-"""Whether the clock is right, and whether the machine is large enough."""
+"""Checks of the machine: clock synchronization, processor, memory, open files."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _PROCESS_MB = 250
 
 
 async def clock_findings(config: Config) -> list[Finding]:
-    """Say whether somebody keeps this machine's clock, and how far it is from the pulse server's."""
+    """Check that NTP synchronizes this machine's clock, and compare it with the pulse server's."""
     found = [_kept(config)]
     offset = await _offset(config.sync.host, config.sync.port, pulse_client_tls(config))
     if offset is None:
@@ -73,7 +73,7 @@ def machine_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[
 
 
 def descriptor_findings(config: Config, descriptors: int) -> list[Finding]:
-    """Say how many connections and viewers the files let that a process may have open."""
+    """Check that the limit of open files allows the configured connections and viewers."""
     wanted, most = config.http.connections, connection_limit(config, descriptors)
     viewers = min(config.http.viewers_max, most)
     has = f"{descriptors} may be open in a process that is started from here: {most} connections"
@@ -88,7 +88,7 @@ def descriptor_findings(config: Config, descriptors: int) -> list[Finding]:
 
 
 def available_mb() -> float | None:
-    """Give the memory that programs may still have, in megabytes; None where the system does not say."""
+    """Return the memory that programs may still have, in megabytes; None where the system does not say."""
     try:
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""Whether the site's ports are free, or who has them."""
+"""Checks of the site's ports: free, taken by this site, or taken by something else."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ALL = frozenset({"0.0.0.0", "::"})  # noqa: S104 — it is not listened on
 
 
 async def port_findings(config: Config) -> tuple[list[Finding], bool]:
-    """Say of each port whether it is free; and whether this very site runs already."""
+    """Report whether each port is free; also return whether this very site is already running."""
     http, sync, zenoh = config.http, config.sync, config.zenoh
     protocol, _, address = zenoh.listen.partition("/")
     bus, _, bus_port = address.rpartition(":")
@@ -61,12 +61,12 @@ async def port_findings(config: Config) -> tuple[list[Finding], bool]:
 
 
 def _overlap(one: tuple[str, int], other: tuple[str, int]) -> bool:
-    """Tell whether two cannot be listened on by two processes of one machine."""
+    """Return whether two cannot be listened on by two processes of one machine."""
     return one[1] == other[1] and (one[0] == other[0] or not _ALL.isdisjoint({one[0], other[0]}))
 
 
 def _taken(host: str, port: int, check: str) -> bool | str | None:
-    """Give None where a port is free, True where somebody has it, and else why it cannot be had."""
+    """Return None where a port is free, True where somebody has it, and else why it cannot be had."""
     try:
         check_port_free(host, port, check)
     except UserError as error:
@@ -112,5 +112,5 @@ def _credentials(config: Config) -> Credentials | None:
 
 
 def _reached(host: str) -> str:
-    """Give where somebody who listens on all addresses is reached from here."""
+    """Return where somebody who listens on all addresses is reached from here."""
     return {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 — it is not listened on

@@ -1,4 +1,4 @@
-"""Whether cameras find the pulse server and the bus where the configuration sends them."""
+"""Checks of reachability: do pulse server and bus answer at the addresses that cameras use."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Place = tuple[str, int]
 
 
 async def reachability_findings(config: Config) -> list[Finding]:
-    """Say of each way whether it leads to who listens here, or to another machine that answers."""
+    """Check that each address leads to a listener of this site, or to another machine that answers."""
     sync, found = config.sync, list[Finding]()
     ways = [("sync.host", (sync.host, sync.port), "sync.bind", (sync.bind, sync.port))]
     connect, listen = host_and_port(config.zenoh.connect), host_and_port(config.zenoh.listen)
@@ -30,7 +30,7 @@ async def reachability_findings(config: Config) -> list[Finding]:
 
 
 def host_and_port(endpoint: str) -> Place | None:
-    """Give host and port of a zenoh endpoint; None: it is of another kind."""
+    """Return host and port of a zenoh endpoint; None: it is of another kind."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
     return (host.strip("[]"), int(port)) if protocol in {"tcp", "tls"} and port.isdecimal() else None
@@ -75,7 +75,7 @@ def _is_of_this_machine(address: str) -> bool:
 
 
 async def _covers(host: str, addresses: set[str]) -> bool:
-    """Tell whether who listens at a host is reached by one of the addresses."""
+    """Return whether who listens at a host is reached by one of the addresses."""
     try:
         return host in _ANYWHERE or not addresses.isdisjoint(await _addresses(host))
     except (socket.gaierror, TimeoutError, UnicodeError):
@@ -83,7 +83,7 @@ async def _covers(host: str, addresses: set[str]) -> bool:
 
 
 async def _refusal(there: Place) -> str:
-    """Say why nobody can be reached; empty: somebody is."""
+    """Return why a connection fails; empty if it succeeds."""
     try:
         async with asyncio.timeout(_ANSWER_S):
             _, writer = await asyncio.open_connection(*there)

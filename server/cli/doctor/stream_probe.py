@@ -1,4 +1,4 @@
-"""What a network camera or a device really sends: size, rate, and whether it can be decoded."""
+"""Measurement of a live stream: picture size, frame rate, decoding errors."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LEAST = 5
 
 @dataclass(frozen=True, slots=True)
 class StreamStats:
-    """What came.
+    """Statistics of a live stream.
 
     Attributes:
         size: width and height in pixels.
@@ -48,7 +48,7 @@ def measure_stream(url: str, options: Mapping[str, str], seconds: float, open_s:
 
 
 def file_fps(file: str) -> float:
-    """Give the pictures a second of a recording, as it says.
+    """Return the pictures a second of a recording, as it says.
 
     Raises:
         UserError: it cannot be opened.

@@ -1,4 +1,4 @@
-"""What ``myview evaluate`` does, from its options to tables and files."""
+"""``myview evaluate``: from options to tables and files."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ def plot_strips(
 
 
 def _strips(views: NDArray[np.int64], fps: float) -> list[_Strip]:
-    """Give the strips of (N,) views."""
+    """Return the strips of (N,) views."""
     strips = []
     for cut in cut_frames(views)[:MOST_CUTS].tolist():
         around = {cut - 1, *(cut + round(seconds * fps) for seconds in _AROUND_S)}
@@ -78,7 +78,7 @@ def _strips(views: NDArray[np.int64], fps: float) -> list[_Strip]:
 
 
 def _read(video: Path, facts: SiteInfo, camera: str, numbers: Sequence[int]) -> dict[int, Image]:
-    """Give frames of a camera's recording by number, in its own size."""
+    """Return frames of a camera's recording by number, in its own size."""
     found: dict[int, Image] = {}
     if not numbers:
         return found
@@ -119,7 +119,7 @@ def _plot(
 
 
 def _with_box(image: Image, box: NDArray[np.float64]) -> Image:
-    """Give a small picture, red green blue, with the (4,) box, which is NaN where there is none."""
+    """Return a small picture, red green blue, with the (4,) box, which is NaN where there is none."""
     scale = _WIDTH / image.shape[1]
     small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     if not np.isnan(box).any():

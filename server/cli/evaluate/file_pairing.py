@@ -25,7 +25,7 @@ class FilePair:
 
 @dataclass(frozen=True, slots=True)
 class _OptionFiles:
-    """What one of the two options names."""
+    """The files that an option names."""
 
     option: str
     files: tuple[Path, ...]
@@ -44,7 +44,7 @@ class _OptionFiles:
 
 
 def pair_files(tracks: Sequence[Path], truth: Sequence[Path]) -> list[FilePair]:
-    """Give the pairs, by the files' names where any agree, else in the order in which they are named.
+    """Return the pairs, by the files' names where any agree, else in the order in which they are named.
 
     Each of the two is some files, or a folder of one file per camera: the folder may be one that `myview
     render` has written, whose tracks are in `tracks/`, or one with a folder `gt/`. Of folders, cameras that
@@ -72,7 +72,7 @@ def pair_files(tracks: Sequence[Path], truth: Sequence[Path]) -> list[FilePair]:
 
 
 def files_by_camera(option: str, paths: Sequence[Path], inner: str) -> dict[str, Path]:
-    """Give the files that an option names, or those of the folder that it names, by camera.
+    """Return the files that an option names, or those of the folder that it names, by camera.
 
     Raises:
         UserError: something is not there, or two files have one name.
@@ -118,7 +118,7 @@ def _check_names(given: _OptionFiles) -> None:
 
 
 def _files(folder: Path, inner: str) -> list[Path]:
-    """Give the MOTChallenge files of a folder, by name."""
+    """Return the MOTChallenge files of a folder, by name."""
     within = folder / inner if (folder / inner).is_dir() else folder
     files = sorted(path for path in within.iterdir() if path.name.endswith(_ENDINGS))
     if not files:

@@ -1,4 +1,4 @@
-"""Who is where in truth, by all cameras together, and which objects are which people."""
+"""Ground truth of several cameras: people's boxes and visibility, and which object is which person."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LEAST_SHOWN = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneTruth:
-    """Everybody in every camera.
+    """The ground truth of all cameras.
 
     Attributes:
         people: their K numbers in the ground truth, in order.
@@ -67,7 +67,7 @@ def build_truth(
 def people_of_objects(
     people: Sequence[int], recordings: Mapping[str, TruthAndTracks], least_iou: float
 ) -> dict[int, int]:
-    """Give the person that each object stands for, for objects that stand for somebody.
+    """Return the person that each object stands for, for objects that stand for somebody.
 
     Raises:
         ValueError: an id is twice in one frame of a camera, which the message names.

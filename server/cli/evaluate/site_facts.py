@@ -1,4 +1,4 @@
-"""What has to be known of a site to judge its choices: from the options, the videos or the rendering."""
+"""Frame rate, picture sizes and switch cost for scoring views: from options, videos or `site.json`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from server.system.errors import UserError
 
 @dataclass(frozen=True, slots=True)
 class SiteOptions:
-    """What the command line says of the site; None where it says nothing."""
+    """Options that describe the site; None where not given."""
 
     size: str | None = None
     """WIDTHxHEIGHT of every camera's picture."""
@@ -24,7 +24,7 @@ class SiteOptions:
 
 
 def videos_by_camera(videos: Sequence[Path], cameras: Sequence[str]) -> dict[str, Path]:
-    """Give each camera's video: by name where the names are the cameras', else in their order.
+    """Return each camera's video: by name where the names are the cameras', else in their order.
 
     Raises:
         UserError: a camera has none.
@@ -43,7 +43,7 @@ def videos_by_camera(videos: Sequence[Path], cameras: Sequence[str]) -> dict[str
 def collect_site_info(
     choices: Path, cameras: Sequence[str], videos: Mapping[str, Path], options: SiteOptions
 ) -> SiteInfo:
-    """Give the facts; options go before videos, and these before the file that a rendering has of itself.
+    """Return the facts; options go before videos, and these before the file that a rendering has of itself.
 
     The rate is the rendering's before it is the videos': that is what its frames are counted by.
 

@@ -58,7 +58,7 @@ def print_table(scores: MultiCameraScores) -> None:
 
 
 def content_of(scores: MultiCameraScores) -> dict[str, Any]:
-    """Give all scores for a file; shares are in [0, 1]."""
+    """Return all scores for a file; shares are in [0, 1]."""
     return {
         "cameras": {camera: asdict(found) for camera, found in scores.cameras.items()},
         "mean": asdict(scores.mean),

@@ -19,7 +19,7 @@ from server.cli.render.site_file import SiteInfo
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewEvaluation:
-    """Choices beside the optimum.
+    """Scores of view choices against the optimum.
 
     Attributes:
         objects: by person, the object that stands for them.
@@ -41,7 +41,7 @@ class ViewEvaluation:
 def evaluate_views(
     truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int], facts: SiteInfo
 ) -> ViewEvaluation:
-    """Judge choices; ``person_of`` says who an object stands for.
+    """Score choices; ``person_of`` maps objects to people.
 
     Raises:
         UserError: a choice names a camera without ground truth.
@@ -94,7 +94,7 @@ def print_views(judged: ViewEvaluation) -> None:
 
 
 def score_cells(score: ViewScore) -> list[str]:
-    """Give a row's numbers: shares in percent, cuts per minute, the shortest shot in frames."""
+    """Return a row's numbers: shares in percent, cuts per minute, the shortest shot in frames."""
     shares = [100.0 * it for it in _shares(score)]
     cuts = [score.cuts_per_minute, score.optimum_cuts_per_minute]
     return [str(score.frames), *(f"{it:.1f}" for it in (*shares, *cuts)), str(score.shortest_shot or "-")]
@@ -105,7 +105,7 @@ def _shares(score: ViewScore) -> tuple[float, ...]:
 
 
 def content_of_views(judged: ViewEvaluation, facts: SiteInfo) -> dict[str, Any]:
-    """Give it all for a file; shares are parts of 1, and null where they are infinite."""
+    """Return it all for a file; shares are parts of 1, and null where they are infinite."""
 
     def content(score: ViewScore) -> dict[str, Any]:
         return {name: value if np.isfinite(value) else None for name, value in asdict(score).items()}

@@ -1,4 +1,4 @@
-"""The offline way: the same classes as live, with a clock that waits for everybody."""
+"""Offline camera workers: the live pipeline in one process per camera, in lockstep instead of real time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _POLL_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class EpochBatch:
-    """What one camera did up to the end of one epoch."""
+    """Access units and tracks of one camera up to the end of an epoch."""
 
     camera: str
     units: list[AccessUnit]
@@ -153,7 +153,7 @@ class CameraRun:
         self.ended = False
 
     def search(self) -> FrameDetections | None:
-        """Take, encode and search the next frame; give what the other cameras are told, if they are."""
+        """Take and encode the next frame and detect people; return the detections for the peers, if any."""
         try:
             image = self._pipeline.take(self._pulse)
         except SourceEndedError:
@@ -165,7 +165,7 @@ class CameraRun:
         return self._searched.word
 
     def follow(self, words: Sequence[FrameDetections]) -> EpochBatch | None:
-        """Follow everybody into it, by what the others found, too; give what an epoch's end brings.
+        """Follow everybody into it, by what the others found, too; return what an epoch's end brings.
 
         Raises:
             UserError: the recording is over, and there was not one picture in it.

@@ -1,4 +1,4 @@
-"""What cameras tell each other offline: a pipe from each to each, and everybody waits for everybody."""
+"""Pipes between offline camera workers, over which they exchange detections in lockstep."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _DECODER = msgspec.json.Decoder(FrameDetections)
 
 
 class PeerLink(Protocol):
-    """The other cameras of one, as it is in step with them."""
+    """The link of one camera to its peers, in lockstep."""
 
     def exchange(self, word: FrameDetections) -> Sequence[FrameDetections]:
-        """Tell them what was found in a frame; give what they found in it."""
+        """Send this camera's detections in a frame; return those of its peers."""
         ...
 
 
@@ -36,7 +36,7 @@ class PeerPipes:
     hear: dict[str, Connection] = field(default_factory=dict)
 
     def exchange(self, word: FrameDetections) -> Sequence[FrameDetections]:
-        """Tell the others what was found in a frame; give what those who have not ended found in it."""
+        """Send this camera's detections in a frame; return those of the peers that have not ended."""
         data = msgspec.json.encode(word)
         for camera, connection in list(self.tell.items()):
             try:
@@ -71,7 +71,7 @@ class PeerPipeFactory:
 
     @contextmanager
     def of(self, camera: str) -> Iterator[PeerPipes]:
-        """Give the ends of a camera's pipes, while its process starts; they are its own from then on."""
+        """Return the ends of a camera's pipes, while its process starts; they are its own from then on."""
         own = self._laid[camera]
         for other in self._others[camera]:
             if other not in self._given:

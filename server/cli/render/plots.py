@@ -58,7 +58,7 @@ def plot_tracks(tracks: Path, out: Path) -> None:
 
 
 def new_figure(size: tuple[float, float]) -> Figure:
-    """Give an empty figure that needs no screen and that nothing global holds on to."""
+    """Return an empty figure that needs no screen and that nothing global holds on to."""
     figure = Figure(figsize=size, layout="tight")
     FigureCanvasAgg(figure)
     return figure

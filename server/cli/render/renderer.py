@@ -52,7 +52,7 @@ class Renderer:
         self.frames = 0
 
     def take(self, batch: EpochBatch) -> None:
-        """Take in what a camera did, and decide what can be decided."""
+        """Add a camera's batch, and decide what can be decided."""
         for unit in batch.units:
             self._shelves[batch.camera].put(unit.pulse, _BOOT, unit.data, key=unit.key)
             self._aligner.frame(batch.camera, _BOOT, unit.pulse)
@@ -109,7 +109,7 @@ def render(config: Config, folder: Path, progress: Callable[[int], None]) -> lis
 
 
 def _say_if_unequal(ended: dict[str, int]) -> None:
-    """Say once that views are of different length."""
+    """Log a warning if the recordings differ in length."""
     if len(set(ended.values())) > 1:
         lengths = ", ".join(f"{camera} with frame {last + 1}" for camera, last in ended.items())
         log.warning("the views are of different length: %s; the shorter ones end first", lengths)

@@ -18,7 +18,7 @@ SITE_FILE = "site.json"
 
 @dataclass(frozen=True, slots=True)
 class SiteInfo:
-    """What has to be known of a site to judge its choices.
+    """Frame rate, switch cost and picture sizes of a rendering.
 
     Attributes:
         fps: frames per second.

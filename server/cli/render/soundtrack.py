@@ -9,7 +9,7 @@ from server.service.streaming.audio_buffer import AudioBuffer
 
 _KEPT_S = 20.0
 _AHEAD_S = 1.0
-"""What an encoder, which gives whole frames, may hold back is less."""
+"""Seconds read ahead; an encoder holds back less."""
 
 
 class Soundtrack:

@@ -1,4 +1,4 @@
-"""What a recorded view says of its pictures: their size and rate."""
+"""Picture size and frame rate of a recorded view."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class VideoInfo:
 
 
 def read_video_info(view: Path) -> VideoInfo:
-    """Look at a video or a folder of images.
+    """Read the picture size and frame rate of a video or a folder of images.
 
     Raises:
         UserError: it cannot be opened, or there is not one picture in it.

@@ -30,7 +30,7 @@ class SiteReport:
 
 
 async def status_once(url: str, token: str | None, *, as_json: bool) -> bool:
-    """Print how a site is; tell whether it is ready.
+    """Print how a site is; return whether it is ready.
 
     Raises:
         UserError: the server refuses, or is none.

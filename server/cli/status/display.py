@@ -19,7 +19,7 @@ _MEGA = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """What two snapshots say together: None where there is only one, or another run between them."""
+    """Rates between two snapshots; None with only one, or after a restart of the service."""
 
     cores: float | None = None
     bytes_s: float | None = None

@@ -46,7 +46,7 @@ def track_templates(
     solver: str | None,
     progress: Callable[[int], None],
 ) -> int:
-    """Follow what is in the boxes of the first picture and write; give the number of objects.
+    """Follow what is in the boxes of the first picture and write; return the number of objects.
 
     Raises:
         UserError: a box is not in the picture, or something cannot be read or written.

@@ -1,4 +1,4 @@
-"""Who may watch and operate, and how far the site is open without that."""
+"""The section `access`: tokens, and access without them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from server.config.sections.base import Section
 
 
 class AccessSettings(Section):
-    """Who may what."""
+    """Access to the page, the streams and the API."""
 
     tokens: Path | None = None
     """The file of tokens; none: whoever reaches `http.host` may watch, and only this machine may operate."""

@@ -1,4 +1,4 @@
-"""What every part of the configuration is made of."""
+"""Types that all sections of the configuration share."""
 
 from __future__ import annotations
 

@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat, ValidationInfo, field_validator
 
 from bestview import CrossViewSettings, validate_homography
-from server.config.dataclass_section import validated
 from server.config.ground_unit import check_unit
 from server.config.sections.base import Identifier, Polygon, Section
+from server.config.unknown_keys import no_unknown_keys
 from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, create_solver
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.interactive import InteractiveSettings
@@ -71,19 +71,19 @@ class TrackSettings(Section):
     """Seconds of frames that may wait on a busy machine; a camera's older ones are left out, and said so."""
     shed_load: bool = True
     """On a machine with too much to do search every 2nd frame, every 3rd and so on, before much is late."""
-    window: Annotated[WindowSettings, validated(WindowSettings)] = WindowSettings()
-    costs: Annotated[CostSettings, validated(CostSettings)] = CostSettings()
-    temporal: Annotated[TemporalSettings, validated(TemporalSettings)] = TemporalSettings()
+    window: Annotated[WindowSettings, no_unknown_keys(WindowSettings)] = WindowSettings()
+    costs: Annotated[CostSettings, no_unknown_keys(CostSettings)] = CostSettings()
+    temporal: Annotated[TemporalSettings, no_unknown_keys(TemporalSettings)] = TemporalSettings()
     """The tracker of that name: person-to-blob matching over some seconds."""
-    assist: Annotated[InteractiveSettings, validated(InteractiveSettings)] = InteractiveSettings()
+    assist: Annotated[InteractiveSettings, no_unknown_keys(InteractiveSettings)] = InteractiveSettings()
     """What is foreseen for an operator to look at, and what their pointing weighs."""
-    cross_view: Annotated[CrossViewSettings, validated(CrossViewSettings)] = CrossViewSettings()
+    cross_view: Annotated[CrossViewSettings, no_unknown_keys(CrossViewSettings)] = CrossViewSettings()
     """How a camera goes by what others find that look at the same ground."""
     cross_view_wait_s: NonNegativeFloat = 0.3
     """Seconds after a frame was taken until which it waits for what the others found in it."""
 
     def lag(self, fps: float) -> int:
-        """Give the frames that follow a final frame at most when a window ends."""
+        """Return the frames that follow a final frame at most when a window ends."""
         return self.temporal.lag(fps) if self.tracker == TEMPORAL_TRACKER else self.window.lag
 
     @field_validator("tracker")

@@ -25,5 +25,5 @@ class DetectSettings(BackgroundSettings):
             raise ValueError("onnx.model: kind onnx needs the path of an ONNX file")
 
     def model_in(self, folder: Path) -> Path | None:
-        """Give the path of the network's file, which is relative to the configuration's folder."""
+        """Return the path of the network's file, which is relative to the configuration's folder."""
         return None if self.onnx.model is None else folder / self.onnx.model

@@ -1,4 +1,4 @@
-"""How pictures are encoded."""
+"""The section `encode`: video encoding."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is given out, and what is kept."""
+"""The sections `http` and `record`: serving and recording."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class HttpSettings(Section):
 
 
 class RecordSettings(Section):
-    """What was streamed, kept on the disk."""
+    """Recording of the streams to disk."""
 
     folder: Path | None = None
     """Where; none: nothing is recorded."""

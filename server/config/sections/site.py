@@ -1,4 +1,4 @@
-"""What all processes of a site share."""
+"""The sections `site`, `sync` and `zenoh`: what all processes of a site share."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from server.config.sections.base import Endpoint, Identifier, PictureSide, Port,
 
 
 class SiteSettings(Section):
-    """What all cameras share. Every camera's picture is scaled to one size, so that any can follow any."""
+    """Picture size and frame rate of the streams: every camera's picture is scaled to this size."""
 
     name: Identifier = "site"
     fps: Annotated[float, Field(ge=0.001, le=1000, allow_inf_nan=False)] = 25.0

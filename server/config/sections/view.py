@@ -1,4 +1,4 @@
-"""The choice of views."""
+"""The section `view`: view selection."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Annotated, Self
 from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
 
 from bestview import IdentitySettings, QualitySettings
-from server.config.dataclass_section import validated
 from server.config.sections.base import Section
+from server.config.unknown_keys import no_unknown_keys
 from tracking.types import RiskReason
 
 LIVE_VIEW_SETTINGS = (
@@ -49,7 +49,7 @@ class ShareSettings(Section):
 
 
 class FlagSettings(Section):
-    """What an operator is asked to look at."""
+    """Flags: where an operator is asked to look."""
 
     per_minute: Annotated[int, Field(ge=0, le=600)] = 2
     """Flags raised a minute at most, where identities are likeliest to fail; those of 3 minutes are saved."""
@@ -82,9 +82,9 @@ class ViewSettings(Section):
     """How long to wait for a camera's tracks before going on without that camera."""
     buffer_s: PositiveFloat = 10.0
     """Video kept per camera."""
-    quality: Annotated[QualitySettings, validated(QualitySettings)] = QualitySettings()
+    quality: Annotated[QualitySettings, no_unknown_keys(QualitySettings)] = QualitySettings()
     """What makes a view good."""
-    identity: Annotated[IdentitySettings, validated(IdentitySettings)] = IdentitySettings()
+    identity: Annotated[IdentitySettings, no_unknown_keys(IdentitySettings)] = IdentitySettings()
     flags: FlagSettings = FlagSettings()
     """Where a camera's tracker may go wrong, of what `track.assist` foresees."""
     share: ShareSettings = ShareSettings()

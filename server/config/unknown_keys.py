@@ -1,9 +1,10 @@
-"""Lets a library's settings dataclass be a section of the configuration, one to one."""
+"""Refusal of unknown configuration keys, with a suggestion of the key that was meant."""
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, get_type_hints
 
@@ -13,14 +14,20 @@ from pydantic_core import PydanticCustomError
 from server.config.values import abbreviate
 
 
-def validated(settings: type) -> BeforeValidator:
-    """Refuse keys that the dataclass does not have: pydantic would ignore them in a plain dataclass."""
+def no_unknown_keys(settings: type) -> BeforeValidator:
+    """Return a validator that refuses keys which a dataclass does not have: pydantic would ignore them."""
 
     def check(value: Any) -> Any:
         _check(settings, value, "")
         return value
 
     return BeforeValidator(check)
+
+
+def did_you_mean(key: str, known: Sequence[str]) -> str:
+    """Return the question whether a similar key was meant; empty where none is similar."""
+    close = difflib.get_close_matches(key, known, n=1)
+    return f"did you mean {close[0]!r}?" if close else ""
 
 
 @cache
@@ -35,8 +42,7 @@ def _check(settings: type, value: Any, place: str) -> None:
     names = [field.name for field in dataclasses.fields(settings)]
     for key, inner in value.items():
         if key not in names:
-            close = difflib.get_close_matches(str(key), names, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"known here: {', '.join(names)}"
+            hint = did_you_mean(str(key), names) or f"known here: {', '.join(names)}"
             raise PydanticCustomError(
                 "unknown_key",
                 "{place}unknown key '{key}'; {hint}",
