@@ -1,4 +1,4 @@
-"""How an object looks: gray histograms of its box, and the distances between them."""
+"""Gray histograms of boxes and the appearance distances between histograms."""
 
 from __future__ import annotations
 

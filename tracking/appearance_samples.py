@@ -1,4 +1,4 @@
-"""How an object looks while nobody else is in its box, run by run of frames."""
+"""Appearance samples: mean histograms of a track over runs of frames without occlusion."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def add_appearance_samples(
 def _samples_of_runs(
     alone: NDArray[np.bool_], states: NDArray[np.int64], first: int, final: Sequence[Detections]
 ) -> tuple[AppearanceSample, ...]:
-    """Put the frames together that follow each other."""
+    """Return one sample per run of consecutive unoccluded frames."""
     runs: list[tuple[int, list[Floats]]] = []
     for place, seen in enumerate(final):
         if not alone[place] or states[place] == OCCLUDED or not seen.histograms.shape[1]:

@@ -1,4 +1,4 @@
-"""Who is taken for whom in one frame."""
+"""Optimal one-to-one assignment in one frame (Hungarian algorithm)."""
 
 from __future__ import annotations
 

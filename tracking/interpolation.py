@@ -1,4 +1,4 @@
-"""Where somebody is while hidden for a moment: on the straight line from sighting to sighting."""
+"""Linear interpolation of short occlusions and skipped frames."""
 
 from __future__ import annotations
 

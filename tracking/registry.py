@@ -1,4 +1,4 @@
-"""The trackers by name: the network program, and what it is measured beside."""
+"""The `Tracker` protocol and the registry of trackers by name."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ _GRAPH = "track-graph"
 
 
 class Tracker(Protocol):
-    """Follows everybody in one camera's pictures. Deterministic, and bounded in memory."""
+    """Tracks the objects of one camera. Deterministic, and bounded in memory."""
 
     def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
-        """Take a frame: what was found in it, and its picture where there is one; a result where windows end.
+        """Add a frame's detections and, if there is one, its image; return a result where windows end.
 
         Raises:
             ValueError: the frame number is not larger than the last one.
@@ -54,20 +54,20 @@ class Tracker(Protocol):
 
 @runtime_checkable
 class PrescanTracker(Protocol):
-    """A tracker that learns the room from pictures of a recording, before its first frame."""
+    """A tracker that learns the background from a recording before its first frame."""
 
     def prepare(self, images: Iterable[Image]) -> None:
-        """Learn from some pictures; from none as it goes."""
+        """Learn from some images; without any, learn online."""
         ...
 
 
 def tracker_names() -> tuple[str, ...]:
-    """Give the names of all trackers."""
+    """Return the names of all trackers."""
     return (DEFAULT_TRACKER, *sorted((*_METHODS, TEMPORAL_TRACKER, _GRAPH)))
 
 
 def needs_images(name: str) -> bool:
-    """Say whether a tracker looks at the pictures itself.
+    """Return whether a tracker needs images, not only detections.
 
     Raises:
         ValueError: no tracker has that name.
@@ -86,7 +86,7 @@ def create_tracker(
     fps: float = 25.0,
     assist: InteractiveSettings | None = None,
 ) -> Tracker:
-    """Give a new tracker for `fps` frames a second.
+    """Create a tracker for a recording at `fps` frames a second.
 
     Only the network program has costs, a solver and an operator's help (where `assist` is enabled it is an
     `InteractiveTracker`), and only temporal consistency `temporal`.

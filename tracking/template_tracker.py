@@ -1,4 +1,4 @@
-"""Tracking objects that are known by a picture of each: the paper's toys (IV.A.1)."""
+"""Tracker of given objects by template matching: the paper's toys (IV.A.1)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tracking.window import WindowResult, WindowSettings, WindowTrack, mean_conf
 
 
 class TemplateTracker:
-    """Follows n given objects, which are numbered from 1. Nobody is born and nobody is forgotten.
+    """Tracks n given objects with ids from 1. No objects are added or removed.
 
     Every object has its own observations in each frame, the peaks of the match with its picture in the
     first frame. That picture stays its template; where it was in the last final frame is its source's
@@ -48,7 +48,7 @@ class TemplateTracker:
         self._last = frame
 
     def push(self, image: Image) -> WindowResult | None:
-        """Take the next frame, first the one after the templates'; give a result where a window ends.
+        """Add the next frame; return a result where a window ends.
 
         Raises:
             ValueError: not an `(H, W, 3)` uint8 picture, or smaller than a template.

@@ -60,7 +60,7 @@ class OnlineTracker:
         detections: Detections,
         image: Image | None = None,  # noqa: ARG002 — other trackers look at it
     ) -> WindowResult | None:
-        """Take the detections of a frame; give a result where one or more windows end.
+        """Add the detections of a frame; return a result where one or more windows end.
 
         A frame number that is left out is a frame without detections. After a gap longer than
         `forget_after` everything before it is final, all objects are forgotten, and the frames of the
@@ -89,7 +89,7 @@ class OnlineTracker:
         return merge_results(self._end())
 
     def _start_again(self, frame: int, detections: Detections) -> WindowResult | None:
-        """After a long gap: end what was before, and begin with this frame as with a first one.
+        """Start again after a long gap, with this frame as the first.
 
         No window ends at this frame, so that no result has to span the gap.
         """
@@ -180,7 +180,7 @@ class OnlineTracker:
         return self._next_id - 1
 
     def _give_birth(self, first: int, frames: list[Detections], states: npt.NDArray[np.int64]) -> bool:
-        """Add new objects to the list; say whether there are any."""
+        """Start tracks for new objects; return whether there are any."""
         start = max(len(frames) - self._window.birth_window, 0)
         test = frames[start:]
         taken = [
@@ -216,7 +216,7 @@ class OnlineTracker:
         return True
 
     def _make_room(self, frame: int, hidden: Collection[int]) -> bool:
-        """Forget the longest hidden object where the list is full; say whether there is room.
+        """Remove the longest hidden object where the list is full; return whether there is room.
 
         `hidden` has the ids of all who are in this window; who has come back in it is not any more.
         """
@@ -243,7 +243,7 @@ class OnlineTracker:
     def _finish(
         self, first: int, final_to: int, frames: Sequence[Detections], states: npt.NDArray[np.int64]
     ) -> None:
-        """Make the frames up to `final_to` final: renew the object list, forget what is long hidden."""
+        """Make the frames up to `final_to` final: update the objects, and forget long hidden ones."""
         if final_to < first:
             return
         for m, seen in enumerate(frames[: final_to - first + 1]):

@@ -1,4 +1,4 @@
-"""What a detector hands on: the hypotheses of one frame."""
+"""Detections of one frame, and risk events."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tracking.boxes import BOX_SIDES
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detections:
-    """What was seen in one frame: K hypotheses of where an object might be (paper II.A).
+    """The detections of one frame: K hypotheses of where an object might be (paper II.A).
 
     Attributes:
         boxes: (K, 4) float64, `left, top, right, bottom` in pixels.
@@ -42,7 +42,7 @@ class Detections:
 
     @classmethod
     def empty(cls, bins: int) -> Detections:
-        """Nothing was seen; histograms would have had `bins` bins."""
+        """Return no detections, with histograms of `bins` bins."""
         return cls(np.empty((0, BOX_SIDES)), np.empty(0), np.empty((0, bins)))
 
 
@@ -53,7 +53,7 @@ somebody fades into the background; the window's answer is not proven to be the 
 
 @dataclass(frozen=True, slots=True)
 class RiskEvent:
-    """One thing that may go wrong. Windows that follow each other tell of the same.
+    """A predicted identity failure. Consecutive windows repeat the same event.
 
     Attributes:
         reason: why.

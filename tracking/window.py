@@ -1,4 +1,4 @@
-"""What goes into the online tracker's window and what comes out of it (paper II.E)."""
+"""Settings and results of the online tracker's window (paper II.E)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tracking.types import Detections, RiskEvent
 
 @dataclass(frozen=True, slots=True)
 class WindowSettings:
-    """The moving window, births and deaths.
+    """The moving window, track initiation and termination.
 
     Raises:
         ValueError: a number of frames or a share makes no sense.
@@ -69,7 +69,7 @@ class WindowSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AppearanceSample:
-    """How an object looks in consecutive frames in which nobody else is in its box.
+    """Mean histogram of an object over consecutive frames without occlusion.
 
     Attributes:
         first: the first of these frames.

@@ -1,4 +1,4 @@
-"""The colors in many boxes of one picture at once, by integral images (Porikli, CVPR 2005)."""
+"""Color histograms of many boxes of one image by integral images (Porikli, CVPR 2005)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class ColorIntegralImage:
         self._limits = np.array([wide, high, wide, high])
 
     def histograms(self, boxes: Floats) -> Floats:
-        """Give the colors' shares in boxes `(..., 4)`, `(..., 64)`; zeros for a box beside the picture."""
+        """Return the color histograms of boxes `(..., 4)`, `(..., 64)`; zeros for a box outside the image."""
         whole = np.clip(np.rint(boxes), 0, self._limits).astype(np.int64)
         left, top, right, bottom = np.moveaxis(whole, -1, 0)
         sums = self._sums
@@ -46,14 +46,14 @@ class ColorIntegralCache:
         self._last: tuple[Image, ColorIntegralImage] | None = None
 
     def get(self, image: Image) -> ColorIntegralImage:
-        """Give a picture's colors."""
+        """Return the integral image of a picture, computed once for the last one."""
         if self._last is None or self._last[0] is not image:
             self._last = image, ColorIntegralImage(image)
         return self._last[1]
 
 
 def upper_and_lower_halves(boxes: Floats) -> Floats:
-    """Give the upper and the lower half of boxes `(..., 4)`: `(..., 2, 4)`."""
+    """Split boxes `(..., 4)` into their upper and lower halves, `(..., 2, 4)`."""
     middle = (boxes[..., 1] + boxes[..., 3]) / 2
     upper, lower = boxes.copy(), boxes.copy()
     upper[..., 3], lower[..., 1] = middle, middle

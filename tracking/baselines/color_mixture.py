@@ -1,4 +1,4 @@
-"""Mixtures of Gaussians over colors, and how probable each color is somebody's (Todor 2009, chapter 9).
+"""Gaussian mixtures over colors, and posterior color probabilities (Todor 2009, chapter 9).
 
 Colors are told apart in steps of eight: whatever is asked of a pixel's color is worked out once for each
 step, and looked up from then on.
@@ -48,7 +48,7 @@ class GaussianMixture:
     covariances: Floats
 
     def densities(self, colors: Floats) -> Floats:
-        """Give p(I) of colors `(..., 3)`."""
+        """Return the densities p(I) of colors `(..., 3)`."""
         parts = [
             share * multivariate_normal.pdf(colors, mean, covariance)
             for share, mean, covariance in zip(self.weights, self.means, self.covariances, strict=True)
@@ -81,12 +81,12 @@ def fit_mixture(pixels: Image, parts: int) -> GaussianMixture:
 
 
 def color_codes(image: Image) -> NDArray[np.int32]:
-    """Give the step of each pixel's color, `(H, W)`, of a picture `(H, W, 3)`."""
+    """Return the color code of each pixel, `(H, W)`, of an image `(H, W, 3)`."""
     steps = (image // _STEP).astype(np.int32)
     return np.asarray((steps[..., 0] * _LEVELS + steps[..., 1]) * _LEVELS + steps[..., 2])
 
 
 def posterior(mine: Floats, others: Floats, prior: float) -> Plane:
-    """Give p(O|I) from p(I|O) and p(I|B), each of all colors `(COLORS,)`, by Bayes' rule."""
+    """Compute p(O|I) by Bayes' rule from p(I|O) and p(I|B), each over all color codes."""
     joint = prior * mine
     return np.asarray(joint / np.maximum(joint + (1.0 - prior) * others, 1e-300), dtype=np.float32)

@@ -1,4 +1,4 @@
-"""A Kalman filter and assignment (SORT: Bewley et al., ICIP 2016).
+"""Prediction by a Kalman filter on boxes (SORT: Bewley et al., ICIP 2016).
 
 The state is the box's middle, its area and its aspect, and the velocities of all but the aspect; a detection
 measures the first four. Nothing in the picture is looked at.
@@ -28,7 +28,7 @@ class KalmanPrediction:
     uses_image = False
 
     def initialize(self, image: Image, box: Floats) -> cv2.KalmanFilter:  # noqa: ARG002 — the box is all
-        """Take somebody new in, who stands still as far as is known."""
+        """Create a filter for a box with zero velocity."""
         known = cv2.KalmanFilter(_STATES, _MEASURED, 0, cv2.CV_64F)
         flow = np.eye(_STATES)
         flow[[0, 1, 2], [4, 5, 6]] = 1.0
@@ -39,13 +39,13 @@ class KalmanPrediction:
         return known
 
     def predict(self, image: Image | None, objects: Sequence[cv2.KalmanFilter]) -> Floats:  # noqa: ARG002
-        """Say where everybody is expected: `(N, 4)`."""
+        """Return the predicted boxes, `(N, 4)`."""
         if not objects:
             return np.empty((0, BOX_SIDES))
         return np.stack([_box(np.asarray(it.predict(), dtype=np.float64)[:, 0]) for it in objects])
 
     def update(self, known: cv2.KalmanFilter, box: Floats) -> Floats:
-        """Correct by a detection; give the box in which both are."""
+        """Correct the state by a detection; return the corrected box."""
         return _box(np.asarray(known.correct(_measured(box)[:, None]), dtype=np.float64)[:, 0])
 
 

@@ -75,13 +75,13 @@ class McmcFilter:
         self._colors = ColorIntegralCache()
 
     def initialize(self, image: Image, box: Floats) -> McmcTarget:
-        """Take somebody's colors."""
+        """Create a target with the colors in its box."""
         start, aspect = initial_state(box)
         colors = self._colors.get(image).histograms(upper_and_lower_halves(box))
         return McmcTarget(colors, aspect, np.tile(start, (self._settings.samples, 1)), box.copy())
 
     def predict(self, image: Image | None, objects: Sequence[McmcTarget]) -> Floats:
-        """Let the chain run: `(N, 4)`, NaN where nobody of an object's colors is."""
+        """Run the Markov chain: `(N, 4)`, NaN for targets whose colors are not found."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None or not objects:
             return boxes
@@ -95,13 +95,13 @@ class McmcFilter:
         return boxes
 
     def update(self, known: McmcTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
-        """Give where somebody is: detections move nobody."""
+        """Return the target's own box: a detection does not move it."""
         return known.box
 
     def _chain(
         self, field: ColorIntegralImage, objects: Sequence[McmcTarget], before: Floats
     ) -> tuple[Floats, Floats]:
-        """Give the samples `(P, N, 5)` and how unlike everybody is in each, `(P, N)`, from those before."""
+        """Run the chain; return its samples `(P, N, 5)` and color distances `(P, N)`."""
         count, plan, rng = len(objects), self._settings, self._rng
         steps = (plan.burn_in + plan.thinning * plan.samples) * count
         who = rng.integers(count, size=steps)

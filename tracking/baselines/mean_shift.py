@@ -1,4 +1,4 @@
-"""Mean shift on how probable each pixel's color is somebody's (Comaniciu et al. 2000; Bradski 1998).
+"""Prediction by mean shift on color back-projection (Comaniciu et al. 2000; Bradski 1998).
 
 A histogram over hue and saturation is taken of the middle of the box that somebody begins with, over that of
 the ring around it: colors that the background has as well say little. The box goes to where the pixels of
@@ -28,7 +28,7 @@ _LEAST = 0.05
 
 @dataclass(slots=True)
 class MeanShiftTarget:
-    """Somebody who is followed: their colors' shares, 0..255, and where they are."""
+    """State of one target: its back-projection histogram, 0 to 255, and its box."""
 
     colors: Plane
     box: Floats
@@ -41,14 +41,14 @@ class MeanShift:
     uses_image = True
 
     def initialize(self, image: Image, box: Floats) -> MeanShiftTarget:
-        """Take somebody's colors."""
+        """Create a target with the colors in its box."""
         space = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
         mine, around = (_histogram(space, _scaled(box, share)) for share in (_CORE, _RING))
         ratio = np.minimum(mine / np.maximum(around, _FLOOR), 1.0) * (mine > _FLOOR)
         return MeanShiftTarget((255.0 * ratio).astype(np.float32), box.copy())
 
     def predict(self, image: Image | None, objects: Sequence[MeanShiftTarget]) -> Floats:
-        """Let everybody climb: `(N, 4)`, NaN where none of their colors is."""
+        """Move each target to the mode of its colors: `(N, 4)`, NaN where they are not found."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None:
             return boxes
@@ -66,7 +66,7 @@ class MeanShift:
         return boxes
 
     def update(self, known: MeanShiftTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
-        """Give where somebody is: detections move nobody."""
+        """Return the target's own box: a detection does not move it."""
         return known.box
 
 
@@ -76,7 +76,7 @@ def _scaled(box: Floats, share: float) -> Floats:
 
 
 def _histogram(space: cv2.typing.MatLike, box: Floats) -> Floats:
-    """Give the shares of the colors in a box, `(16, 16)`; of none where it is outside the picture."""
+    """Return the hue-saturation histogram of a box, `(16, 16)`; zeros outside the image."""
     high, wide = space.shape[:2]
     left, top, right, bottom = np.clip(np.rint(box), 0, [wide, high, wide, high]).astype(int).tolist()
     if left >= right or top >= bottom:

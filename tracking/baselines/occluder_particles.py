@@ -1,4 +1,4 @@
-"""By whom somebody is hidden, as particles: the second cue (Todor 2009, chapter 9).
+"""Occlusion as particles: the second cue of occlusion cues (Todor 2009, chapter 9).
 
 A particle holds the share of somebody that each other object hides, at least 0 and together at most 1; what
 is left is their own. The thesis leaves open how that is kept for more than two objects. Here a particle has
@@ -33,23 +33,23 @@ class OccluderParticles:
 
     @staticmethod
     def unoccluded(count: int) -> OccluderParticles:
-        """Give particles of somebody whom nobody is near."""
+        """Return particles for a target with no occluder nearby."""
         return OccluderParticles((), np.zeros((count, 0)), np.full(count, 1.0 / count))
 
     @property
     def visible_and_hidden_shares(self) -> Floats:
-        """Give the shares with somebody's own first: `(P, 1 + len(who))`, rows that sum to 1."""
+        """Return the visible share, then each occluder's share: `(P, 1 + occluders)`, rows sum to 1."""
         return np.column_stack([1.0 - self.states.sum(axis=1), self.states])
 
     @property
     def hidden_share(self) -> Floats:
-        """Give what all others hide together, `(P,)`."""
+        """Return the share hidden by all occluders together, `(P,)`."""
         return np.asarray(self.states.sum(axis=1))
 
     def propagate(
         self, rng: np.random.Generator, near: Sequence[int], noise: float, jumps: float = 0.0
     ) -> None:
-        """Draw anew where few count, let those who are near now in, and add noise.
+        """Resample, update the set of nearby occluders, and add noise to their shares.
 
         The share `jumps` of the particles becomes not hidden, and as many wholly hidden by somebody (mixed
         states: Isard, Blake, ICCV 1998): people come out, and go behind others, faster than the noise is.

@@ -1,4 +1,4 @@
-"""Two particle filters for each object that depend on each other: position and occlusion (Todor 2009, ch. 9).
+"""Two coupled particle filters per target: position and occlusion (Todor 2009, ch. 9).
 
 A position is a window. How well it shows an object is the mean of `p(O|I)` over its pixels less the mean over
 the ring around it, O and the background being mixtures of Gaussians over color. An occlusion says what share
@@ -45,14 +45,14 @@ class CenterSurroundIntegral:
             self._sums = cv2.integral(values, sdepth=cv2.CV_64F).reshape(self._sums.shape)
 
     def contrast(self, windows: Floats) -> Floats:
-        """Give the mean in windows `(..., 4)` less the mean in the rings around them, `(..., N)`."""
+        """Return the mean inside windows `(..., 4)` minus the mean in their surrounding rings, `(..., N)`."""
         inside, pixels = self._summed(windows)
         around, all_pixels = self._summed(add_ring(windows))
         ring = (around - inside) / np.maximum(all_pixels - pixels, 1.0)
         return np.asarray(inside / np.maximum(pixels, 1.0) - ring)
 
     def _summed(self, windows: Floats) -> tuple[Floats, Floats]:
-        """Give the sums over windows, `(..., N)`, and of how many pixels, `(..., 1)`."""
+        """Return the sums over windows, `(..., N)`, and their pixel counts, `(..., 1)`."""
         whole = np.clip(np.rint(windows) - self._corner, 0, self._limits).astype(np.int64)
         left, top, right, bottom = np.moveaxis(whole, -1, 0)
         sums = self._sums
@@ -61,7 +61,7 @@ class CenterSurroundIntegral:
 
 
 def add_ring(windows: Floats) -> Floats:
-    """Give windows `(..., 4)` with their rings."""
+    """Return windows `(..., 4)` enlarged by their surrounding rings."""
     sides = windows[..., 2:] - windows[..., :2]
     margin = sides * (np.sqrt(1.0 + RING_AREA_RATIO) - 1.0) / 2
     return np.concatenate([windows[..., :2] - margin, windows[..., 2:] + margin], axis=-1)
@@ -142,7 +142,7 @@ class OcclusionCues:
         self._age = 0
 
     def initialize(self, image: Image, box: Floats) -> OcclusionCueTarget:
-        """Fit somebody's mixture to the middle of their box, and put all particles there."""
+        """Create a target: fit its color mixture to the core of its box and put all particles there."""
         plan, (start, aspect) = self._settings, initial_state(box)
         if self._behind is None:
             self._learn_background(image, [box])
@@ -154,7 +154,7 @@ class OcclusionCues:
         )
 
     def predict(self, image: Image | None, objects: Sequence[OcclusionCueTarget]) -> Floats:
-        """Let both filters of everybody go on: `(N, 4)`, NaN where nobody of an object's colors is."""
+        """Advance both filters of every target: `(N, 4)`, NaN for targets whose colors are not found."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None:
             return boxes
@@ -171,7 +171,7 @@ class OcclusionCues:
         return boxes
 
     def update(self, known: OcclusionCueTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
-        """Give where somebody is: detections move nobody."""
+        """Return the target's own box: a detection does not move it."""
         return known.box
 
     def _learn_background(self, image: Image, boxes: Sequence[Floats]) -> None:
@@ -190,7 +190,7 @@ class OcclusionCues:
         return posterior(likely, likely if self._behind is None else self._behind, RING_AREA_RATIO)
 
     def _go_on(self, image: Image, item: OcclusionCueTarget, objects: Sequence[OcclusionCueTarget]) -> float:
-        """Let one object's two filters go on, and weigh them; how well it is seen, S."""
+        """Advance and weigh one target's two filters; return how visible it is, S."""
         plan = self._settings
         states, item.weights = resample_if_degenerate(self._rng, item.states, item.weights)
         item.states = propagate(self._rng, states)
@@ -218,7 +218,7 @@ class OcclusionCues:
 
 
 def _inside(image: Image, box: Floats) -> Image:
-    """Give the pixels `(N, 3)` in a box `(4,)`; the nearest where it is beside the picture."""
+    """Return the pixels `(N, 3)` of a box `(4,)`; the nearest pixel for a box outside the image."""
     high, wide = image.shape[:2]
     left, top = np.clip(np.rint(box[:2]), 0, [wide - 1, high - 1]).astype(int).tolist()
     right, bottom = np.clip(np.rint(box[2:]), [left + 1, top + 1], [wide, high]).astype(int).tolist()
@@ -230,7 +230,7 @@ def _touch(box: Floats, area: Floats) -> bool:
 
 
 def _worths(image: Image, area: Floats, windows: Floats, objects: Sequence[OcclusionCueTarget]) -> Floats:
-    """Say how well windows `(P, 4)` show each object: `(P, N)`."""
+    """Compute the center-surround contrast of each object in windows `(P, 4)`: `(P, N)`."""
     high, wide = image.shape[:2]
     left, top = np.clip(np.floor(area[:2]), 0, [wide, high]).astype(int).tolist()
     right, bottom = np.clip(np.ceil(area[2:]), [left, top], [wide, high]).astype(int).tolist()

@@ -1,4 +1,4 @@
-"""KLT: corners followed by optical flow (Lucas, Kanade 1981; Shi, Tomasi 1994; Kalal et al., ICPR 2010).
+"""Prediction by KLT optical flow of corners (Lucas, Kanade 1981; Shi, Tomasi 1994; Kalal et al. 2010).
 
 The corners in a box are followed from picture to picture and back. Those that come back to where they were
 move the box by the median of their steps, and grow it by the median of how distances between them change.
@@ -47,11 +47,11 @@ class OpticalFlow:
         self._before: Mask | None = None
 
     def initialize(self, image: Image, box: Floats) -> FlowTarget:  # noqa: ARG002 — the next picture tells
-        """Take somebody new in: their corners are looked for when the next picture comes."""
+        """Create a target; its corners are detected when the next image comes."""
         return FlowTarget(box.copy())
 
     def predict(self, image: Image | None, objects: Sequence[FlowTarget]) -> Floats:
-        """Follow everybody's corners: `(N, 4)`, NaN where too few came back."""
+        """Track the targets' corners: `(N, 4)`, NaN where too few were tracked back."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None:
             return boxes
@@ -66,12 +66,12 @@ class OpticalFlow:
         return boxes
 
     def update(self, known: FlowTarget, box: Floats) -> Floats:  # noqa: ARG002 — the flow alone says where
-        """Give where somebody is: detections move nobody."""
+        """Return the target's own box: a detection does not move it."""
         return known.box
 
 
 def _followed(before: Mask, now: Mask, box: Floats) -> Floats | None:
-    """Give a box `(4,)` of one picture in the next; None: it cannot be told."""
+    """Return the box `(4,)` moved to the next image, or `None` where too few corners were tracked."""
     mask = np.zeros_like(before)
     inset = _INSIDE * (box[2] - box[0])
     left, right = round(box[0] + inset), round(box[2] - inset)
@@ -94,7 +94,7 @@ def _followed(before: Mask, now: Mask, box: Floats) -> Floats | None:
 
 
 def _flow(before: Mask, now: Mask, corners: Plane) -> tuple[Plane, NDArray[np.bool_]]:
-    """Follow corners `(P, 1, 2)` into the next picture: where they are, and `(P,)` whether it is known."""
+    """Track corners `(P, 1, 2)` into the next image: positions, and `(P,)` whether each was found."""
     there, found, _ = cv2.calcOpticalFlowPyrLK(
         before, now, corners, np.empty(0, dtype=np.float32), winSize=_WINDOW, maxLevel=_LEVELS
     )
@@ -102,7 +102,7 @@ def _flow(before: Mask, now: Mask, corners: Plane) -> tuple[Plane, NDArray[np.bo
 
 
 def _growth(start: Floats, end: Floats) -> float:
-    """Give the median of how the distances between points `(P, 2)` change."""
+    """Return the median ratio of the distances between points `(P, 2)` before and after."""
     first, second = np.triu_indices(len(start), 1)
     was = np.hypot(*(start[first] - start[second]).T)
     now = np.hypot(*(end[first] - end[second]).T)

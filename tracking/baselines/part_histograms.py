@@ -1,4 +1,4 @@
-"""The three color channels' histograms in the parts of many boxes at once, by one integral image.
+"""Histograms of the color channels in the parts of many boxes, by one integral image.
 
 The picture is cut to where the boxes are. Each pixel's three levels are written as ones among zeros, one
 after the other for all channels, so that a corner of a box is one row of sums in memory (Porikli, CVPR 2005).
@@ -34,7 +34,7 @@ class PartHistograms:
             cv2.integral(bins, self._sums, sdepth=cv2.CV_32S)
 
     def histograms(self, boxes: Floats) -> Floats:
-        """Give the levels' shares in boxes `(..., 4)`, `(..., 3, 8)`; zeros for a box that is elsewhere."""
+        """Return the channel histograms of boxes `(..., 4)`, `(..., 3, 8)`; zeros outside the area."""
         left, top, right, bottom = self._area
         whole = np.clip(np.rint(boxes), [left, top] * 2, [max(right, left), max(bottom, top)] * 2)
         x0, y0, x1, y1 = np.moveaxis(whole.astype(np.int64) - [left, top, left, top], -1, 0)
@@ -45,7 +45,7 @@ class PartHistograms:
 
 
 def core_boxes(boxes: Floats) -> Floats:
-    """Give the middles of boxes `(..., 4)`, where somebody is."""
+    """Return the core of boxes `(..., 4)`, where most pixels are the person's."""
     middles = (boxes[..., :2] + boxes[..., 2:]) / 2
     halves = _CORE * (boxes[..., 2:] - boxes[..., :2]) / 2
     return np.concatenate([middles - halves, middles + halves], axis=-1)

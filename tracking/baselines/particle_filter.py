@@ -1,4 +1,4 @@
-"""One particle filter for each object, by its colors (Pérez et al., ECCV 2002; Nummiaro et al. 2003).
+"""Independent color particle filters (Pérez et al., ECCV 2002; Nummiaro et al. 2003).
 
 A particle is a box: its middle, its height and the step that it took. It goes on as it went, with noise that
 grows with its height, and weighs `exp(-λ d²)`, d being the Bhattacharyya distance of the colors in its upper
@@ -74,7 +74,7 @@ class ParticleFilters:
         self._colors = ColorIntegralCache()
 
     def initialize(self, image: Image, box: Floats) -> ParticleTarget:
-        """Take somebody's colors, and put all particles at them."""
+        """Create a target: take its color histograms and put all particles at its box."""
         count, (start, aspect) = self._settings.particles, initial_state(box)
         colors = self._colors.get(image).histograms(upper_and_lower_halves(box))
         return ParticleTarget(
@@ -82,7 +82,7 @@ class ParticleFilters:
         )
 
     def predict(self, image: Image | None, objects: Sequence[ParticleTarget]) -> Floats:
-        """Let all particles go on and weigh them: `(N, 4)`, NaN where none is like its object."""
+        """Propagate and weigh the particles: `(N, 4)`, NaN where none matches its target."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None:
             return boxes
@@ -98,31 +98,31 @@ class ParticleFilters:
         return boxes
 
     def update(self, known: ParticleTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
-        """Give where somebody is: detections move nobody."""
+        """Return the target's own box: a detection does not move it."""
         return known.box
 
     def _go_on(self, item: ParticleTarget) -> None:
-        """Draw anew where few particles count, and move all of them."""
+        """Resample where needed, and propagate the particles."""
         states, item.weights = resample_if_degenerate(self._rng, item.states, item.weights)
         item.states = propagate(self._rng, states)
 
 
 def initial_state(box: Floats) -> tuple[Floats, float]:
-    """Give the state `(5,)` of somebody in a box `(4,)` who stands, and width over height."""
+    """Return the state `(5,)` of a standing person in a box `(4,)`, and its aspect ratio."""
     tall = max(box[3] - box[1], 1.0)
     state = np.array([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2, tall, 0.0, 0.0])
     return state, (box[2] - box[0]) / tall
 
 
 def reweight(weights: Floats, distance: Floats, sharpness: float) -> Floats:
-    """Weigh particles `(P,)` anew by how unlike they are, `(P,)`; the weights sum to 1."""
+    """Multiply particle weights `(P,)` by their likelihood of distances `(P,)`, and normalize them."""
     # Relative to the nearest: what all of them lack, a shadow or a passer-by, is no weight.
     anew = weights * np.exp(-sharpness * (distance - distance.min()))
     return np.asarray(anew / anew.sum())
 
 
 def propagate(rng: np.random.Generator, states: Floats) -> Floats:
-    """Move particles `(..., 5)` as they went, with noise."""
+    """Propagate particles `(..., 5)` with their velocity and noise."""
     noise = rng.standard_normal((*states.shape[:-1], 3)) * states[..., 2:3]
     moved = states.copy()
     moved[..., 3:] = _GOES_ON * states[..., 3:] + _STEP * noise[..., :2]
@@ -132,7 +132,7 @@ def propagate(rng: np.random.Generator, states: Floats) -> Floats:
 
 
 def particle_boxes(states: Floats, aspect: float | Floats) -> Floats:
-    """Give the boxes of particles `(..., 5)`, `(..., 4)`."""
+    """Return the boxes of particles `(..., 5)`, `(..., 4)`."""
     x, y, tall = states[..., 0], states[..., 1], states[..., 2]
     wide = tall * aspect
     return np.stack([x - wide / 2, y - tall / 2, x + wide / 2, y + tall / 2], axis=-1)
@@ -142,7 +142,7 @@ Indices = NDArray[np.intp]
 
 
 def systematic_resample(rng: np.random.Generator, weights: Floats) -> Indices:
-    """Draw as many particles as there are by their weights `(P,)`, which sum to 1: which ones, `(P,)`."""
+    """Return the indices `(P,)` of particles resampled by their weights `(P,)`, which sum to 1."""
     count = len(weights)
     # Systematic: one draw for all.
     marks = (rng.random() + np.arange(count)) / count
@@ -152,7 +152,7 @@ def systematic_resample(rng: np.random.Generator, weights: Floats) -> Indices:
 def resample_if_degenerate(
     rng: np.random.Generator, states: Floats, weights: Floats
 ) -> tuple[Floats, Floats]:
-    """Give the particles `(P, S)` and weights `(P,)` to go on with: others where fewer than half count."""
+    """Return particles `(P, S)` and weights `(P,)`, resampled where the effective number is below half."""
     count = len(weights)
     if 1.0 / float(np.square(weights).sum()) >= count / 2:
         return states, weights

@@ -1,4 +1,4 @@
-"""Particle filters kept apart (Todor 2009, section 8.3, which has the separation from its reference 49).
+"""Particle filters with an overlap factor between similar targets (Todor 2009, section 8.3).
 
 A particle weighs `exp(-λ Σ D²)`, summed over the parts of its box (the middle of it, where somebody is) and
 the three color channels, D² being one less the Bhattacharyya coefficient of a part's histogram and that of
@@ -65,7 +65,7 @@ class SeparatedParticleSettings:
 
 @dataclass(slots=True)
 class SeparatedTarget(ParticleTarget):
-    """Somebody who is followed, whose colors are `(parts, 3, 8)`: each part's histograms.
+    """State of one target, whose colors are part histograms `(parts, 3, 8)`.
 
     Attributes:
         reference_similarities: how like themselves they were in their first pictures.
@@ -85,7 +85,7 @@ class SeparatedParticles:
         self._rng = np.random.default_rng(self._settings.seed)
 
     def initialize(self, image: Image, box: Floats) -> SeparatedTarget:
-        """Take the colors of somebody's parts, and put all particles at them."""
+        """Create a target: take its part histograms and put all particles at its box."""
         count, (start, aspect) = self._settings.particles, initial_state(box)
         colors = PartHistograms(image, box).histograms(self._parts(box))
         return SeparatedTarget(
@@ -93,7 +93,7 @@ class SeparatedParticles:
         )
 
     def predict(self, image: Image | None, objects: Sequence[SeparatedTarget]) -> Floats:
-        """Let all particles go on, weigh and separate them: `(N, 4)`, NaN where none is like its object."""
+        """Propagate, weigh and separate the particles: `(N, 4)`, NaN where none matches its target."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None:
             return boxes
@@ -109,14 +109,14 @@ class SeparatedParticles:
         return boxes
 
     def update(self, known: SeparatedTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
-        """Give where somebody is: detections move nobody."""
+        """Return the target's own box: a detection does not move it."""
         return known.box
 
     def _parts(self, boxes: Floats) -> Floats:
         return split_boxes(core_boxes(boxes), self._settings.rows, self._settings.columns)
 
     def _weigh(self, image: Image, item: SeparatedTarget) -> tuple[PartHistograms, Floats]:
-        """Let one object's particles go on and weigh them alone: the colors there, and their D² `(P,)`."""
+        """Propagate and weigh one target's particles: the histograms there, and their D² `(P,)`."""
         states, item.weights = resample_if_degenerate(self._rng, item.states, item.weights)
         item.states = propagate(self._rng, states)
         places = particle_boxes(item.states, item.aspect)
@@ -128,7 +128,7 @@ class SeparatedParticles:
         return colors, distances.mean(axis=(-2, -1))
 
     def _behind_another(self, colors: PartHistograms, item: SeparatedTarget) -> bool:
-        """Whether somebody is less like themselves than at first; learn from their first pictures."""
+        """Return whether a target looks less like its reference than in its first images: it is occluded."""
         box = particle_boxes(item.weights @ item.states, item.aspect)
         alike = float(bhattacharyya_coefficient(colors.histograms(self._parts(box)), item.colors).mean())
         if len(item.reference_similarities) < self._settings.reference_frames:
@@ -138,7 +138,7 @@ class SeparatedParticles:
 
 
 def overlap_factors(middles: Sequence[Floats], reduced: int) -> list[Floats]:
-    """Give each object's particles their factor.
+    """Compute the overlap factor of each object's particles.
 
     Args:
         middles: of each object `(P, 2)`, x and y in pixels.

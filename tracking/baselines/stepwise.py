@@ -1,4 +1,4 @@
-"""Trackers that decide frame by frame, and never change their mind: the survey's.
+"""Frame-by-frame trackers: one assignment per frame, decisions are final.
 
 All of them begin, match and end objects alike, so that what is measured is how each follows them. A detection
 that overlaps nobody is somebody new, who counts from the third frame in a row. In each frame the objects are
@@ -29,22 +29,22 @@ S = TypeVar("S")
 
 
 class PredictionMethod(Protocol, Generic[S]):
-    """One way of following objects from picture to picture. Deterministic: no clock, a seed of its own."""
+    """How a tracker predicts targets from image to image. Deterministic: no clock, its own seed."""
 
     name: str
     uses_image: bool
     """It looks at the picture: where it says that somebody is counts without a detection there, too."""
 
     def initialize(self, image: Image, box: Floats) -> S:
-        """Take somebody new in, who is in this `(4,)` box. Who does not look is not given the picture."""
+        """Create a target from a box `(4,)`. A method that does not use images gets an empty one."""
         ...
 
     def predict(self, image: Image | None, objects: Sequence[S]) -> Floats:
-        """Say where all of them are in the next picture: `(N, 4)`, NaN for those who are lost."""
+        """Predict the boxes in the next image: `(N, 4)`, NaN for targets that are lost."""
         ...
 
     def update(self, known: S, box: Floats) -> Floats:
-        """Hear of the detection `(4,)` that somebody was matched with; give where they are then, `(4,)`."""
+        """Update a target with its matched detection `(4,)`; return its new box `(4,)`."""
         ...
 
 
@@ -53,7 +53,7 @@ _NO_PICTURE: Image = np.empty((0, 0, 3), dtype=np.uint8)
 
 @dataclass(frozen=True, slots=True)
 class StepwiseSettings:
-    """When objects begin, match and end.
+    """When tracks start, match and end.
 
     Raises:
         ValueError: a share is none, or a number of frames makes no sense.
@@ -100,7 +100,7 @@ class StepwiseTrack(Generic[S]):
 
 
 class StepwiseTracker(Generic[S]):
-    """Follows everybody by a method. What it says of a frame is final at once."""
+    """Frame-by-frame tracker around a prediction method. Its results are final at once."""
 
     def __init__(
         self, method: PredictionMethod[S], window: WindowSettings, settings: StepwiseSettings | None = None
@@ -116,7 +116,7 @@ class StepwiseTracker(Generic[S]):
         self._last: int | None = None
 
     def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
-        """Take a frame; give a result where one or more windows end.
+        """Take a frame; return a result where one or more windows end.
 
         A frame number that is left out is a frame of which nothing is known. After a gap longer than
         `forget_after` of the window everybody is forgotten, and the frames of the gap are in no result.
@@ -139,13 +139,13 @@ class StepwiseTracker(Generic[S]):
         return self._result(frame) if (frame + 1) // stride > (before + 1) // stride else None
 
     def flush(self) -> WindowResult | None:
-        """End the recording. `None` where everything was told already."""
+        """Finish the recording; `None` where everything was published already."""
         if self._first is None or self._last is None or self._last < self._first:
             return None
         return self._result(self._last)
 
     def _start_again(self, frame: int, detections: Detections, image: Image | None) -> WindowResult | None:
-        """After a long gap: end what was before, so that no result has to span the gap."""
+        """Start again after a long gap, so that no result has to span it."""
         result = self.flush()
         self._objects, self._seen = [], {frame: detections}
         self._first = self._last = frame
@@ -153,7 +153,7 @@ class StepwiseTracker(Generic[S]):
         return result
 
     def _pass_by(self, frames: int) -> None:
-        """Let frames go by of which nothing is known."""
+        """Count frames without data as missed."""
         for item in self._objects:
             item.missed_frames += frames
         self._end_some()
@@ -174,7 +174,7 @@ class StepwiseTracker(Generic[S]):
         self._begin(frame, detections, taken, image)
 
     def _match(self, frame: int, detections: Detections) -> NDArray[np.bool_]:
-        """Match objects with detections; say which are taken, `(K,)`."""
+        """Match tracks with detections; return which detections are taken, `(K,)`."""
         taken = np.zeros(len(detections), dtype=np.bool_)
         if not self._objects or not len(detections):
             return taken
@@ -191,7 +191,7 @@ class StepwiseTracker(Generic[S]):
     def _begin(
         self, frame: int, detections: Detections, taken: NDArray[np.bool_], image: Image | None
     ) -> None:
-        """Take in whoever a detection shows that is at nobody, the surest first."""
+        """Start tracks from unmatched detections, in descending order of score."""
         if image is None:
             if self._method.uses_image:
                 return  # there is nothing to know them by
@@ -217,7 +217,7 @@ class StepwiseTracker(Generic[S]):
         ]
 
     def _result(self, last: int) -> WindowResult:
-        """Tell of all frames that were not told of yet."""
+        """Return the result for all frames not yet published."""
         first = last if self._first is None else self._first
         frames = range(first, last + 1)
         told = [item for item in self._everybody() if self._counts(item)]
@@ -244,11 +244,11 @@ class StepwiseTracker(Generic[S]):
         return result
 
     def _everybody(self) -> Iterable[StepwiseTrack[S]]:
-        """Give all of whom there may be something to tell."""
+        """Return all tracks that may have something to publish."""
         return (*self._ended, *self._objects)
 
     def _counts(self, item: StepwiseTrack[S]) -> bool:
-        """Whether somebody is surely somebody."""
+        """Return whether a track is confirmed."""
         return item.matches >= self._settings.confirm_frames
 
     def _bins(self) -> int:

@@ -1,4 +1,4 @@
-"""The track graph: who merges into a group is known again when it splits (Todor 2009, chapter 7).
+"""Track graph: identities are restored when a merged group splits (Todor 2009, chapter 7).
 
 Tracks are followed by a Kalman filter and assignment. Somebody who is no longer detected where somebody
 else covers them merges into that one's track, which is of several people from then on. Somebody new who
@@ -35,7 +35,7 @@ _VELOCITY = slice(4, 6)
 
 
 class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
-    """Tracks, groups of them, and who comes out of a group."""
+    """Kalman tracks with merges into groups and splits from them."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         return super()._counts(item) and item.serial not in self._leaving
 
     def _tidy(self, frame: int) -> None:
-        """Let go of groups whose track ended, of who is in one for long, and of who came out and is gone."""
+        """Remove ended groups, members that stayed too long, and ended split candidates."""
         alive = {item.serial for item in self._objects}
         self._leaving = {
             it: who
@@ -86,7 +86,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         self._looks = {serial: look for serial, look in self._looks.items() if serial in known}
 
     def _learn(self, frame: int, detections: Detections) -> None:
-        """See how everybody looks who is matched: alone, come out of a group, or the rest of one."""
+        """Update the appearance of matched tracks: single, split candidate, or the rest of a group."""
         for item in self._objects:
             _, place = item.observations.get(frame, (item.box, OCCLUDED))
             if place == OCCLUDED:
@@ -102,7 +102,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
                 self._looks.setdefault(item.serial, MeanAppearance.empty(detections)).add(histogram)
 
     def _merge(self, frame: int) -> None:
-        """Let those who are not detected any more into the track of whoever covers them."""
+        """Merge tracks that are no longer detected into the track that covers them."""
         sure = [item for item in self._objects if self._counts(item)]
         for item in sure:
             hosts = [it for it in sure if it.missed_frames == 0 and it in self._objects]
@@ -123,12 +123,12 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         self._leaving = {it: who for it, who in self._leaving.items() if who.host is not item}
 
     def _end(self, item: KalmanTrack, frame: int) -> TrackEnd:
-        """Say how somebody goes into a group."""
+        """Return the end of a track that enters a group."""
         step = np.asarray(item.target.statePost, dtype=np.float64)[_VELOCITY, 0]
         return _ended(frame, item.box, step, self._looks[item.serial].mean)
 
     def _leave(self, frame: int) -> None:
-        """Note who is new beside a group: they came out of it."""
+        """Register new tracks beside a group as split candidates."""
         hosts = [it for it in self._objects if it.serial in self._groups]
         for item in self._objects:
             if item.matches > 1 or frame not in item.observations or not hosts:
@@ -144,7 +144,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         return np.asarray(box + np.array([-margin, -margin, margin, margin]))
 
     def _split(self) -> None:
-        """Decide who those are that came out of a group and were seen for long enough."""
+        """Decide the identity of split candidates seen for long enough."""
         for serial, who in list(self._leaving.items()):
             enough = (
                 who.track.matches >= self._graph.split_decision_frames
@@ -167,7 +167,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
                 self._part(who, group, left)
 
     def _part(self, who: SplitCandidate, group: TrackGroup, left: int) -> None:
-        """Give tracks to those whose they are: the `left`th of a group came out of it."""
+        """Reassign the tracks after a split: member `left` of the group has left it."""
         host = who.host
         del self._groups[host.serial]
         followed, place = host, left
@@ -194,7 +194,7 @@ def _ended(frame: int, box: Floats, step: Floats, look: Floats) -> TrackEnd:
 
 
 def _take_over(item: KalmanTrack, track: KalmanTrack, first: int) -> None:
-    """Let a person go on as a track, with what it showed from the frame `first` on."""
+    """Continue `item` as `track`, with its observations from the frame `first` on."""
     item.target, item.box, item.missed_frames = track.target, track.box, track.missed_frames
     item.observations.update(
         {frame: track.observations[frame] for frame in track.observations if frame >= first}

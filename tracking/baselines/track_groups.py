@@ -1,4 +1,4 @@
-"""What the track graph remembers: how people look, who is in a group, who came out of one."""
+"""State of the track graph: appearances, groups and split candidates."""
 
 from __future__ import annotations
 
@@ -43,18 +43,18 @@ class TrackGraphSettings:
 
 @dataclass(slots=True, eq=False)
 class MeanAppearance:
-    """How somebody looks, the mean of some frames."""
+    """Mean histogram over some frames."""
 
     total: Floats
     frames: int = 0
 
     @staticmethod
     def empty(detections: Detections) -> MeanAppearance:
-        """Give the look of somebody not seen yet."""
+        """Return an appearance without observations."""
         return MeanAppearance(np.zeros(detections.histograms.shape[1]))
 
     def add(self, histogram: Floats) -> None:
-        """Take a frame's `(B,)` in."""
+        """Add a frame's histogram `(B,)`."""
         self.total, self.frames = self.total + histogram, self.frames + 1
 
     @property
@@ -65,7 +65,7 @@ class MeanAppearance:
 
 @dataclass(slots=True, eq=False)
 class TrackGroup:
-    """Several people in one track, which is the first one's."""
+    """Several people merged into one track, the first member's."""
 
     entries: list[TrackEnd]
     """How everybody went in; the first is who is followed on."""
@@ -75,7 +75,7 @@ class TrackGroup:
 
 @dataclass(slots=True, eq=False)
 class SplitCandidate:
-    """Somebody who came out of a group, and it is not decided yet who they are."""
+    """A new track beside a group whose identity is not decided yet."""
 
     track: KalmanTrack
     host: KalmanTrack

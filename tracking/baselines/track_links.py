@@ -1,4 +1,4 @@
-"""Who left a group: identities linked across a split by maximum a posteriori (Todor 2009, sections 7.2, 7.3).
+"""Identity links across a split by maximum a posteriori (Todor 2009, sections 7.2, 7.3).
 
 The graph is that of Nillius, Sullivan and Carlsson (CVPR 2006): its nodes are tracks of one person or of
 several, its links the merges and splits between them. A split of N people into m tracks of n_i people has
@@ -41,7 +41,7 @@ class TrackEnd:
 
 
 def track_distance(before: TrackEnd, after: TrackEnd, close: int) -> float:
-    """Say how unlike one person two tracks are, I: 0 to 1.
+    """Return the distance I of two tracks of one person, 0 to 1.
 
     The motion counts where they are at most `close` frames apart: how far from where the first was heading
     the second begins, in heights.
@@ -57,7 +57,7 @@ def track_distance(before: TrackEnd, after: TrackEnd, close: int) -> float:
 def departed_member(
     group: Sequence[TrackEnd], out: TrackEnd, rest: TrackEnd, close: int, unlike: float
 ) -> int | None:
-    """Say which of a group is the one who came out; None: nobody of them, who was never in it.
+    """Return the index of the group member who left; `None` if it is none of them.
 
     Args:
         group: how everybody went in, at least one.

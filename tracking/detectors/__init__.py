@@ -1,4 +1,4 @@
-"""Detectors: where objects might be in a frame."""
+"""Detectors: candidate boxes with scores and histograms."""
 
 from tracking.detectors.background.box_filter import BoxFilterSettings
 from tracking.detectors.background.detector import (

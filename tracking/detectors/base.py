@@ -1,4 +1,4 @@
-"""What every detector offers: frames in, hypotheses out."""
+"""The `Detector` protocol, and the array types of images and masks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Plane: TypeAlias = npt.NDArray[np.float32]
 
 
 class Detector(Protocol):
-    """Finds candidate boxes in the frames of one camera.
+    """Detects candidate boxes in the frames of one camera.
 
     A detector may remember what it saw (a background, the height of people), so one instance
     belongs to one camera. It has no clock and no randomness: the same frames in the same order give the
@@ -26,7 +26,7 @@ class Detector(Protocol):
     """
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:
-        """Give the hypotheses of the next frame.
+        """Return the detections of the next frame.
 
         Args:
             image: `(H, W, 3)` uint8, blue green red, the same size in every call.

@@ -1,4 +1,4 @@
-"""How people look in color: upper and lower body apart, brightness and two chromas each.
+"""Color histograms of the upper and lower body: brightness and two chroma shares each.
 
 Six histograms beside each other in one row: brightness, red share and blue share of the upper half of a
 box, then of its lower half. Every one of the six holds a sixth of the row's mass, so that measures on
@@ -55,7 +55,7 @@ class AppearanceSettings:
 
 @dataclass(frozen=True, slots=True)
 class AppearanceExtractor:
-    """What a detector says that its boxes look like: color histograms, or the paper's gray ones."""
+    """Computes the appearance histograms of boxes: color, or the paper's gray ones."""
 
     settings: AppearanceSettings = field(default_factory=AppearanceSettings)
     gray_bins: int = 64  # bins of the gray histograms
@@ -66,7 +66,7 @@ class AppearanceExtractor:
         return self.settings.length if self.settings.color else self.gray_bins
 
     def histograms(self, image: Image, boxes: Floats, mask: Mask | None = None) -> Floats:
-        """Give the look of each box `(K, 4)` of a picture `(H, W, 3)`: `(K, bins)`, rows summing to 1.
+        """Return the histogram of each box `(K, 4)` of an image `(H, W, 3)`: `(K, bins)`, rows sum to 1.
 
         Only the pixels count at which `mask` `(H, W)`, where there is one, is not 0.
         """
@@ -77,7 +77,7 @@ class AppearanceExtractor:
 
 
 def color_histograms(image: Image, boxes: Floats, bins: int, mask: Mask | None = None) -> Floats:
-    """Give the six histograms of each box, `(K, 6 bins)`, rows summing to 1.
+    """Return the six histograms of each box, `(K, 6 bins)`, rows sum to 1.
 
     Args:
         image: `(H, W, 3)`.
@@ -116,7 +116,7 @@ def _rows(counts: Floats) -> Floats:
 
 
 def _coded(image: Image, bins: int, mask: Mask) -> npt.NDArray[np.uint8]:
-    """Give each pixel's bins of brightness (its square root), red and blue share, `(H, W, 3)`.
+    """Return each pixel's bins of brightness (its square root), red and blue share, `(H, W, 3)`.
 
     Those of the second channel begin at `bins`, of the third at `2 bins`, so that one count does for all.
     Only pixels of the mask are looked at; the others are 0.
@@ -129,7 +129,7 @@ def _coded(image: Image, bins: int, mask: Mask) -> npt.NDArray[np.uint8]:
 
 
 def _codes_of(pixels: npt.NDArray[np.uint8], bins: int) -> npt.NDArray[np.uint8]:
-    """Give the bins of pixels `(N, 3)`."""
+    """Return the bins of pixels `(N, 3)`."""
     blue, green, red = (plane.astype(np.float32) + np.float32(_DARK) for plane in pixels.T)
     per_total = np.float32(bins / (_MOST_SHARE - _LEAST_SHARE)) / (blue + green + red)
     first = np.float32(bins * _LEAST_SHARE / (_MOST_SHARE - _LEAST_SHARE))

@@ -1,4 +1,4 @@
-"""OpenCV's people detector: oriented gradients and a linear SVM (Dalal and Triggs, CVPR 2005)."""
+"""OpenCV's HOG people detector with a linear SVM (Dalal and Triggs, CVPR 2005)."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class HogSettings:
         ValueError: a setting makes no sense.
     """
 
-    min_height: float = 0.14  # smallest person, in picture heights: the smaller the slower
-    scale_step: float = 1.08  # each size of the scan is this factor above the one before
-    min_margin: float = 0.0  # least distance from the SVM's border; below 0 gives more, and more false ones
-    nms_iou: float = 0.5  # of two boxes that overlap (IoU) by more, the one of lower score is left out
-    max_detections: int = 40  # boxes handed on at most
+    min_height: float = 0.14  # smallest person, in image heights: the smaller the slower
+    scale_step: float = 1.08  # factor between two sizes of the scan
+    min_margin: float = 0.0  # least distance from the SVM's boundary; below 0 finds more, also false ones
+    nms_iou: float = 0.5  # of two boxes that overlap (IoU) more, the one of lower score is dropped
+    max_detections: int = 40  # boxes per frame at most
 
     def __post_init__(self) -> None:
         if not 0.0 < self.min_height <= 1.0:
@@ -46,7 +46,7 @@ class HogSettings:
 
 
 class HogDetector:
-    """Finds upright people in single pictures; remembers nothing. Scores are `1 / (1 + exp(-margin))`."""
+    """Detects upright people in single images, without memory."""
 
     warming_up = False
 
@@ -68,7 +68,7 @@ class HogDetector:
         return self._looks.bins
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
-        """Give the people of a frame, best first.
+        """Return the people detected in a frame, best first.
 
         Raises:
             ValueError: not an `(H, W, 3)` uint8 picture.
@@ -82,7 +82,7 @@ class HogDetector:
         return Detections(boxes, scores[kept], self._looks.histograms(image, boxes))
 
     def _found(self, image: Image) -> tuple[Floats, Floats]:
-        """Give all windows in which the SVM sees somebody, cut down to the person: boxes and scores."""
+        """Return the SVM's positive windows cut to the person: boxes and scores."""
         height, width = image.shape[:2]
         factor = _PERSON_ROWS / (self.settings.min_height * height)
         size = (max(round(width * factor), 64), max(round(height * factor), 128))

@@ -1,4 +1,4 @@
-"""Parts of the picture to ignore: overlays, a street behind a window, a monitor."""
+"""Ignored polygons of the image: overlays, a street behind a window, a monitor."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Polygons: TypeAlias = Sequence[Polygon]
 
 
 def visible_mask(height: int, width: int, polygons: Sequence[Polygon], scale: float = 1.0) -> Mask:
-    """Give a mask `(height, width)` that is 0 inside the polygons and 255 elsewhere.
+    """Return a mask `(height, width)` that is 0 inside the polygons and 255 elsewhere.
 
     Args:
         height: rows of the mask.
@@ -40,14 +40,14 @@ def visible_mask(height: int, width: int, polygons: Sequence[Polygon], scale: fl
 
 
 class IgnoreFilter:
-    """Tells which boxes of whole-picture detectors lie too far inside what is ignored."""
+    """Filters out boxes that lie mostly inside ignored polygons."""
 
     def __init__(self, polygons: Polygons) -> None:
         self._polygons = polygons
         self._sums: Floats | None = None
 
     def keep(self, shape: tuple[int, ...], boxes: Floats) -> npt.NDArray[np.bool_]:
-        """Say of each box `(N, 4)` in a picture of `shape` whether enough of it counts, `(N,)`."""
+        """Return which boxes `(N, 4)` in an image of `shape` are visible enough, `(N,)`."""
         if not self._polygons:
             return np.ones(len(boxes), dtype=np.bool_)
         if self._sums is None or self._sums.shape != (shape[0] + 1, shape[1] + 1):

@@ -1,4 +1,4 @@
-"""Detections from a MOTChallenge file, behind the interface of a detector."""
+"""Detector that reads a MOTChallenge file."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _SURE = 0.9
 
 
 class MotFileDetector:
-    """Gives the detections of a file frame by frame; appearance from the picture where there is one.
+    """Reads detections from a file frame by frame; histograms come from the image where there is one.
 
     Confidences become scores in [0, 1]: as they are if all lie there, else stretched from the smallest
     of the file to what a tenth of them exceeds (detectors write what they like, the files do not say the
@@ -54,7 +54,7 @@ class MotFileDetector:
         return self.settings.first_frame + max(self._frames, default=0) - 1
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:
-        """Give the detections of the frame; none where the file has none."""
+        """Return the detections of the frame; none where the file has none."""
         number = self._next if frame is None else frame
         self._next = number + 1
         bins = self.settings.bins if image.size else 0
@@ -70,7 +70,7 @@ class MotFileDetector:
 
 
 def _by_frame(rows: Sequence[MotRow]) -> dict[int, np.ndarray[tuple[int, int], np.dtype[np.float64]]]:
-    """Give the rows `left, top, right, bottom, score` of each frame, best first."""
+    """Return the rows `left, top, right, bottom, score` of each frame, best first."""
     confidences = [row.confidence for row in rows]
     least, most = 0.0, 1.0
     if confidences and not (min(confidences) >= 0.0 and max(confidences) <= 1.0):

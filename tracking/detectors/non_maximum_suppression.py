@@ -1,4 +1,4 @@
-"""Of boxes on one person, the best: non-maximum suppression."""
+"""Non-maximum suppression of boxes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tracking.boxes import Floats, heights, widths
 
 
 def non_maximum_suppression(boxes: Floats, scores: Floats, apart: float, most: int) -> npt.NDArray[np.int64]:
-    """Give the indices of boxes `(N, 4)` that overlap (IoU) none better by more than `apart`, best first.
+    """Return the indices of the boxes `(N, 4)` left by non-maximum suppression at IoU `apart`, best first.
 
     At most `most` of them. Of equal scores the leftmost, then the topmost comes first, so that the answer
     does not depend on the order in which the boxes came.

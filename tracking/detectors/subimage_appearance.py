@@ -1,4 +1,4 @@
-"""Sub-images as appearance, in the form of histograms: the same distances measure them (paper IV.A.1).
+"""Sub-images as appearance, in the form of histograms (paper IV.A.1).
 
 A pixel of value v in [0, 1] becomes the two numbers v and 1 - v; all of a sub-image's, divided by how many
 pixels it has, sum to 1. The intersection distance of two such rows is then the mean absolute difference of
@@ -43,7 +43,7 @@ _WHITE = 255.0
 
 
 def subimage_histograms(image: Image, boxes: Floats, settings: SubimageSettings) -> Floats:
-    """Give the sub-image in each box, made small, as a row: `(K, B)`, rows summing to 1.
+    """Return the resized sub-image of each box as a row: `(K, B)`, rows sum to 1.
 
     Args:
         image: `(H, W, 3)`.

@@ -1,4 +1,4 @@
-"""Local peaks of template matching: where something that looked like this might be (paper IV.A.1)."""
+"""Template matching detector: local peaks of the correlation (paper IV.A.1)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LEAST_SIDE = 4
 
 @dataclass(frozen=True, slots=True)
 class TemplateSettings:
-    """Searching for one object by what it looked like.
+    """Settings of template matching for one object.
 
     Raises:
         ValueError: a setting makes no sense.
@@ -46,7 +46,7 @@ class TemplateSettings:
 
 
 class TemplateDetector:
-    """Finds one object in every frame by normalized cross-correlation with a picture of it.
+    """Detects one object by normalized cross-correlation with a template image.
 
     Each object has observations of its own, as many as there are peaks: `build_network_per_object` takes
     them, `TemplateTracker` does it all. Nothing is remembered from one frame to the next.
@@ -74,7 +74,7 @@ class TemplateDetector:
         return len(self.histogram)
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
-        """Give the peaks of a frame, best first; boxes have the template's size, scores are correlations.
+        """Return the peaks of a frame, best first; boxes have the template's size, scores are correlations.
 
         Raises:
             ValueError: not an `(H, W, 3)` uint8 picture, or smaller than the template.
@@ -90,7 +90,7 @@ class TemplateDetector:
         return Detections(boxes, scores, self._looks(image, boxes))
 
     def _peaks(self, image: Image) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Floats]:
-        """Give left, top and score of the local maxima, best first."""
+        """Return left, top and score of the local maxima, best first."""
         match = cv2.matchTemplate(image, self._template, cv2.TM_CCOEFF_NORMED)
         # Where the picture is of one color the correlation is not defined: nothing is there.
         match = np.where(np.isfinite(match), np.clip(match, 0.0, 1.0), 0.0).astype(np.float32)

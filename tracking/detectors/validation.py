@@ -1,4 +1,4 @@
-"""Frames that a detector can work on, and settings that it can work by."""
+"""Checks of images and settings shared by the detectors."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _CHANNELS = 3
 
 
 def validate_image(image: Image) -> Image:
-    """Give the picture back.
+    """Return the image, after checking it.
 
     Raises:
         ValueError: it is not `(H, W, 3)` uint8.

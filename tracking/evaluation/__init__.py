@@ -1,4 +1,4 @@
-"""How good tracks are, against ground truth: HOTA, MOTA, IDF1, identity switches.
+"""Evaluation against ground truth: HOTA, MOTA, IDF1, identity switches, occlusions.
 
 Needs the extra `evaluate` (`pip install myview[evaluate]`); the tracker itself does not use it.
 """

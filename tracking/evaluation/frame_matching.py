@@ -1,4 +1,4 @@
-"""Truth and tracks side by side, frame by frame."""
+"""Overlaps and matches of ground truth and tracks, frame by frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Ids = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameSimilarity:
-    """One frame of one camera.
+    """Ground truth and tracks of one frame, and their overlaps.
 
     Attributes:
         truth: `(T,)` ids of the people who are there.
@@ -33,7 +33,7 @@ class FrameSimilarity:
 def align_frames(
     truth: Iterable[MotRow], tracks: Iterable[MotRow], least_iou: float
 ) -> list[FrameSimilarity]:
-    """Give the frames in which there is anybody, in order.
+    """Return the overlaps of truth and tracks frame by frame, for frames with any, in order.
 
     Truth of confidence 0 does not count: such a person need not be found, and a track that is at them
     (and at nobody who counts) is left out rather than wrong, as MOTChallenge has it.
@@ -82,7 +82,7 @@ _STAY = 1000.0
 
 
 def match_frames(frames: Iterable[FrameSimilarity], least_iou: float) -> Iterator[NDArray[np.bool_]]:
-    """Give for each frame which person is matched with which track, `(T, R)`."""
+    """Yield for each frame which person is matched with which track, `(T, R)`."""
     before: dict[int, int] = {}
     for frame in frames:
         pairs = np.zeros(frame.similarity.shape, dtype=bool)

@@ -1,4 +1,4 @@
-"""Scores of several cameras that share their people's numbers."""
+"""Scores of several cameras with shared ids."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tracking.motchallenge import MotRow
 
 @dataclass(frozen=True, slots=True)
 class TruthAndTracks:
-    """One camera: what is there and what was found."""
+    """Ground truth and tracks of one camera."""
 
     truth: Sequence[MotRow]
     tracks: Sequence[MotRow]
@@ -41,7 +41,7 @@ class MultiCameraScores:
 
 
 def average_scores(scores: Sequence[Scores]) -> Scores:
-    """Give the mean of the shares and the total of the counts.
+    """Return the mean of the shares and the total of the counts.
 
     Raises:
         ValueError: there are no scores.

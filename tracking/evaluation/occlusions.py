@@ -1,4 +1,4 @@
-"""Who is hidden for a while and comes back: whether their number is the same before and after."""
+"""Occlusions in the ground truth, and whether identities survive them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Occlusion:
 
 
 def find_occlusions(truth: Iterable[MotRow], around: int) -> list[Occlusion]:
-    """Find who is hidden and comes back, by the visible shares of the truth.
+    """Find the occlusions after which a person reappears, from the truth's visible shares.
 
     Truth without shares between 0 and 1 only says whom its annotator called hidden, or nothing at all (-1).
     There somebody is hidden by their box, too; of two boxes the one that ends lower is the nearer person's.
@@ -53,7 +53,7 @@ def identities_kept(
     around: int,
     least_iou: float = DEFAULT_MIN_IOU,
 ) -> list[bool]:
-    """Say of each occlusion whether its person's number is the same before and after.
+    """Return for each occlusion whether the person's track id is the same before and after it.
 
     That is the number they are most often matched with in the `around` frames before, and in those after;
     somebody who has none on either side did not keep it.
@@ -79,7 +79,7 @@ def _most(numbers: dict[int, int], frames: range) -> int | None:
 
 
 def _hidden(rows: Sequence[MotRow]) -> Iterable[tuple[MotRow, bool]]:
-    """Say of each row whether its person is hidden."""
+    """Yield each row with whether its person is hidden."""
     has_shares = any(0.0 < row.visible < 1.0 for row in rows)
     frames: dict[int, list[MotRow]] = {}
     for row in rows:
@@ -95,7 +95,7 @@ def _hidden(rows: Sequence[MotRow]) -> Iterable[tuple[MotRow, bool]]:
 
 
 def _of(person: int, frames: dict[int, bool], around: int) -> Iterable[Occlusion]:
-    """Give one person's occlusions from whether they are seen, by frame."""
+    """Yield one person's occlusions from their visibility by frame."""
     hidden = sorted(frame for frame, seen in frames.items() if not seen)
     runs: list[list[int]] = []
     for frame in hidden:

@@ -1,4 +1,4 @@
-"""The ceiling: what perfect association would make of detections."""
+"""Oracle association: the upper bound of tracking on given detections."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tracking.motchallenge import MotRow
 def oracle_association(
     detections: Iterable[MotRow], truth: Iterable[MotRow], least_iou: float = DEFAULT_MIN_IOU
 ) -> list[MotRow]:
-    """Give each detection the id of the person it is at, and leave out those that are at nobody.
+    """Return the detections with the id of the person they match; drop those that match no one.
 
     In each frame people and detections are assigned to each other, for the largest total overlap, none
     below `least_iou`. What the scores of these tracks lack, no tracker can find in the detections (but

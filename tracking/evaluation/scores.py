@@ -1,4 +1,4 @@
-"""The scores of tracks against ground truth."""
+"""Scores of tracks against ground truth."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DEFAULT_MIN_IOU = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Scores:
-    """How good tracks are. Shares are in [0, 1], 1 is perfect; MOTA may be negative.
+    """Evaluation scores of tracks. Shares are in [0, 1], 1 is perfect; MOTA may be negative.
 
     Attributes:
         hota: higher order tracking accuracy: the mean over overlaps of .05 to .95 of the geometric mean
@@ -67,7 +67,7 @@ def evaluate(truth: Iterable[MotRow], tracks: Iterable[MotRow], least_iou: float
 
 
 def score_frames(frames: Sequence[FrameSimilarity], least_iou: float) -> Scores:
-    """Score frames that are lined up."""
+    """Score aligned frames."""
     people = [frame.truth.tolist() for frame in frames]
     found = [frame.tracks.tolist() for frame in frames]
     overlaps = [frame.similarity.tolist() for frame in frames]
@@ -109,6 +109,6 @@ HEADINGS = {
 
 
 def format_scores(scores: Scores, names: Iterable[str]) -> list[str]:
-    """Give some of the scores as text: counts as they are, shares in percent."""
+    """Return some of the scores as text: counts as they are, shares in percent."""
     values = (getattr(scores, name) for name in names)
     return [f"{value}" if isinstance(value, int) else f"{100.0 * value:.1f}" for value in values]

@@ -1,4 +1,4 @@
-"""The operator who helps: troubles are foreseen, and a pointing is taken (Todor 2009, chapter 8)."""
+"""Interactive tracking: risk prediction and operator corrections (Todor 2009, chapter 8)."""
 
 from tracking.interactive.corrections import PositionCorrection
 from tracking.interactive.risk import RiskFeatures

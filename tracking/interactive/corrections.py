@@ -1,4 +1,4 @@
-"""Somebody points at somebody: what that costs the nodes of its frame."""
+"""An operator's corrections as costs of network nodes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tracking.model.network import Network
 
 @dataclass(frozen=True, slots=True)
 class PositionCorrection:
-    """At this frame this object is at this pixel.
+    """An operator's statement: in this frame this object is at this pixel.
 
     Attributes:
         frame: the frame number.
@@ -40,7 +40,7 @@ class PositionCorrection:
 
 
 def normalized_offset(pointing: PositionCorrection, boxes: Floats) -> Floats:
-    """Say how far boxes `(..., 4)` are from what is pointed at, `(...)` in [0, 1].
+    """Return the normalized squared distance of boxes `(..., 4)` from a correction, `(...)` in [0, 1].
 
     The squared distance of the point from the middle of the box, in units of twice the reach, 1 at most:
     where people point with normal errors it is the logarithm of a likelihood, up to a factor; and nobody
@@ -52,7 +52,7 @@ def normalized_offset(pointing: PositionCorrection, boxes: Floats) -> Floats:
 
 
 def near_correction(pointing: PositionCorrection, boxes: Floats) -> NDArray[np.bool_]:
-    """Say which boxes `(K, 4)` may be what is pointed at, `(K,)`."""
+    """Return which boxes `(K, 4)` are close enough to be the corrected object, `(K,)`."""
     return np.asarray(normalized_offset(pointing, boxes) < 1.0)
 
 

@@ -1,4 +1,4 @@
-"""Who is pointed at where nothing like them is found: a hypothesis at that place, of their size.
+"""Inserted hypotheses: candidates for corrected objects that the detector missed.
 
 Where a detector takes two bodies for one, or overlooks somebody, there is no place for who is pointed at to
 be in. So one is made: theirs alone, and in nobody's way.
@@ -25,19 +25,19 @@ InsertedHypotheses = Mapping[int, Mapping[int, int]]
 
 
 def box_around(pointing: PositionCorrection, size: Floats) -> Floats:
-    """Give the box `(4,)` of somebody of a size `(2,)`, across and down, around what is pointed at."""
+    """Return the box `(4,)` of `size` `(2,)` (width, height) centered at the corrected point."""
     middle = np.array([pointing.x, pointing.y])
     return np.concatenate([middle - size / 2.0, middle + size / 2.0])
 
 
 def has_hypothesis(pointing: PositionCorrection, size: Floats, boxes: Floats) -> bool:
-    """Say whether any of the boxes `(K, 4)` may be whom somebody of that size points at."""
+    """Return whether any of the boxes `(K, 4)` is near the point and of about that size."""
     ratio = areas(boxes) / max(float(size[0] * size[1]), 1.0)
     return bool((near_correction(pointing, boxes) & (ratio < _ALIKE) & (ratio > 1.0 / _ALIKE)).any())
 
 
 def insert_hypothesis(seen: Detections, box: Floats, look: Floats) -> Detections:
-    """Add an observation that no detector has made: of score 0, so that nobody new begins with it."""
+    """Append a hypothesis for a corrected object, of score 0 so that no new track starts from it."""
     return Detections(
         np.concatenate([seen.boxes, box[None]]),
         np.append(seen.scores, 0.0),
@@ -48,7 +48,7 @@ def insert_hypothesis(seen: Detections, box: Floats, look: Floats) -> Detections
 def apply_insertions(
     network: Network, first: int, ids: Sequence[int], places: InsertedHypotheses, change: float
 ) -> Network:
-    """Give the network of a window from the frame `first` where what was made for somebody is theirs alone.
+    """Return the network of a window in which inserted hypotheses belong to their object only.
 
     To others such a place is none. It conflicts with nothing, since what is found there is one box of
     several. A way of less than a body to it or from it costs at most `change`, what a usual change does: a
@@ -79,6 +79,6 @@ def apply_insertions(
 
 
 def _near(box: Floats, boxes: Floats) -> NDArray[np.bool_]:
-    """Say which of the boxes `(K, 4)` are no more than a body's size from a box, `(K,)`."""
+    """Return which boxes `(K, 4)` are within one body size of a box, `(K,)`."""
     middle, middles = (box[:2] + box[2:]) / 2.0, (boxes[:, :2] + boxes[:, 2:]) / 2.0
     return np.asarray(((middles - middle) ** 2).sum(axis=1) <= areas(box))

@@ -1,4 +1,4 @@
-"""Who was pointed at late: where the identity was lost, and what is to be said of the frames since then."""
+"""Late corrections: where an identity was lost, and what follows for the frames since."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def backdate_correction(
 
 
 def _instead(pointing: PositionCorrection, memory: WindowMemory) -> int | None:
-    """Give the track that is at the point instead of the one that is pointed at, if there is one."""
+    """Return the track at the corrected point, if it is another one than the corrected track."""
     there = memory.assignments.get(pointing.frame, {})
     far = {
         number: float(normalized_offset(pointing, memory.detections[pointing.frame].boxes[state]))
@@ -65,19 +65,19 @@ def _instead(pointing: PositionCorrection, memory: WindowMemory) -> int | None:
 
 
 def _covered(seen: NDArray[np.bool_]) -> bool:
-    """Say whether a may be behind b: a, the first of `(2, M)`, is hidden at last, and b was there before."""
+    """Return whether a may be occluded by b: a, the first row of `(2, M)`, ends hidden, and b was there."""
     shown = np.flatnonzero(seen[0])
     return bool(len(shown) and not seen[0, -1] and seen[1, : shown[-1] + 1].any())
 
 
 def _aim(box: Floats) -> tuple[float, float, float]:
-    """Give the middle of a box, and the reach of who points at it exactly."""
+    """Return the center of a box, and the tolerance of an exact correction."""
     x, y = (box[:2] + box[2:]) / 2.0
     return float(x), float(y), max(float(heights(box)) / 4.0, 1.0)
 
 
 def _start(states: NDArray[np.int64], frames: Sequence[Detections | None], costs: CostSettings) -> int:
-    """Give the place of the first frame in which two tracks, states `(2, M)`, have changed places."""
+    """Return the index of the first frame after two tracks, states `(2, M)`, have swapped."""
     seen = states != OCCLUDED
     began = int(seen[1].argmax())
     if began > 0 and not seen[0, began:].any():
@@ -100,7 +100,7 @@ def _start(states: NDArray[np.int64], frames: Sequence[Detections | None], costs
 
 
 def _template(number: int, states: NDArray[np.int64], frames: Sequence[Detections]) -> Template:
-    """Give an object as it was first seen; where that is the first frame, it cannot have been elsewhere."""
+    """Return the template of an object as first seen; a box only if that is the first frame."""
     m = int((states != OCCLUDED).argmax())
     found = frames[m]
     return Template(number, found.histograms[states[m]], found.boxes[states[m]] if m == 0 else None)
@@ -113,7 +113,7 @@ def _only(seen: Detections | None, rows: NDArray[np.int64], bins: int) -> Detect
 
 
 def _nearest(states: NDArray[np.int64], frames: Sequence[Detections]) -> int:
-    """Give where two who are both seen were nearest to each other, in heights; else where b is first seen."""
+    """Return the index of the frame in which two visible tracks were nearest, else b's first frame."""
     both = np.flatnonzero((states != OCCLUDED).all(axis=0))
     if not len(both):
         return int(np.flatnonzero(states[1] != OCCLUDED)[0]) if (states[1] != OCCLUDED).any() else 0

@@ -1,4 +1,4 @@
-"""The frames after a window, as they will be if everybody goes on as they went."""
+"""Predicted crossings: the frames after a window under constant motion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SIGHTINGS = 12
 
 @dataclass(frozen=True, slots=True)
 class Crossing:
-    """Two whose ways cross.
+    """Two objects predicted to cross.
 
     Attributes:
         first, second: their ids.
@@ -44,7 +44,7 @@ class Crossing:
 
 
 def predict_paths(window: SolvedWindow, frames: int) -> dict[int, tuple[int, Floats]]:
-    """Give where everybody goes who was seen often enough: for how long they are hidden, and `(frames, 4)`.
+    """Return by object the frames it has been hidden and its predicted boxes `(frames, 4)`.
 
     The first of these boxes is in the frame after the last sighting.
     """
@@ -58,7 +58,7 @@ def predict_paths(window: SolvedWindow, frames: int) -> dict[int, tuple[int, Flo
 
 
 def _motion(trail: Floats, first: int) -> MotionModel:
-    """Give how somebody moves who was at `trail` `(T, 4)`, for frames from `first` on."""
+    """Return the motion model of a trajectory `(T, 4)`, for frames from `first` on."""
     seen = np.flatnonzero(~np.isnan(trail[:, 0]))[-_SIGHTINGS:]
     return MotionModel.of(seen.tolist(), trail[seen], first)
 

@@ -1,4 +1,4 @@
-"""How likely what is foreseen goes wrong, unless somebody helps."""
+"""Probability of an identity failure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LEAD = 10.0
 
 @dataclass(frozen=True, slots=True)
 class RiskFeatures:
-    """What a risk is told from.
+    """Features of the risk model.
 
     Attributes:
         margin: what it would cost the tracker to see it the other way.
@@ -48,6 +48,6 @@ twenty, and less the surer the two are told apart."""
 
 
 def failure_probability(reason: RiskReason, signs: RiskFeatures) -> float:
-    """Give the probability of a failure, by a logistic regression on its signs."""
+    """Return the probability of an identity failure, by logistic regression."""
     odds = sum(weight * term for weight, term in zip(WEIGHTS[reason], signs.regression_terms, strict=True))
     return 1.0 / (1.0 + math.exp(-odds))

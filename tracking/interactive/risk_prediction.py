@@ -1,4 +1,4 @@
-"""What a solved window tells of troubles: what lies ahead, and what it could not tell for certain."""
+"""Risk prediction from a solved window: upcoming and undecided identity failures."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _RECENT = 5
 
 
 class RiskPredictor:
-    """Looks for troubles. Without memory: the same window has the same."""
+    """Predicts identity failures from solved windows. Stateless."""
 
     def __init__(self, settings: InteractiveSettings, costs: CostSettings) -> None:
         self._settings = settings
         self._costs = costs
 
     def predict(self, window: SolvedWindow) -> tuple[RiskEvent, ...]:
-        """Give the troubles of a window, the worst first: each pair once for a reason."""
+        """Return the risk events of a window, the riskiest first, one per pair and reason."""
         found = swap_margins(window.network, window.states)
         troubles = [
             *self._exchanges(window, found),
@@ -44,7 +44,7 @@ class RiskPredictor:
         return tuple(once.values())
 
     def _exchanges(self, window: SolvedWindow, found: SwapMargins) -> list[RiskEvent]:
-        """Give the pairs whose identities could be exchanged for little, in a frame that becomes final now.
+        """Return the pairs with a small swap margin in a frame that becomes final now.
 
         Of later frames more will be known when they become final.
         """
@@ -63,7 +63,7 @@ class RiskPredictor:
         ]
 
     def _alike(self, window: SolvedWindow) -> list[RiskEvent]:
-        """Give those whose ways cross within the horizon, and who could then be exchanged for little."""
+        """Return the pairs that cross within the horizon and could then be swapped at low cost."""
         found = predict_crossings(window, self._settings.horizon_frames, self._costs)
         return [
             _trouble(
@@ -79,7 +79,7 @@ class RiskPredictor:
         ]
 
     def _vanished(self, window: SolvedWindow) -> list[RiskEvent]:
-        """Give those who have been hidden for a while: with who covers them and looks alike, or alone.
+        """Return the objects hidden for a while, with the similar object that covers them, if any.
 
         The margin is what the looks of a whole window tell of the two, over what one differs from oneself;
         nothing tells anything of who is just not seen.
@@ -104,7 +104,7 @@ class RiskPredictor:
         return found
 
     def _fading(self, window: SolvedWindow) -> list[RiskEvent]:
-        """Give those whose detections have become faint of late, or will within the horizon at this rate."""
+        """Return the objects whose detection scores are low, or will be within the horizon."""
         found = []
         scores, faint = window.scores, self._settings.min_confidence
         for n, number in enumerate(window.ids):
@@ -119,7 +119,7 @@ class RiskPredictor:
         return found
 
     def _gap(self, window: SolvedWindow, margins: Floats) -> list[RiskEvent]:
-        """Give the two who are nearest to being exchanged, where the window's answer is not proven."""
+        """Return the pair with the smallest swap margin, where the solution is not proven optimal."""
         if window.report.gap <= self._settings.max_solver_gap or not np.isfinite(margins).any():
             return []
         a, b = divmod(int(margins.argmin()), margins.shape[1])
@@ -130,14 +130,14 @@ class RiskPredictor:
 def _trouble(
     reason: RiskReason, objects: tuple[int, ...], window: SolvedWindow, frame: int, margin: float, length: int
 ) -> RiskEvent:
-    """Give a trouble with its risk; `length` as in `RiskFeatures`."""
+    """Return a risk event with its probability; `length` as in `RiskFeatures`."""
     margin = max(margin, 0.0)
     likely = failure_probability(reason, RiskFeatures(margin, frame - window.last, length))
     return RiskEvent(reason, objects, frame, margin, length, likely)
 
 
 def _unclear(window: SolvedWindow, a: int, b: int) -> int:
-    """Give in how many of the last frames the objects a and b were in each other's way, or one was hidden."""
+    """Return in how many recent frames objects a and b overlapped, or one of them was hidden."""
     one, other = (window.recent_boxes[window.known_ids.index(window.ids[n])] for n in (a, b))
     hidden = np.isnan(one[:, 0]) | np.isnan(other[:, 0])
     return int(np.count_nonzero(hidden | (np.nan_to_num(overlap(one, other)) > _TOUCH)))

@@ -1,4 +1,4 @@
-"""The settings of the operator's help."""
+"""Settings of interactive tracking."""
 
 from __future__ import annotations
 
@@ -10,24 +10,22 @@ _MOST_FRAMES = 10_000
 
 @dataclass(frozen=True, slots=True)
 class InteractiveSettings:
-    """What is foreseen, and what pointing weighs.
+    """Settings of risk prediction and operator corrections.
 
     Raises:
         ValueError: a number makes no sense.
     """
 
-    enabled: bool = False  # troubles are foreseen and pointings taken; off, it costs nothing
-    memory_frames: int = (
-        250  # frames back that a pointing may mend; detections and object lists are kept for them
-    )
-    horizon_frames: int = 25  # frames ahead for which people are taken to go on as they went
-    swap_margin: float = 1.0  # cost difference below which two who may have been exchanged are a trouble
-    crossing_margin: float = 1.0  # the same of two who are about to cross, as far as it can be told before
-    hidden_frames: int = 10  # frames after which somebody hidden is a trouble
-    min_confidence: float = 0.15  # score below which somebody fades; scores are in [0, 1]
-    max_solver_gap: float = 0.01  # gap of a window (relative) above which its answer is a trouble
-    correction_weight: float = 2.0  # most that one pointing can cost an object that is elsewhere
-    hidden_share: float = 0.25  # share of it that being hidden costs who is pointed at
+    enabled: bool = False  # predict risks and accept operator corrections; false: no overhead
+    memory_frames: int = 250  # frames back that a correction may change
+    horizon_frames: int = 25  # frames ahead for which motion is extrapolated
+    swap_margin: float = 1.0  # swap margin (cost) below which a past pair is at risk
+    crossing_margin: float = 1.0  # swap margin (cost) below which a predicted crossing is at risk
+    hidden_frames: int = 10  # frames after which a hidden object is at risk
+    min_confidence: float = 0.15  # detection score below which an object is at risk, 0 to 1
+    max_solver_gap: float = 0.01  # relative gap of a window above which its solution is at risk
+    correction_weight: float = 2.0  # largest cost of a correction for an object that is elsewhere
+    hidden_share: float = 0.25  # share of it that being hidden costs the corrected object
 
     def __post_init__(self) -> None:
         if not all(

@@ -1,4 +1,4 @@
-"""A window that has been solved, with all that the answer was chosen by."""
+"""A solved window with its network, solution and detections."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tracking.types import Detections
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SolvedWindow:
-    """One window.
+    """A solved window with its network and solution.
 
     Attributes:
         first: its first frame.

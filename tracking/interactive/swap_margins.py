@@ -1,4 +1,4 @@
-"""How nearly two objects of a window could have each other's identity."""
+"""Swap margins: how much more a window costs with two identities exchanged."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tracking.solvers.objective import nodes_from_states
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SwapMargins:
-    """The cheapest exchange of every two objects of a window.
+    """The cheapest identity swap of every two objects of a window.
 
     Attributes:
         margins: (n, n) symmetric, what it costs more than the answer; infinite where no arcs lead over, and
@@ -28,12 +28,12 @@ class SwapMargins:
 
 
 def swap_margin_matrix(network: Network, states: NDArray[np.int64]) -> Floats:
-    """Give the margins of `swap_margins`, (n, n)."""
+    """Return the margins of `swap_margins`, (n, n)."""
     return swap_margins(network, states).margins
 
 
 def swap_margins(network: Network, states: NDArray[np.int64]) -> SwapMargins:
-    """Price the exchange of every two objects from some frame on, for all pairs and frames at once.
+    """Compute the cost of swapping every two objects from every frame on, and the cheapest frame.
 
     From frame f on, a goes where b went and b where a went; everybody else stays, so nothing new conflicts.
     What a's path costs then is a head of its own path, one arc over, and b's tail at a's prices: sums
@@ -66,7 +66,7 @@ def swap_margins(network: Network, states: NDArray[np.int64]) -> SwapMargins:
 
 
 def _ways(network: Network, nodes: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """Give the costs of the paths, (n,), and of a's with b's tail from each frame on, (n, n, M)."""
+    """Return the costs of the paths, (n,), and of a's path with b's tail from each frame on, (n, n, M)."""
     frames, sets = np.arange(network.frames), network.pair_sets
     n = len(nodes)
     # All of them: what the path of b (second axis) costs at the prices of a (first axis).

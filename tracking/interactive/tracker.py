@@ -1,4 +1,4 @@
-"""The online tracker that foresees trouble and takes a pointing."""
+"""The online tracker with risk prediction and operator corrections."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _TRAIL = 75
 
 
 class InteractiveTracker(OnlineTracker):
-    """An `OnlineTracker` that says what it foresees, and mends the past where it is told who is where.
+    """An `OnlineTracker` that predicts identity failures and takes an operator's corrections.
 
     Without a pointing its tracks are those of an `OnlineTracker`. Memory is bounded by `assist.memory`.
     """
@@ -71,7 +71,7 @@ class InteractiveTracker(OnlineTracker):
         return result
 
     def remembers(self, frame: int) -> bool:
-        """Say whether a pointing at this frame can still be taken."""
+        """Return whether a correction of this frame can still be applied."""
         if self._last is None or frame > self._last:
             return self._last is not None and frame <= self._last + self._assist.memory_frames
         steps = self._memory.snapshots
@@ -103,7 +103,7 @@ class InteractiveTracker(OnlineTracker):
         return self._again(frame)
 
     def _hear(self, pointing: PositionCorrection) -> list[int]:
-        """Take down a pointing; give the frames that it says something else of than the answer there."""
+        """Store a correction; return the frames in which it contradicts the solution."""
         self._pointings.setdefault(pointing.frame, {})[pointing.object] = pointing
         self._place(pointing)
         doubt = self._memory.disagreement(pointing, self._assist)
@@ -121,7 +121,7 @@ class InteractiveTracker(OnlineTracker):
         return frames
 
     def _place(self, pointing: PositionCorrection) -> None:
-        """Make sure that there is something at the place that is pointed at."""
+        """Insert a hypothesis at the corrected point where no detection fits."""
         look = next((it.histogram for it in self._objects if it.id == pointing.object), None)
         if look is None or pointing.frame not in self._memory.detections:
             return
@@ -130,7 +130,7 @@ class InteractiveTracker(OnlineTracker):
             self._seen[pointing.frame] = self._memory.detections[pointing.frame]
 
     def _agreed(self, pointing: PositionCorrection) -> int:
-        """Give the frame since which the object may have been somebody else: it was pointed at before."""
+        """Return the frame after the object's last correction that the solution agrees with."""
         before = [
             frame + 1
             for frame, said in self._pointings.items()
@@ -141,7 +141,7 @@ class InteractiveTracker(OnlineTracker):
         return max(before, default=self._memory.snapshots[0].first)
 
     def _again(self, frame: int) -> WindowResult | None:
-        """Solve the windows since a frame once more."""
+        """Solve the windows since a frame again."""
         steps = list(self._memory.windows_since(frame))
         if not steps:
             return None

@@ -1,4 +1,4 @@
-"""The past seconds of a tracker: what was seen in them, and where it stood before each of its windows."""
+"""Memory of past windows: detections, assignments, and the tracker's state before each window."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _SAME_TIME = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WindowSnapshot:
-    """A window about to be solved.
+    """The tracker's state before a window is solved.
 
     Attributes:
         first: its first frame.
@@ -54,7 +54,7 @@ class WindowSnapshot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InitiatedTrack:
-    """Somebody new: where and when, the number that they were given, and the window that it was in."""
+    """A new track: start frame, box, id, and the window it started in."""
 
     frame: int
     box: Floats
@@ -63,7 +63,7 @@ class InitiatedTrack:
 
 
 class WindowMemory:
-    """What a tracker needs to go back by up to `frames` frames. Bounded by them.
+    """What a tracker needs to re-solve the last `frames` frames. Bounded by them.
 
     Attributes:
         detections: the detections, by frame; a frame that is not there showed nothing.
@@ -83,7 +83,7 @@ class WindowMemory:
         self.snapshots: deque[WindowSnapshot] = deque()
 
     def add_detections(self, frame: int, detections: Detections) -> None:
-        """Take the detections of a frame, and forget what is too long ago."""
+        """Add the detections of a frame, and drop frames older than the memory."""
         self.detections[frame] = detections
         oldest = frame - self._frames
         # Of a window that reaches back beyond the memory, the detections are needed, too.
@@ -97,7 +97,7 @@ class WindowMemory:
         self._undone = [it for it in self._undone if it.frame >= oldest - _SAME_TIME]
 
     def insert_hypothesis(self, pointing: PositionCorrection, look: Floats) -> None:
-        """Make a place for who is pointed at, where nothing like them is found, or move what was made."""
+        """Insert or move the hypothesis of a corrected object where no detection fits."""
         frame, who = pointing.frame, pointing.object
         size, seen = self._size(who, frame), self.detections.get(frame)
         if size is None or seen is None:
@@ -114,7 +114,7 @@ class WindowMemory:
             self.inserted[frame] = {**made, who: len(seen)}
 
     def _size(self, who: int, frame: int) -> Floats | None:
-        """Give how large somebody was found around a frame, `(2,)` pixels across and down, in the median."""
+        """Return the median size of an object around a frame, `(2,)` pixels (width, height)."""
         sides = [
             self.detections[n].boxes[self.assignments[n][who]]
             for n in range(frame - _AROUND, frame + _AROUND + 1)
@@ -125,7 +125,7 @@ class WindowMemory:
         return np.median([box[2:] - box[:2] for box in sides], axis=0) if sides else None
 
     def record_window(self, step: WindowSnapshot) -> None:
-        """Take down that a window is solved; later ones are not valid any more."""
+        """Record a window about to be solved; later windows become invalid."""
         while self.snapshots and self.snapshots[-1].order >= step.order:
             self.snapshots.pop()
         self.snapshots.append(step)
@@ -133,21 +133,21 @@ class WindowMemory:
         self._births = [it for it in self._births if it.window < step.order]
 
     def record_states(self, first: int, ids: Sequence[int], states: npt.NDArray[np.int64]) -> None:
-        """Take down a window's answer, `(n, M)` from the frame `first` on, -1 where hidden."""
+        """Record a window's solution `(n, M)` from the frame `first` on, -1 where hidden."""
         for m, column in enumerate(states.T.tolist()):
             self.assignments[first + m] = {
                 number: state for number, state in zip(ids, column, strict=True) if state != OCCLUDED
             }
 
     def keep_only(self, first: int, ids: set[int]) -> None:
-        """From the frame `first` on, leave out who is none of `ids`: their tracks have ended."""
+        """Drop the assignments of ended tracks (not in `ids`) from the frame `first` on."""
         for frame in [it for it in self.assignments if it >= first]:
             self.assignments[frame] = {
                 number: it for number, it in self.assignments[frame].items() if number in ids
             }
 
     def boxes_of(self, ids: Sequence[int], last: int, frames: int) -> Floats:
-        """Give where these were in so many frames up to `last`, `(n, frames, 4)` pixels, NaN where hidden."""
+        """Return objects' boxes in the `frames` frames up to `last`, `(n, frames, 4)`, NaN where hidden."""
         boxes = np.full((len(ids), frames, BOX_SIDES), np.nan)
         for place, frame in enumerate(range(last - frames + 1, last + 1)):
             there = self.assignments.get(frame, {})
@@ -157,13 +157,13 @@ class WindowMemory:
         return boxes
 
     def windows_since(self, frame: int) -> Sequence[WindowSnapshot]:
-        """Give the windows from the first one that this frame is in; none where that is forgotten."""
+        """Return the windows from the first that contains this frame; empty where it is forgotten."""
         if not self.snapshots or frame < self.snapshots[0].first:
             return ()
         return [it for it in self.snapshots if it.end >= frame]
 
     def disagreement(self, pointing: PositionCorrection, settings: InteractiveSettings) -> float:
-        """Give what an answer that follows the pointing saves in its frame; 0 where it does already."""
+        """Return the cost by which a correction contradicts the solution; 0 where they agree."""
         if pointing.frame not in self.assignments or pointing.frame not in self.detections:
             return 0.0
         far = normalized_offset(pointing, self.detections[pointing.frame].boxes)
@@ -172,7 +172,7 @@ class WindowMemory:
         return settings.correction_weight * (now - min(float(far.min(initial=1.0)), settings.hidden_share))
 
     def assign_id(self, frame: int, box: Floats, fresh: int) -> int:
-        """Number somebody new in the window that is being solved: `fresh`, or as before it was undone.
+        """Return the id of a new track: `fresh`, or its id before its window was undone.
 
         Without anything undone nobody ever has a number that somebody else had.
         """
@@ -184,7 +184,7 @@ class WindowMemory:
         return number
 
     def _began(self, frame: int, box: Floats) -> InitiatedTrack | None:
-        """Give who began there before, in a window that has been undone."""
+        """Return the track that started there in an undone window."""
         near = [it for it in self._undone if abs(it.frame - frame) <= _SAME_TIME]
         found = max(near, key=lambda it: (float(iou(it.box, box)), -it.id), default=None)
         return found if found is not None and float(iou(found.box, box)) >= _SAME_PLACE else None

@@ -1,1 +1,1 @@
-"""Lifecycle."""
+"""Track lifecycle: gating, initiation and termination."""

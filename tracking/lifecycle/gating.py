@@ -1,4 +1,4 @@
-"""How far an object can have got since it was seen: places out of reach are no places of its network.
+"""Gating: detections an object cannot have reached are excluded from its network.
 
 Paper II.B allows partially connected networks for exactly this reason. Without it an object that comes
 out of an occlusion node may do so anywhere in the picture.

@@ -1,4 +1,4 @@
-"""New objects: the backward and forward test of paper II.E."""
+"""Track initiation: the backward and forward test of paper II.E."""
 
 from __future__ import annotations
 

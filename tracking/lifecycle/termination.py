@@ -1,4 +1,4 @@
-"""Two tracks on one person: the younger one goes."""
+"""Track termination: duplicates and false new tracks."""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ class ArcGeneration:
         return _PricedTrellis(trellis, ahead, point.reduced_cost_limits, float(least.sum()) - point.charge)
 
     def _enter_better_arcs(self, priced: _PricedTrellis) -> bool:
-        """Let in arcs whose best path betters the program; say whether there are any."""
+        """Add arcs whose best path improves the program; return whether there are any."""
         layout, objects = self._network.layout, self._network.objects
         passes = MinMarginals.of(priced.trellis, priced.forward)
         for states in (_STATES_WITH_LAYOUT if layout else _STATES, self._network.places + 1):

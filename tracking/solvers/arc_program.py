@@ -83,7 +83,7 @@ def _ends(network: Network, exists: NDArray[np.bool_]) -> tuple[Ints, ...]:
 
 
 def _add_conflicts(build: LinearProgramBuilder, network: Network, nodes: Ints) -> None:
-    """Let at most one path go through each conflict row."""
+    """Add the constraint of at most one path through each conflict row."""
     for m in range(network.frames):
         rows = network.rows(m)
         row, n, place = np.nonzero(rows)

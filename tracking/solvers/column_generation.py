@@ -138,7 +138,7 @@ class PathGeneration:
         return int(np.bincount(group_objects(self._meets)).max())
 
     def _bind(self, rows: list[ConflictRow]) -> None:
-        """Let the objects that break the rows, and paths around all rows, into the program."""
+        """Add the objects that violate rows, and paths that avoid all rows, to the program."""
         concerned = self._meet(rows)
         new = np.flatnonzero(concerned & ~self._active)
         self._active[new] = True
@@ -152,7 +152,7 @@ class PathGeneration:
         self._enter_detours(np.flatnonzero(concerned))
 
     def _enter_detours(self, objects: Ints) -> None:
-        """Let in, for each of the objects, the best path that goes through no row at all."""
+        """Add for each of the objects the best path that avoids all rows."""
         node = self._network.node.copy()
         for row in self._master.rows:
             node[:, row.frame][row.members] = np.inf
@@ -190,7 +190,7 @@ class PathGeneration:
         return sum([self._enter(active, nodes) for nodes in met]) > 0
 
     def _enter(self, objects: Ints, nodes: Ints) -> int:
-        """Let paths of objects in; give how many are new."""
+        """Add paths of objects; return how many are new."""
         every = self._alone.nodes.copy()
         every[objects] = nodes
         return self._master.add_paths(objects, Paths(nodes, path_costs(self._network, every)[objects]))

@@ -100,7 +100,7 @@ class ConflictDuals:
         self.prices = np.empty(0)
 
     def add_rows(self, rows: Sequence[ConflictRow]) -> None:
-        """Let more rows have a price."""
+        """Add rows to be priced."""
         if not rows:
             return
         each = np.arange(self._members.shape[1])[:, None]

@@ -77,7 +77,7 @@ class LayoutConstraints:
             self._add_squares(highs, plus.ravel(), count)
 
     def _add_squares(self, highs: highspy.Highs, squared: Ints, count: int) -> None:
-        """Let the columns `squared` cost μ times their squares."""
+        """Set the cost of the columns `squared` to μ times their squares."""
         hessian = highspy.HighsHessian()
         hessian.dim_ = count
         hessian.format_ = highspy.HessianFormat.kTriangular

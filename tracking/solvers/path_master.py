@@ -46,7 +46,7 @@ class PathMaster:
         self.rows: list[ConflictRow] = []
 
     def add_objects(self, objects: Sequence[int]) -> None:
-        """Let the program choose for these objects, too; give them paths before the next `solve`."""
+        """Add these objects to the program; they need paths before the next `solve`."""
         first = len(self._object_rows) + len(self.rows)
         self._object_rows.update({n: first + k for k, n in enumerate(objects)})
         count = len(objects)

@@ -1,4 +1,4 @@
-"""The empty room as a Gaussian of each pixel's color in YUV (section 3; Wren et al., PAMI 1997)."""
+"""Gaussian background model of each pixel in YUV (section 3; Wren et al., PAMI 1997)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class YuvBackground:
     """Mean and covariance of each pixel, `(H, W, 3)` and `(H, W, 3, 3)`."""
 
     def __init__(self, images: Sequence[Image], settings: BlobSettings) -> None:
-        """Learn from pictures of the room, empty, or with people who do not stand where they are for long.
+        """Learn from images of the room, empty or with people who keep moving.
 
         The report's room is empty. Here the mean is of what lies near the median, so that who walks
         through some of the pictures is no part of it.
@@ -48,23 +48,23 @@ class YuvBackground:
         self._squared = np.float32(settings.threshold**2)
 
     def foreground(self, image: Image) -> Mask:
-        """Give the pixels that are further from the background than the threshold, `(H, W)`."""
+        """Return the foreground mask `(H, W)`: pixels farther from the background than the threshold."""
         distance = self.distance(image)
         return np.where(distance > self._squared, np.uint8(255), np.uint8(0))
 
     def distance(self, image: Image) -> Plane:
-        """Give the squared Mahalanobis distance of every pixel from the background, `(H, W)`."""
+        """Return the squared Mahalanobis distance of every pixel from the background, `(H, W)`."""
         y, u, v = cv2.split(_yuv(self._leveled(image)) - self._mean)
         # With the Cholesky factor L of the inverse covariance, |L' d|^2 is d' C^-1 d.
         a, b, c, d, e, f = self._whitening
         return np.asarray(np.square(a * y + b * u + c * v) + np.square(d * u + e * v) + np.square(f * v))
 
     def learn(self, image: Image, free: Mask) -> None:
-        """Take a picture in where nobody is: `free` is 255 there."""
+        """Update the mean with an image where `free` is 255."""
         cv2.accumulateWeighted(_yuv(self._leveled(image)), self._mean, self._rate, mask=free)
 
     def _leveled(self, image: Image) -> Image:
-        """Give the picture at the exposure of the first one: cameras change theirs."""
+        """Return the image at the exposure of the reference image."""
         return apply_gains(image, 1.0 / channel_gains(image, self._reference))
 
 
@@ -73,7 +73,7 @@ def _yuv(image: Image) -> Plane:
 
 
 def _whitening(covariance: Floats) -> tuple[Plane, ...]:
-    """Give the six entries of the transposed Cholesky factors of the inverses `(H, W, 3, 3)`, row by row."""
+    """Return the six entries of the transposed Cholesky factors of the inverses `(H, W, 3, 3)`."""
     factors = np.linalg.cholesky(np.linalg.inv(covariance)).astype(np.float32)
     upper = ((0, 0), (1, 0), (2, 0), (1, 1), (2, 1), (2, 2))
     return tuple(np.ascontiguousarray(factors[..., row, column]) for row, column in upper)

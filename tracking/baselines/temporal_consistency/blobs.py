@@ -1,4 +1,4 @@
-"""Blobs: contiguous foreground that may be one person, several, or nobody (section 3)."""
+"""Blob segmentation: connected foreground of one person, several, or none (section 3)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST_GROWN = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blob:
-    """One blob of one picture, in pixels of the working picture.
+    """One connected foreground region, in pixels of the working image.
 
     Attributes:
         box: `(4,)`, left, top, right, bottom.
@@ -43,7 +43,7 @@ class Blob:
 
 
 class BlobDetector:
-    """Finds the blobs of one camera's pictures; they get fewer and larger the nearer people stand.
+    """Segments one camera's images into blobs; people who stand close together share one.
 
     Attributes:
         size: of the working picture, width and height.
@@ -51,7 +51,7 @@ class BlobDetector:
     """
 
     def __init__(self, size: tuple[int, int], room_m: float, settings: BlobSettings) -> None:
-        """Look at pictures of a size (width, height) in pixels that show `room_m` meters of floor across."""
+        """Set up for images of `size` (width, height) in pixels that show `room_m` meters of floor across."""
         self._settings = settings
         width, height = size
         scale = min(1.0, settings.work_width / width)
@@ -69,7 +69,7 @@ class BlobDetector:
         return self._background is not None
 
     def resize(self, image: Image) -> Image:
-        """Give the working picture."""
+        """Return the image at the working size."""
         if (image.shape[1], image.shape[0]) == self.size:
             return image
         return np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
@@ -83,7 +83,7 @@ class BlobDetector:
         self._background = YuvBackground(images, self._settings)
 
     def detect(self, image: Image, *, learn: bool) -> tuple[Blob, ...]:
-        """Give the blobs of a working picture, from left to right; none while the background is unknown.
+        """Return the blobs of a working image, from left to right; none while the background is unknown.
 
         `learn`: what is around them goes into the background.
         """

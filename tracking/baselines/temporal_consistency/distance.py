@@ -1,4 +1,4 @@
-"""How far somebody has gone from blob to blob, and what that costs (section 3.1)."""
+"""Distance between blobs of two stages and its cost (section 3.1)."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _HEIGHT, _MIDDLE, _WIDTH = 50.0, 2.0, 0.15
 
 
 def is_nested(first: Floats, second: Floats) -> bool:
-    """Say whether one of two boxes `(4,)` lies within the other."""
+    """Return whether one of two boxes `(4,)` lies within the other."""
     out = bool((first[:2] <= second[:2]).all() and (first[2:] >= second[2:]).all())
     return out or bool((second[:2] <= first[:2]).all() and (second[2:] >= first[2:]).all())
 
 
 def distance_score(before: Blob, after: Blob, meter: float, settings: TemporalSettings) -> float:
-    """Give d_s in meters, `meter` being one in pixels.
+    """Return the distance score d_s in meters; `meter` is one meter in pixels.
 
     0 where one box is within the other, `partly` where they overlap, else `apart` and the gap between them.
     """
@@ -35,7 +35,7 @@ def distance_score(before: Blob, after: Blob, meter: float, settings: TemporalSe
 
 
 def blob_gap(first: Blob, second: Blob) -> float:
-    """Give the pixels between two blobs on the line from middle to middle.
+    """Return the gap in pixels between two blobs along the line between their centers.
 
     Of edges, not of middles: who leaves a crowd moves its middle further than anybody has gone.
     """
@@ -51,7 +51,7 @@ def blob_gap(first: Blob, second: Blob) -> float:
 
 
 def _inside(blob: Blob, points: Floats) -> NDArray[np.bool_]:
-    """Say which points `(N, 2)` lie in a blob, `(N,)`."""
+    """Return which points `(N, 2)` lie in a blob, `(N,)`."""
     columns, rows = np.floor(points - blob.box[:2]).astype(np.int64).T
     high, wide = blob.mask.shape
     within = (columns >= 0) & (columns < wide) & (rows >= 0) & (rows < high)
@@ -61,7 +61,7 @@ def _inside(blob: Blob, points: Floats) -> NDArray[np.bool_]:
 
 
 def distance_cost(share: float) -> float:
-    """Give g(x): x up to 1, the way that is walked in the time; beyond, a sigmoid that climbs to 51."""
+    """Return g(x): x up to 1, the distance walked in the time; beyond, a sigmoid that rises to 51."""
     if share <= 1.0:
         return share
     return _HEIGHT / (math.exp(-(share - _MIDDLE) / _WIDTH) + 1.0) + 1.0
@@ -70,7 +70,7 @@ def distance_cost(share: float) -> float:
 def distance_costs(
     before: Sequence[Blob], after: Sequence[Blob], seconds: float, meter: float, settings: TemporalSettings
 ) -> Floats:
-    """Give f_dist for going from each blob to each of `seconds` later, `(B', B)`."""
+    """Compute f_dist from each blob to each blob `seconds` later, `(B', B)`."""
     allowed = settings.speed_m_s * seconds
     costs = [
         [distance_cost(distance_score(old, new, meter, settings) / allowed) for new in after]

@@ -25,7 +25,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WindowGraph:
-    """A window of T stages after the last decided one, for P people.
+    """A window of T stages after the last decided stage, for P people.
 
     Attributes:
         start: `(P,)`, everybody's blob in the decided stage, an index of the first of `steps`' rows.
@@ -51,7 +51,7 @@ class WindowGraph:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Links:
-    """What is left for one person between two stages.
+    """The links of one person between two stages.
 
     Attributes:
         blobs: `(r,)`, the later stage's blobs that they may be in, ascending.
@@ -73,7 +73,7 @@ PersonLinks = tuple[tuple[Links, ...], ...]
 
 
 def prune_links(graph: WindowGraph) -> PersonLinks:
-    """Prune the graph: keep the links that are short enough, between blobs that can be got to.
+    """Prune the graph: keep the links that are short enough between reachable blobs.
 
     A person for whom none is left at a stage keeps all of that stage: they must be somewhere.
     """
@@ -102,14 +102,14 @@ def count_joint_edges(found: Sequence[Sequence[Links]]) -> list[int]:
 
 
 def count_unpruned_edges(graph: WindowGraph) -> list[int]:
-    """Count them in the graph in which nothing is pruned."""
+    """Count the links between joint nodes in the unpruned graph, stage by stage."""
     return count_joint_edges(prune_links(replace(graph, max_step_cost=np.inf)))
 
 
 def merge_costs(
     blobs: Sequence[Indices], shared: NDArray[np.bool_], taken: NDArray[np.int64], merge: float
 ) -> Floats:
-    """Give a M of every joint node of a stage.
+    """Return the merge cost a M of every joint node of a stage.
 
     Args:
         blobs: for each of k people, the `(r,)` blobs that they may be in.

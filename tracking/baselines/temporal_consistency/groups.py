@@ -1,4 +1,4 @@
-"""People who cannot meet in a window are decided apart: what is saved is exponential, and nothing is lost."""
+"""Independent groups of people are solved separately: exponentially faster, and still exact."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tracking.baselines.temporal_consistency.per_person_search import cheapest_j
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointPath:
-    """Where everybody is in the stages of a window.
+    """The blobs of all people in the stages of a window.
 
     Attributes:
         blobs: `(T, P)`, the blob of each person.
@@ -27,7 +27,7 @@ class JointPath:
 
 
 def solve_joint_path(graph: WindowGraph, found: PersonLinks, most_states: int) -> JointPath:
-    """Find everybody's best path; `found` are the graph's `ways`.
+    """Find the joint path of all people; `found` are the graph's pruned links.
 
     Only merges tie people together, so those who share no blob they might be in at one time are apart. Of too
     many who are not, the first are decided together, and then the others beside them.
@@ -53,7 +53,7 @@ def solve_joint_path(graph: WindowGraph, found: PersonLinks, most_states: int) -
 
 
 def _meeting(graph: WindowGraph, found: PersonLinks) -> list[list[int]]:
-    """Put the people together who may be in one blob in any stage, in the order of their first."""
+    """Group the people who may share a blob in any stage, ordered by their first member."""
     group = list(range(graph.people))
     for row, shared in enumerate(graph.shared):
         first: dict[int, int] = {}
@@ -70,7 +70,7 @@ def _meeting(graph: WindowGraph, found: PersonLinks) -> list[list[int]]:
 
 
 def _fitting(found: PersonLinks, people: list[int], most_states: int) -> list[int]:
-    """Give as many of the first people as have few enough joint states together, at least one."""
+    """Return the longest prefix of `people` with few enough joint states, at least one person."""
     for count in range(len(people), 1, -1):
         stages = zip(*(found[it] for it in people[:count]), strict=True)
         if max(prod(len(links.blobs) for links in stage) for stage in stages) <= most_states:

@@ -1,4 +1,4 @@
-"""Who comes and who has gone. The report counts people by hand, and leaves doors to others (section 2.2)."""
+"""New and departed people. The report counts people by hand and leaves doors to others (section 2.2)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from tracking.baselines.temporal_consistency.window import Stage, StageDecision,
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _UnassignedBlob:
-    """A blob that has been nobody's in so many decided stages in a row."""
+    """A blob without a person, and for how many decided stages in a row."""
 
     blob: Blob
     stages: int
 
 
 class PersonLifecycle:
-    """Says which blobs are somebody new, and who has been nowhere for too long."""
+    """Decides which blobs are new people, and who has left."""
 
     def __init__(self, settings: TemporalSettings, meter: float) -> None:
         self._settings, self._meter = settings, meter
@@ -30,7 +30,7 @@ class PersonLifecycle:
         """By number: since how many decided stages they have been nowhere."""
 
     def find_new(self, window: TemporalWindow, done: StageDecision) -> list[int]:
-        """Give the blobs of a stage just decided that are somebody new, the largest first.
+        """Return the blobs of a decided stage that are new people, the largest first.
 
         Such a blob is nobody's, as large as a person, and stays so from stage to stage for `confirm` of them;
         what the window says of the stages after it counts, too.
@@ -51,7 +51,7 @@ class PersonLifecycle:
         return sorted(new, key=lambda at: -done.stage.blobs[at].area)[:room]
 
     def find_departed(self, done: StageDecision, stage_s: float) -> set[int]:
-        """Give the numbers of those who have been nowhere for `forget_s`."""
+        """Return the ids of people who have been absent for `forget_after_s`."""
         self._away = {
             number: self._away.get(number, 0) + 1
             for number, at in done.blob_by_id.items()
@@ -67,7 +67,7 @@ class PersonLifecycle:
         return gone
 
     def _goes_on(self, window: TemporalWindow, blob: Blob) -> int:
-        """Count the waiting stages in a row in which a blob near it is nobody's on the best path."""
+        """Count the consecutive pending stages with an unassigned blob nearby."""
         if window.path is None:
             return 0
         count = 0
@@ -80,13 +80,13 @@ class PersonLifecycle:
         return count
 
     def _near(self, before: Blob, after: Blob) -> bool:
-        """Say whether somebody can have gone from one to the other in a stage."""
+        """Return whether a person can have walked from one blob to the other within a stage."""
         reach = self._settings.speed_m_s * self._settings.stage_s
         return distance_score(before, after, self._meter, self._settings) <= reach
 
 
 def initial_people(stage: Stage, settings: TemporalSettings, meter: float) -> list[tuple[int, int]]:
-    """Number the blobs of a first stage that are as large as a person: pairs of number and blob."""
+    """Return id and blob of the first stage's blobs that are as large as a person."""
     least = settings.min_person_m2 * meter**2
     large = [at for at, blob in enumerate(stage.blobs) if blob.area >= least]
     return [(number + 1, at) for number, at in enumerate(large[: settings.max_people])]

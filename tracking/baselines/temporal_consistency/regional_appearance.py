@@ -1,4 +1,4 @@
-"""How somebody looks in each part of the room: up to nine histograms (section 3.2; Krumm et al. 2000)."""
+"""Color histograms of a person by image region: up to nine (section 3.2; Krumm et al. 2000)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ beyond is the first or the last bin."""
 
 
 def uv_histogram(image: Image, mask: Mask) -> Floats:
-    """Give the shares of the colors of the masked pixels of a BGR picture, `(64,)`; zeros where none is."""
+    """Return the UV histogram of the masked pixels of a BGR image, `(64,)`; zeros without pixels."""
     chosen = cv2.cvtColor(image, cv2.COLOR_BGR2YUV)[mask > 0][:, 1:].astype(np.int64)
     bins = np.clip((chosen - _LOWEST) // _STEP, 0, SPLIT - 1)
     counts = np.bincount(bins[:, 0] * SPLIT + bins[:, 1], minlength=BINS)
@@ -25,7 +25,7 @@ def uv_histogram(image: Image, mask: Mask) -> Floats:
 
 
 def mismatch(found: Floats, model: Floats) -> Floats:
-    """Give how little of the models' colors is found: eq. (2), 0 for all of them to 1 for none.
+    """Return one minus the histogram intersection: eq. (2), 0 for the same colors to 1.
 
     Args:
         found: `(..., 64)` shares of the pixels in a blob.
@@ -35,10 +35,10 @@ def mismatch(found: Floats, model: Floats) -> Floats:
 
 
 class RegionalAppearance:
-    """One person's histograms, each with the place where it was taken."""
+    """One person's color histograms by image region."""
 
     def __init__(self, parts: int, size: tuple[int, int]) -> None:
-        """Begin with none; `size` is that of the picture (width, height), `parts` are on each side of it."""
+        """Start empty; `size` is the image size (width, height), `parts` the regions on each side."""
         self._parts, self._size = parts, np.array(size, dtype=np.float64)
         self._looks: dict[tuple[int, int], tuple[Floats, Floats]] = {}
 
@@ -46,12 +46,12 @@ class RegionalAppearance:
         return len(self._looks)
 
     def learn(self, middle: Floats, colors: Floats) -> None:
-        """Take in how the person looks at a place `(2,)`; what was known of that part of the room goes."""
+        """Store the histogram seen at a position `(2,)`, replacing that region's previous one."""
         across, down = np.clip((middle / self._size * self._parts).astype(int), 0, self._parts - 1).tolist()
         self._looks[across, down] = middle.copy(), colors
 
     def costs(self, middles: Floats, colors: Floats, unknown: float) -> Floats:
-        """Say how unlike the person blobs are: middles `(B, 2)`, colors `(B, 64)` give `(B,)`.
+        """Return the color mismatch of blobs with centers `(B, 2)` and colors `(B, 64)`: `(B,)`.
 
         Each is compared with the histogram that was taken nearest to it.
         """

@@ -1,4 +1,4 @@
-"""What temporal consistency is set by; the report's own numbers are the defaults where it has any."""
+"""Settings of temporal consistency; defaults are the report's numbers where it has any."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NOT_NEGATIVE = (
 
 @dataclass(frozen=True, slots=True)
 class BlobSettings:
-    """The background, and what of the foreground is a blob (section 3).
+    """Background model and blob segmentation (section 3).
 
     Raises:
         ValueError: a number makes no sense.
@@ -47,40 +47,32 @@ class BlobSettings:
 
 @dataclass(frozen=True, slots=True)
 class TemporalSettings:
-    """The window, its costs, and how people come and go.
+    """The window, its costs, and how people enter and leave.
 
     Raises:
         ValueError: a number makes no sense.
     """
 
-    window_stages: int = (
-        5  # samples of a window: somebody's place is decided when so many are there; 1 is at once
-    )
-    stage_s: float = 0.5  # seconds from one sample to the next
-    room_m: float = 6.0  # meters of floor that the picture is wide
-    merge_cost: float = 0.35  # M: what each person costs who is in a blob with others, but for one of them
-    speed_m_s: float = 1.45  # V_a: meters a second that people go, a little less than walking
-    partial_overlap_m: float = 0.06  # C_PO: meters that two blobs are apart whose boxes overlap in part
-    no_overlap_m: float = 0.16  # C_NO: meters added where they do not overlap
-    prune_factor: float = (
-        2.0  # times the way at that speed beyond which a link is left out of the graph; 0: none is
-    )
-    unknown_appearance: float = 0.5  # what a look costs of somebody whose looks are not known
-    appearance_regions: int = (
-        3  # parts of the room on each side, with a histogram of everybody in each of them
-    )
-    isolated_m: float = 0.4  # meters to the next person from which on somebody's looks are learned
-    closed_world: bool = False  # the report's own: nobody comes or goes after the first stage
-    absence_cost: float = 1.0  # what each stage costs in which somebody is nowhere
-    border_exit_cost: float = 0.25  # what going out of the picture costs, and coming in
-    inner_exit_cost: float = 2.0  # the same in the middle of the picture
-    confirm_stages: int = 3  # stages in a row in which a blob must be nobody's to be somebody new
-    min_person_m2: float = 0.1  # square meters of floor that somebody new covers at least
-    forget_after_s: float = 10.0  # seconds nowhere after which somebody is gone for good
-    max_people: int = 12  # people followed at most
-    max_joint_states: int = (
-        100_000  # joint states of a stage; more people are decided one group after the other
-    )
+    window_stages: int = 5  # samples in a window: a sample is decided when so many have come; 1: at once
+    stage_s: float = 0.5  # seconds between two samples
+    room_m: float = 6.0  # meters of floor across the image; metric ground calibration overrides it
+    merge_cost: float = 0.35  # M: cost of each further person in a shared blob
+    speed_m_s: float = 1.45  # V_a: usual speed of people, meters a second
+    partial_overlap_m: float = 0.06  # C_PO: distance of two blobs whose boxes overlap in part, meters
+    no_overlap_m: float = 0.16  # C_NO: meters added where boxes do not overlap
+    prune_factor: float = 2.0  # multiple of the usual distance beyond which links are pruned; 0: none
+    unknown_appearance: float = 0.5  # appearance cost of a person without learned appearance
+    appearance_regions: int = 3  # image regions per side with a histogram each, 1 to 3
+    isolated_m: float = 0.4  # meters to the next person from which appearance is learned
+    closed_world: bool = False  # true: nobody enters or leaves after the first stage (the report)
+    absence_cost: float = 1.0  # cost of each stage in which a person is absent
+    border_exit_cost: float = 0.25  # cost of leaving or entering at the image border
+    inner_exit_cost: float = 2.0  # the same away from the border
+    confirm_stages: int = 3  # stages in a row in which a blob must be unassigned to be a new person
+    min_person_m2: float = 0.1  # least square meters of floor covered by a new person
+    forget_after_s: float = 10.0  # seconds of absence after which a person is forgotten
+    max_people: int = 12  # people tracked at most
+    max_joint_states: int = 100_000  # joint states per stage; larger groups are solved in turn
     blobs: BlobSettings = field(default_factory=BlobSettings)
 
     def __post_init__(self) -> None:
@@ -103,9 +95,9 @@ class TemporalSettings:
             raise ValueError(f"prune_factor must be 0, for none, or at least 1, not {self.prune_factor}")
 
     def stage_frames(self, fps: float) -> int:
-        """Give the frames from one sample to the next."""
+        """Return the frames from one sample to the next."""
         return max(1, round(self.stage_s * fps))
 
     def lag(self, fps: float) -> int:
-        """Give the frames that follow a frame at most before it is final."""
+        """Return the largest number of frames that follow a frame before it is final."""
         return self.window_stages * self.stage_frames(fps) - 1

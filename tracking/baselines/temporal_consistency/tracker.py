@@ -1,4 +1,4 @@
-"""Follows everybody in one camera's pictures by temporal consistency."""
+"""The temporal consistency tracker of one camera."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tracking.window import WindowResult, WindowSettings, WindowTrack
 
 
 class TemporalTracker:
-    """Person-to-blob matching over a window of samples. What is decided of a sample is final.
+    """Person-to-blob matching over a window of samples. A decided sample is final.
 
     It looks at the pictures alone: a detection only says how the person looks whom it shows.
     """
@@ -30,7 +30,7 @@ class TemporalTracker:
     def __init__(
         self, window: WindowSettings, settings: TemporalSettings | None = None, fps: float = 25.0
     ) -> None:
-        """Give results every `stride` frames of `window`, of a recording with `fps` frames a second."""
+        """Set up for results every `stride` frames of a recording at `fps` frames a second."""
         self._window, self._settings, self._fps = window, settings or TemporalSettings(), fps
         self._every = self._settings.stage_frames(fps)
         self._blobs: BlobDetector | None = None
@@ -54,13 +54,13 @@ class TemporalTracker:
         self._next_stage = 0
 
     def prepare(self, images: Iterable[Image]) -> None:
-        """Learn the background from pictures of a recording, before its first frame; of none, as it goes."""
+        """Learn the background from images of a recording before its first frame; without any, online."""
         small = [self._blobs_of(image).resize(image) for image in images]
         if small and self._blobs is not None:
             self._blobs.prepare(small)
 
     def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
-        """Take a frame; give a result where one or more windows end.
+        """Take a frame; return a result where one or more windows end.
 
         A frame without a picture is one of which nothing is known; the sample is taken from the next one.
         After a gap longer than `forget_after` of the window everybody is forgotten, and the frames of the gap
@@ -99,13 +99,13 @@ class TemporalTracker:
         return self._result()
 
     def _forget(self) -> None:
-        """Forget everybody, but not the room."""
+        """Forget all people, but keep the background."""
         self._people, self._newcomers = None, None
         self._trails, self._stops = BlobBoxHistory(), {}
         self._final, self._next_stage = None, 0
 
     def _look(self, frame: int, image: Image) -> None:
-        """Find the blobs of a picture, and decide what can be decided with them."""
+        """Segment an image into blobs, and decide the stages that are due."""
         blobs = self._blobs_of(image)
         small = blobs.resize(image)
         if not blobs.ready:
@@ -121,7 +121,7 @@ class TemporalTracker:
         self._sample(Stage(frame, found), blobs)
 
     def _keep_up(self, frame: int) -> None:
-        """Decide without the samples that did not come, where there was no picture for long."""
+        """Decide overdue stages where images have been missing for long."""
         oldest = frame - self._settings.lag(self._fps)
         while self._people is not None and self._final is not None and self._final < oldest:
             done = self._people.commit()
@@ -154,7 +154,7 @@ class TemporalTracker:
             self._decided(done)
 
     def _decided(self, done: StageDecision) -> None:
-        """Keep what was decided, and see who has come and who has gone."""
+        """Store a decision, and update who has entered and left."""
         for number, at in done.blob_by_id.items():
             self._stops.setdefault(number, []).append((done.stage.frame, self._box(done.stage, at)))
         self._final = max(done.stage.frame, -1 if self._final is None else self._final)
@@ -167,11 +167,11 @@ class TemporalTracker:
             self._stops[self._numbers] = [(done.stage.frame, self._box(done.stage, at))]
 
     def _box(self, stage: Stage, at: int) -> Floats | None:
-        """Give a blob's box in pixels of the camera's picture."""
+        """Return a blob's box in pixels of the camera's image; `None` for absence."""
         return None if at == stage.absent else stage.blobs[at].box * self._scale
 
     def _result(self) -> WindowResult:
-        """Tell of all frames that are not final yet, or have become so just now."""
+        """Return the result for all frames not published as final before."""
         assert self._first is not None  # noqa: S101 — there was a frame
         assert self._last is not None  # noqa: S101
         first, last = self._first, self._last
@@ -185,7 +185,7 @@ class TemporalTracker:
         return result
 
     def _all_stops(self) -> SampledBoxes:
-        """Give where everybody is at samples: what was decided, then the best path as it stands."""
+        """Return everyone's boxes at samples: the decided ones, then the current best path."""
         if self._people is None or self._people.path is None:
             return self._stops
         stops = {number: list(it) for number, it in self._stops.items()}
@@ -195,7 +195,7 @@ class TemporalTracker:
         return stops
 
     def _drop(self, final: int) -> None:
-        """Forget the frames that are final, but for the last sample of everybody who is followed."""
+        """Drop final frames, except each person's last sample."""
         self._first = final + 1
         self._seen = {frame: it for frame, it in self._seen.items() if frame > final}
         self._trails.forget_through(final)
@@ -223,7 +223,7 @@ _SAME = 0.3
 def build_window_tracks(
     stops: SampledBoxes, trails: BlobBoxHistory, seen: Sequence[Detections], first: int, final: int
 ) -> tuple[WindowTrack, ...]:
-    """Give the tracks of the frames from `first` on, of which `seen` are the detections, by ascending number.
+    """Return the tracks of the frames from `first` on, by ascending id; `seen` are their detections.
 
     `final` is the last of them that never changes again.
     """
@@ -242,7 +242,7 @@ def build_window_tracks(
 
 
 def _shown(boxes: Floats, seen: Sequence[Detections]) -> NDArray[np.int64]:
-    """Say which detection shows somebody in each frame, `(F,)`, -1 for none."""
+    """Return the detection that matches a track in each frame, `(F,)`, -1 for none."""
     states = np.full(len(seen), OCCLUDED, dtype=np.int64)
     for row, found in enumerate(seen):
         if len(found) and not np.isnan(boxes[row, 0]):

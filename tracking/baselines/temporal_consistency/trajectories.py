@@ -1,4 +1,4 @@
-"""Where everybody is in every frame: in their blobs at the samples, and along them in between."""
+"""Boxes in every frame: the blobs at samples, and interpolated along blobs in between."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ SampledBoxes = dict[int, list[tuple[int, Floats | None]]]
 
 
 class BlobBoxHistory:
-    """The boxes of the blobs of every frame that is not final yet."""
+    """Blob boxes of every frame that is not final yet."""
 
     def __init__(self) -> None:
         self._boxes: dict[int, Floats] = {}
 
     def add(self, frame: int, boxes: Floats) -> None:
-        """Take the boxes `(B, 4)` of a frame in."""
+        """Store the boxes `(B, 4)` of a frame."""
         self._boxes[frame] = boxes
 
     def forget_through(self, frame: int) -> None:
-        """Forget all frames up to this one."""
+        """Drop all frames up to this one."""
         self._boxes = {it: boxes for it, boxes in self._boxes.items() if it > frame}
 
     def trajectory(self, stops: list[tuple[int, Floats | None]], first: int, last: int) -> Floats:
-        """Give somebody's boxes in the frames `first`..`last`, `(F, 4)`, NaN where they are nowhere.
+        """Return a person's boxes in the frames `first` to `last`, `(F, 4)`, NaN where absent.
 
         Args:
             stops: frames and their blob's boxes `(4,)` at samples, ascending; None: nowhere.
@@ -59,14 +59,14 @@ class BlobBoxHistory:
     def _between(
         self, frame: int, before: tuple[int, Floats | None], after: tuple[int, Floats | None]
     ) -> Floats | None:
-        """Give the blob on the straight way from one sample to the next, or the way where none is there."""
+        """Return the blob nearest to the straight line between two samples, or the point on the line."""
         if before[1] is None or after[1] is None:
             return None
         share = (frame - before[0]) / (after[0] - before[0])
         return self._blob(frame, (1.0 - share) * before[1] + share * after[1])
 
     def _blob(self, frame: int, expected: Floats) -> Floats:
-        """Give the box of a frame's blob that is nearest to a box, or that box if none is near."""
+        """Return the box of the frame's blob that overlaps a box most, or that box if none does."""
         boxes = self._boxes.get(frame)
         if boxes is None or not len(boxes):
             return expected

@@ -19,7 +19,7 @@ from tracking.boxes import Floats, intersections
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
-    """A sample: what was seen at a frame."""
+    """A sample: the blobs of one frame."""
 
     frame: int
     blobs: tuple[Blob, ...]
@@ -32,7 +32,7 @@ class Stage:
 
 @dataclass(slots=True, eq=False)
 class TrackedPerson:
-    """Somebody who is followed: their number, looks, and the index of their blob in the decided stage."""
+    """A tracked person: id, appearance, and blob index in the decided stage."""
 
     id: int
     appearance: RegionalAppearance
@@ -41,7 +41,7 @@ class TrackedPerson:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StageDecision:
-    """What was decided of a stage.
+    """The decision of one stage.
 
     Attributes:
         stage: which one.
@@ -53,7 +53,7 @@ class StageDecision:
 
 
 class TemporalWindow:
-    """Decides where a known number of people is, at each stage after `stages` samples.
+    """Decides each stage for a known set of people, `window_stages` samples later.
 
     Attributes:
         people: who is followed, by ascending number.
@@ -65,7 +65,7 @@ class TemporalWindow:
     def __init__(
         self, settings: TemporalSettings, size: tuple[int, int], meter: float, frame_s: float
     ) -> None:
-        """Look at pictures of a size (width, height), `meter` pixels a meter, a frame each `frame_s`."""
+        """Set up for images of `size` (width, height), `meter` pixels a meter, a frame each `frame_s`."""
         self._settings, self._size, self._meter, self._frame_s = settings, size, meter, frame_s
         self.people: list[TrackedPerson] = []
         self.decided: Stage | None = None
@@ -77,7 +77,7 @@ class TemporalWindow:
         self._steps: deque[Floats] = deque()
 
     def begin(self, stage: Stage, people: Sequence[tuple[int, int]]) -> None:
-        """Start from a stage in which it is known who is where: pairs of number and blob."""
+        """Start from a stage with known assignments: pairs of id and blob."""
         self.decided, self.path = stage, None
         self.pending.clear()
         self._steps.clear()
@@ -85,7 +85,7 @@ class TemporalWindow:
         self._learn(stage)
 
     def push(self, stage: Stage) -> StageDecision | None:
-        """Take a sample; decide the oldest that waits if as many as the window has stages do.
+        """Add a sample; decide the oldest pending stage once the window is full.
 
         Raises:
             ValueError: it is not known yet who is where, or the frame is not after the last one.
@@ -101,7 +101,7 @@ class TemporalWindow:
         return self.commit() if len(self.pending) >= self._settings.window_stages else None
 
     def commit(self) -> StageDecision | None:
-        """Decide the oldest stage that waits; None: none does."""
+        """Decide the oldest pending stage; `None` if there is none."""
         if not self.pending or self.path is None:
             return None
         stage, chosen = self.pending.popleft(), self.path.blobs[0]
@@ -115,13 +115,13 @@ class TemporalWindow:
         return StageDecision(stage, {person.id: person.blob for person in self.people})
 
     def add(self, number: int, at: int) -> None:
-        """Take somebody in who is in a blob of the decided stage."""
+        """Add a person who is in a blob of the decided stage."""
         self.people.append(self._person(number, at))
         self._learn_of(self.people[-1])
         self._solve()
 
     def remove(self, numbers: set[int]) -> None:
-        """Forget people."""
+        """Remove people."""
         kept = [row for row, person in enumerate(self.people) if person.id not in numbers]
         self.people = [self.people[row] for row in kept]
         if self.path is not None:
@@ -131,7 +131,7 @@ class TemporalWindow:
         return TrackedPerson(number, RegionalAppearance(self._settings.appearance_regions, self._size), at)
 
     def _solve(self) -> None:
-        """Find the best path through all stages that wait."""
+        """Find the best joint path through all pending stages."""
         if not self.pending:
             return
         settings = self._settings
@@ -148,7 +148,7 @@ class TemporalWindow:
         self.path = solve_joint_path(self.graph, self.links, settings.max_joint_states)
 
     def _looks(self, stage: Stage) -> Floats:
-        """Give f_color of everybody in every blob, and of being nowhere: `(P, B + 1)`."""
+        """Compute f_color of everyone in every blob, and the cost of absence: `(P, B + 1)`."""
         costs = np.full((len(self.people), len(stage.blobs) + 1), self._settings.absence_cost)
         if stage.blobs:
             middles = np.stack([blob.center for blob in stage.blobs])
@@ -158,7 +158,7 @@ class TemporalWindow:
         return costs
 
     def _between(self, before: Stage, after: Stage) -> Floats:
-        """Give f_dist between two stages, nowhere included: `(B' + 1, B + 1)`."""
+        """Compute f_dist between two stages, absence included: `(B' + 1, B + 1)`."""
         seconds = (after.frame - before.frame) * self._frame_s
         costs = np.full((len(before.blobs) + 1, len(after.blobs) + 1), np.inf)
         costs[:-1, :-1] = distance_costs(before.blobs, after.blobs, seconds, self._meter, self._settings)
@@ -169,14 +169,14 @@ class TemporalWindow:
         return costs
 
     def _way_out(self, blob: Blob) -> float:
-        """Give what it costs to leave the picture from a blob, or to come in there."""
+        """Return the cost of leaving the image from a blob, or of entering there."""
         left, top, right, bottom = blob.box.tolist()
         room = min(left, top, self._size[0] - right, self._size[1] - bottom)
         at_edge = room < self._settings.no_overlap_m * self._meter
         return self._settings.border_exit_cost if at_edge else self._settings.inner_exit_cost
 
     def _learn(self, stage: Stage) -> None:
-        """Learn how everybody looks who is by themselves in a stage that is decided (section 2.2)."""
+        """Update the appearance of everyone isolated in a decided stage (section 2.2)."""
         for person in self.people:
             if person.blob < stage.absent:
                 self._learn_of(person)

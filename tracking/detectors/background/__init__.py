@@ -1,1 +1,1 @@
-"""People as foreground: background models, foreground explanation, height model."""
+"""Background-subtraction detector: background models, foreground fit, height model."""

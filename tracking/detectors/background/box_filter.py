@@ -1,4 +1,4 @@
-"""Boxes of a standing person's proportions over position and scale (paper IV.A.2)."""
+"""Box filters: scan for bodies of standing people over position and scale (paper IV.A.2)."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class BoxFilterSettings:
 
     body: Body = "person"  # person: head, trunk and legs inside the box; box: all of it (the paper)
     aspect_ratio: float = 0.38  # width of a person's box over its height
-    min_height: float = 0.14  # smallest person, in picture heights; see also `HeightLineSettings`
-    max_height: float = 0.95  # tallest person, in picture heights
+    min_height: float = 0.14  # smallest person, in image heights; see also height_model
+    max_height: float = 0.95  # tallest person, in image heights
     height_step: float = 1.08  # each height of the scan is this factor above the one before
     background_cost: float = 0.35  # what a background pixel inside the body costs, a foreground one brings 1
-    min_gain: float = 0.3  # least gain of a hypothesis, in areas of its body
-    min_visible: float = 0.45  # least share of a box that is inside the picture and not ignored
-    max_peaks: int = 240  # local maxima kept for what follows, best first
+    min_gain: float = 0.3  # least gain of a box, in areas of its body
+    min_visible: float = 0.45  # least share of a box that is inside the image and not ignored
+    max_peaks: int = 240  # local maxima kept for the foreground fit, best first
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ class ScanPeaks:
 
 @dataclass(frozen=True, slots=True)
 class HeightRange:
-    """Heights near the height line, both in cells."""
+    """Range of possible heights around the height model, in cells."""
 
     model: HeightModel
     tolerance: float  # share by which a height may differ from the line
@@ -64,7 +64,7 @@ class HeightRange:
     min_height: float  # smallest person, in picture heights
 
     def priors(self, feet: Floats, height: float | Floats) -> Floats:
-        """Give the factor on the gain at each foot row: 1 on the line, 0 where the height is impossible.
+        """Return the factor on the gain at each foot row: 1 at the expected height, 0 where impossible.
 
         A height at the edge of what is possible counts for `1 - _EDGE` of one on the line.
         """
@@ -83,7 +83,7 @@ _MOVES = np.array([(x, y, x, y) for y in (0, -1, 1) for x in (0, -1, 1)], dtype=
 
 
 class BoxFilter:
-    """Finds the places and heights of bodies that gain most, in planes of one size.
+    """Scans planes of one size for the positions and heights of bodies with the largest gain.
 
     A cell in a body adds its gain; the sum is lessened by the prior of the body's height at its foot.
     """
@@ -99,7 +99,7 @@ class BoxFilter:
         self._plans: list[HeightPlan] | None = None
 
     def peaks(self, gain: Plane, band: HeightRange | None) -> ScanPeaks:
-        """Scan all places and heights and give the local maxima, best first.
+        """Scan all positions and heights; return the local maxima, best first.
 
         Args:
             gain: `(H, W)`, what each cell adds to a body that covers it.
@@ -145,7 +145,7 @@ class BoxFilter:
         return ScanPeaks(boxes[order], gains[order], sizes[order], priors[order], corners.select(order))
 
     def _measured(self, boxes: Floats, sums: Floats) -> tuple[Floats, Floats, PartRectangles]:
-        """Give the gains, priors and parts of boxes."""
+        """Return the gains, priors and parts of boxes."""
         corners = part_rectangles(boxes, self._parts, self._shape)
         gains = corners.sums(sums)
         if self._band is None:
@@ -159,7 +159,7 @@ def _best_first(boxes: Floats, gains: Floats) -> npt.NDArray[np.int64]:
 
 
 def scan_heights(rows: int, least: float, settings: BoxFilterSettings) -> Floats:
-    """Give the heights from `least` on to try in a picture of so many rows, in cells, `(S,)`, ascending."""
+    """Return the heights to scan, in cells, `(S,)`, ascending, from `least` on."""
     most = settings.max_height * rows
     steps = int(np.floor(np.log(most / least) / np.log(settings.height_step))) + 1
     return np.unique(np.rint(least * settings.height_step ** np.arange(steps)))

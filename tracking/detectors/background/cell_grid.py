@@ -1,4 +1,4 @@
-"""The three sizes a picture has inside the background detector: camera, working picture, cells."""
+"""Coordinate systems of the background detector: camera image, working image, cells."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class CellGrid:
         self.weight: Plane = (self.cell_shares(self.visible) > 0.5).astype(np.float32)  # noqa: PLR2004 — half
 
     def resize(self, image: Image) -> Image:
-        """Give the working picture `(h, w, 3)`."""
+        """Return the image at the working size, `(h, w, 3)`."""
         if image.shape[:2] == self._work:
             return image
         size = (self._work[1], self._work[0])
         return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
     def cell_shares(self, mask: Mask) -> Plane:
-        """Give the share of the mask in each cell, 0 to 1, with the margin around (0)."""
+        """Return the share of the mask in each cell, 0 to 1, padded by the margin."""
         size = (self._work[1] // self._cell, self._work[0] // self._cell)
         shares = cv2.resize(mask, size, interpolation=cv2.INTER_AREA).astype(np.float32) / 255.0
         return np.pad(shares, self.margin)

@@ -1,4 +1,4 @@
-"""The camera's gain: automatic exposure and white balance change the empty scene by 15 % and more."""
+"""Exposure compensation: automatic exposure and white balance change the empty scene by 15 % and more."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LEAST_PIXELS = 30
 
 
 def channel_gains(image: Image, reference: Image) -> npt.NDArray[np.float64]:
-    """Give per channel the factor by which the image is brighter than the reference, `(3,)`.
+    """Return the gain of the image over the reference per channel, `(3,)`.
 
     The median over the picture of the ratio: people who cover less than half of it do not move it.
     """

@@ -1,4 +1,4 @@
-"""The standard detector: people as what differs from a learned background."""
+"""The default detector: people as foreground of a learned background (paper IV.A.2)."""
 
 from __future__ import annotations
 
@@ -49,11 +49,13 @@ class BackgroundSettings:
 
     model: Literal["median", "mog2"] = "median"  # how the background is learned
     work_width: int = 360  # pixels; wider pictures are made smaller first
-    gray_bins: int = 64  # bins of the gray histograms
-    prescan_frames: int = 500  # of a recording, seen before the first is searched; 0: none
-    prescan_every: int = 20  # of these, one in so many is looked at
+    gray_bins: int = 64  # bins of the gray histograms, 1 to 256
+    prescan_frames: int = (
+        500  # frames of a recording scanned before the first is searched; 0: none, as if live
+    )
+    prescan_every: int = 20  # of these, one in so many is used
     ignore: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons of (x, y) in pixels to ignore
-    border_margin: float = 0.25  # people may be out of the picture by this share of the picture's height
+    border_margin: float = 0.25  # share of the image height by which people may extend beyond the image
     appearance: AppearanceSettings = field(default_factory=AppearanceSettings)
     median: MedianSettings = field(default_factory=MedianSettings)
     shadows: ShadowSettings = field(default_factory=ShadowSettings)
@@ -72,7 +74,7 @@ class BackgroundSettings:
 
 
 def paper_settings(settings: BackgroundSettings) -> BackgroundSettings:
-    """Give the settings with all off that is not in the paper (IV.A.2).
+    """Return the settings of the paper's detector (IV.A.2): all extensions off.
 
     What is left are full boxes over place and height, each by itself, and gray histograms.
     """
@@ -94,7 +96,7 @@ S = TypeVar("S", bound=BackgroundSettings)
 
 
 def overhead_settings(settings: S) -> S:
-    """Give the settings for a camera that looks straight down: people are as wide as long, and have no line.
+    """Return the settings for a camera that looks straight down: square boxes and no height model.
 
     Their least size is half of what they are tall where they stand upright.
     """
@@ -115,12 +117,12 @@ class _Background(Protocol):
 
 
 class BackgroundDetector:
-    """Finds standing people in the foreground of one camera. Deterministic, about a second to warm up."""
+    """Detects standing people in one camera's foreground. Deterministic; warms up for about a second."""
 
     def __init__(
         self, settings: BackgroundSettings | None = None, floor: FloorGeometry | None = None
     ) -> None:
-        """Begin with an empty memory; `floor` is what was measured of it in the pictures."""
+        """Start without a background; `floor` is the calibrated floor geometry, where known."""
         self.settings = settings or BackgroundSettings()
         self._looks = AppearanceExtractor(self.settings.appearance, self.settings.gray_bins)
         self._floor = floor
@@ -139,7 +141,7 @@ class BackgroundDetector:
         """Whether the last frame could not be searched, since the background was not known."""
 
     def prepare(self, images: Iterable[Image], every: int) -> None:
-        """Learn the empty scene and how tall people look from frames of a recording, before its first one.
+        """Learn the background and the height model from a recording before its first frame.
 
         Args:
             images: people may come and go in them; they are taken one by one, and kept small.
@@ -161,7 +163,7 @@ class BackgroundDetector:
                 )
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
-        """Give the hypotheses of the next frame; none while the background is not known yet.
+        """Return the detections of the next frame; none while the background is not known yet.
 
         Raises:
             ValueError: not an `(H, W, 3)` uint8 picture, or another size than before.
@@ -207,7 +209,7 @@ class BackgroundDetector:
         )
 
     def _heights(self, grid: CellGrid) -> HeightRange | None:
-        """Give the heights that are possible, in cells; the same object for as long as the line stays."""
+        """Return the possible heights in cells; the same object while the model is unchanged."""
         line, heights = self._learner.model, self.settings.height_model
         if line is not self._line:
             self._line = line
@@ -247,12 +249,12 @@ _AROUND = 0.15
 
 
 def _cleaned(mask: Mask) -> Mask:
-    """Take out lonely pixels and close small holes."""
+    """Remove isolated pixels and close small holes."""
     return np.asarray(cv2.morphologyEx(cv2.medianBlur(mask, 5), cv2.MORPH_CLOSE, _CLOSE), dtype=np.uint8)
 
 
 def _occupied(boxes: npt.NDArray[np.float64], shape: tuple[int, ...]) -> Mask:
-    """Give a mask `shape` that is 255 where somebody is."""
+    """Return a mask of `shape` that is 255 inside the boxes."""
     occupied = np.zeros(shape, dtype=np.uint8)
     for left, top, right, bottom in boxes:
         x, y = _AROUND * (right - left), _AROUND * (bottom - top)

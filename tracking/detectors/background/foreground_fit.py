@@ -1,4 +1,4 @@
-"""A small set of people who explain the foreground, and their runners-up."""
+"""Foreground fit: a small set of people that explains the foreground, and alternatives."""
 
 from __future__ import annotations
 
@@ -15,19 +15,15 @@ from tracking.detectors.base import Plane
 
 @dataclass(frozen=True, slots=True)
 class ForegroundFitSettings:
-    """Which hypotheses of a frame are handed on."""
+    """Which hypotheses of a frame become detections."""
 
-    enabled: bool = True  # false: the boxes as the scan found them, each by itself (the paper)
-    max_people: int = 40  # people that a frame's foreground is explained by at most
-    max_people_uncalibrated: int = (
-        10  # and while it is not known well how tall people are: many small ones explain anything
-    )
-    min_gain: float = (
-        0.3  # least gain of a further person, in areas of the part of the body that nobody covers
-    )
-    max_hypotheses: int = 16  # K: hypotheses handed on, people and runners-up, where people are few
-    max_alternatives: int = 8  # handed on beside the people however many these are
-    max_iou: float = 0.55  # runners-up overlap (IoU) what is handed on already by less than this
+    enabled: bool = True  # false: all boxes of the scan, each by itself (the paper)
+    max_people: int = 40  # people selected per frame at most
+    max_people_uncalibrated: int = 10  # the same while the height model is unreliable
+    min_gain: float = 0.3  # least gain of a further person, in visible body areas
+    max_hypotheses: int = 16  # K: detections per frame, people and alternatives, where people are few
+    max_alternatives: int = 8  # alternatives beside the people, however many these are
+    max_iou: float = 0.55  # largest overlap (IoU) of an alternative with another detection
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +41,7 @@ class ForegroundFit:
 def fit_foreground(
     peaks: ScanPeaks, foreground: Plane, cost: Plane, weight: Plane, settings: ForegroundFitSettings
 ) -> ForegroundFit:
-    """Choose the people who explain most, one after the other, move each of them, then add runners-up.
+    """Select people whose bodies explain the foreground, refine each, then add alternatives.
 
     The gain of a body is the foreground inside that nobody explains yet, less the background inside (a
     linear form of the log-likelihood `P(foreground) = 1 - (1 - e) prod (1 - t_k)`). The score of a
@@ -83,7 +79,7 @@ _LEAST_VISIBLE = 0.6
 
 
 class GreedySearch:
-    """Greedy choice, then moves and removals.
+    """Greedy selection, then refinement of each selected candidate.
 
     Attributes:
         gains: `(P,)`, what each candidate gains beside the chosen.
@@ -103,7 +99,7 @@ class GreedySearch:
         self._extent = peaks.parts.extent
 
     def select_people(self) -> list[int]:
-        """Give the indices of the chosen, in the order in which they were first chosen."""
+        """Select people greedily; return their indices in the order of selection."""
         chosen: list[int] = []
         while len(chosen) < self._settings.max_people:
             best = self._best(chosen)
@@ -125,24 +121,24 @@ class GreedySearch:
         return chosen
 
     def gain_per_area(self) -> npt.NDArray[np.float64]:
-        """Give each candidate's gain beside the chosen, in areas of what is visible of its body, `(P,)`."""
+        """Return each candidate's gain per visible body area beside the selected, `(P,)`."""
         least = _LEAST_VISIBLE * self._peaks.areas
         return np.asarray(self._peaks.priors * self.gains / np.maximum(self.visible, least))
 
     def add(self, index: int) -> None:
-        """Let a candidate cover its cells."""
+        """Add a candidate to the selected: it covers its cells."""
         place, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
         self._lose(place, inside & (self._covers[place] == 0), -1.0)
         self._covers[place] += inside
 
     def remove(self, index: int) -> None:
-        """Let it no longer do so."""
+        """Remove a candidate from the selected."""
         place, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
         self._covers[place] -= inside
         self._lose(place, inside & (self._covers[place] == 0), 1.0)
 
     def _lose(self, place: tuple[slice, slice], cells: npt.NDArray[np.bool_], sign: float) -> None:
-        """Change gains and visible parts by what the cells are worth, of the bodies on this piece."""
+        """Update gains and visible areas of the bodies that overlap the changed cells."""
         lost = integral_image(self._lost[place] * cells[..., None].astype(np.float32))
         (top, bottom), (left, right) = ((it.start, it.stop) for it in place)
         lefts, tops, rights, bottoms = self._extent
@@ -152,7 +148,7 @@ class GreedySearch:
         self.visible[near] += sign * change[:, 1]
 
     def _best(self, chosen: list[int]) -> int | None:
-        """Give the candidate that gains most beside the chosen; `None` where none gains enough."""
+        """Return the candidate with the largest gain beside the selected; `None` where none gains enough."""
         if not len(self.gains):
             return None
         shares = self.gain_per_area()
@@ -165,7 +161,7 @@ class GreedySearch:
 def _runners_up(
     boxes: npt.NDArray[np.float64], chosen: list[int], settings: ForegroundFitSettings
 ) -> list[int]:
-    """Give the next best candidates that differ enough from each other and from the chosen."""
+    """Return the next best candidates that overlap neither each other nor the selected too much."""
     if not len(boxes):
         return []
     overlaps = iou(boxes[:, None], boxes[None])
@@ -211,7 +207,7 @@ def shrink_to_foreground(
 
 
 def _trim(profile: npt.NDArray[np.float32]) -> int:
-    """Give by how many cells the near end of a profile can be cut."""
+    """Return how many cells can be trimmed at the start of a profile."""
     most = int(_MOST_TRIM * len(profile))
     full = np.flatnonzero(profile[: most + 1] >= _LEAST_FILL)
     return int(full[0]) if full.size else 0

@@ -1,4 +1,4 @@
-"""How tall people look where: on a flat floor a box's height is a straight line in its foot's y.
+"""Height model: on a flat floor a person's box height is linear in the foot's row.
 
 A pinhole camera `c` above a flat floor sees a person of height `p` as `h = p / c (y - horizon)` rows
 tall: one slope for the whole picture. So the slope is about known before anybody is seen (people are
@@ -21,23 +21,23 @@ from tracking.detectors.base import Mask
 
 @dataclass(frozen=True, slots=True)
 class HeightModelSettings:
-    """Learning the height line `h = slope * y + offset` from people who stand alone."""
+    """Settings of the height model `h = slope * y + offset`, learned from isolated people."""
 
-    enabled: bool = True  # off: every height everywhere (the paper's box filters)
-    min_samples: int = 3  # times that somebody is seen alone in a new place before the line is trusted
-    max_samples: int = 1000  # the newest that are kept
-    sample_every: int = 1  # frames between two looks for isolated people
-    prior_slope: float = 0.65  # person's height over the camera's: what the slope is without evidence
+    enabled: bool = True  # false: all heights everywhere (the paper)
+    min_samples: int = 3  # isolated people at different positions needed for the model
+    max_samples: int = 1000  # newest samples kept
+    sample_every: int = 1  # frames between two samples
+    prior_slope: float = 0.65  # person height over camera height: the slope without samples
     prior_slope_std: float = 0.18  # standard deviation of that
-    min_height: float = 0.08  # smallest person, in picture heights, where people as small were seen alone
-    tolerance: float = 0.15  # a hypothesis may be this share taller or smaller than the line says
-    tolerance_std: float = 1.0  # standard deviations of the line by which it may be taller or smaller besides
-    max_scatter: float = 0.13  # median deviation, in heights, above which there is no line (stairs)
+    min_height: float = 0.08  # smallest person, in image heights, once people as small were seen isolated
+    tolerance: float = 0.15  # share by which a box may be taller or smaller than the model
+    tolerance_std: float = 1.0  # standard deviations of the model allowed besides
+    max_scatter: float = 0.13  # median deviation, in heights, above which there is no model (stairs)
 
 
 @dataclass(frozen=True, slots=True)
 class FloorGeometry:
-    """What measuring the floor says of people's heights.
+    """What the floor calibration implies about people's heights.
 
     Attributes:
         horizon: the row of the picture in which the floor ends: people there would be without height.
@@ -49,7 +49,7 @@ class FloorGeometry:
     slope: float | None
 
     def scaled_by(self, scale: float) -> FloorGeometry:
-        """Give the same in a picture that is so many times as large."""
+        """Return the geometry in an image scaled by `scale`."""
         return FloorGeometry(self.horizon * scale, self.slope)
 
 
@@ -70,15 +70,15 @@ class HeightModel:
     """Nobody much smaller was seen: far beyond the people seen, the line says nothing."""
 
     def expected_height(self, foot: Floats) -> Floats:
-        """Give the expected heights, in the unit of `foot`."""
+        """Return the expected heights at foot rows, in the unit of `foot`."""
         return self.slope * foot + self.offset
 
     def standard_deviation(self, foot: Floats) -> Floats:
-        """Give the standard deviations of the expected heights, in the unit of `foot`."""
+        """Return the standard deviations of the expected heights, in the unit of `foot`."""
         return np.hypot(self.level_std, self.slope_std * (foot - self.center))
 
     def in_cells(self, cell: float, margin: float) -> HeightModel:
-        """Give the same line in cells of `cell` pixels, in a plane with `margin` cells added above."""
+        """Return the model in cells of `cell` pixels, in a plane with `margin` cells added above."""
         return HeightModel(
             self.slope,
             self.offset / cell - self.slope * margin,
@@ -90,7 +90,7 @@ class HeightModel:
 
 
 class HeightModelEstimator:
-    """Collects isolated standing blobs as it goes and fits the line to them.
+    """Estimates the height model online from isolated standing people.
 
     Where people's heights follow from the floor there is a line from the beginning.
     """
@@ -98,7 +98,7 @@ class HeightModelEstimator:
     def __init__(
         self, settings: HeightModelSettings, floor: FloorGeometry | None = None, rows: float = 0.0
     ) -> None:
-        """Begin without samples; `rows` is the height of the picture that the `floor` is seen in."""
+        """Start without samples; `rows` is the height of the image in which `floor` is given."""
         self._settings = settings
         self._prior = height_prior(settings, floor, rows)
         self._samples: deque[tuple[float, float]] = deque(maxlen=settings.max_samples)
@@ -113,14 +113,14 @@ class HeightModelEstimator:
 
     @property
     def is_reliable(self) -> bool:
-        """Whether it is known how tall people are: by meters of floor, or by many who were seen alone."""
+        """Return whether the model is reliable: from a metric floor, or from enough samples."""
         line = self.model
         if line is None or self._prior.model is not None:
             return line is not None
         return line.level_std <= _SURE * (line.slope * line.center + line.offset)
 
     def observe(self, foreground: Mask, visible: Mask, frames: int = 1) -> None:
-        """Look at one frame's foreground `(H, W)`; `visible` is 0 where the picture is ignored.
+        """Add the isolated people of one frame's foreground `(H, W)`; `visible` is 0 in ignored areas.
 
         It stands for so many `frames` in a row.
         """
@@ -165,7 +165,7 @@ _MEASURED = 0.06
 
 @dataclass(frozen=True, slots=True)
 class HeightPrior:
-    """What is known of the line before anybody was seen.
+    """Prior knowledge of the height model.
 
     The slope is `N(slope, slope_spread^2)`, and the line `N(0, spread^2)` at the horizon where there is one.
     """
@@ -181,7 +181,7 @@ class HeightPrior:
 def height_prior(
     settings: HeightModelSettings, floor: FloorGeometry | None = None, rows: float = 0.0
 ) -> HeightPrior:
-    """Give what is known before anybody was seen in a picture of so many rows."""
+    """Return the prior of the height model in an image of `rows` rows."""
     if floor is None:
         return HeightPrior(settings.prior_slope, settings.prior_slope_std)
     off = _HORIZON * rows
@@ -195,7 +195,7 @@ def height_prior(
 def fit_height_model(
     samples: Floats, settings: HeightModelSettings, prior: HeightPrior | None = None, people: int = 1
 ) -> HeightModel | None:
-    """Fit the line to samples `(N, 2)` of foot and height; where they fit none, give what is known before.
+    """Fit the model to samples `(N, 2)` of foot row and height; the prior's model where no line fits.
 
     They are of at least so many different `people`: all of them may be tall by a share that is found along
     with the line, and leaves it the more in doubt the fewer they are.
@@ -237,19 +237,19 @@ def fit_height_model(
 
 
 def _says(height: Floats) -> Floats:
-    """Give how much each sample says, 1 on the mean: tall ones more, since pieces of people are small."""
+    """Return the weight of each sample, 1 on average: tall ones more, since parts of people are small."""
     return np.asarray(height / height.mean())
 
 
 def _median(values: Floats, weights: Floats) -> float:
-    """Give the weighted median."""
+    """Return the weighted median."""
     order = np.argsort(values, kind="stable")
     total = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(total, total[-1] / 2.0)])
 
 
 def _best_of_grid(foot: Floats, height: Floats, prior: HeightPrior) -> tuple[float, float]:
-    """Give slope and offset of the line through a sample or the horizon that most samples are close to."""
+    """Return slope and offset of the grid's best line through a sample or the horizon."""
     slopes = prior.slope + prior.slope_std * _SLOPES
     through = np.linspace(0, len(foot) - 1, min(len(foot), _SAMPLES_A_SLOPE)).astype(np.int64)
     offsets = height[through] - slopes[:, None] * foot[through]

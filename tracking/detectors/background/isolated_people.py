@@ -1,4 +1,4 @@
-"""Blobs of the foreground that are one whole standing person alone: what the height line learns from."""
+"""Isolated standing people in the foreground: the samples of the height model."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MERGED_AREA = 0.05
 
 @dataclass(frozen=True, slots=True)
 class IsolatedPerson:
-    """Somebody who stands alone, in pixels: the column of their middle, the row of their foot, and height."""
+    """An isolated standing person, in pixels: center column, foot row and height."""
 
     middle: float
     foot: float
@@ -31,7 +31,7 @@ class IsolatedPerson:
 
 
 def find_isolated_people(foreground: Mask, visible: Mask) -> list[IsolatedPerson]:
-    """Give every blob that looks like one whole standing person alone."""
+    """Return every foreground blob that looks like one whole isolated standing person."""
     rows, columns = foreground.shape
     # Outlines instead of labeled pixels: a twentieth of the time.
     outlines, _ = cv2.findContours(foreground, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
@@ -50,13 +50,13 @@ def find_isolated_people(foreground: Mask, visible: Mask) -> list[IsolatedPerson
 
 
 def _blob(outline: npt.NDArray[Any]) -> tuple[int, ...]:
-    """Give left, top, width, height and area, holes included."""
+    """Return left, top, width, height and area of an outline, holes included."""
     around = cv2.arcLength(outline, True) / 2.0  # noqa: FBT003 — closed; half a pixel all around
     return (*cv2.boundingRect(outline), round(cv2.contourArea(outline) + around) + 1)
 
 
 def _crowded(blobs: npt.NDArray[np.int64], label: int) -> bool:
-    """Say whether another sizeable blob reaches into this one's surroundings: a person in pieces."""
+    """Return whether another large blob is near this one: probably parts of one person."""
     left, top, width, height, area = blobs[label].tolist()
     reach = height // 8
     others = np.delete(blobs, label, axis=0)
@@ -73,7 +73,7 @@ _FORGET = 50
 
 
 class SampleNoveltyFilter:
-    """Remembers where people were seen alone, and tells who is in a place in which nobody just was."""
+    """Drops samples of people who stand where a sample was just taken."""
 
     def __init__(self) -> None:
         self._places = np.empty((0, 3))
@@ -81,7 +81,7 @@ class SampleNoveltyFilter:
         """Frames since somebody was there."""
 
     def new_samples(self, people: Sequence[IsolatedPerson], frames: int = 1) -> list[IsolatedPerson]:
-        """Give who of one frame's people counts; the look before was so many `frames` ago."""
+        """Return the people who count as new samples; the previous frame was `frames` ago."""
         self._since += frames
         anew: list[IsolatedPerson] = []
         for person in people:

@@ -1,4 +1,4 @@
-"""A background that neither absorbs people nor keeps their ghosts: the median of the first frames."""
+"""Median background model: absorbs neither people nor their ghosts."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class MedianSettings:
 
 
 class MedianBackground:
-    """A background model of one camera: the median of the first frames, updated where nobody is.
+    """Background model of one camera: the median of the first frames, updated where no people are.
 
     Usable after half of the bootstrap; the median is taken again at its end.
     """
@@ -58,7 +58,7 @@ class MedianBackground:
         """The frame last seen, and its gains."""
 
     def prepare(self, images: Sequence[Image]) -> None:
-        """Take the background from pictures seen before the first frame; without any, learn it as it goes."""
+        """Learn the background from images before the first frame; without any, learn it online."""
         for image in images:
             self._sample(image)
         if self._samples:
@@ -66,11 +66,11 @@ class MedianBackground:
             self._frames, self._samples = self._settings.bootstrap_frames, []
 
     def segment_still(self, image: Image) -> Segmentation | None:
-        """Tell foreground from shadow and background in a picture that is not the next frame."""
+        """Segment an image that is not the next frame."""
         return None if self._rounded is None else self._compared(image, self._rounded)[0]
 
     def segment(self, image: Image) -> Segmentation | None:
-        """Tell foreground from shadow and background; `None` while the background is not known yet."""
+        """Segment the next frame; `None` while the background is not known yet."""
         self._bootstrap(image)
         self._frames += 1
         if self._rounded is None:
@@ -81,7 +81,7 @@ class MedianBackground:
         return split
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
-        """Update the background with the frame last seen, except where somebody is.
+        """Update the background with the last frame, except where people are.
 
         Args:
             foreground: `(H, W)`, the cleaned foreground of that frame.
@@ -105,7 +105,7 @@ class MedianBackground:
         self._rounded = np.rint(self._exact).astype(np.uint8)
 
     def _compared(self, image: Image, background: Image) -> tuple[Segmentation, npt.NDArray[np.float64]]:
-        """Give what differs from the background at the picture's gains, and the gains."""
+        """Return the segmentation against the background at the image's gains, and the gains."""
         gains = channel_gains(image, background)
         expected = apply_gains(background, gains)
         blue, green, red = cv2.split(cv2.absdiff(image, expected))

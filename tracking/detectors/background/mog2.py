@@ -1,4 +1,4 @@
-"""The usual mixture of Gaussians as a background, for comparison and for waving trees."""
+"""Mixture-of-Gaussians background model, for comparison and for moving vegetation."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Mog2Background:
         )
 
     def segment(self, image: Image) -> Segmentation | None:
-        """Tell foreground from shadow and background; `None` while the background is not known yet."""
+        """Segment the next frame; `None` while the background is not known yet."""
         mask = self._model.apply(image)
         self._frames += 1
         if self._frames <= self._settings.warm_up_frames:

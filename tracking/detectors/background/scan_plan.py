@@ -1,4 +1,4 @@
-"""Where the scan for people looks, worked out once and used for as long as the height line stays."""
+"""Scan positions per height, planned once per height model."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _Read: TypeAlias = tuple[slice, slice]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeightPlan:
-    """The places of the bodies of one height, in cells.
+    """The scan positions of bodies of one height, in cells.
 
     Attributes:
         size: width and height.
@@ -44,7 +44,7 @@ class HeightPlan:
     corner_slices: tuple[tuple[_Read, _Read, _Read, _Read], ...]
 
     def peaks(self, sums: Floats) -> tuple[Floats, Floats]:
-        """Give the local maxima of the gain, whose integral is `sums`: boxes `(P, 4)` and gains `(P,)`."""
+        """Return the local maxima of the gain with integral image `sums`: boxes `(P, 4)` and gains `(P,)`."""
         gains = np.zeros((len(self.tops), len(self.lefts)))
         for right_bottom, right_top, left_bottom, left_top in self.corner_slices:
             gains += sums[right_bottom]
@@ -72,7 +72,7 @@ def plan_height(
     priors: Floats,
     least_gain: float,
 ) -> HeightPlan | None:
-    """Plan one height; `None` where no body of it is possible.
+    """Plan the scan of one height; `None` where no such body is possible.
 
     Args:
         shape: of the plane, in cells.

@@ -1,4 +1,4 @@
-"""What a background model says about the pixels of a frame."""
+"""Result of a background model: foreground and shadow masks."""
 
 from __future__ import annotations
 

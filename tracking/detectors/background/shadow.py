@@ -1,4 +1,4 @@
-"""Shadows: darker than the floor, but of the floor's color.
+"""Shadow detection: darker than the floor, but of the floor's color.
 
 Gray trousers look the same, so what looks like a shadow counts neither for a person nor against one.
 """
@@ -23,7 +23,7 @@ class ShadowSettings:
 
 
 def shadow_mask(image: Image, background: Image, foreground: Mask, settings: ShadowSettings) -> Mask:
-    """Give the part of the foreground `(H, W)` that looks like a shadow.
+    """Return the part of the foreground `(H, W)` that looks like a shadow.
 
     Args:
         image: `(H, W, 3)`.

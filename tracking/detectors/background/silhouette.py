@@ -1,4 +1,4 @@
-"""The outline of a standing person, in five rectangles, so that integral images can measure it."""
+"""Body shape of a standing person as five rectangles, for integral images."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ BODY_PARTS: dict[Body, tuple[BodyPart, ...]] = {"person": PERSON_PARTS, "box": B
 
 
 def integral_image(plane: Plane) -> npt.NDArray[np.float64]:
-    """Give the sums over all rectangles that begin in the top left corner, `(H + 1, W + 1)`."""
+    """Return the integral image of a plane, `(H + 1, W + 1)`."""
     return np.asarray(cv2.integral(plane, sdepth=cv2.CV_64F))
 
 
 def part_rectangles(
     boxes: npt.NDArray[np.float64], parts: tuple[BodyPart, ...], shape: tuple[int, ...]
 ) -> PartRectangles:
-    """Give the whole cells of the parts of boxes `(K, 4)` in cells, cut at the borders of a plane."""
+    """Return the body parts of boxes `(K, 4)` in whole cells, clipped to a plane of `shape`."""
     across = (boxes[:, 2] - boxes[:, 0])[:, None]
     down = (boxes[:, 3] - boxes[:, 1])[:, None]
     shares = np.array([(part.left, part.top, part.right, part.bottom) for part in parts])
@@ -77,11 +77,11 @@ class PartRectangles:
         return self.left.min(axis=1), self.top.min(axis=1), self.right.max(axis=1), self.bottom.max(axis=1)
 
     def select(self, chosen: npt.NDArray[np.int64]) -> PartRectangles:
-        """Give those of some of the bodies."""
+        """Return the parts of the chosen bodies."""
         return PartRectangles(self.left[chosen], self.top[chosen], self.right[chosen], self.bottom[chosen])
 
     def clip_to(self, place: tuple[slice, slice]) -> PartRectangles:
-        """Give the corners in a piece of the plane, cut at its borders."""
+        """Return the parts relative to a region of the plane, clipped to it."""
         rows, columns = place
         width, height = columns.stop - columns.start, rows.stop - rows.start
         return PartRectangles(
@@ -92,12 +92,12 @@ class PartRectangles:
         )
 
     def bounds(self, k: int) -> tuple[slice, slice]:
-        """Give the rows and columns that body `k` lies in."""
+        """Return the rows and columns that body `k` spans."""
         rows = slice(int(self.top[k].min()), int(self.bottom[k].max()))
         return rows, slice(int(self.left[k].min()), int(self.right[k].max()))
 
     def mask(self, k: int) -> npt.NDArray[np.bool_]:
-        """Give the cells inside body `k`, in the piece of the plane `around` it."""
+        """Return the mask of body `k` within its `bounds`."""
         rows, columns = self.bounds(k)
         x, y = columns.start, rows.start
         inside = np.zeros((rows.stop - y, columns.stop - x), dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""Ghosts: holes that somebody left in the background who stood there while it was learned."""
+"""Static foreground (ghosts): holes in the background left by people present while it was learned."""
 
 from __future__ import annotations
 
@@ -21,28 +21,28 @@ _AROUND = (9, 9)
 
 @dataclass(frozen=True, slots=True)
 class StaticForegroundSettings:
-    """When a part of the foreground that never moves is taken into the background.
+    """When foreground that never moves is absorbed into the background.
 
     Raises:
         ValueError: it is looked at in no steps.
     """
 
-    check_every: int = 5  # frames between two looks at what has not moved
-    still_checks: int = 6  # looks in a row without motion before a part is judged
-    settled_after_checks: int = 20  # looks that agree with the background after which it is sure, so that ...
-    settled_still_checks: int = 50  # ... so many looks without motion are needed: furniture, not ghosts
-    motion_threshold: float = 14.0  # gray levels between two looks that count as motion
-    min_outline_share: float = 0.3  # share of a part's outline that must border on the background
+    check_every: int = 5  # frames between two checks of what has not moved
+    still_checks: int = 6  # checks in a row without motion before a region is judged
+    settled_after_checks: int = 20  # checks that agree with the background after which a pixel is settled
+    settled_still_checks: int = 50  # checks without motion needed at settled pixels: furniture, not ghosts
+    motion_threshold: float = 14.0  # gray levels between two checks that count as motion
+    min_outline_share: float = 0.3  # least share of a region's outline that borders on the background
     min_edge_ratio: float = 1.3  # how much sharper an outline is in the background than in the frame
-    min_sharper_share: float = 0.65  # share of the outline towards the background that must be that sharp
-    min_area: int = 40  # square pixels of the working picture; smaller parts are noise
+    min_sharper_share: float = 0.65  # least share of the outline that is sharper in the background
+    min_area: int = 40  # square pixels of the working image; smaller regions are noise
 
     def __post_init__(self) -> None:
         require_at_least_one(self, "check_every")
 
 
 class StaticForegroundFilter:
-    """Tells a ghost from a person who stands still, by the outline.
+    """Distinguishes static foreground (ghosts) from people who stand still, by their outline.
 
     A person's outline is an edge in the frame and not in the background; a ghost's is one in the
     background and not in the frame. Only the outline towards the background says anything: inside the
@@ -58,12 +58,12 @@ class StaticForegroundFilter:
         self._agreed: Mask = np.zeros((1, 1), dtype=np.uint8)
 
     def is_due(self) -> bool:
-        """Count a frame; say whether it is one to look for ghosts in."""
+        """Count a frame; return whether it is one to check."""
         self._frames += 1
         return self._frames % self._settings.check_every == 0
 
     def find(self, image: Image, background: Image, foreground: Mask) -> Mask | None:
-        """Give a mask of the ghosts found in this frame, or `None` where there is none.
+        """Return the mask of static foreground to absorb in this frame, or `None`.
 
         Args:
             image: `(H, W, 3)`, at the gain of the background.
@@ -94,7 +94,7 @@ class StaticForegroundFilter:
     def _judge(
         self, image: Image, background: Image, foreground: Mask, waited: npt.NDArray[np.bool_]
     ) -> Mask | None:
-        """Judge the parts `waited` one by one."""
+        """Check the motionless regions one by one."""
         parts = cv2.morphologyEx(waited.astype(np.uint8), cv2.MORPH_OPEN, _SMALL)
         count, labels, stats, _ = cv2.connectedComponentsWithStats(parts)
         border = cv2.morphologyEx(foreground, cv2.MORPH_GRADIENT, _RING) > 0
@@ -121,7 +121,7 @@ class StaticForegroundFilter:
 
 
 def _contrast(image: Image, inside: Mask, outside: Plane) -> Plane:
-    """Give how much the colors on the two sides of an outline differ around each pixel, `(h, w)`."""
+    """Return the color contrast across an outline around each pixel, `(h, w)`."""
     sides = []
     for side in (inside.astype(np.float32), outside):
         weight = cv2.boxFilter(side, -1, _AROUND, normalize=False, borderType=cv2.BORDER_CONSTANT)

@@ -1,4 +1,4 @@
-"""A neural detector of the user's: any YOLO-style ONNX file, run by onnxruntime on the processor."""
+"""Neural detector: any YOLO-style ONNX network, run by onnxruntime on the CPU."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ class OnnxSettings:
     """
 
     model: Path | None = None  # the file
-    output_layout: Layout = "auto"  # how its output is written; auto: by its shape
-    classes: tuple[int, ...] = (0,)  # the classes that are people; 0 in COCO
-    min_score: float = 0.25  # boxes below this score are left out
-    nms_iou: float = 0.7  # of two boxes that overlap (IoU) by more, the one of lower score is left out
-    input_size: int = 640  # pixels a side that pictures are fitted into, where the file leaves it open
-    threads: int = 1  # threads of one network; there is a process for each camera already
-    max_detections: int = 100  # boxes handed on at most
+    output_layout: Layout = "auto"  # layout of the output: yolov5, yolov8, end2end; auto: by its shape
+    classes: tuple[int, ...] = (0,)  # class numbers of people: 0 in COCO
+    min_score: float = 0.25  # boxes below this score are dropped
+    nms_iou: float = 0.7  # of two boxes that overlap (IoU) more, the one of lower score is dropped
+    input_size: int = 640  # side of the input in pixels, where the file leaves it open
+    threads: int = 1  # threads of the network; each camera has its own process
+    max_detections: int = 100  # boxes per frame at most
 
     def __post_init__(self) -> None:
         if not self.classes or min(self.classes) < 0:
@@ -52,7 +52,7 @@ class OnnxSettings:
 
 
 class OnnxDetector:
-    """Finds people with a network; remembers nothing.
+    """Detects people with an ONNX network, without memory.
 
     Raises:
         ValueError: no file is named, or it is no network that takes a picture and gives boxes as YOLO's do.
@@ -84,7 +84,7 @@ class OnnxDetector:
         return self._looks.bins
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
-        """Give the people of a frame, best first.
+        """Return the people detected in a frame, best first.
 
         Raises:
             ValueError: not an `(H, W, 3)` uint8 picture, or the network's output is not as YOLO's.
@@ -138,7 +138,7 @@ def _opened(model: Path, threads: int) -> Any:
 
 
 def _input_of(session: Any, settings: OnnxSettings) -> tuple[str, tuple[int, int], type[np.floating]]:
-    """Give the input's name, its height and width, and its type."""
+    """Return the input's name, its height and width, and its type."""
     inputs = session.get_inputs()
     shape = list(inputs[0].shape)
     fits = len(inputs) == 1 and len(shape) == _DIMENSIONS and shape[0] in {1, None} | _names(shape[:1])
@@ -151,7 +151,7 @@ def _input_of(session: Any, settings: OnnxSettings) -> tuple[str, tuple[int, int
 
 
 def _names(sides: list[Any]) -> set[Any]:
-    """Give those sides that the file leaves open: they have a name instead of a number."""
+    """Return the dimensions that the file leaves open: they have a name instead of a number."""
     return {side for side in sides if isinstance(side, str)}
 
 

@@ -1,4 +1,4 @@
-"""What YOLO networks write, in its three layouts, as boxes and scores."""
+"""Decoder of YOLO outputs in three layouts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class DecodedBoxes:
 
 
 def decode_output(output: npt.NDArray[np.floating], layout: Layout, classes: Sequence[int]) -> DecodedBoxes:
-    """Read the output of a network; a box scores what the likeliest of the classes asked for does.
+    """Decode the output of a YOLO network; a box scores its likeliest requested class.
 
     | layout | shape | a row |
     | --- | --- | --- |
