@@ -14,7 +14,7 @@ from tracking.types import Detections
 from tracking.window import AppearanceSample, WindowTrack
 
 _MAX_OVERLAP = 0.2
-"""Overlap (IoU) above which somebody else is in the box. Whoever is hidden just now counts too."""
+"""Overlap (IoU) above which another object occludes the box, hidden ones included."""
 
 
 def add_appearance_samples(
@@ -32,22 +32,22 @@ def add_appearance_samples(
     boxes = np.stack([track.interpolated for track in tracks])[:, : len(final)]
     overlaps = np.nan_to_num(iou(boxes[:, None], boxes[None]))
     overlaps[np.arange(len(tracks)), np.arange(len(tracks))] = 0.0
-    alone = overlaps.max(axis=1) <= _MAX_OVERLAP
+    unoccluded = overlaps.max(axis=1) <= _MAX_OVERLAP
     return tuple(
-        replace(track, appearance_samples=_samples_of_runs(mine, row, first, final))
-        for track, mine, row in zip(tracks, alone, states, strict=True)
+        replace(track, appearance_samples=_samples_of_runs(visible, row, first, final))
+        for track, visible, row in zip(tracks, unoccluded, states, strict=True)
     )
 
 
 def _samples_of_runs(
-    alone: NDArray[np.bool_], states: NDArray[np.int64], first: int, final: Sequence[Detections]
+    unoccluded: NDArray[np.bool_], states: NDArray[np.int64], first: int, final: Sequence[Detections]
 ) -> tuple[AppearanceSample, ...]:
     """Return one sample per run of consecutive unoccluded frames."""
     runs: list[tuple[int, list[Floats]]] = []
-    for place, seen in enumerate(final):
-        if not alone[place] or states[place] == OCCLUDED or not seen.histograms.shape[1]:
+    for place, detections in enumerate(final):
+        if not unoccluded[place] or states[place] == OCCLUDED or not detections.histograms.shape[1]:
             continue
-        histogram = seen.histograms[states[place]]
+        histogram = detections.histograms[states[place]]
         if runs and runs[-1][0] + len(runs[-1][1]) == first + place:
             runs[-1][1].append(histogram)
         else:

@@ -73,10 +73,10 @@ def displacement(first: Floats, second: Floats) -> Floats:
 
 
 def normalized_distance(first: Floats, second: Floats) -> Floats:
-    """Return how far somebody goes from one box to another, in mean heights, shape (...).
+    """Return the distance between boxes in mean box heights, shape (...).
 
-    The middle's way across, and the shorter of the ways of head and foot: one of them may be cut off by
-    the border, or hidden by somebody in front.
+    Horizontally between centers, vertically the shorter of head and foot distance: one of them may be cut
+    off by the border, or occluded.
     """
     across = (first[..., 0] + first[..., 2] - second[..., 0] - second[..., 2]) / 2.0
     down = np.minimum(np.abs(first[..., 3] - second[..., 3]), np.abs(first[..., 1] - second[..., 1]))

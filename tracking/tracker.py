@@ -47,7 +47,7 @@ class OnlineTracker:
         self._solver = solver
         # One object alone is a shortest path: dynamic programming is exact.
         self._single = create_solver("separate-dp")
-        self._seen: dict[int, Detections] = {}
+        self._detections: dict[int, Detections] = {}
         self._objects: list[TrackedObject] = []
         self._next_id = 1
         self._warm_start: WindowWarmStart | None = None
@@ -75,10 +75,12 @@ class OnlineTracker:
         if self._last is None:
             self._first = frame
         elif frame - self._last > self._window.forget_after:
-            return self._start_again(frame, detections)
+            return self._restart(frame, detections)
         else:
-            results += [self._solve(end, end - self._window.lag) for end in self._ends(self._last + 1, frame)]
-        self._seen[frame] = detections
+            results += [
+                self._solve(end, end - self._window.lag) for end in self._window_ends(self._last + 1, frame)
+            ]
+        self._detections[frame] = detections
         self._last = frame
         if (frame + 1) % self._window.stride == 0:
             results.append(self._solve(frame, frame - self._window.lag))
@@ -86,9 +88,9 @@ class OnlineTracker:
 
     def flush(self) -> WindowResult | None:
         """End the recording: all frames become final. `None` where they were already."""
-        return merge_results(self._end())
+        return merge_results(self._flush_windows())
 
-    def _start_again(self, frame: int, detections: Detections) -> WindowResult | None:
+    def _restart(self, frame: int, detections: Detections) -> WindowResult | None:
         """Start again after a long gap, with this frame as the first.
 
         No window ends at this frame, so that no result has to span the gap.
@@ -96,16 +98,16 @@ class OnlineTracker:
         result = self.flush()
         self._objects = []
         self._warm_start = None
-        self._seen = {frame: detections}
+        self._detections = {frame: detections}
         self._first = self._last = frame
         return result
 
-    def _end(self) -> list[WindowResult]:
+    def _flush_windows(self) -> list[WindowResult]:
         if self._first is None or self._last is None or self._last < self._first:
             return []
         return [self._solve(self._last, self._last)]
 
-    def _ends(self, start: int, stop: int) -> list[int]:
+    def _window_ends(self, start: int, stop: int) -> list[int]:
         """Return the window ends in `start <= n < stop`."""
         stride = self._window.stride
         return list(range(start + (-(start + 1)) % stride, stop, stride))
@@ -116,34 +118,34 @@ class OnlineTracker:
         numbers = range(first, end + 1)
         frames = [self._frame(number) for number in numbers]
         states, report = self._assign(first, frames)
-        born = self._give_birth(first, frames, states)
-        if born:
+        initiated = self._initiate_tracks(first, frames, states)
+        if initiated:
             states, report = self._assign(first, frames)
         boxes = [select_boxes(row, frames) for row in states]
-        gone = terminated_ids(self._objects, boxes, self._window.duplicate_overlap)
+        ended = terminated_ids(self._objects, boxes, self._window.duplicate_overlap)
         shown = [
             n
             for n, (item, rows) in enumerate(zip(self._objects, boxes, strict=True))
-            if item.id not in gone and not np.isnan(rows).all()
+            if item.id not in ended and not np.isnan(rows).all()
         ]
         tracks = [self._track(self._objects[n], first, states[n], boxes[n], frames) for n in shown]
         final = frames[: max(final_to - first + 1, 0)]
-        looking = add_appearance_samples(tracks, [states[n] for n in shown], first, final)
-        alive = [n for n, item in enumerate(self._objects) if item.id not in gone]
+        sampled = add_appearance_samples(tracks, [states[n] for n in shown], first, final)
+        alive = [n for n, item in enumerate(self._objects) if item.id not in ended]
         self._objects = [self._objects[n] for n in alive]
         self._finish(first, final_to, frames, states[alive])
-        return WindowResult(first, end, max(final_to, first - 1), looking, report)
+        return WindowResult(first, end, max(final_to, first - 1), sampled, report)
 
     def _frame(self, number: int) -> Detections:
-        return self._seen[number] if number in self._seen else Detections.empty(self._bins())
+        return self._detections[number] if number in self._detections else Detections.empty(self._bins())
 
     def _bins(self) -> int:
-        return next((seen.histograms.shape[1] for seen in self._seen.values()), 0)
+        return next((seen.histograms.shape[1] for seen in self._detections.values()), 0)
 
     def _assign(self, first: int, frames: Sequence[Detections]) -> tuple[npt.NDArray[np.int64], SolveReport]:
         """Solve the window for all remembered objects: states `(n, F)`, -1 where hidden."""
         states = np.full((len(self._objects), len(frames)), OCCLUDED, dtype=np.int64)
-        allowed = [self._allowed(item, first, frames) for item in self._objects]
+        allowed = [self._gated_detections(item, first, frames) for item in self._objects]
         # An object that nothing in the window can be is hidden throughout: it need not enter the program.
         inside = [n for n, places in enumerate(allowed) if any(place.any() for place in places)]
         if not inside:
@@ -154,7 +156,7 @@ class OnlineTracker:
         network = restrict_network(
             build_network(templates, frames, self._costs), [allowed[n] for n in inside]
         )
-        network = self._weighed(network, first, ids)
+        network = self._adjust_costs(network, first, ids)
         solution = self._solver.solve(
             network, self._warm_start.for_window(first, ids) if self._warm_start else None
         )
@@ -162,7 +164,7 @@ class OnlineTracker:
         states[inside] = solution.states
         return states, solution.report
 
-    def _allowed(
+    def _gated_detections(
         self, item: TrackedObject, first: int, frames: Sequence[Detections]
     ) -> list[npt.NDArray[np.bool_]]:
         """Return for each frame which detections the object can be, `(K_m,)` bool; nothing: none in any."""
@@ -170,16 +172,16 @@ class OnlineTracker:
             return []
         return [gate_detections(item, first + m, seen, self._window) for m, seen in enumerate(frames)]
 
-    def _weighed(self, network: Network, first: int, ids: list[int]) -> Network:  # noqa: ARG002
+    def _adjust_costs(self, network: Network, first: int, ids: list[int]) -> Network:  # noqa: ARG002
         """Return the network to solve for the objects `ids`; subclasses override it to change costs."""
         return network
 
-    def _number(self, birth: Birth, frame: int) -> int:  # noqa: ARG002
-        """Return an unused id for an object born in this frame."""
+    def _assign_id(self, birth: Birth, frame: int) -> int:  # noqa: ARG002
+        """Return an unused id for an object initiated in this frame."""
         self._next_id += 1
         return self._next_id - 1
 
-    def _give_birth(self, first: int, frames: list[Detections], states: npt.NDArray[np.int64]) -> bool:
+    def _initiate_tracks(self, first: int, frames: list[Detections], states: npt.NDArray[np.int64]) -> bool:
         """Start tracks for new objects; return whether there are any."""
         start = max(len(frames) - self._window.birth_window, 0)
         test = frames[start:]
@@ -191,42 +193,44 @@ class OnlineTracker:
         hidden = {it.id for it, row in zip(self._objects, states, strict=True) if (row == OCCLUDED).all()}
         for birth in find_births(test, taken, self._window, self._costs, self._single):
             frame = first + start + birth.offset
-            if self._come_back(first, frame, birth):
+            if self._reidentify(first, frame, birth):
                 added = True
-            elif self._make_room(first, hidden):
+            elif self._evict_if_full(first, hidden):
                 self._objects.append(
-                    TrackedObject(self._number(birth, frame), birth.histogram, birth.box, frame)
+                    TrackedObject(self._assign_id(birth, frame), birth.histogram, birth.box, frame)
                 )
                 added = True
         return added
 
-    def _come_back(self, first: int, frame: int, birth: Birth) -> bool:
+    def _reidentify(self, first: int, frame: int, birth: Birth) -> bool:
         """Re-identify a birth as a long hidden object of the same appearance; return whether one matched."""
-        away = [
+        hidden_objects = [
             item for item in self._objects if item.frames_occluded(first - 1) > self._window.reidentify_after
         ]
-        if not away or not birth.histogram.size:
+        if not hidden_objects or not birth.histogram.size:
             return False
-        looks = np.stack([item.histogram for item in away])
+        looks = np.stack([item.histogram for item in hidden_objects])
         distances = appearance_distance(birth.histogram[None], looks, self._costs.measure)[0]
         best = int(np.argmin(distances))
         if distances[best] > self._window.reidentify_max_distance:
             return False
-        away[best].restart_at(birth.box, frame)
+        hidden_objects[best].restart_at(birth.box, frame)
         return True
 
-    def _make_room(self, frame: int, hidden: Collection[int]) -> bool:
+    def _evict_if_full(self, frame: int, hidden: Collection[int]) -> bool:
         """Remove the longest hidden object where the list is full; return whether there is room.
 
         `hidden` has the ids of all who are in this window; who has come back in it is not any more.
         """
         if len(self._objects) < self._window.max_objects:
             return True
-        away = [item for item in self._objects if item.id in hidden and item.frames_occluded(frame) > 0]
-        if away:
+        hidden_objects = [
+            item for item in self._objects if item.id in hidden and item.frames_occluded(frame) > 0
+        ]
+        if hidden_objects:
             # `max` takes the first of equals: the lowest id.
-            self._objects.remove(max(away, key=lambda item: item.frames_occluded(frame)))
-        return bool(away)
+            self._objects.remove(max(hidden_objects, key=lambda item: item.frames_occluded(frame)))
+        return bool(hidden_objects)
 
     def _track(
         self,
@@ -259,5 +263,5 @@ class OnlineTracker:
                     )
         forget_after = self._window.forget_after
         self._objects = [item for item in self._objects if item.frames_occluded(final_to) <= forget_after]
-        self._seen = {number: seen for number, seen in self._seen.items() if number > final_to}
+        self._detections = {number: seen for number, seen in self._detections.items() if number > final_to}
         self._first = final_to + 1

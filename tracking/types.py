@@ -47,8 +47,8 @@ class Detections:
 
 
 RiskReason = Literal["alike", "exchange", "fading", "gap"]
-"""Why: two who look alike are about to cross; two could just as well have exchanged their identities;
-somebody fades into the background; the window's answer is not proven to be the best one."""
+"""`alike`: two similar objects are about to cross; `exchange`: two could as well have swapped identities;
+`fading`: an object fades into the background; `gap`: the window's solution is not proven optimal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,15 +56,14 @@ class RiskEvent:
     """A predicted identity failure. Consecutive windows repeat the same event.
 
     Attributes:
-        reason: why.
-        objects: the ids of the one or two tracks that it is about; first whom to point at.
+        reason: the kind of failure.
+        objects: the ids of the one or two tracks concerned; the first is the one to correct.
         frame: when it is expected. The newest frame or later for what is ahead; within the window for what
             has been seen to be doubtful (`exchange`: where the identities would part): pictures are shown
             later than they are tracked, so that it may still be ahead of who looks at them.
-        margin: how sure the tracker is, as a cost: 0 is undecided.
-        length: frames for which the two are in each other's way, or somebody is hidden.
-        risk: how likely it is to go wrong unless somebody helps, in [0, 1]: what troubles of all reasons are
-            compared by.
+        margin: certainty of the tracker, as a cost: 0 is undecided.
+        length: frames for which the two overlap, or an object is hidden.
+        risk: probability of the failure without help, in [0, 1]; comparable between reasons.
     """
 
     reason: RiskReason

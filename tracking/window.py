@@ -89,10 +89,10 @@ class WindowTrack:
     Attributes:
         id: the object's number: from 1 in each tracker, never used again.
         boxes: `(F, 4)` pixels, one row per frame of the window, NaN where the object is hidden.
-        bridged: `(F, 4)` the same, with the gaps of up to `bridge` frames filled: where it probably is.
+        interpolated: `(F, 4)` the same, with gaps of up to `max_interpolated_gap` frames interpolated.
         histogram: `(B,)`, its template.
         confidence: mean score of its boxes over the window, 0 where hidden; in [0, 1].
-        looks: where nobody else was in its boxes, in the frames up to `final_to`; in their order.
+        appearance_samples: mean histograms over unoccluded frames up to `final_to`, in order.
     """
 
     id: int
@@ -114,9 +114,9 @@ class WindowResult:
             An object of which no frame is final yet may still vanish.
         tracks: the objects that are seen in any of the frames, by ascending id.
         report: what the solver has proven about the last window.
-        risk_events: what the newest window foresees, the worst first; only where the tracker is set to.
-        revised_from: the first frame that was final and has changed after all, since somebody was pointed at:
-            all frames from `first` on are to be taken anew. None: nothing that was final has changed.
+        risk_events: predicted identity failures, the riskiest first; only of an `InteractiveTracker`.
+        revised_from: the first final frame changed by an operator's correction: all frames from `first` on
+            replace earlier results. None: no final frame has changed.
     """
 
     first: int
@@ -143,13 +143,15 @@ def merge_results(results: list[WindowResult]) -> WindowResult | None:
         for track in result.tracks:
             nowhere = np.full((newest.last - first + 1, BOX_SIDES), np.nan)
             known = tracks.get(track.id)
-            boxes, bridges = (known.boxes, known.interpolated) if known else (nowhere, nowhere.copy())
+            boxes, interpolated = (known.boxes, known.interpolated) if known else (nowhere, nowhere.copy())
             boxes[window] = track.boxes[: kept - result.first + 1]
-            bridges[window] = track.interpolated[: kept - result.first + 1]
-            looks = (
+            interpolated[window] = track.interpolated[: kept - result.first + 1]
+            samples = (
                 (*known.appearance_samples, *track.appearance_samples) if known else track.appearance_samples
             )
-            tracks[track.id] = replace(track, boxes=boxes, interpolated=bridges, appearance_samples=looks)
+            tracks[track.id] = replace(
+                track, boxes=boxes, interpolated=interpolated, appearance_samples=samples
+            )
     seen = [tracks[id_] for id_ in sorted(tracks) if not np.isnan(tracks[id_].boxes).all()]
     return replace(newest, first=first, tracks=tuple(seen))
 

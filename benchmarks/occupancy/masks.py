@@ -57,7 +57,7 @@ def masks_of(config: Config, camera: str) -> Masks:
     if not isinstance(detector, BackgroundDetector):
         raise CannotMapError(f"camera {camera} is not searched by its background")
     heard = _Heard(detector)
-    detector._hypotheses = heard  # type: ignore[method-assign]  # noqa: SLF001
+    detector._fit = heard  # type: ignore[method-assign]  # noqa: SLF001
     foreground: list[Mask | None] = []
     shadow: list[Mask | None] = []
     for pulse in count():
@@ -80,7 +80,7 @@ class _Heard:
     """Stands before a detector's search for people, and keeps what that is given."""
 
     def __init__(self, detector: BackgroundDetector) -> None:
-        self._search = detector._hypotheses  # noqa: SLF001
+        self._search = detector._fit  # noqa: SLF001
         self._last: tuple[Mask | None, Mask | None] = (None, None)
         self.grid: CellGrid | None = None
 

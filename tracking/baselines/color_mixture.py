@@ -19,12 +19,12 @@ from tracking.detectors.base import Image, Plane
 _STEP = 8
 _LEVELS = 256 // _STEP
 COLOR_CODES = _LEVELS**3
-_LEAST = _STEP**2 / 2
+_MIN_VARIANCE = _STEP**2 / 2
 """Added to the variance of every channel: no color is surer than a step is wide."""
-_MOST_PIXELS = 1000
+_MAX_PIXELS = 1000
 """That a mixture is fitted to, spread evenly over those that there are."""
-_ROUNDS = 20
-_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, _ROUNDS, 1e-2)
+_MAX_ITERATIONS = 20
+_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, _MAX_ITERATIONS, 1e-2)
 
 _axis = np.arange(_LEVELS) * float(_STEP) + (_STEP - 1) / 2
 CODE_COLORS: Floats = np.stack(np.meshgrid(_axis, _axis, _axis, indexing="ij"), axis=-1).reshape(
@@ -62,9 +62,9 @@ def fit_mixture(pixels: Image, parts: int) -> GaussianMixture:
     It begins with groups along the axis on which they differ most, not by chance: the same pixels give the
     same mixture.
     """
-    spread = np.linspace(0, len(pixels) - 1, min(len(pixels), _MOST_PIXELS)).astype(np.int64)
+    spread = np.linspace(0, len(pixels) - 1, min(len(pixels), _MAX_PIXELS)).astype(np.int64)
     colors = pixels[spread].astype(np.float64)
-    everywhere = np.cov(colors.T, bias=True) + _LEAST * np.eye(3)
+    everywhere = np.cov(colors.T, bias=True) + _MIN_VARIANCE * np.eye(3)
     if len(colors) < 2 * parts:
         return GaussianMixture(np.ones(1), colors.mean(axis=0)[None], everywhere[None])
     along = colors @ np.linalg.eigh(everywhere).eigenvectors[:, -1]
@@ -77,7 +77,9 @@ def fit_mixture(pixels: Image, parts: int) -> GaussianMixture:
     model.trainM(colors, belongs)
     covariances = np.stack([np.asarray(it, dtype=np.float64) for it in model.getCovs()])
     shares = np.asarray(model.getWeights(), dtype=np.float64).ravel()
-    return GaussianMixture(shares, np.asarray(model.getMeans(), np.float64), covariances + _LEAST * np.eye(3))
+    return GaussianMixture(
+        shares, np.asarray(model.getMeans(), np.float64), covariances + _MIN_VARIANCE * np.eye(3)
+    )
 
 
 def color_codes(image: Image) -> NDArray[np.int32]:

@@ -1,7 +1,7 @@
 """Prediction by a Kalman filter on boxes (SORT: Bewley et al., ICIP 2016).
 
-The state is the box's middle, its area and its aspect, and the velocities of all but the aspect; a detection
-measures the first four. Nothing in the picture is looked at.
+The state is the box's center, area and aspect ratio, and the velocities of all but the aspect ratio; a
+detection measures the first four. The image is not used.
 """
 
 from __future__ import annotations

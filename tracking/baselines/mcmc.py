@@ -1,9 +1,9 @@
 """One filter for all objects: MCMC with an interaction prior (Khan, Balch, Dellaert, ECCV 2004).
 
-A sample is everybody's state at once. In each picture the Markov chain starts at a sample of the last one,
-everybody having gone on. Then one object at a time, drawn at random, is proposed to go on otherwise, which is
-accepted with probability min(1, ratio) of `exp(-λ d²) Π exp(-g overlap)`: the colors' likelihood times the
-pairwise prior by which two objects seldom share a place. Samples after the burn-in are the next picture's.
+A sample is the joint state of all targets. In each image the Markov chain starts at a propagated sample of
+the previous image. Then one target at a time, drawn at random, is proposed to move differently, which is
+accepted with probability min(1, ratio) of `exp(-λ d²) Π exp(-g overlap)`: the color likelihood times the
+pairwise prior against overlapping targets. Samples after the burn-in are kept for the next image.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from tracking.baselines.particle_filter import initial_state, particle_boxes, pr
 from tracking.boxes import BOX_SIDES, Floats, iou
 from tracking.detectors.base import Image
 
-_LAMBDA, _APART = 20.0, 8.0
-_LOST = 0.5
-"""Mean squared distance above which nobody of these colors is there."""
+_LAMBDA, _OVERLAP_WEIGHT = 20.0, 8.0
+_MAX_DISTANCE = 0.5
+"""Mean squared color distance above which a target counts as lost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class McmcSettings:
 
 @dataclass(slots=True)
 class McmcTarget:
-    """Somebody who is followed.
+    """State of one target.
 
     Attributes:
         colors: `(2, 64)` of the upper and the lower half.
@@ -64,7 +64,7 @@ class McmcTarget:
 
 
 class McmcFilter:
-    """Everybody jointly: who is near somebody else is pushed away from them."""
+    """Joint particle filter of all targets with a pairwise prior against overlaps."""
 
     name = "mcmc"
     uses_image = True
@@ -90,7 +90,7 @@ class McmcFilter:
         for row, item in enumerate(objects):
             item.states = samples[:, row]
             item.box = particle_boxes(item.states.mean(axis=0), item.aspect)
-            if float(distances[:, row].mean()) <= _LOST:
+            if float(distances[:, row].mean()) <= _MAX_DISTANCE:
                 boxes[row] = item.box
         return boxes
 
@@ -104,16 +104,16 @@ class McmcFilter:
         """Run the chain; return its samples `(P, N, 5)` and color distances `(P, N)`."""
         count, plan, rng = len(objects), self._settings, self._rng
         steps = (plan.burn_in + plan.thinning * plan.samples) * count
-        who = rng.integers(count, size=steps)
-        # A proposal does not depend on where the chain is: all of them are drawn, and compared, at once.
-        proposed = propagate(rng, before[rng.integers(len(before), size=steps), who])
+        moving = rng.integers(count, size=steps)
+        # A proposal does not depend on the chain's state: all are drawn and compared at once.
+        proposed = propagate(rng, before[rng.integers(len(before), size=steps), moving])
         aspects = np.array([item.aspect for item in objects])
-        boxes = particle_boxes(proposed, aspects[who])
+        boxes = particle_boxes(proposed, aspects[moving])
         far = np.empty(steps)
         for row, item in enumerate(objects):
-            mine = who == row
+            mine = moving == row
             far[mine] = color_distance(field, boxes[mine], item.colors)
-        luck = np.log(rng.random(steps))
+        log_uniform = np.log(rng.random(steps))
         now = propagate(rng, before[rng.integers(len(before))])
         places = particle_boxes(now, aspects)
         unlike_now = np.array(
@@ -121,12 +121,12 @@ class McmcFilter:
         )
         kept, distances = np.empty((plan.samples, count, now.shape[1])), np.empty((plan.samples, count))
         for step in range(steps):
-            n = who[step]
+            n = moving[step]
             gain = _LAMBDA * (unlike_now[n] - far[step])
             if count > 1:
                 others = np.delete(places, n, axis=0)
-                gain += _APART * float((iou(places[n], others) - iou(boxes[step], others)).sum())
-            if luck[step] < gain:
+                gain += _OVERLAP_WEIGHT * float((iou(places[n], others) - iou(boxes[step], others)).sum())
+            if log_uniform[step] < gain:
                 now[n], places[n], unlike_now[n] = proposed[step], boxes[step], far[step]
             place, rest = divmod(step + 1 - plan.burn_in * count, plan.thinning * count)
             if place >= 1 and not rest:

@@ -1,8 +1,8 @@
 """Prediction by mean shift on color back-projection (Comaniciu et al. 2000; Bradski 1998).
 
-A histogram over hue and saturation is taken of the middle of the box that somebody begins with, over that of
-the ring around it: colors that the background has as well say little. The box goes to where the pixels of
-these colors are densest. It keeps its size.
+A histogram over hue and saturation is taken of the core of the first box, divided by that of the ring
+around it: colors that the background shares count little. The box moves to the densest pixels of these
+colors. It keeps its size.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _CORE, _RING = 0.6, 1.6
 """Of a box, its middle; and what surrounds it, as a multiple of its sides."""
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.5)
 _FLOOR = 1e-3
-_LEAST = 0.05
+_MIN_PROBABILITY = 0.05
 """Mean probability in a box below which nobody of these colors is there."""
 
 
@@ -43,7 +43,7 @@ class MeanShift:
     def initialize(self, image: Image, box: Floats) -> MeanShiftTarget:
         """Create a target with the colors in its box."""
         space = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
-        mine, around = (_histogram(space, _scaled(box, share)) for share in (_CORE, _RING))
+        mine, around = (_histogram(space, _scale_box(box, share)) for share in (_CORE, _RING))
         ratio = np.minimum(mine / np.maximum(around, _FLOOR), 1.0) * (mine > _FLOOR)
         return MeanShiftTarget((255.0 * ratio).astype(np.float32), box.copy())
 
@@ -59,7 +59,7 @@ class MeanShift:
             wide, tall = (max(round(it), 1) for it in item.box[2:] - item.box[:2])
             _, (x, y, width, height) = cv2.meanShift(likely, (left, top, wide, tall), _STOP)
             inside = likely[max(y, 0) : y + height, max(x, 0) : x + width]
-            if inside.size and float(inside.mean()) >= 255 * _LEAST:
+            if inside.size and float(inside.mean()) >= 255 * _MIN_PROBABILITY:
                 size = item.box[2:] - item.box[:2]
                 middle = np.array([x + width / 2, y + height / 2])
                 item.box = boxes[row] = np.concatenate([middle - size / 2, middle + size / 2])
@@ -70,7 +70,7 @@ class MeanShift:
         return known.box
 
 
-def _scaled(box: Floats, share: float) -> Floats:
+def _scale_box(box: Floats, share: float) -> Floats:
     middle, half = (box[:2] + box[2:]) / 2, share * (box[2:] - box[:2]) / 2
     return np.asarray(np.concatenate([middle - half, middle + half]))
 

@@ -1,9 +1,9 @@
 """Occlusion as particles: the second cue of occlusion cues (Todor 2009, chapter 9).
 
-A particle holds the share of somebody that each other object hides, at least 0 and together at most 1; what
-is left is their own. The thesis leaves open how that is kept for more than two objects. Here a particle has
-one share for each object that is near, whoever comes near begins with 0, and after the noise shares below 0
-are 0 and shares that are more than all of somebody are scaled to all of them.
+A particle holds the share of the target that each other target hides, at least 0 and together at most 1;
+the rest is visible. The thesis leaves open how this holds for more than two targets. Here a particle has
+one share for each nearby target, a new neighbor starts at 0, and after adding noise, shares below 0 are
+clipped and a sum above 1 is scaled to 1.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
 """Two coupled particle filters per target: position and occlusion (Todor 2009, ch. 9).
 
-A position is a window. How well it shows an object is the mean of `p(O|I)` over its pixels less the mean over
-the ring around it, O and the background being mixtures of Gaussians over color. An occlusion says what share
-of somebody others hide. A window and an occlusion together are worth `S = Σ q_k S_k`: who is half hidden
-looks half like who hides them. Each particle of one filter is weighed by `exp(λ S - μ hidden)`, averaged over
-the particles of the other by their weights (the thesis draws one of them). The second term draws everybody
-back to where they are not hidden; who is hidden is looked for further around, as their place is not seen.
+A position is a window. Its visibility is the mean of `p(O|I)` over its pixels minus the mean over the
+surrounding ring, where O and the background are mixtures of Gaussians over color. An occlusion is the share
+of the target that each other target hides. A window with an occlusion has the visibility `S = Σ q_k S_k`: a
+half hidden target looks half like its occluder. Each particle of one filter is weighted by `exp(λ S - μ
+hidden)`, averaged over the particles of the other filter by their weights (the thesis draws one of them).
+The second term favors unoccluded positions. Hidden targets are searched in a wider area, since their
+position is not observed.
 """
 
 from __future__ import annotations
@@ -46,12 +47,12 @@ class CenterSurroundIntegral:
 
     def contrast(self, windows: Floats) -> Floats:
         """Return the mean inside windows `(..., 4)` minus the mean in their surrounding rings, `(..., N)`."""
-        inside, pixels = self._summed(windows)
-        around, all_pixels = self._summed(add_ring(windows))
+        inside, pixels = self._sums_over(windows)
+        around, all_pixels = self._sums_over(add_ring(windows))
         ring = (around - inside) / np.maximum(all_pixels - pixels, 1.0)
         return np.asarray(inside / np.maximum(pixels, 1.0) - ring)
 
-    def _summed(self, windows: Floats) -> tuple[Floats, Floats]:
+    def _sums_over(self, windows: Floats) -> tuple[Floats, Floats]:
         """Return the sums over windows, `(..., N)`, and their pixel counts, `(..., 1)`."""
         whole = np.clip(np.rint(windows) - self._corner, 0, self._limits).astype(np.int64)
         left, top, right, bottom = np.moveaxis(whole, -1, 0)
@@ -81,7 +82,7 @@ class OcclusionCueSettings:
     sharpness: float = 20.0  # λ
     occlusion_penalty: float = 8.0  # μ: against being hidden
     occlusion_noise: float = 0.1  # of a share, from picture to picture
-    jump_share: float = 0.1  # share of its particles that is seen again, and share that is hidden, at once
+    jump_share: float = 0.1  # share of particles that become visible, and share that become hidden, per image
     occluded_search_noise: float = 0.1  # noise of a place for each share that is hidden, in heights
     min_visibility: float = 0.05  # S below which nobody of these colors is there
     background_refresh_frames: int = 250  # pictures after which the background is fitted again
@@ -104,7 +105,7 @@ class OcclusionCueSettings:
 
 @dataclass(slots=True)
 class OcclusionCueTarget:
-    """Somebody who is followed.
+    """State of one target.
 
     Attributes:
         id: nobody else has it.
@@ -137,16 +138,16 @@ class OcclusionCues:
         self._settings = settings or OcclusionCueSettings()
         self._rng = np.random.default_rng(self._settings.seed)
         self._numbers = count(1)
-        self._behind: Floats | None = None
+        self._background: Floats | None = None
         """`(COLORS,)`, p(I|B)."""
-        self._age = 0
+        self._background_age = 0
 
     def initialize(self, image: Image, box: Floats) -> OcclusionCueTarget:
         """Create a target: fit its color mixture to the core of its box and put all particles there."""
         plan, (start, aspect) = self._settings, initial_state(box)
-        if self._behind is None:
+        if self._background is None:
             self._learn_background(image, [box])
-        likely = fit_mixture(_inside(image, core_boxes(box)), plan.components).densities(CODE_COLORS)
+        likely = fit_mixture(_pixels_inside(image, core_boxes(box)), plan.components).densities(CODE_COLORS)
         states, weights = np.tile(start, (plan.particles, 1)), np.full(plan.particles, 1.0 / plan.particles)
         shares = OccluderParticles.unoccluded(plan.particles)
         return OcclusionCueTarget(
@@ -158,15 +159,15 @@ class OcclusionCues:
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None:
             return boxes
-        self._age += 1
-        if objects and self._age > self._settings.background_refresh_frames:
+        self._background_age += 1
+        if objects and self._background_age > self._settings.background_refresh_frames:
             self._learn_background(image, [item.box for item in objects])
             for item in objects:
                 item.color_posterior = self._posterior(item.color_likelihood)
-        seen = [self._go_on(image, item, objects) for item in objects]
-        for row, (item, worth) in enumerate(zip(objects, seen, strict=True)):
+        visibilities = [self._advance(image, item, objects) for item in objects]
+        for row, (item, visibility) in enumerate(zip(objects, visibilities, strict=True)):
             item.box = particle_boxes(item.weights @ item.states, item.aspect)
-            if worth >= self._settings.min_visibility:
+            if visibility >= self._settings.min_visibility:
                 boxes[row] = item.box
         return boxes
 
@@ -181,15 +182,17 @@ class OcclusionCues:
             left, top, right, bottom = np.maximum(np.rint(add_ring(box)), 0).astype(int).tolist()
             free[top:bottom, left:right] = False
         pixels = image[free] if free.any() else image.reshape(-1, 3)
-        self._behind, self._age = (
+        self._background, self._background_age = (
             fit_mixture(pixels, self._settings.background_components).densities(CODE_COLORS),
             0,
         )
 
     def _posterior(self, likely: Floats) -> Plane:
-        return posterior(likely, likely if self._behind is None else self._behind, RING_AREA_RATIO)
+        return posterior(likely, likely if self._background is None else self._background, RING_AREA_RATIO)
 
-    def _go_on(self, image: Image, item: OcclusionCueTarget, objects: Sequence[OcclusionCueTarget]) -> float:
+    def _advance(
+        self, image: Image, item: OcclusionCueTarget, objects: Sequence[OcclusionCueTarget]
+    ) -> float:
         """Advance and weigh one target's two filters; return how visible it is, S."""
         plan = self._settings
         states, item.weights = resample_if_degenerate(self._rng, item.states, item.weights)
@@ -204,20 +207,20 @@ class OcclusionCues:
         windows = particle_boxes(item.states, item.aspect)
         wide = add_ring(windows)
         area = np.concatenate([wide[:, :2].min(axis=0), wide[:, 2:].max(axis=0)])
-        near = [it for it in objects if it is not item and _touch(it.box, area)]
+        near = [it for it in objects if it is not item and _intersects(it.box, area)]
         item.occluders.propagate(self._rng, [it.id for it in near], plan.occlusion_noise, plan.jump_share)
-        worths = _worths(image, area, windows, [item, *near])
+        worths = _contrasts(image, area, windows, [item, *near])
         pairs = worths @ item.occluders.visible_and_hidden_shares.T
         good = np.exp(
             plan.sharpness * (pairs - pairs.max()) - plan.occlusion_penalty * item.occluders.hidden_share
         )
         before = item.weights, item.occluders.weights
-        item.weights = _normal(before[0] * (good @ before[1]))
-        item.occluders.weights = _normal(before[1] * (before[0] @ good))
+        item.weights = _normalized(before[0] * (good @ before[1]))
+        item.occluders.weights = _normalized(before[1] * (before[0] @ good))
         return float(item.weights @ pairs @ item.occluders.weights)
 
 
-def _inside(image: Image, box: Floats) -> Image:
+def _pixels_inside(image: Image, box: Floats) -> Image:
     """Return the pixels `(N, 3)` of a box `(4,)`; the nearest pixel for a box outside the image."""
     high, wide = image.shape[:2]
     left, top = np.clip(np.rint(box[:2]), 0, [wide - 1, high - 1]).astype(int).tolist()
@@ -225,11 +228,11 @@ def _inside(image: Image, box: Floats) -> Image:
     return np.ascontiguousarray(image[top:bottom, left:right]).reshape(-1, 3)
 
 
-def _touch(box: Floats, area: Floats) -> bool:
+def _intersects(box: Floats, area: Floats) -> bool:
     return bool((box[:2] < area[2:]).all() and (area[:2] < box[2:]).all())
 
 
-def _worths(image: Image, area: Floats, windows: Floats, objects: Sequence[OcclusionCueTarget]) -> Floats:
+def _contrasts(image: Image, area: Floats, windows: Floats, objects: Sequence[OcclusionCueTarget]) -> Floats:
     """Compute the center-surround contrast of each object in windows `(P, 4)`: `(P, N)`."""
     high, wide = image.shape[:2]
     left, top = np.clip(np.floor(area[:2]), 0, [wide, high]).astype(int).tolist()
@@ -239,5 +242,5 @@ def _worths(image: Image, area: Floats, windows: Floats, objects: Sequence[Occlu
     return CenterSurroundIntegral(likely, left, top).contrast(windows)
 
 
-def _normal(weights: Floats) -> Floats:
+def _normalized(weights: Floats) -> Floats:
     return np.asarray(weights / weights.sum())

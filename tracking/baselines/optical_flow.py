@@ -1,7 +1,7 @@
-"""Prediction by KLT optical flow of corners (Lucas, Kanade 1981; Shi, Tomasi 1994; Kalal et al. 2010).
+"""Prediction by KLT optical flow of corners (Lucas, Kanade 1981; Shi, Tomasi 1994; Kalal et al., ICPR 2010).
 
-The corners in a box are followed from picture to picture and back. Those that come back to where they were
-move the box by the median of their steps, and grow it by the median of how distances between them change.
+The corners in a box are tracked to the next image and back. Those that return to their start move the box
+by the median of their steps, and scale it by the median change of the distances between them.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Image, Mask, Plane
 
 _CORNERS = 40
-_QUALITY, _BETWEEN = 0.01, 3.0
+_QUALITY, _MIN_CORNER_DISTANCE = 0.01, 3.0
 """Of the best corner's; and pixels between two corners."""
 _WINDOW, _LEVELS = (11, 11), 3
-_RETURNS = 1.0
+_MAX_RETURN_ERROR = 1.0
 """Pixels from its place at which a corner that was followed back must end."""
-_LEAST = 4
+_MIN_CORNERS = 4
 """Corners that a step is told from."""
-_INSIDE = 0.15
+_BORDER_SHARE = 0.15
 """Of a box's width on either side in which its corners are the background's."""
-_GROWS = 1.1
+_MAX_GROWTH = 1.1
 """Factor by which a box may change from one picture to the next."""
 
 
 @dataclass(slots=True)
 class FlowTarget:
-    """Somebody who is followed."""
+    """State of one target: its box."""
 
     box: Floats
 
 
 class OpticalFlow:
-    """The median of the flow of a box's corners."""
+    """Moves a box by the median optical flow of its corners."""
 
     name = "klt"
     uses_image = True
@@ -60,7 +60,7 @@ class OpticalFlow:
         if before is None or before.shape != now.shape:
             return boxes
         for row, item in enumerate(objects):
-            moved = _followed(before, now, item.box)
+            moved = _tracked_box(before, now, item.box)
             if moved is not None:
                 boxes[row] = item.box = moved
         return boxes
@@ -70,24 +70,24 @@ class OpticalFlow:
         return known.box
 
 
-def _followed(before: Mask, now: Mask, box: Floats) -> Floats | None:
+def _tracked_box(before: Mask, now: Mask, box: Floats) -> Floats | None:
     """Return the box `(4,)` moved to the next image, or `None` where too few corners were tracked."""
     mask = np.zeros_like(before)
-    inset = _INSIDE * (box[2] - box[0])
+    inset = _BORDER_SHARE * (box[2] - box[0])
     left, right = round(box[0] + inset), round(box[2] - inset)
     mask[max(round(box[1]), 0) : max(round(box[3]), 0), max(left, 0) : max(right, 0)] = 255
-    found = cv2.goodFeaturesToTrack(before, _CORNERS, _QUALITY, _BETWEEN, mask=mask)
-    if found is None or len(found) < _LEAST:
+    found = cv2.goodFeaturesToTrack(before, _CORNERS, _QUALITY, _MIN_CORNER_DISTANCE, mask=mask)
+    if found is None or len(found) < _MIN_CORNERS:
         return None
     corners = np.asarray(found, dtype=np.float32)
     there, reached = _flow(before, now, corners)
     back, returned = _flow(now, before, there)
     start, end = corners[:, 0], there[:, 0]
-    kept = reached & returned & (np.hypot(*(back[:, 0] - start).T) <= _RETURNS)
-    if np.count_nonzero(kept) < _LEAST:
+    kept = reached & returned & (np.hypot(*(back[:, 0] - start).T) <= _MAX_RETURN_ERROR)
+    if np.count_nonzero(kept) < _MIN_CORNERS:
         return None
     start, end = start[kept].astype(np.float64), end[kept].astype(np.float64)
-    scale = float(np.clip(_growth(start, end), 1 / _GROWS, _GROWS))
+    scale = float(np.clip(_growth(start, end), 1 / _MAX_GROWTH, _MAX_GROWTH))
     middle = (box[:2] + box[2:]) / 2 + np.median(end - start, axis=0)
     half = scale * (box[2:] - box[:2]) / 2
     return np.concatenate([middle - half, middle + half])
@@ -106,5 +106,5 @@ def _growth(start: Floats, end: Floats) -> float:
     first, second = np.triu_indices(len(start), 1)
     was = np.hypot(*(start[first] - start[second]).T)
     now = np.hypot(*(end[first] - end[second]).T)
-    apart = was > _BETWEEN
+    apart = was > _MIN_CORNER_DISTANCE
     return float(np.median(now[apart] / was[apart])) if apart.any() else 1.0

@@ -1,9 +1,9 @@
 """Independent color particle filters (Pérez et al., ECCV 2002; Nummiaro et al. 2003).
 
-A particle is a box: its middle, its height and the step that it took. It goes on as it went, with noise that
-grows with its height, and weighs `exp(-λ d²)`, d being the Bhattacharyya distance of the colors in its upper
-and lower halves from those that the object began with. Particles are drawn anew by their weights when
-fewer than half of them count. Filters know nothing of each other.
+A particle is a box: center, height and velocity. It is propagated with noise that grows with its height,
+and weighted by `exp(-λ d²)`, where d is the Bhattacharyya distance of the colors in its upper and lower
+halves from the target's first ones. Particles are resampled when their effective number falls below half.
+Filters do not interact.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Image
 
 _LAMBDA = 20.0
-_STEP, _GROW = 0.04, 0.01
+_STEP_NOISE, _HEIGHT_NOISE = 0.04, 0.01
 """Noise of a step and of the height, in heights."""
-_GOES_ON = 0.8
+_DAMPING = 0.8
 """Of a step, what the next one keeps."""
-_LOST = 0.5
+_MAX_DISTANCE = 0.5
 """Mean squared distance above which nobody of these colors is among the particles."""
 
 
@@ -45,7 +45,7 @@ class ParticleSettings:
 
 @dataclass(slots=True)
 class ParticleTarget:
-    """Somebody who is followed.
+    """State of one target.
 
     Attributes:
         colors: `(2, 64)` of the upper and the lower half.
@@ -63,7 +63,7 @@ class ParticleTarget:
 
 
 class ParticleFilters:
-    """Independent filters, the basic tracker of the survey."""
+    """Independent particle filters, the survey's basic tracker."""
 
     name = "particle"
     uses_image = True
@@ -87,13 +87,13 @@ class ParticleFilters:
         if image is None:
             return boxes
         for row, item in enumerate(objects):
-            self._go_on(item)
+            self._propagate(item)
             distance = color_distance(
                 self._colors.get(image), particle_boxes(item.states, item.aspect), item.colors
             )
             item.weights = reweight(item.weights, distance, _LAMBDA)
             item.box = particle_boxes(item.weights @ item.states, item.aspect)
-            if float(item.weights @ distance) <= _LOST:
+            if float(item.weights @ distance) <= _MAX_DISTANCE:
                 boxes[row] = item.box
         return boxes
 
@@ -101,7 +101,7 @@ class ParticleFilters:
         """Return the target's own box: a detection does not move it."""
         return known.box
 
-    def _go_on(self, item: ParticleTarget) -> None:
+    def _propagate(self, item: ParticleTarget) -> None:
         """Resample where needed, and propagate the particles."""
         states, item.weights = resample_if_degenerate(self._rng, item.states, item.weights)
         item.states = propagate(self._rng, states)
@@ -116,7 +116,7 @@ def initial_state(box: Floats) -> tuple[Floats, float]:
 
 def reweight(weights: Floats, distance: Floats, sharpness: float) -> Floats:
     """Multiply particle weights `(P,)` by their likelihood of distances `(P,)`, and normalize them."""
-    # Relative to the nearest: what all of them lack, a shadow or a passer-by, is no weight.
+    # Relative to the best particle: what all lack (a shadow, an occluder) does not count.
     anew = weights * np.exp(-sharpness * (distance - distance.min()))
     return np.asarray(anew / anew.sum())
 
@@ -125,9 +125,9 @@ def propagate(rng: np.random.Generator, states: Floats) -> Floats:
     """Propagate particles `(..., 5)` with their velocity and noise."""
     noise = rng.standard_normal((*states.shape[:-1], 3)) * states[..., 2:3]
     moved = states.copy()
-    moved[..., 3:] = _GOES_ON * states[..., 3:] + _STEP * noise[..., :2]
+    moved[..., 3:] = _DAMPING * states[..., 3:] + _STEP_NOISE * noise[..., :2]
     moved[..., :2] += moved[..., 3:]
-    moved[..., 2] = np.maximum(states[..., 2] + _GROW * noise[..., 2], 1.0)
+    moved[..., 2] = np.maximum(states[..., 2] + _HEIGHT_NOISE * noise[..., 2], 1.0)
     return moved
 
 

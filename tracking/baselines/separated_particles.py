@@ -1,13 +1,14 @@
 """Particle filters with an overlap factor between similar targets (Todor 2009, section 8.3).
 
-A particle weighs `exp(-λ Σ D²)`, summed over the parts of its box (the middle of it, where somebody is) and
-the three color channels, D² being one less the Bhattacharyya coefficient of a part's histogram and that of
-the same part of the box that the object began with.
+A particle has the weight `exp(-λ Σ D²)`, summed over the parts of its box's core and the three color
+channels; D² is one minus the Bhattacharyya coefficient of a part's histogram and its reference from the
+first box.
 
-Where particles of several objects are, each weighs the square of its overlap factor as well, so that two
-alike do not end on the same one of them: the kidnapping of independent filters. Somebody who is less like
-themselves than they were at first is behind somebody dressed otherwise. Nothing then drives them away, or
-they would flee to the next who is dressed like them.
+A particle's weight is also multiplied by the square of its overlap factor: the share of its target's own
+particles among all particles in its cell. So two similar targets do not end on the same person
+("kidnapping" of independent filters). A target that looks less like its reference than in its first images
+is occluded; the overlap factor is then not applied, since it would push the target to the next similar
+person.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from tracking.baselines.particle_filter import (
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Image
 
-_LOST = 0.5
+_MAX_DISTANCE = 0.5
 """Mean D² above which nobody of these colors is among the particles."""
 
 
@@ -75,7 +76,7 @@ class SeparatedTarget(ParticleTarget):
 
 
 class SeparatedParticles:
-    """One filter for each; who is dressed alike keeps apart."""
+    """One particle filter per target, kept apart from those of similar targets."""
 
     name = "separated-particles"
     uses_image = True
@@ -100,11 +101,11 @@ class SeparatedParticles:
         seen = [self._weigh(image, item) for item in objects]
         factors = overlap_factors([item.states[:, :2] for item in objects], self._settings.cell_pixels)
         for row, (item, (places, unlike), factor) in enumerate(zip(objects, seen, factors, strict=True)):
-            if not self._behind_another(places, item):
+            if not self._is_occluded(places, item):
                 weights = item.weights * factor**self._settings.overlap_power
                 item.weights = weights / weights.sum()
             item.box = particle_boxes(item.weights @ item.states, item.aspect)
-            if float(item.weights @ unlike) <= _LOST:
+            if float(item.weights @ unlike) <= _MAX_DISTANCE:
                 boxes[row] = item.box
         return boxes
 
@@ -127,7 +128,7 @@ class SeparatedParticles:
         item.weights = reweight(item.weights, total, self._settings.sharpness)
         return colors, distances.mean(axis=(-2, -1))
 
-    def _behind_another(self, colors: PartHistograms, item: SeparatedTarget) -> bool:
+    def _is_occluded(self, colors: PartHistograms, item: SeparatedTarget) -> bool:
         """Return whether a target looks less like its reference than in its first images: it is occluded."""
         box = particle_boxes(item.weights @ item.states, item.aspect)
         alike = float(bhattacharyya_coefficient(colors.histograms(self._parts(box)), item.colors).mean())

@@ -1,9 +1,9 @@
 """Frame-by-frame trackers: one assignment per frame, decisions are final.
 
-All of them begin, match and end objects alike, so that what is measured is how each follows them. A detection
-that overlaps nobody is somebody new, who counts from the third frame in a row. In each frame the objects are
-matched with the detections by one assignment over the overlaps (IoU). Who is matched with none for
-`patience` frames is gone, and their number with them.
+All of them start, match and end tracks in the same way, so that a comparison measures the prediction
+method. A detection that overlaps no track starts a new one, which is confirmed in its third consecutive
+frame. In each frame tracks and detections are matched by one assignment over their overlaps (IoU). A track
+without a match for `max_missed_frames` frames ends, and its id with it.
 """
 
 from __future__ import annotations
@@ -84,14 +84,14 @@ class StepwiseSettings:
 
 @dataclass(slots=True)
 class StepwiseTrack(Generic[S]):
-    """Somebody who is followed."""
+    """One track of a frame-by-frame tracker."""
 
     id: int
-    """0: not told of yet."""
+    """Published id; 0 while the track is not published."""
     target: S
     box: Floats
     serial: int
-    """Nobody else has it, whether they are told of or not."""
+    """Unique number, also while unpublished."""
     matches: int = 1
     missed_frames: int = 0
     """Frames since the last match."""
@@ -109,9 +109,9 @@ class StepwiseTracker(Generic[S]):
         self._settings = settings or StepwiseSettings()
         self._objects: list[StepwiseTrack[S]] = []
         self._ended: list[StepwiseTrack[S]] = []
-        """Those who are gone since the last result."""
+        """Tracks that ended since the last result."""
         self._numbers = self._serials = 0
-        self._seen: dict[int, Detections] = {}
+        self._detections: dict[int, Detections] = {}
         self._first: int | None = None
         self._last: int | None = None
 
@@ -127,12 +127,12 @@ class StepwiseTracker(Generic[S]):
         if self._last is not None and frame <= self._last:
             raise ValueError(f"frame {frame} came after frame {self._last}")
         if self._last is not None and frame - self._last > self._window.forget_after:
-            return self._start_again(frame, detections, image)
+            return self._restart(frame, detections, image)
         if self._last is not None:
-            self._pass_by(frame - self._last - 1)
+            self._skip_frames(frame - self._last - 1)
         if self._first is None:
             self._first = frame
-        self._seen[frame] = detections
+        self._detections[frame] = detections
         self._step(frame, detections, image)
         stride, before = self._window.stride, self._first - 1 if self._last is None else self._last
         self._last = frame
@@ -144,19 +144,19 @@ class StepwiseTracker(Generic[S]):
             return None
         return self._result(self._last)
 
-    def _start_again(self, frame: int, detections: Detections, image: Image | None) -> WindowResult | None:
+    def _restart(self, frame: int, detections: Detections, image: Image | None) -> WindowResult | None:
         """Start again after a long gap, so that no result has to span it."""
         result = self.flush()
-        self._objects, self._seen = [], {frame: detections}
+        self._objects, self._detections = [], {frame: detections}
         self._first = self._last = frame
         self._step(frame, detections, image)
         return result
 
-    def _pass_by(self, frames: int) -> None:
+    def _skip_frames(self, frames: int) -> None:
         """Count frames without data as missed."""
         for item in self._objects:
             item.missed_frames += frames
-        self._end_some()
+        self._end_lost_tracks()
 
     def _step(self, frame: int, detections: Detections, image: Image | None) -> None:
         moved = self._method.predict(image, [item.target for item in self._objects])
@@ -170,8 +170,8 @@ class StepwiseTracker(Generic[S]):
                     item.missed_frames = self._settings.max_missed_frames  # nobody yet, and not there
                 elif self._method.uses_image and item.missed_frames <= self._settings.max_unmatched_frames:
                     item.observations[frame] = (item.box, OCCLUDED)
-        self._end_some()
-        self._begin(frame, detections, taken, image)
+        self._end_lost_tracks()
+        self._start_tracks(frame, detections, taken, image)
 
     def _match(self, frame: int, detections: Detections) -> NDArray[np.bool_]:
         """Match tracks with detections; return which detections are taken, `(K,)`."""
@@ -188,7 +188,7 @@ class StepwiseTracker(Generic[S]):
             taken[column] = True
         return taken
 
-    def _begin(
+    def _start_tracks(
         self, frame: int, detections: Detections, taken: NDArray[np.bool_], image: Image | None
     ) -> None:
         """Start tracks from unmatched detections, in descending order of score."""
@@ -209,7 +209,7 @@ class StepwiseTracker(Generic[S]):
             item.observations[frame] = (box, place)
             self._objects.append(item)
 
-    def _end_some(self) -> None:
+    def _end_lost_tracks(self) -> None:
         gone = [item for item in self._objects if item.missed_frames >= self._settings.max_missed_frames]
         self._ended += [item for item in gone if item.matches >= self._settings.confirm_frames]
         self._objects = [
@@ -220,39 +220,39 @@ class StepwiseTracker(Generic[S]):
         """Return the result for all frames not yet published."""
         first = last if self._first is None else self._first
         frames = range(first, last + 1)
-        told = [item for item in self._everybody() if self._counts(item)]
-        for item in told:
+        confirmed = [item for item in self._all_tracks() if self._is_confirmed(item)]
+        for item in confirmed:
             if not item.id:
                 self._numbers += 1
                 item.id = self._numbers
-        told = sorted((item for item in told if item.observations), key=lambda item: item.id)
-        seen = [self._seen.get(frame, Detections.empty(self._bins())) for frame in frames]
-        tracks = [self._track(item, frames, seen) for item in told]
+        confirmed = sorted((item for item in confirmed if item.observations), key=lambda item: item.id)
+        seen = [self._detections.get(frame, Detections.empty(self._bins())) for frame in frames]
+        tracks = [self._track(item, frames, seen) for item in confirmed]
         states = [
             np.array(
                 [item.observations[it][1] if it in item.observations else OCCLUDED for it in frames],
                 dtype=np.int64,
             )
-            for item in told
+            for item in confirmed
         ]
         report = SolveReport(self._method.name, 0.0, 0.0, integral=False, conflicts=0, rounds=0)
         result = WindowResult(first, last, last, add_appearance_samples(tracks, states, first, seen), report)
-        for item in self._everybody():
-            # Who does not count yet is not told of; when they do, it is from the next window on.
+        for item in self._all_tracks():
+            # Unconfirmed tracks are not published; once confirmed, they are from the next window on.
             item.observations = {}
-        self._ended, self._seen, self._first = [], {}, last + 1
+        self._ended, self._detections, self._first = [], {}, last + 1
         return result
 
-    def _everybody(self) -> Iterable[StepwiseTrack[S]]:
+    def _all_tracks(self) -> Iterable[StepwiseTrack[S]]:
         """Return all tracks that may have something to publish."""
         return (*self._ended, *self._objects)
 
-    def _counts(self, item: StepwiseTrack[S]) -> bool:
+    def _is_confirmed(self, item: StepwiseTrack[S]) -> bool:
         """Return whether a track is confirmed."""
         return item.matches >= self._settings.confirm_frames
 
     def _bins(self) -> int:
-        return next((seen.histograms.shape[1] for seen in self._seen.values()), 0)
+        return next((seen.histograms.shape[1] for seen in self._detections.values()), 0)
 
     def _track(self, item: StepwiseTrack[S], frames: range, seen: list[Detections]) -> WindowTrack:
         boxes = np.full((len(frames), BOX_SIDES), np.nan)

@@ -1,10 +1,10 @@
 """Track graph: identities are restored when a merged group splits (Todor 2009, chapter 7).
 
-Tracks are followed by a Kalman filter and assignment. Somebody who is no longer detected where somebody
-else covers them merges into that one's track, which is of several people from then on. Somebody new who
-begins beside such a track splits from it: after some frames, `departed_member` decides who left and who
-goes on. The original sees a whole recording first; here a split is decided after some frames, and what was
-told before that stays.
+Tracks are predicted by a Kalman filter and matched by assignment. A track that is no longer detected where
+another one covers it merges into that track, which then stands for several people. A new track that starts
+beside such a group splits from it: after some frames `departed_member` decides who left and who stays. The
+original sees the whole recording first; here a split is decided after some frames, and what was published
+before stays.
 """
 
 from __future__ import annotations
@@ -45,34 +45,34 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
     ) -> None:
         super().__init__(KalmanPrediction(), window, settings)
         self._graph = graph or TrackGraphSettings()
-        self._looks: dict[int, MeanAppearance] = {}
+        self._appearances: dict[int, MeanAppearance] = {}
         self._groups: dict[int, TrackGroup] = {}
-        self._leaving: dict[int, SplitCandidate] = {}
+        self._split_candidates: dict[int, SplitCandidate] = {}
 
     def _step(self, frame: int, detections: Detections, image: Image | None) -> None:
         super()._step(frame, detections, image)
-        self._tidy(frame)
+        self._remove_ended(frame)
         self._learn(frame, detections)
         self._merge(frame)
-        self._leave(frame)
+        self._add_split_candidates(frame)
         self._split()
 
-    def _everybody(self) -> Iterable[KalmanTrack]:
+    def _all_tracks(self) -> Iterable[KalmanTrack]:
         return (
-            *super()._everybody(),
+            *super()._all_tracks(),
             *(item for group in self._groups.values() for item in group.merged_tracks),
         )
 
-    def _counts(self, item: KalmanTrack) -> bool:
-        return super()._counts(item) and item.serial not in self._leaving
+    def _is_confirmed(self, item: KalmanTrack) -> bool:
+        return super()._is_confirmed(item) and item.serial not in self._split_candidates
 
-    def _tidy(self, frame: int) -> None:
+    def _remove_ended(self, frame: int) -> None:
         """Remove ended groups, members that stayed too long, and ended split candidates."""
         alive = {item.serial for item in self._objects}
-        self._leaving = {
-            it: who
-            for it, who in self._leaving.items()
-            if it in alive and who.host.serial in alive and who.host.serial in self._groups
+        self._split_candidates = {
+            it: candidate
+            for it, candidate in self._split_candidates.items()
+            if it in alive and candidate.host.serial in alive and candidate.host.serial in self._groups
         }
         for serial, group in list(self._groups.items()):
             long = [frame - end.frame > self._graph.max_group_frames for end in group.entries[1:]]
@@ -82,8 +82,8 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
             group.merged_tracks = [item for item, it in zip(group.merged_tracks, gone, strict=True) if not it]
             if not group.merged_tracks:
                 del self._groups[serial]
-        known = {item.serial for item in self._everybody()}
-        self._looks = {serial: look for serial, look in self._looks.items() if serial in known}
+        known = {item.serial for item in self._all_tracks()}
+        self._appearances = {serial: look for serial, look in self._appearances.items() if serial in known}
 
     def _learn(self, frame: int, detections: Detections) -> None:
         """Update the appearance of matched tracks: single, split candidate, or the rest of a group."""
@@ -92,18 +92,18 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
             if place == OCCLUDED:
                 continue
             histogram = detections.histograms[place]
-            if item.serial in self._leaving:
-                self._leaving[item.serial].appearance.add(histogram)
+            if item.serial in self._split_candidates:
+                self._split_candidates[item.serial].appearance.add(histogram)
             elif item.serial in self._groups:
-                for who in self._leaving.values():
-                    if who.host is item:
-                        who.host_appearance.add(histogram)
+                for candidate in self._split_candidates.values():
+                    if candidate.host is item:
+                        candidate.host_appearance.add(histogram)
             else:
-                self._looks.setdefault(item.serial, MeanAppearance.empty(detections)).add(histogram)
+                self._appearances.setdefault(item.serial, MeanAppearance.empty(detections)).add(histogram)
 
     def _merge(self, frame: int) -> None:
         """Merge tracks that are no longer detected into the track that covers them."""
-        sure = [item for item in self._objects if self._counts(item)]
+        sure = [item for item in self._objects if self._is_confirmed(item)]
         for item in sure:
             hosts = [it for it in sure if it.missed_frames == 0 and it in self._objects]
             if item.missed_frames < self._graph.merge_after_frames or not hosts:
@@ -120,14 +120,16 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         group.entries += [self._end(item, frame)] if merged is None else merged.entries
         group.merged_tracks += [item] if merged is None else [item, *merged.merged_tracks]
         self._objects.remove(item)
-        self._leaving = {it: who for it, who in self._leaving.items() if who.host is not item}
+        self._split_candidates = {
+            it: candidate for it, candidate in self._split_candidates.items() if candidate.host is not item
+        }
 
     def _end(self, item: KalmanTrack, frame: int) -> TrackEnd:
         """Return the end of a track that enters a group."""
         step = np.asarray(item.target.statePost, dtype=np.float64)[_VELOCITY, 0]
-        return _ended(frame, item.box, step, self._looks[item.serial].mean)
+        return _ended(frame, item.box, step, self._appearances[item.serial].mean)
 
-    def _leave(self, frame: int) -> None:
+    def _add_split_candidates(self, frame: int) -> None:
         """Register new tracks beside a group as split candidates."""
         hosts = [it for it in self._objects if it.serial in self._groups]
         for item in self._objects:
@@ -136,8 +138,12 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
             near = intersections(np.stack([self._around(it.box) for it in hosts]), item.box)
             host = hosts[int(np.argmax(near))]
             if near.max() > 0.0 and item is not host:
-                look, rest = (MeanAppearance(np.zeros_like(self._looks[host.serial].total)) for _ in range(2))
-                self._leaving[item.serial] = SplitCandidate(item, host, frame, item.box, host.box, look, rest)
+                look, rest = (
+                    MeanAppearance(np.zeros_like(self._appearances[host.serial].total)) for _ in range(2)
+                )
+                self._split_candidates[item.serial] = SplitCandidate(
+                    item, host, frame, item.box, host.box, look, rest
+                )
 
     def _around(self, box: Floats) -> Floats:
         margin = self._graph.split_margin * (box[2] - box[0])
@@ -145,47 +151,49 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
 
     def _split(self) -> None:
         """Decide the identity of split candidates seen for long enough."""
-        for serial, who in list(self._leaving.items()):
+        for serial, candidate in list(self._split_candidates.items()):
             enough = (
-                who.track.matches >= self._graph.split_decision_frames
-                and who.host_appearance.frames
-                and who.appearance.frames
+                candidate.track.matches >= self._graph.split_decision_frames
+                and candidate.host_appearance.frames
+                and candidate.appearance.frames
             )
-            group = self._groups.get(who.host.serial)
+            group = self._groups.get(candidate.host.serial)
             if not enough and group is not None:
                 continue
-            del self._leaving[serial]
+            del self._split_candidates[serial]
             if group is None:
                 continue
             still = np.zeros(2)
-            out = _ended(who.first_frame, who.first_box, still, who.appearance.mean)
-            rest = _ended(who.first_frame, who.first_host_box, still, who.host_appearance.mean)
+            out = _ended(candidate.first_frame, candidate.first_box, still, candidate.appearance.mean)
+            rest = _ended(
+                candidate.first_frame, candidate.first_host_box, still, candidate.host_appearance.mean
+            )
             left = departed_member(
                 group.entries, out, rest, self._graph.motion_frames, self._graph.max_distance
             )
             if left is not None:
-                self._part(who, group, left)
+                self._reassign_tracks(candidate, group, left)
 
-    def _part(self, who: SplitCandidate, group: TrackGroup, left: int) -> None:
+    def _reassign_tracks(self, candidate: SplitCandidate, group: TrackGroup, left: int) -> None:
         """Reassign the tracks after a split: member `left` of the group has left it."""
-        host = who.host
+        host = candidate.host
         del self._groups[host.serial]
         followed, place = host, left
         if left == 0:
-            # Who is followed was the one who left: the next of the group is followed in their place.
+            # The host itself left: the next member of the group takes over its track.
             followed, place = group.merged_tracks[0], 1
             self._objects.append(followed)
-            _take_over(followed, host, who.first_frame)
-            _take_over(host, who.track, who.first_frame)
+            _take_over(followed, host, candidate.first_frame)
+            _take_over(host, candidate.track, candidate.first_frame)
             group.entries[0], group.entries[1] = group.entries[1], group.entries[0]
         else:
             self._objects.append(group.merged_tracks[left - 1])
-            _take_over(group.merged_tracks[left - 1], who.track, who.first_frame)
-        self._objects.remove(who.track)
+            _take_over(group.merged_tracks[left - 1], candidate.track, candidate.first_frame)
+        self._objects.remove(candidate.track)
         del group.entries[place], group.merged_tracks[place - 1]
         if group.merged_tracks:
             self._groups[followed.serial] = group
-        for other in self._leaving.values():
+        for other in self._split_candidates.values():
             other.host = followed if other.host is host else other.host
 
 

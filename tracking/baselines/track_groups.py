@@ -13,7 +13,7 @@ from tracking.boxes import Floats
 from tracking.types import Detections
 
 KalmanTrack = StepwiseTrack[cv2.KalmanFilter]
-"""Somebody who is followed."""
+"""A track predicted by a Kalman filter."""
 
 
 @dataclass(frozen=True, slots=True)

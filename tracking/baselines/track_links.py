@@ -1,10 +1,10 @@
 """Identity links across a split by maximum a posteriori (Todor 2009, sections 7.2, 7.3).
 
-The graph is that of Nillius, Sullivan and Carlsson (CVPR 2006): its nodes are tracks of one person or of
-several, its links the merges and splits between them. A split of N people into m tracks of n_i people has
-`Π C(N - n_1 - … - n_{i-1}, n_i)` states. Here one person leaves at a time: two tracks, N states. A state's
-probability is the product of `exp(-λ I)` over the tracks of one person that it links, I being the distance
-of their looks, and of the motion as well where they are close in time.
+The graph is that of Nillius, Sullivan and Carlsson (CVPR 2006): its nodes are tracks of one or several
+people, its links the merges and splits between them. A split of N people into m tracks of n_i people has `Π
+C(N - n_1 - … - n_{i-1}, n_i)` states. Here one person leaves at a time: two tracks, N states. The
+probability of a state is the product of `exp(-λ I)` over the single-person tracks that it links, where I is
+their appearance distance, combined with a motion distance if they are close in time.
 """
 
 from __future__ import annotations

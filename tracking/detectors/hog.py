@@ -53,19 +53,19 @@ class HogDetector:
     def __init__(
         self,
         settings: HogSettings | None = None,
-        looks: AppearanceExtractor | None = None,
+        appearance: AppearanceExtractor | None = None,
         ignore: Polygons = (),
     ) -> None:
         self.settings = settings or HogSettings()
-        self._looks = looks or AppearanceExtractor()
-        self._ignored = IgnoreFilter(ignore)
+        self._appearance = appearance or AppearanceExtractor()
+        self._ignore_filter = IgnoreFilter(ignore)
         self._hog = cv2.HOGDescriptor()
         self._hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector(), dtype=np.float32))
 
     @property
     def bins(self) -> int:
         """The length of a row of the histograms."""
-        return self._looks.bins
+        return self._appearance.bins
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
         """Return the people detected in a frame, best first.
@@ -74,14 +74,14 @@ class HogDetector:
             ValueError: not an `(H, W, 3)` uint8 picture.
         """
         validate_image(image)
-        boxes, scores = self._found(image)
-        seen = self._ignored.keep(image.shape, boxes)
+        boxes, scores = self._positive_windows(image)
+        seen = self._ignore_filter.keep(image.shape, boxes)
         boxes, scores = boxes[seen], scores[seen]
         kept = non_maximum_suppression(boxes, scores, self.settings.nms_iou, self.settings.max_detections)
         boxes = boxes[kept]
-        return Detections(boxes, scores[kept], self._looks.histograms(image, boxes))
+        return Detections(boxes, scores[kept], self._appearance.histograms(image, boxes))
 
-    def _found(self, image: Image) -> tuple[Floats, Floats]:
+    def _positive_windows(self, image: Image) -> tuple[Floats, Floats]:
         """Return the SVM's positive windows cut to the person: boxes and scores."""
         height, width = image.shape[:2]
         factor = _PERSON_ROWS / (self.settings.min_height * height)

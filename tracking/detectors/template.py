@@ -65,7 +65,7 @@ class TemplateDetector:
         # Odd, so that a peak is in the middle of what it is compared with.
         reach = [2 * max(1, round(self.settings.peak_distance * side)) + 1 for side in (height, width)]
         self._around = np.ones(reach, dtype=np.uint8)
-        self.histogram: Floats = self._looks(self._template, np.array([[0.0, 0.0, width, height]]))[0]
+        self.histogram: Floats = self._histograms(self._template, np.array([[0.0, 0.0, width, height]]))[0]
         """`(B,)`, what the template itself looks like, in the terms of the observations."""
 
     @property
@@ -87,7 +87,7 @@ class TemplateDetector:
             )
         lefts, tops, scores = self._peaks(image)
         boxes = np.stack([lefts, tops, lefts + width, tops + height], axis=1).astype(np.float64)
-        return Detections(boxes, scores, self._looks(image, boxes))
+        return Detections(boxes, scores, self._histograms(image, boxes))
 
     def _peaks(self, image: Image) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Floats]:
         """Return left, top and score of the local maxima, best first."""
@@ -102,7 +102,7 @@ class TemplateDetector:
         order = np.lexsort((tops, lefts, -scores))[: self.settings.max_peaks]
         return lefts[order], tops[order], scores[order]
 
-    def _looks(self, image: Image, boxes: Floats) -> Floats:
+    def _histograms(self, image: Image, boxes: Floats) -> Floats:
         settings = self.settings
         if settings.appearance == "subimage":
             return subimage_histograms(image, boxes, settings.subimage)

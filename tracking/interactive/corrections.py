@@ -22,7 +22,7 @@ class PositionCorrection:
         object: the track's id.
         x: pixels from the left.
         y: pixels from the top.
-        tolerance: how far off the pointing may be, pixels: where it is usually within.
+        tolerance: how far off the correction may be, pixels: where it is usually within.
 
     Raises:
         ValueError: the reach is not positive, or a number is none.
@@ -39,7 +39,7 @@ class PositionCorrection:
             raise ValueError(f"a correction needs finite coordinates and a positive tolerance, not {self}")
 
 
-def normalized_offset(pointing: PositionCorrection, boxes: Floats) -> Floats:
+def normalized_offset(correction: PositionCorrection, boxes: Floats) -> Floats:
     """Return the normalized squared distance of boxes `(..., 4)` from a correction, `(...)` in [0, 1].
 
     The squared distance of the point from the middle of the box, in units of twice the reach, 1 at most:
@@ -47,22 +47,22 @@ def normalized_offset(pointing: PositionCorrection, boxes: Floats) -> Floats:
     is more than elsewhere, however far.
     """
     middles = (boxes[..., :2] + boxes[..., 2:]) / 2.0
-    squared = ((middles - [pointing.x, pointing.y]) ** 2).sum(axis=-1) / (2.0 * pointing.tolerance) ** 2
+    squared = ((middles - [correction.x, correction.y]) ** 2).sum(axis=-1) / (2.0 * correction.tolerance) ** 2
     return np.asarray(np.minimum(squared, 1.0))
 
 
-def near_correction(pointing: PositionCorrection, boxes: Floats) -> NDArray[np.bool_]:
+def near_correction(correction: PositionCorrection, boxes: Floats) -> NDArray[np.bool_]:
     """Return which boxes `(K, 4)` are close enough to be the corrected object, `(K,)`."""
-    return np.asarray(normalized_offset(pointing, boxes) < 1.0)
+    return np.asarray(normalized_offset(correction, boxes) < 1.0)
 
 
 def apply_corrections(
     network: Network,
     first: int,
     ids: Sequence[int],
-    pointings: Mapping[int, Mapping[int, PositionCorrection]],
+    corrections: Mapping[int, Mapping[int, PositionCorrection]],
     settings: InteractiveSettings,
-    comeback: float,
+    reappearance_cost: float,
 ) -> Network:
     """Return the network of a window with the corrections' costs added to its nodes.
 
@@ -70,23 +70,23 @@ def apply_corrections(
     far(v)` more, and being occluded costs it `correction_weight hidden_share` more: an operator who points
     at a covered object points closer to its true position than to the center of the object in front. Other
     objects are not charged, since a place holds one object only. The corrected object may reappear anywhere
-    near the point: arcs out of the occlusion node that were gated away get the cost `comeback`.
+    near the point: arcs out of the occlusion node that were gated away get the cost `reappearance_cost`.
 
     Args:
         network: objects `ids`, which share their observations.
         first: the window's first frame.
         ids: the tracks, in the order of the network's objects.
-        pointings: corrections by frame and object.
+        corrections: corrections by frame and object.
         settings: the weights.
-        comeback: cost of the most expensive way out of an occlusion.
+        reappearance_cost: cost of the most expensive way out of an occlusion.
     """
-    frames = [m for m in range(network.frames) if first + m in pointings]
+    frames = [m for m in range(network.frames) if first + m in corrections]
     if not frames:
         return network
     node, source, pair = network.node.copy(), network.source.copy(), network.pair.copy()
     owners = np.asarray(ids)
     for m in frames:
-        for it in pointings[first + m].values():
+        for it in corrections[first + m].values():
             own = np.flatnonzero(owners == it.object)
             if not len(own):
                 continue
@@ -94,5 +94,5 @@ def apply_corrections(
             node[own, m, :-1] += settings.correction_weight * far
             node[own, m, -1] += settings.correction_weight * settings.hidden_share
             way = source[own[0]] if m == 0 else pair[network.pair_sets[own[0]], m - 1, -1]
-            way[:-1][(far < 1.0) & np.isinf(way[:-1])] = comeback
+            way[:-1][(far < 1.0) & np.isinf(way[:-1])] = reappearance_cost
     return replace(network, node=node, source=source, pair=pair)

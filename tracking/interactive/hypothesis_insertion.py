@@ -17,31 +17,35 @@ from tracking.interactive.corrections import PositionCorrection, near_correction
 from tracking.model.network import Network
 from tracking.types import Detections
 
-_ALIKE = 1.6
+_MAX_AREA_RATIO = 1.6
 """Factor between the areas of somebody and a box that is still theirs; two bodies side by side have more."""
 
 InsertedHypotheses = Mapping[int, Mapping[int, int]]
 """Which observation was made for whom: the index by object, by frame."""
 
 
-def box_around(pointing: PositionCorrection, size: Floats) -> Floats:
+def box_around(correction: PositionCorrection, size: Floats) -> Floats:
     """Return the box `(4,)` of `size` `(2,)` (width, height) centered at the corrected point."""
-    middle = np.array([pointing.x, pointing.y])
+    middle = np.array([correction.x, correction.y])
     return np.concatenate([middle - size / 2.0, middle + size / 2.0])
 
 
-def has_hypothesis(pointing: PositionCorrection, size: Floats, boxes: Floats) -> bool:
+def has_hypothesis(correction: PositionCorrection, size: Floats, boxes: Floats) -> bool:
     """Return whether any of the boxes `(K, 4)` is near the point and of about that size."""
     ratio = areas(boxes) / max(float(size[0] * size[1]), 1.0)
-    return bool((near_correction(pointing, boxes) & (ratio < _ALIKE) & (ratio > 1.0 / _ALIKE)).any())
+    return bool(
+        (
+            near_correction(correction, boxes) & (ratio < _MAX_AREA_RATIO) & (ratio > 1.0 / _MAX_AREA_RATIO)
+        ).any()
+    )
 
 
-def insert_hypothesis(seen: Detections, box: Floats, look: Floats) -> Detections:
+def insert_hypothesis(seen: Detections, box: Floats, histogram: Floats) -> Detections:
     """Append a hypothesis for a corrected object, of score 0 so that no new track starts from it."""
     return Detections(
         np.concatenate([seen.boxes, box[None]]),
         np.append(seen.scores, 0.0),
-        np.concatenate([seen.histograms, look[None, : seen.histograms.shape[1]]]),
+        np.concatenate([seen.histograms, histogram[None, : seen.histograms.shape[1]]]),
     )
 
 

@@ -17,12 +17,12 @@ from tracking.model.settings import CostSettings
 from tracking.solvers.base import OCCLUDED
 from tracking.types import Detections
 
-_SURE = 0.5
+_MAX_OFFSET = 0.5
 """How far (`normalized_offset`) a track may be from the point to be the one that is pointed at."""
 
 
 def backdate_correction(
-    pointing: PositionCorrection, memory: WindowMemory, costs: CostSettings, since: int
+    correction: PositionCorrection, memory: WindowMemory, costs: CostSettings, since: int
 ) -> list[PositionCorrection]:
     """Return the corrections for earlier frames that a correction implies, back to the frame `since`.
 
@@ -34,16 +34,16 @@ def backdate_correction(
     Returns an empty list where a is already at the point, where no other track is, or where a may be
     occluded by b.
     """
-    a, b = pointing.object, _instead(pointing, memory)
+    a, b = correction.object, _track_at_point(correction, memory)
     if b is None:
         return []
-    frames = [n for n in sorted(memory.assignments) if since <= n <= pointing.frame]
+    frames = [n for n in sorted(memory.assignments) if since <= n <= correction.frame]
     states = np.array([[memory.assignments[n].get(k, OCCLUDED) for n in frames] for k in (a, b)])
     if _covered(states != OCCLUDED):
         return []
     start = _start(states, [memory.detections.get(n) for n in frames], costs)
     return [
-        PositionCorrection(n, ours, *_aim(memory.detections[n].boxes[state]))
+        PositionCorrection(n, ours, *_exact_point(memory.detections[n].boxes[state]))
         for place, n in enumerate(frames)
         if start <= place < len(frames) - 1
         for ours, state in ((a, states[1, place]), (b, states[0, place]))
@@ -51,17 +51,17 @@ def backdate_correction(
     ]
 
 
-def _instead(pointing: PositionCorrection, memory: WindowMemory) -> int | None:
+def _track_at_point(correction: PositionCorrection, memory: WindowMemory) -> int | None:
     """Return the track at the corrected point, if it is another one than the corrected track."""
-    there = memory.assignments.get(pointing.frame, {})
+    there = memory.assignments.get(correction.frame, {})
     far = {
-        number: float(normalized_offset(pointing, memory.detections[pointing.frame].boxes[state]))
+        number: float(normalized_offset(correction, memory.detections[correction.frame].boxes[state]))
         for number, state in there.items()
     }
     if not far:
         return None
-    nearest = min(far, key=lambda number: (far[number], number != pointing.object, number))
-    return nearest if nearest != pointing.object and far[nearest] < _SURE else None
+    nearest = min(far, key=lambda number: (far[number], number != correction.object, number))
+    return nearest if nearest != correction.object and far[nearest] < _MAX_OFFSET else None
 
 
 def _covered(seen: NDArray[np.bool_]) -> bool:
@@ -70,7 +70,7 @@ def _covered(seen: NDArray[np.bool_]) -> bool:
     return bool(len(shown) and not seen[0, -1] and seen[1, : shown[-1] + 1].any())
 
 
-def _aim(box: Floats) -> tuple[float, float, float]:
+def _exact_point(box: Floats) -> tuple[float, float, float]:
     """Return the center of a box, and the tolerance of an exact correction."""
     x, y = (box[:2] + box[2:]) / 2.0
     return float(x), float(y), max(float(heights(box)) / 4.0, 1.0)
@@ -84,7 +84,7 @@ def _start(states: NDArray[np.int64], frames: Sequence[Detections | None], costs
         return began
     rows = [np.unique(column[column != OCCLUDED]) for column in states.T]
     bins = next(it.histograms.shape[1] for it in frames if it is not None)
-    few = [_only(it, row, bins) for it, row in zip(frames, rows, strict=True)]
+    few = [_select_rows(it, row, bins) for it, row in zip(frames, rows, strict=True)]
     local = np.array(
         [
             [OCCLUDED if k == OCCLUDED else int(np.searchsorted(row, k)) for k in pair]
@@ -106,7 +106,7 @@ def _template(number: int, states: NDArray[np.int64], frames: Sequence[Detection
     return Template(number, found.histograms[states[m]], found.boxes[states[m]] if m == 0 else None)
 
 
-def _only(seen: Detections | None, rows: NDArray[np.int64], bins: int) -> Detections:
+def _select_rows(seen: Detections | None, rows: NDArray[np.int64], bins: int) -> Detections:
     if seen is None or not len(rows):
         return Detections.empty(bins)
     return Detections(seen.boxes[rows], seen.scores[rows], seen.histograms[rows])

@@ -15,7 +15,7 @@ from tracking.model.object_state import Template
 from tracking.model.settings import CostSettings
 from tracking.types import Detections
 
-_TOUCH = 0.25
+_MIN_OVERLAP = 0.25
 """Shared over average area from which two boxes are in each other's way."""
 
 _RECENT = 5
@@ -75,15 +75,16 @@ def predict_crossings(window: SolvedWindow, horizon: int, costs: CostSettings) -
         return []
     rows = list(known)
     ahead = np.stack([way[hidden:][:horizon] for hidden, way in known.values()])
-    meeting = overlap(ahead[:, None], ahead[None]) > _TOUCH
+    meeting = overlap(ahead[:, None], ahead[None]) > _MIN_OVERLAP
     near = np.triu(meeting.any(axis=2) & ~meeting[:, :, 0], 1)
     if not near.any():
         return []
-    looks = window.known_histograms[rows]
-    seen = [Detections(ahead[:, m], np.ones(len(rows)), looks) for m in range(horizon)]
+    histograms = window.known_histograms[rows]
+    seen = [Detections(ahead[:, m], np.ones(len(rows)), histograms) for m in range(horizon)]
     motions = [_motion(window.recent_boxes[n], window.recent_boxes.shape[1]) for n in rows]
     templates = [
-        Template(n, look, motion.box, motion) for n, look, motion in zip(rows, looks, motions, strict=True)
+        Template(n, histogram, motion.box, motion)
+        for n, histogram, motion in zip(rows, histograms, motions, strict=True)
     ]
     states = np.tile(np.arange(len(rows))[:, None], (1, horizon))
     found = swap_margins(build_network(templates, seen, costs), states)

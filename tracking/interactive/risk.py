@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from tracking.types import RiskReason
 
-_MUCH = 10.0
+_MAX_MARGIN = 10.0
 """A margin from which more of it tells nothing."""
-_LEAD = 10.0
+_LEAD_SCALE = 10.0
 """Frames that what is ahead is counted in."""
 
 
@@ -33,7 +33,7 @@ class RiskFeatures:
         """The terms of the log odds: a constant, the margin, and what is ahead and what has begun apart."""
         ahead = float(self.lead > 0.0)
         begun = math.log1p(self.length) * (1.0 - ahead)
-        return 1.0, min(self.margin, _MUCH), ahead, ahead * self.lead / _LEAD, begun
+        return 1.0, min(self.margin, _MAX_MARGIN), ahead, ahead * self.lead / _LEAD_SCALE, begun
 
 
 WEIGHTS: Mapping[RiskReason, tuple[float, float, float, float, float]] = {

@@ -14,7 +14,7 @@ from tracking.interactive.swap_margins import SwapMargins, swap_margins
 from tracking.model.settings import CostSettings
 from tracking.types import RiskEvent, RiskReason
 
-_TOUCH = 0.25
+_MIN_OVERLAP = 0.25
 """Shared over average area from which somebody covers somebody else."""
 
 _RECENT = 5
@@ -31,19 +31,19 @@ class RiskPredictor:
     def predict(self, window: SolvedWindow) -> tuple[RiskEvent, ...]:
         """Return the risk events of a window, the riskiest first, one per pair and reason."""
         found = swap_margins(window.network, window.states)
-        troubles = [
-            *self._exchanges(window, found),
-            *self._alike(window),
-            *self._vanished(window),
-            *self._fading(window),
-            *self._gap(window, found.margins),
+        events = [
+            *self._swaps(window, found),
+            *self._similar_crossings(window),
+            *self._hidden_objects(window),
+            *self._low_confidence(window),
+            *self._unproven(window, found.margins),
         ]
         once: dict[tuple[str, tuple[int, ...]], RiskEvent] = {}
-        for it in sorted(troubles, key=lambda it: (-it.risk, it.frame, it.objects, it.reason)):
+        for it in sorted(events, key=lambda it: (-it.risk, it.frame, it.objects, it.reason)):
             once.setdefault((it.reason, tuple(sorted(it.objects))), it)
         return tuple(once.values())
 
-    def _exchanges(self, window: SolvedWindow, found: SwapMargins) -> list[RiskEvent]:
+    def _swaps(self, window: SolvedWindow, found: SwapMargins) -> list[RiskEvent]:
         """Return the pairs with a small swap margin in a frame that becomes final now.
 
         Of later frames more will be known when they become final.
@@ -51,22 +51,22 @@ class RiskPredictor:
         settled = window.first + found.frames <= window.final_to
         first, second = np.nonzero(np.triu((found.margins < self._settings.swap_margin) & settled, 1))
         return [
-            _trouble(
+            _risk_event(
                 "exchange",
                 _pair(window, a, b),
                 window,
                 window.first + int(found.frames[a, b]),
                 float(found.margins[a, b]),
-                _unclear(window, a, b),
+                _ambiguous_frames(window, a, b),
             )
             for a, b in zip(first.tolist(), second.tolist(), strict=True)
         ]
 
-    def _alike(self, window: SolvedWindow) -> list[RiskEvent]:
+    def _similar_crossings(self, window: SolvedWindow) -> list[RiskEvent]:
         """Return the pairs that cross within the horizon and could then be swapped at low cost."""
         found = predict_crossings(window, self._settings.horizon_frames, self._costs)
         return [
-            _trouble(
+            _risk_event(
                 "alike",
                 tuple(sorted((it.first, it.second))),
                 window,
@@ -78,13 +78,13 @@ class RiskPredictor:
             if it.margin < self._settings.crossing_margin
         ]
 
-    def _vanished(self, window: SolvedWindow) -> list[RiskEvent]:
+    def _hidden_objects(self, window: SolvedWindow) -> list[RiskEvent]:
         """Return the objects hidden for a while, with the similar object that covers them, if any.
 
-        The margin is what the looks of a whole window tell of the two, over what one differs from oneself;
-        nothing tells anything of who is just not seen.
+        The margin is the appearance distance of the two over a whole window, above the distance of an
+        object to itself; it is 0 for an object that is hidden without an occluder.
         """
-        looks, found = window.known_histograms, []
+        histograms, found = window.known_histograms, []
         length = window.last - window.first + 1
         for n, (hidden, way) in predict_paths(window, window.recent_boxes.shape[1]).items():
             if hidden < self._settings.hidden_frames:
@@ -94,16 +94,18 @@ class RiskPredictor:
             covers = np.nan_to_num(overlap(here, way[:hidden])).max(axis=1, initial=0.0)
             b = int(covers.argmax())
             frame = window.last - hidden + 1
-            differ = float(appearance_distance(looks[n, None], looks[b, None], self._costs.measure)[0, 0])
+            differ = float(
+                appearance_distance(histograms[n, None], histograms[b, None], self._costs.measure)[0, 0]
+            )
             margin = length * max(differ - self._costs.unknown_appearance, 0.0)
-            if covers[b] > _TOUCH and margin < self._settings.crossing_margin:
+            if covers[b] > _MIN_OVERLAP and margin < self._settings.crossing_margin:
                 pair = window.known_ids[n], window.known_ids[b]
-                found.append(_trouble("alike", pair, window, frame, margin, hidden))
+                found.append(_risk_event("alike", pair, window, frame, margin, hidden))
             else:
-                found.append(_trouble("fading", (window.known_ids[n],), window, frame, 0.0, hidden))
+                found.append(_risk_event("fading", (window.known_ids[n],), window, frame, 0.0, hidden))
         return found
 
-    def _fading(self, window: SolvedWindow) -> list[RiskEvent]:
+    def _low_confidence(self, window: SolvedWindow) -> list[RiskEvent]:
         """Return the objects whose detection scores are low, or will be within the horizon."""
         found = []
         scores, faint = window.scores, self._settings.min_confidence
@@ -115,19 +117,23 @@ class RiskPredictor:
             left = (level - faint) / -slope if slope < 0.0 else np.inf
             if level <= faint or left <= self._settings.horizon_frames:
                 frame = window.last + max(int(left), 0) if level > faint else window.last
-                found.append(_trouble("fading", (number,), window, frame, float(level - faint), 0))
+                found.append(_risk_event("fading", (number,), window, frame, float(level - faint), 0))
         return found
 
-    def _gap(self, window: SolvedWindow, margins: Floats) -> list[RiskEvent]:
+    def _unproven(self, window: SolvedWindow, margins: Floats) -> list[RiskEvent]:
         """Return the pair with the smallest swap margin, where the solution is not proven optimal."""
         if window.report.gap <= self._settings.max_solver_gap or not np.isfinite(margins).any():
             return []
         a, b = divmod(int(margins.argmin()), margins.shape[1])
         pair = _pair(window, a, b)
-        return [_trouble("gap", pair, window, window.last, float(margins[a, b]), _unclear(window, a, b))]
+        return [
+            _risk_event(
+                "gap", pair, window, window.last, float(margins[a, b]), _ambiguous_frames(window, a, b)
+            )
+        ]
 
 
-def _trouble(
+def _risk_event(
     reason: RiskReason, objects: tuple[int, ...], window: SolvedWindow, frame: int, margin: float, length: int
 ) -> RiskEvent:
     """Return a risk event with its probability; `length` as in `RiskFeatures`."""
@@ -136,11 +142,11 @@ def _trouble(
     return RiskEvent(reason, objects, frame, margin, length, likely)
 
 
-def _unclear(window: SolvedWindow, a: int, b: int) -> int:
+def _ambiguous_frames(window: SolvedWindow, a: int, b: int) -> int:
     """Return in how many recent frames objects a and b overlapped, or one of them was hidden."""
     one, other = (window.recent_boxes[window.known_ids.index(window.ids[n])] for n in (a, b))
     hidden = np.isnan(one[:, 0]) | np.isnan(other[:, 0])
-    return int(np.count_nonzero(hidden | (np.nan_to_num(overlap(one, other)) > _TOUCH)))
+    return int(np.count_nonzero(hidden | (np.nan_to_num(overlap(one, other)) > _MIN_OVERLAP)))
 
 
 def _pair(window: SolvedWindow, a: int, b: int) -> tuple[int, ...]:

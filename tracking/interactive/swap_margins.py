@@ -52,7 +52,7 @@ def swap_margins(network: Network, states: NDArray[np.int64]) -> SwapMargins:
     n = network.objects
     if not n:
         return SwapMargins(np.empty((0, 0)), np.empty((0, 0), dtype=np.int64))
-    own, crossed = _ways(network, nodes_from_states(network, states))
+    own, crossed = _path_costs(network, nodes_from_states(network, states))
     both = crossed + crossed.transpose(1, 0, 2)
     # Two who stay hidden to the end have exchanged nothing that could be seen.
     shown = (states != OCCLUDED)[:, ::-1].cumsum(axis=1)[:, ::-1] > 0
@@ -65,7 +65,7 @@ def swap_margins(network: Network, states: NDArray[np.int64]) -> SwapMargins:
     return SwapMargins(margins, frames)
 
 
-def _ways(network: Network, nodes: NDArray[np.int64]) -> tuple[Floats, Floats]:
+def _path_costs(network: Network, nodes: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """Return the costs of the paths, (n,), and of a's path with b's tail from each frame on, (n, n, M)."""
     frames, sets = np.arange(network.frames), network.pair_sets
     n = len(nodes)

@@ -26,35 +26,35 @@ from tracking.tracker import OnlineTracker
 from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings, merge_results
 
-_DOUBT = 0.25
-"""Share of a pointing's weight from which windows are solved again: small errors change nothing."""
+_MIN_DISAGREEMENT = 0.25
+"""Share of a correction's weight from which windows are solved again."""
 
-_TRAIL = 75
-"""Frames up to the newest over which it is looked where everybody was."""
+_RECENT_FRAMES = 75
+"""Number of recent frames whose boxes are used for risk prediction."""
 
 
 class InteractiveTracker(OnlineTracker):
     """An `OnlineTracker` that predicts identity failures and takes an operator's corrections.
 
-    Without a pointing its tracks are those of an `OnlineTracker`. Memory is bounded by `assist.memory`.
+    Without a correction its tracks are those of an `OnlineTracker`. Memory is bounded by `memory_frames`.
     """
 
     def __init__(
         self, window: WindowSettings, costs: CostSettings, solver: Solver, assist: InteractiveSettings
     ) -> None:
         super().__init__(window, costs, solver)
-        self._assist = assist
-        self._foresight = RiskPredictor(assist, costs)
+        self._settings = assist
+        self._risk_predictor = RiskPredictor(assist, costs)
         self._memory = WindowMemory(assist.memory_frames)
-        self._pointings: dict[int, dict[int, PositionCorrection]] = {}
-        """By frame and object: who points twice means the second."""
-        self._doubtful: list[int] = []
-        """Frames of pointings that say something else than the answer, which is to be sought again."""
-        self._doubt = 0.0
-        """What the answer would save by following them."""
+        self._corrections: dict[int, dict[int, PositionCorrection]] = {}
+        """By frame and object: a later correction replaces an earlier one."""
+        self._contradicted_frames: list[int] = []
+        """Frames whose corrections contradict the solution."""
+        self._total_disagreement = 0.0
+        """Cost by which these corrections contradict the solution."""
         self._network: tuple[Sequence[int], Network] | None = None
         self._solved: SolvedWindow | None = None
-        self._foresees = True
+        self._predicts_risks = True
 
     def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
         """Take the detections of a frame; see `OnlineTracker.push`."""
@@ -63,22 +63,22 @@ class InteractiveTracker(OnlineTracker):
             self._memory.add_detections(frame, detections)
         result = super().push(frame, detections, image)
         if gap > self._window.forget_after:
-            # Nobody is remembered over such a gap: what was before it cannot be mended any more.
-            self._memory = WindowMemory(self._assist.memory_frames)
+            # Nothing is remembered over such a gap: what was before it cannot be corrected any more.
+            self._memory = WindowMemory(self._settings.memory_frames)
             self._memory.add_detections(frame, detections)
-        oldest = frame - self._assist.memory_frames
-        self._pointings = {number: it for number, it in self._pointings.items() if number >= oldest}
+        oldest = frame - self._settings.memory_frames
+        self._corrections = {number: it for number, it in self._corrections.items() if number >= oldest}
         return result
 
     def remembers(self, frame: int) -> bool:
         """Return whether a correction of this frame can still be applied."""
         if self._last is None or frame > self._last:
-            return self._last is not None and frame <= self._last + self._assist.memory_frames
+            return self._last is not None and frame <= self._last + self._settings.memory_frames
         steps = self._memory.snapshots
         first = steps[0].first if steps else self._first
-        return first is not None and frame >= max(first, self._last - self._assist.memory_frames)
+        return first is not None and frame >= max(first, self._last - self._settings.memory_frames)
 
-    def apply_corrections(self, pointings: Sequence[PositionCorrection]) -> WindowResult | None:
+    def apply_corrections(self, corrections: Sequence[PositionCorrection]) -> WindowResult | None:
         """Apply an operator's corrections, also to final frames; return what changes.
 
         The windows since the first corrected frame are solved again with the corrections' costs
@@ -91,56 +91,63 @@ class InteractiveTracker(OnlineTracker):
         still to come, or the frames are no longer remembered (see `remembers`).
         """
         frames: list[int] = []
-        for it in sorted(pointings, key=lambda it: (it.frame, it.object)):
+        for it in sorted(corrections, key=lambda it: (it.frame, it.object)):
             if self.remembers(it.frame):
-                frames += self._hear(it)
-        # Doubts too small to be followed at once wait for others; what is forgotten meanwhile is not mended.
-        self._doubtful = [frame for frame in (*self._doubtful, *frames) if self.remembers(frame)]
-        if not self._doubtful or self._doubt < _DOUBT * self._assist.correction_weight:
+                frames += self._store_correction(it)
+        # Small contradictions wait for others; frames that are forgotten meanwhile are dropped.
+        self._contradicted_frames = [
+            frame for frame in (*self._contradicted_frames, *frames) if self.remembers(frame)
+        ]
+        if (
+            not self._contradicted_frames
+            or self._total_disagreement < _MIN_DISAGREEMENT * self._settings.correction_weight
+        ):
             return None
-        frame = min(self._doubtful)
-        self._doubtful, self._doubt = [], 0.0
-        return self._again(frame)
+        frame = min(self._contradicted_frames)
+        self._contradicted_frames, self._total_disagreement = [], 0.0
+        return self._solve_again(frame)
 
-    def _hear(self, pointing: PositionCorrection) -> list[int]:
+    def _store_correction(self, correction: PositionCorrection) -> list[int]:
         """Store a correction; return the frames in which it contradicts the solution."""
-        self._pointings.setdefault(pointing.frame, {})[pointing.object] = pointing
-        self._place(pointing)
-        doubt = self._memory.disagreement(pointing, self._assist)
+        self._corrections.setdefault(correction.frame, {})[correction.object] = correction
+        self._place(correction)
+        doubt = self._memory.disagreement(correction, self._settings)
         if not doubt:
             return []
-        self._doubt += doubt
-        frames = [pointing.frame]
-        steps = self._memory.windows_since(pointing.frame)
-        for it in backdate_correction(pointing, self._memory, self._costs, self._agreed(pointing)):
+        self._total_disagreement += doubt
+        frames = [correction.frame]
+        steps = self._memory.windows_since(correction.frame)
+        for it in backdate_correction(
+            correction, self._memory, self._costs, self._last_agreement(correction)
+        ):
             if it.frame < steps[0].first or len(frames) > 1:
-                self._pointings.setdefault(it.frame, {}).setdefault(it.object, it)
+                self._corrections.setdefault(it.frame, {}).setdefault(it.object, it)
                 frames.append(it.frame)
         if len(frames) > 1:
-            self._doubt += self._assist.correction_weight
+            self._total_disagreement += self._settings.correction_weight
         return frames
 
-    def _place(self, pointing: PositionCorrection) -> None:
+    def _place(self, correction: PositionCorrection) -> None:
         """Insert a hypothesis at the corrected point where no detection fits."""
-        look = next((it.histogram for it in self._objects if it.id == pointing.object), None)
-        if look is None or pointing.frame not in self._memory.detections:
+        histogram = next((it.histogram for it in self._objects if it.id == correction.object), None)
+        if histogram is None or correction.frame not in self._memory.detections:
             return
-        self._memory.insert_hypothesis(pointing, look)
-        if pointing.frame in self._seen:
-            self._seen[pointing.frame] = self._memory.detections[pointing.frame]
+        self._memory.insert_hypothesis(correction, histogram)
+        if correction.frame in self._detections:
+            self._detections[correction.frame] = self._memory.detections[correction.frame]
 
-    def _agreed(self, pointing: PositionCorrection) -> int:
+    def _last_agreement(self, correction: PositionCorrection) -> int:
         """Return the frame after the object's last correction that the solution agrees with."""
         before = [
             frame + 1
-            for frame, said in self._pointings.items()
-            if frame < pointing.frame
-            and pointing.object in said
-            and not self._memory.disagreement(said[pointing.object], self._assist)
+            for frame, said in self._corrections.items()
+            if frame < correction.frame
+            and correction.object in said
+            and not self._memory.disagreement(said[correction.object], self._settings)
         ]
         return max(before, default=self._memory.snapshots[0].first)
 
-    def _again(self, frame: int) -> WindowResult | None:
+    def _solve_again(self, frame: int) -> WindowResult | None:
         """Solve the windows since a frame again."""
         steps = list(self._memory.windows_since(frame))
         if not steps:
@@ -152,12 +159,12 @@ class InteractiveTracker(OnlineTracker):
         results = []
         for step in steps:
             first = self._first
-            self._seen = {n: it for n, it in self._memory.detections.items() if first <= n <= step.end}
-            # What was foreseen before has been told.
-            self._foresees = step is steps[-1]
+            self._detections = {n: it for n, it in self._memory.detections.items() if first <= n <= step.end}
+            # Risks of earlier windows have been published.
+            self._predicts_risks = step is steps[-1]
             results.append(self._solve(step.end, step.final_to))
         first = self._first
-        self._seen = {n: it for n, it in self._memory.detections.items() if n >= first}
+        self._detections = {n: it for n, it in self._memory.detections.items() if n >= first}
         result = merge_results(results)
         changed = [n for n, it in sorted(self._memory.assignments.items()) if it != before.get(n)]
         if result is None or not changed:
@@ -170,14 +177,16 @@ class InteractiveTracker(OnlineTracker):
         self._memory.record_window(WindowSnapshot(first, end, final_to, objects, self._warm_start))
         result = super()._solve(end, final_to)
         self._memory.keep_only(first, {track.id for track in result.tracks})
-        if self._solved is None or not self._foresees:
+        if self._solved is None or not self._predicts_risks:
             return result
         solved = replace(
             self._solved,
             final_to=final_to,
-            recent_boxes=self._memory.boxes_of(self._solved.known_ids, end, max(_TRAIL, end - first + 1)),
+            recent_boxes=self._memory.boxes_of(
+                self._solved.known_ids, end, max(_RECENT_FRAMES, end - first + 1)
+            ),
         )
-        return replace(result, risk_events=self._foresight.predict(solved))
+        return replace(result, risk_events=self._risk_predictor.predict(solved))
 
     def _assign(self, first: int, frames: Sequence[Detections]) -> tuple[npt.NDArray[np.int64], SolveReport]:
         self._network = None
@@ -202,29 +211,29 @@ class InteractiveTracker(OnlineTracker):
             )
         return states, report
 
-    def _allowed(
+    def _gated_detections(
         self, item: TrackedObject, first: int, frames: Sequence[Detections]
     ) -> list[npt.NDArray[np.bool_]]:
-        allowed = super()._allowed(item, first, frames)
+        allowed = super()._gated_detections(item, first, frames)
         for m, seen in enumerate(frames):
-            pointing = self._pointings.get(first + m, {}).get(item.id)
-            if pointing is not None:
-                # Who is pointed at has got there, however far it is.
+            correction = self._corrections.get(first + m, {}).get(item.id)
+            if correction is not None:
+                # The corrected object is at the point, however far that is.
                 allowed = allowed or [np.zeros(len(it), dtype=np.bool_) for it in frames]
-                allowed[m] = allowed[m] | near_correction(pointing, seen.boxes)
+                allowed[m] = allowed[m] | near_correction(correction, seen.boxes)
             for who, place in self._memory.inserted.get(first + m, {}).items():
                 if allowed and who != item.id:
                     allowed[m][place] = False
         return allowed
 
-    def _weighed(self, network: Network, first: int, ids: list[int]) -> Network:
+    def _adjust_costs(self, network: Network, first: int, ids: list[int]) -> Network:
         network = apply_insertions(network, first, ids, self._memory.inserted, self._costs.change)
-        comeback = self._costs.change + self._costs.motion + self._costs.reappearance
-        network = apply_corrections(network, first, ids, self._pointings, self._assist, comeback)
+        reappearance_cost = self._costs.change + self._costs.motion + self._costs.reappearance
+        network = apply_corrections(network, first, ids, self._corrections, self._settings, reappearance_cost)
         self._network = ids, network
         return network
 
-    def _number(self, birth: Birth, frame: int) -> int:
+    def _assign_id(self, birth: Birth, frame: int) -> int:
         number = self._memory.assign_id(frame, birth.box, self._next_id)
         self._next_id = max(self._next_id, number + 1)
         return number

@@ -21,7 +21,7 @@ from tracking.types import Detections
 _SAME_PLACE = 0.5
 """Overlap (IoU) from which somebody new is the one who began in that frame before."""
 
-_AROUND = 50
+_SIZE_FRAMES = 50
 """Frames before and after in which it is looked how large somebody is."""
 
 _SAME_TIME = 5
@@ -68,13 +68,13 @@ class WindowMemory:
     Attributes:
         detections: the detections, by frame; a frame that is not there showed nothing.
         assignments: who was in which of them in the end, by frame: the observation's index by id.
-        inserted: what was made of pointings, by frame: the observation's index by whom it was made for.
+        inserted: what was made of corrections, by frame: the observation's index by whom it was made for.
         snapshots: the windows, oldest first.
     """
 
     def __init__(self, frames: int) -> None:
         self._frames = frames
-        self._births: list[InitiatedTrack] = []
+        self._initiated: list[InitiatedTrack] = []
         self._undone: list[InitiatedTrack] = []
         """Those whose windows are solved again: who begins there once more has their number."""
         self.detections: dict[int, Detections] = {}
@@ -93,31 +93,31 @@ class WindowMemory:
         self.detections = {number: it for number, it in self.detections.items() if number >= oldest}
         self.assignments = {number: it for number, it in self.assignments.items() if number >= oldest}
         self.inserted = {number: it for number, it in self.inserted.items() if number >= oldest}
-        self._births = [it for it in self._births if it.frame >= oldest - _SAME_TIME]
+        self._initiated = [it for it in self._initiated if it.frame >= oldest - _SAME_TIME]
         self._undone = [it for it in self._undone if it.frame >= oldest - _SAME_TIME]
 
-    def insert_hypothesis(self, pointing: PositionCorrection, look: Floats) -> None:
+    def insert_hypothesis(self, correction: PositionCorrection, histogram: Floats) -> None:
         """Insert or move the hypothesis of a corrected object where no detection fits."""
-        frame, who = pointing.frame, pointing.object
+        frame, who = correction.frame, correction.object
         size, seen = self._size(who, frame), self.detections.get(frame)
         if size is None or seen is None:
             return
         made = self.inserted.get(frame, {})
         real = len(seen) - len(made)
-        box = box_around(pointing, size)
+        box = box_around(correction, size)
         if who in made:
             boxes = seen.boxes.copy()
             boxes[made[who]] = box
             self.detections[frame] = Detections(boxes, seen.scores, seen.histograms)
-        elif not has_hypothesis(pointing, size, seen.boxes[:real]):
-            self.detections[frame] = insert_hypothesis(seen, box, look)
+        elif not has_hypothesis(correction, size, seen.boxes[:real]):
+            self.detections[frame] = insert_hypothesis(seen, box, histogram)
             self.inserted[frame] = {**made, who: len(seen)}
 
     def _size(self, who: int, frame: int) -> Floats | None:
         """Return the median size of an object around a frame, `(2,)` pixels (width, height)."""
         sides = [
             self.detections[n].boxes[self.assignments[n][who]]
-            for n in range(frame - _AROUND, frame + _AROUND + 1)
+            for n in range(frame - _SIZE_FRAMES, frame + _SIZE_FRAMES + 1)
             if who in self.assignments.get(n, {})
             and who not in self.inserted.get(n, {})
             and n in self.detections
@@ -129,8 +129,8 @@ class WindowMemory:
         while self.snapshots and self.snapshots[-1].order >= step.order:
             self.snapshots.pop()
         self.snapshots.append(step)
-        self._undone += [it for it in self._births if it.window >= step.order]
-        self._births = [it for it in self._births if it.window < step.order]
+        self._undone += [it for it in self._initiated if it.window >= step.order]
+        self._initiated = [it for it in self._initiated if it.window < step.order]
 
     def record_states(self, first: int, ids: Sequence[int], states: npt.NDArray[np.int64]) -> None:
         """Record a window's solution `(n, M)` from the frame `first` on, -1 where hidden."""
@@ -162,12 +162,12 @@ class WindowMemory:
             return ()
         return [it for it in self.snapshots if it.end >= frame]
 
-    def disagreement(self, pointing: PositionCorrection, settings: InteractiveSettings) -> float:
+    def disagreement(self, correction: PositionCorrection, settings: InteractiveSettings) -> float:
         """Return the cost by which a correction contradicts the solution; 0 where they agree."""
-        if pointing.frame not in self.assignments or pointing.frame not in self.detections:
+        if correction.frame not in self.assignments or correction.frame not in self.detections:
             return 0.0
-        far = normalized_offset(pointing, self.detections[pointing.frame].boxes)
-        state = self.assignments[pointing.frame].get(pointing.object)
+        far = normalized_offset(correction, self.detections[correction.frame].boxes)
+        state = self.assignments[correction.frame].get(correction.object)
         now = settings.hidden_share if state is None else float(far[state])
         return settings.correction_weight * (now - min(float(far.min(initial=1.0)), settings.hidden_share))
 
@@ -176,14 +176,14 @@ class WindowMemory:
 
         Without anything undone nobody ever has a number that somebody else had.
         """
-        known = self._began(frame, box)
+        known = self._undone_track(frame, box)
         if known is not None:
             self._undone.remove(known)
         number = fresh if known is None else known.id
-        self._births.append(InitiatedTrack(frame, box, number, self.snapshots[-1].order))
+        self._initiated.append(InitiatedTrack(frame, box, number, self.snapshots[-1].order))
         return number
 
-    def _began(self, frame: int, box: Floats) -> InitiatedTrack | None:
+    def _undone_track(self, frame: int, box: Floats) -> InitiatedTrack | None:
         """Return the track that started there in an undone window."""
         near = [it for it in self._undone if abs(it.frame - frame) <= _SAME_TIME]
         found = max(near, key=lambda it: (float(iou(it.box, box)), -it.id), default=None)

@@ -29,8 +29,8 @@ def gate_detections(
 def within_gate(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings) -> npt.NDArray[np.bool_]:
     """Return which boxes `(K, 4)` an object of `box` `(4,)` can have reached after `elapsed` frames, `(K,)`.
 
-    It may have gone (`normalized_distance`) `reach + reach_per_frame (elapsed - 1)` heights, and the height
-    changed by a factor.
+    It may have gone (`normalized_distance`) `gate_heights + gate_growth (elapsed - 1)` heights, and the
+    height changed by a factor.
     """
     tall, other = float(heights(box)), heights(boxes)
     far = window.gate_heights + window.gate_growth * max(elapsed - 1, 0)

@@ -26,7 +26,7 @@ class PersonLifecycle:
     def __init__(self, settings: TemporalSettings, meter: float) -> None:
         self._settings, self._meter = settings, meter
         self._unclaimed: list[_UnassignedBlob] = []
-        self._away: dict[int, int] = {}
+        self._absent_stages: dict[int, int] = {}
         """By number: since how many decided stages they have been nowhere."""
 
     def find_new(self, window: TemporalWindow, done: StageDecision) -> list[int]:
@@ -41,8 +41,8 @@ class PersonLifecycle:
         for at, blob in enumerate(done.stage.blobs):
             if at in claimed or blob.area < least:
                 continue
-            before = max((it.stages for it in self._unclaimed if self._near(it.blob, blob)), default=0)
-            if before + 1 + self._goes_on(window, blob) >= self._settings.confirm_stages:
+            before = max((it.stages for it in self._unclaimed if self._reachable(it.blob, blob)), default=0)
+            if before + 1 + self._pending_stages(window, blob) >= self._settings.confirm_stages:
                 new.append(at)
             else:
                 unclaimed.append(_UnassignedBlob(blob, before + 1))
@@ -52,34 +52,34 @@ class PersonLifecycle:
 
     def find_departed(self, done: StageDecision, stage_s: float) -> set[int]:
         """Return the ids of people who have been absent for `forget_after_s`."""
-        self._away = {
-            number: self._away.get(number, 0) + 1
+        self._absent_stages = {
+            number: self._absent_stages.get(number, 0) + 1
             for number, at in done.blob_by_id.items()
             if at == done.stage.absent
         }
         gone = {
             number
-            for number, stages in self._away.items()
+            for number, stages in self._absent_stages.items()
             if stages * stage_s >= self._settings.forget_after_s
         }
         for number in gone:
-            del self._away[number]
+            del self._absent_stages[number]
         return gone
 
-    def _goes_on(self, window: TemporalWindow, blob: Blob) -> int:
+    def _pending_stages(self, window: TemporalWindow, blob: Blob) -> int:
         """Count the consecutive pending stages with an unassigned blob nearby."""
         if window.path is None:
             return 0
         count = 0
         for stage, chosen in zip(window.pending, window.path.blobs, strict=True):
             free = np.setdiff1d(np.arange(len(stage.blobs)), chosen)
-            near = [stage.blobs[at] for at in free.tolist() if self._near(blob, stage.blobs[at])]
+            near = [stage.blobs[at] for at in free.tolist() if self._reachable(blob, stage.blobs[at])]
             if not near:
                 break
             blob, count = near[0], count + 1
         return count
 
-    def _near(self, before: Blob, after: Blob) -> bool:
+    def _reachable(self, before: Blob, after: Blob) -> bool:
         """Return whether a person can have walked from one blob to the other within a stage."""
         reach = self._settings.speed_m_s * self._settings.stage_s
         return distance_score(before, after, self._meter, self._settings) <= reach

@@ -40,15 +40,15 @@ class TemporalTracker:
         self._pictures = 0
         """Pictures seen while the background is learned."""
         self._numbers = 0
-        self._seen: dict[int, Detections] = {}
+        self._detections: dict[int, Detections] = {}
         self._bins = 0
         self._first: int | None = None
         """The first frame that is not final."""
         self._last: int | None = None
         self._people: TemporalWindow | None = None
-        self._newcomers: PersonLifecycle | None = None
-        self._trails = BlobBoxHistory()
-        self._stops: SampledBoxes = {}
+        self._lifecycle: PersonLifecycle | None = None
+        self._blob_history = BlobBoxHistory()
+        self._samples: SampledBoxes = {}
         self._final: int | None = None
         """The last decided frame."""
         self._next_stage = 0
@@ -80,10 +80,10 @@ class TemporalTracker:
         if self._first is None:
             self._first = frame
         self._last = frame
-        self._seen[frame], self._bins = detections, detections.histograms.shape[1]
+        self._detections[frame], self._bins = detections, detections.histograms.shape[1]
         if image is not None:
-            self._look(frame, image)
-        self._keep_up(frame)
+            self._observe(frame, image)
+        self._decide_overdue(frame)
         stride, before = self._window.stride, self._first - 1 if last is None else last
         if ended is not None:
             return ended
@@ -94,33 +94,33 @@ class TemporalTracker:
         if self._first is None or self._last is None or self._last < self._first:
             return None
         while (done := None if self._people is None else self._people.commit()) is not None:
-            self._decided(done)
+            self._apply_decision(done)
         self._final = self._last
         return self._result()
 
     def _forget(self) -> None:
         """Forget all people, but keep the background."""
-        self._people, self._newcomers = None, None
-        self._trails, self._stops = BlobBoxHistory(), {}
+        self._people, self._lifecycle = None, None
+        self._blob_history, self._samples = BlobBoxHistory(), {}
         self._final, self._next_stage = None, 0
 
-    def _look(self, frame: int, image: Image) -> None:
+    def _observe(self, frame: int, image: Image) -> None:
         """Segment an image into blobs, and decide the stages that are due."""
         blobs = self._blobs_of(image)
         small = blobs.resize(image)
         if not blobs.ready:
             self._bootstrap(blobs, small)
             return
-        due = frame >= self._next_stage
-        found = blobs.detect(small, learn=due)
+        is_due = frame >= self._next_stage
+        found = blobs.detect(small, learn=is_due)
         boxes = np.array([blob.box for blob in found]).reshape(-1, 4) * self._scale
-        self._trails.add(frame, boxes)
-        if not due or (self._settings.closed_world and not found):
+        self._blob_history.add(frame, boxes)
+        if not is_due or (self._settings.closed_world and not found):
             return  # nobody can be nowhere: the sample is taken later
         self._next_stage = (frame // self._every + 1) * self._every
         self._sample(Stage(frame, found), blobs)
 
-    def _keep_up(self, frame: int) -> None:
+    def _decide_overdue(self, frame: int) -> None:
         """Decide overdue stages where images have been missing for long."""
         oldest = frame - self._settings.lag(self._fps)
         while self._people is not None and self._final is not None and self._final < oldest:
@@ -128,7 +128,7 @@ class TemporalTracker:
             if done is None:
                 self._final = oldest
             else:
-                self._decided(done)
+                self._apply_decision(done)
 
     def _bootstrap(self, blobs: BlobDetector, small: Image) -> None:
         settings = self._settings.blobs
@@ -141,30 +141,30 @@ class TemporalTracker:
             self._learned = []
 
     def _sample(self, stage: Stage, blobs: BlobDetector) -> None:
-        if self._people is None or self._newcomers is None:
+        if self._people is None or self._lifecycle is None:
             first = initial_people(stage, self._settings, blobs.pixels_per_meter)
             if self._settings.closed_world and not first:
                 return  # who is there is only counted once
             self._people = TemporalWindow(self._settings, blobs.size, blobs.pixels_per_meter, 1.0 / self._fps)
-            self._newcomers = PersonLifecycle(self._settings, blobs.pixels_per_meter)
+            self._lifecycle = PersonLifecycle(self._settings, blobs.pixels_per_meter)
             self._people.begin(stage, [(self._numbers + number, at) for number, at in first])
             self._numbers += len(first)
-            self._decided(StageDecision(stage, {it.id: it.blob for it in self._people.people}))
+            self._apply_decision(StageDecision(stage, {it.id: it.blob for it in self._people.people}))
         elif (done := self._people.push(stage)) is not None:
-            self._decided(done)
+            self._apply_decision(done)
 
-    def _decided(self, done: StageDecision) -> None:
+    def _apply_decision(self, done: StageDecision) -> None:
         """Store a decision, and update who has entered and left."""
         for number, at in done.blob_by_id.items():
-            self._stops.setdefault(number, []).append((done.stage.frame, self._box(done.stage, at)))
+            self._samples.setdefault(number, []).append((done.stage.frame, self._box(done.stage, at)))
         self._final = max(done.stage.frame, -1 if self._final is None else self._final)
-        if self._settings.closed_world or self._people is None or self._newcomers is None:
+        if self._settings.closed_world or self._people is None or self._lifecycle is None:
             return
-        self._people.remove(self._newcomers.find_departed(done, self._settings.stage_s))
-        for at in self._newcomers.find_new(self._people, done):
+        self._people.remove(self._lifecycle.find_departed(done, self._settings.stage_s))
+        for at in self._lifecycle.find_new(self._people, done):
             self._numbers += 1
             self._people.add(self._numbers, at)
-            self._stops[self._numbers] = [(done.stage.frame, self._box(done.stage, at))]
+            self._samples[self._numbers] = [(done.stage.frame, self._box(done.stage, at))]
 
     def _box(self, stage: Stage, at: int) -> Floats | None:
         """Return a blob's box in pixels of the camera's image; `None` for absence."""
@@ -178,29 +178,29 @@ class TemporalTracker:
         frames = range(first, last + 1)
         # Where nobody is followed yet, nothing that comes changes what was not seen.
         final = last if self._final is None else max(min(self._final, last), first - 1)
-        seen = [self._seen.get(frame, Detections.empty(self._bins)) for frame in frames]
-        tracks = build_window_tracks(self._all_stops(), self._trails, seen, first, final)
+        seen = [self._detections.get(frame, Detections.empty(self._bins)) for frame in frames]
+        tracks = build_window_tracks(self._all_samples(), self._blob_history, seen, first, final)
         result = WindowResult(first, last, final, tracks, self._report())
-        self._drop(final)
+        self._drop_final(final)
         return result
 
-    def _all_stops(self) -> SampledBoxes:
+    def _all_samples(self) -> SampledBoxes:
         """Return everyone's boxes at samples: the decided ones, then the current best path."""
         if self._people is None or self._people.path is None:
-            return self._stops
-        stops = {number: list(it) for number, it in self._stops.items()}
+            return self._samples
+        stops = {number: list(it) for number, it in self._samples.items()}
         for stage, chosen in zip(self._people.pending, self._people.path.blobs.tolist(), strict=True):
             for person, at in zip(self._people.people, chosen, strict=True):
                 stops.setdefault(person.id, []).append((stage.frame, self._box(stage, at)))
         return stops
 
-    def _drop(self, final: int) -> None:
+    def _drop_final(self, final: int) -> None:
         """Drop final frames, except each person's last sample."""
         self._first = final + 1
-        self._seen = {frame: it for frame, it in self._seen.items() if frame > final}
-        self._trails.forget_through(final)
+        self._detections = {frame: it for frame, it in self._detections.items() if frame > final}
+        self._blob_history.forget_through(final)
         here = set() if self._people is None else {it.id for it in self._people.people}
-        self._stops = {number: stops[-1:] for number, stops in self._stops.items() if number in here}
+        self._samples = {number: stops[-1:] for number, stops in self._samples.items() if number in here}
 
     def _report(self) -> SolveReport:
         path = None if self._people is None else self._people.path
@@ -232,7 +232,7 @@ def build_window_tracks(
         boxes = trails.trajectory(mine, first, first + len(seen) - 1)
         if np.isnan(boxes).all():
             continue
-        shown = _shown(boxes, seen)
+        shown = _matched_detections(boxes, seen)
         looks = [it.histograms[at] for it, at in zip(seen, shown, strict=True) if at != OCCLUDED]
         histogram = mean_histogram(np.stack(looks)) if looks else np.empty(seen[0].histograms.shape[1])
         sure = float(np.mean(~np.isnan(boxes[:, 0])))
@@ -241,7 +241,7 @@ def build_window_tracks(
     return add_appearance_samples(tracks, states, first, seen[: final - first + 1])
 
 
-def _shown(boxes: Floats, seen: Sequence[Detections]) -> NDArray[np.int64]:
+def _matched_detections(boxes: Floats, seen: Sequence[Detections]) -> NDArray[np.int64]:
     """Return the detection that matches a track in each frame, `(F,)`, -1 for none."""
     states = np.full(len(seen), OCCLUDED, dtype=np.int64)
     for row, found in enumerate(seen):

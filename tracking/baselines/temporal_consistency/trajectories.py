@@ -30,42 +30,42 @@ class BlobBoxHistory:
         """Drop all frames up to this one."""
         self._boxes = {it: boxes for it, boxes in self._boxes.items() if it > frame}
 
-    def trajectory(self, stops: list[tuple[int, Floats | None]], first: int, last: int) -> Floats:
+    def trajectory(self, samples: list[tuple[int, Floats | None]], first: int, last: int) -> Floats:
         """Return a person's boxes in the frames `first` to `last`, `(F, 4)`, NaN where absent.
 
         Args:
-            stops: frames and their blob's boxes `(4,)` at samples, ascending; None: nowhere.
+            samples: frames and their blob's boxes `(4,)` at samples, ascending; None: nowhere.
             first: the first frame.
             last: the last frame.
         """
         boxes = np.full((last - first + 1, BOX_SIDES), np.nan)
-        frames = [frame for frame, _ in stops]
+        frames = [frame for frame, _ in samples]
         for row, frame in enumerate(range(first, last + 1)):
             place = bisect_left(frames, frame)
-            if place < len(stops) and stops[place][0] == frame:
-                box = stops[place][1]
+            if place < len(samples) and samples[place][0] == frame:
+                box = samples[place][1]
             elif place == 0:
                 continue
-            elif place == len(stops):
+            elif place == len(samples):
                 # After the newest sample: on from frame to frame.
-                before = boxes[row - 1] if row else stops[-1][1]
-                box = None if before is None or np.isnan(before[0]) else self._blob(frame, before)
+                before = boxes[row - 1] if row else samples[-1][1]
+                box = None if before is None or np.isnan(before[0]) else self._nearest_blob(frame, before)
             else:
-                box = self._between(frame, stops[place - 1], stops[place])
+                box = self._interpolated(frame, samples[place - 1], samples[place])
             if box is not None:
                 boxes[row] = box
         return boxes
 
-    def _between(
+    def _interpolated(
         self, frame: int, before: tuple[int, Floats | None], after: tuple[int, Floats | None]
     ) -> Floats | None:
         """Return the blob nearest to the straight line between two samples, or the point on the line."""
         if before[1] is None or after[1] is None:
             return None
         share = (frame - before[0]) / (after[0] - before[0])
-        return self._blob(frame, (1.0 - share) * before[1] + share * after[1])
+        return self._nearest_blob(frame, (1.0 - share) * before[1] + share * after[1])
 
-    def _blob(self, frame: int, expected: Floats) -> Floats:
+    def _nearest_blob(self, frame: int, expected: Floats) -> Floats:
         """Return the box of the frame's blob that overlaps a box most, or that box if none does."""
         boxes = self._boxes.get(frame)
         if boxes is None or not len(boxes):

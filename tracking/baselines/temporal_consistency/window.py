@@ -96,7 +96,7 @@ class TemporalWindow:
         if stage.frame <= before.frame:
             raise ValueError(f"the stage of frame {stage.frame} came after that of frame {before.frame}")
         self.pending.append(stage)
-        self._steps.append(self._between(before, stage))
+        self._steps.append(self._distance_costs(before, stage))
         self._solve()
         return self.commit() if len(self.pending) >= self._settings.window_stages else None
 
@@ -117,7 +117,7 @@ class TemporalWindow:
     def add(self, number: int, at: int) -> None:
         """Add a person who is in a blob of the decided stage."""
         self.people.append(self._person(number, at))
-        self._learn_of(self.people[-1])
+        self._learn_person(self.people[-1])
         self._solve()
 
     def remove(self, numbers: set[int]) -> None:
@@ -139,7 +139,7 @@ class TemporalWindow:
         self.graph = WindowGraph(
             np.array([person.blob for person in self.people], dtype=np.int64),
             tuple(self._steps),
-            tuple(self._looks(stage) for stage in self.pending),
+            tuple(self._appearance_costs(stage) for stage in self.pending),
             tuple(np.arange(len(stage.blobs) + 1) < stage.absent for stage in self.pending),
             settings.merge_cost,
             longest,
@@ -147,7 +147,7 @@ class TemporalWindow:
         self.links = prune_links(self.graph)
         self.path = solve_joint_path(self.graph, self.links, settings.max_joint_states)
 
-    def _looks(self, stage: Stage) -> Floats:
+    def _appearance_costs(self, stage: Stage) -> Floats:
         """Compute f_color of everyone in every blob, and the cost of absence: `(P, B + 1)`."""
         costs = np.full((len(self.people), len(stage.blobs) + 1), self._settings.absence_cost)
         if stage.blobs:
@@ -157,18 +157,18 @@ class TemporalWindow:
                 costs[row, :-1] = person.appearance.costs(middles, colors, self._settings.unknown_appearance)
         return costs
 
-    def _between(self, before: Stage, after: Stage) -> Floats:
+    def _distance_costs(self, before: Stage, after: Stage) -> Floats:
         """Compute f_dist between two stages, absence included: `(B' + 1, B + 1)`."""
         seconds = (after.frame - before.frame) * self._frame_s
         costs = np.full((len(before.blobs) + 1, len(after.blobs) + 1), np.inf)
         costs[:-1, :-1] = distance_costs(before.blobs, after.blobs, seconds, self._meter, self._settings)
         if not self._settings.closed_world:
-            costs[:-1, -1] = [self._way_out(blob) for blob in before.blobs]
-            costs[-1, :-1] = [self._way_out(blob) for blob in after.blobs]
+            costs[:-1, -1] = [self._exit_cost(blob) for blob in before.blobs]
+            costs[-1, :-1] = [self._exit_cost(blob) for blob in after.blobs]
             costs[-1, -1] = 0.0
         return costs
 
-    def _way_out(self, blob: Blob) -> float:
+    def _exit_cost(self, blob: Blob) -> float:
         """Return the cost of leaving the image from a blob, or of entering there."""
         left, top, right, bottom = blob.box.tolist()
         room = min(left, top, self._size[0] - right, self._size[1] - bottom)
@@ -179,9 +179,9 @@ class TemporalWindow:
         """Update the appearance of everyone isolated in a decided stage (section 2.2)."""
         for person in self.people:
             if person.blob < stage.absent:
-                self._learn_of(person)
+                self._learn_person(person)
 
-    def _learn_of(self, person: TrackedPerson) -> None:
+    def _learn_person(self, person: TrackedPerson) -> None:
         stage = self.decided
         if stage is None or person.blob >= stage.absent:
             return

@@ -76,10 +76,10 @@ class HeightRange:
         return np.where((away <= 1.0) & (expected > 0.0), 1.0 - _EDGE * away**2, 0.0)
 
 
-# What a height at the edge of the band loses of its gain.
+# Share of its gain that a height at the edge of the range loses.
 _EDGE = 0.3
 # Where a box is looked for around a place of the scan, in steps; first where it is.
-_MOVES = np.array([(x, y, x, y) for y in (0, -1, 1) for x in (0, -1, 1)], dtype=np.float64)
+_OFFSETS = np.array([(x, y, x, y) for y in (0, -1, 1) for x in (0, -1, 1)], dtype=np.float64)
 
 
 class BoxFilter:
@@ -95,48 +95,48 @@ class BoxFilter:
         self._weights = integral_image(weight)
         self._shape = (weight.shape[0], weight.shape[1])
         self._rows = rows
-        self._band: HeightRange | None = None
+        self._range: HeightRange | None = None
         self._plans: list[HeightPlan] | None = None
 
-    def peaks(self, gain: Plane, band: HeightRange | None) -> ScanPeaks:
+    def peaks(self, gain: Plane, height_range: HeightRange | None) -> ScanPeaks:
         """Scan all positions and heights; return the local maxima, best first.
 
         Args:
             gain: `(H, W)`, what each cell adds to a body that covers it.
-            band: where it is known, which heights are possible at which foot.
+            height_range: the possible heights by foot row; None: all.
         """
-        if self._plans is None or band is not self._band:
-            self._band, self._plans = band, self._planned(band)
+        if self._plans is None or height_range is not self._range:
+            self._range, self._plans = height_range, self._plan_heights(height_range)
         sums = integral_image(gain)
         found = [plan.peaks(sums) for plan in self._plans]
         boxes = np.concatenate([np.empty((0, 4)), *(places for places, _ in found)])
         gains = np.concatenate([np.empty(0), *(values for _, values in found)])
         order = _best_first(boxes, gains)[: self._settings.max_peaks]
-        return self._refined(boxes[order], sums)
+        return self._refine(boxes[order], sums)
 
-    def _planned(self, band: HeightRange | None) -> list[HeightPlan]:
+    def _plan_heights(self, height_range: HeightRange | None) -> list[HeightPlan]:
         feet = np.arange(self._shape[0] + 1, dtype=np.float64)
         plans: list[HeightPlan] = []
         least = self._settings.min_height * self._rows
-        if band is not None:
-            least = min(least, max(band.min_height * self._rows, band.model.min_height))
+        if height_range is not None:
+            least = min(least, max(height_range.min_height * self._rows, height_range.model.min_height))
         for height in scan_heights(self._rows, least, self._settings).astype(np.int64).tolist():
             size = max(round(self._settings.aspect_ratio * height), 2), height
-            priors = np.ones(len(feet)) if band is None else band.priors(feet, float(height))
+            priors = np.ones(len(feet)) if height_range is None else height_range.priors(feet, float(height))
             plan = plan_height(self._shape, size, self._parts, priors, self._settings.min_gain)
             if plan is not None:
                 plans.append(plan)
         return plans
 
-    def _refined(self, boxes: Floats, sums: Floats) -> ScanPeaks:
+    def _refine(self, boxes: Floats, sums: Floats) -> ScanPeaks:
         """Move each box to the best place between those of the scan, by half a step and half again."""
         step = np.maximum((boxes[:, 3] - boxes[:, 1]) // STEPS_A_HEIGHT, 1.0)
         while (step := step // 2).any():
-            moved = boxes[:, None] + step[:, None, None] * _MOVES
-            gains, priors, _ = self._measured(moved.reshape(-1, 4), sums)
-            best = np.argmax((gains * priors).reshape(len(boxes), len(_MOVES)), axis=1)
+            moved = boxes[:, None] + step[:, None, None] * _OFFSETS
+            gains, priors, _ = self._measure(moved.reshape(-1, 4), sums)
+            best = np.argmax((gains * priors).reshape(len(boxes), len(_OFFSETS)), axis=1)
             boxes = moved[np.arange(len(boxes)), best]
-        gains, priors, corners = self._measured(boxes, sums)
+        gains, priors, corners = self._measure(boxes, sums)
         whole = part_rectangles(boxes, BODY_PARTS["box"], self._shape).sums(self._weights)
         extent = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
         order = _best_first(boxes, gains * priors)
@@ -144,13 +144,13 @@ class BoxFilter:
         sizes = np.maximum(corners.sums(self._weights), 1.0)
         return ScanPeaks(boxes[order], gains[order], sizes[order], priors[order], corners.select(order))
 
-    def _measured(self, boxes: Floats, sums: Floats) -> tuple[Floats, Floats, PartRectangles]:
+    def _measure(self, boxes: Floats, sums: Floats) -> tuple[Floats, Floats, PartRectangles]:
         """Return the gains, priors and parts of boxes."""
         corners = part_rectangles(boxes, self._parts, self._shape)
         gains = corners.sums(sums)
-        if self._band is None:
+        if self._range is None:
             return gains, np.ones(len(boxes)), corners
-        return gains, self._band.priors(boxes[:, 3], boxes[:, 3] - boxes[:, 1]), corners
+        return gains, self._range.priors(boxes[:, 3], boxes[:, 3] - boxes[:, 1]), corners
 
 
 def _best_first(boxes: Floats, gains: Floats) -> npt.NDArray[np.int64]:

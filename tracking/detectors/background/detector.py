@@ -124,9 +124,9 @@ class BackgroundDetector:
     ) -> None:
         """Start without a background; `floor` is the calibrated floor geometry, where known."""
         self.settings = settings or BackgroundSettings()
-        self._looks = AppearanceExtractor(self.settings.appearance, self.settings.gray_bins)
+        self._appearance = AppearanceExtractor(self.settings.appearance, self.settings.gray_bins)
         self._floor = floor
-        self._learner = HeightModelEstimator(self.settings.height_model)
+        self._height_estimator = HeightModelEstimator(self.settings.height_model)
         self._background: _Background = (
             MedianBackground(self.settings.median, self.settings.static_foreground, self.settings.shadows)
             if self.settings.model == "median"
@@ -135,8 +135,8 @@ class BackgroundDetector:
         self._shape: tuple[int, ...] | None = None
         self._grid: CellGrid | None = None
         self._filter: BoxFilter | None = None
-        self._line: HeightModel | None = None
-        self._band: HeightRange | None = None
+        self._height_model: HeightModel | None = None
+        self._height_range: HeightRange | None = None
         self.warming_up = True
         """Whether the last frame could not be searched, since the background was not known."""
 
@@ -153,13 +153,13 @@ class BackgroundDetector:
         background = self._background
         if not isinstance(background, MedianBackground):
             return
-        small = [self._grid_of(image).resize(image) for image in images]
+        small = [self._grid_for(image).resize(image) for image in images]
         background.prepare(small)
         for image in small:
             split = background.segment_still(image)
             if split is not None and self._grid is not None:
-                self._learner.observe(
-                    _cleaned(split.foreground & self._grid.visible), self._grid.visible, every
+                self._height_estimator.observe(
+                    _clean_mask(split.foreground & self._grid.visible), self._grid.visible, every
                 )
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
@@ -168,30 +168,32 @@ class BackgroundDetector:
         Raises:
             ValueError: not an `(H, W, 3)` uint8 picture, or another size than before.
         """
-        grid = self._grid_of(image)
+        grid = self._grid_for(image)
         small = grid.resize(image)
         split = self._background.segment(small)
         self.warming_up = split is None
         if split is None:
             return Detections.empty(self.bins)
-        mask = _cleaned(split.foreground & grid.visible)
-        self._learner.observe(mask, grid.visible)
-        found = self._hypotheses(mask, split.shadow & grid.visible & ~mask, grid)
+        mask = _clean_mask(split.foreground & grid.visible)
+        self._height_estimator.observe(mask, grid.visible)
+        found = self._fit(mask, split.shadow & grid.visible & ~mask, grid)
         boxes = grid.cells_to_work(found.boxes)
-        self._background.learn(mask, _occupied(boxes[: found.people], mask.shape))
-        return Detections(grid.work_to_image(boxes), found.scores, self._looks.histograms(small, boxes, mask))
+        self._background.learn(mask, _occupied_mask(boxes[: found.people], mask.shape))
+        return Detections(
+            grid.work_to_image(boxes), found.scores, self._appearance.histograms(small, boxes, mask)
+        )
 
     @property
     def bins(self) -> int:
         """The length of a row of the histograms."""
-        return self._looks.bins
+        return self._appearance.bins
 
     @property
     def height_model(self) -> HeightModel | None:
         """How tall people are where, in pixels of the working picture; None: not known yet."""
-        return self._learner.model
+        return self._height_estimator.model
 
-    def _hypotheses(self, mask: Mask, shadow: Mask, grid: CellGrid) -> ForegroundFit:
+    def _fit(self, mask: Mask, shadow: Mask, grid: CellGrid) -> ForegroundFit:
         settings = self.settings
         foreground = grid.cell_shares(mask)
         empty = np.maximum(grid.weight - foreground - grid.cell_shares(shadow), 0.0)
@@ -199,31 +201,31 @@ class BackgroundDetector:
         if self._filter is None:
             self._filter = BoxFilter(grid.weight, mask.shape[0] // CELL, settings.box_filter)
         peaks = self._filter.peaks(foreground - cost, self._heights(grid))
-        explaining = settings.foreground_fit
-        if not self._learner.is_reliable:
-            fewer = min(explaining.max_people, explaining.max_people_uncalibrated)
-            explaining = replace(explaining, max_people=fewer)
-        found = fit_foreground(peaks, foreground, cost, grid.weight, explaining)
+        fit_settings = settings.foreground_fit
+        if not self._height_estimator.is_reliable:
+            fewer = min(fit_settings.max_people, fit_settings.max_people_uncalibrated)
+            fit_settings = replace(fit_settings, max_people=fewer)
+        found = fit_foreground(peaks, foreground, cost, grid.weight, fit_settings)
         return ForegroundFit(
             shrink_to_foreground(found.boxes, foreground, grid.weight), found.scores, found.people
         )
 
     def _heights(self, grid: CellGrid) -> HeightRange | None:
         """Return the possible heights in cells; the same object while the model is unchanged."""
-        line, heights = self._learner.model, self.settings.height_model
-        if line is not self._line:
-            self._line = line
-            self._band = None
+        line, heights = self._height_estimator.model, self.settings.height_model
+        if line is not self._height_model:
+            self._height_model = line
+            self._height_range = None
             if line is not None:
-                self._band = HeightRange(
+                self._height_range = HeightRange(
                     line.in_cells(CELL, grid.margin),
                     heights.tolerance,
                     heights.tolerance_std,
                     heights.min_height,
                 )
-        return self._band
+        return self._height_range
 
-    def _grid_of(self, image: Image) -> CellGrid:
+    def _grid_for(self, image: Image) -> CellGrid:
         validate_image(image)
         if self._grid is None:
             self._shape = image.shape
@@ -236,7 +238,9 @@ class BackgroundDetector:
             )
             if self._floor is not None:
                 floor = self._floor.scaled_by(self._grid.scale)
-                self._learner = HeightModelEstimator(self.settings.height_model, floor, self._grid.rows)
+                self._height_estimator = HeightModelEstimator(
+                    self.settings.height_model, floor, self._grid.rows
+                )
         if image.shape != self._shape:
             raise ValueError(f"the frames' size changed from {self._shape} to {image.shape}")
         return self._grid
@@ -248,12 +252,12 @@ _CLOSE = np.ones((5, 3), dtype=np.uint8)
 _AROUND = 0.15
 
 
-def _cleaned(mask: Mask) -> Mask:
+def _clean_mask(mask: Mask) -> Mask:
     """Remove isolated pixels and close small holes."""
     return np.asarray(cv2.morphologyEx(cv2.medianBlur(mask, 5), cv2.MORPH_CLOSE, _CLOSE), dtype=np.uint8)
 
 
-def _occupied(boxes: npt.NDArray[np.float64], shape: tuple[int, ...]) -> Mask:
+def _occupied_mask(boxes: npt.NDArray[np.float64], shape: tuple[int, ...]) -> Mask:
     """Return a mask of `shape` that is 255 inside the boxes."""
     occupied = np.zeros(shape, dtype=np.uint8)
     for left, top, right, bottom in boxes:

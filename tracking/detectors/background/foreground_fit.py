@@ -64,18 +64,18 @@ def fit_foreground(
         scores.append(float(search.gain_per_area()[index]))
         search.add(index)
     people = len(chosen) if settings.enabled else settings.max_hypotheses
-    for index in _runners_up(peaks.boxes, chosen, settings):
+    for index in _alternatives(peaks.boxes, chosen, settings):
         chosen.append(index)
         scores.append(float(shares[index]))
     return ForegroundFit(peaks.boxes[chosen].reshape(-1, 4), np.clip(scores, 0.0, 1.0), people)
 
 
 # How often each person is looked for again, given the others: the first choice was made without them.
-_MOVES = 2
+_REFINEMENTS = 2
 
 
 # A body of which less is visible than this share counts as if so much were: a hand proves nobody.
-_LEAST_VISIBLE = 0.6
+_MIN_VISIBLE = 0.6
 
 
 class GreedySearch:
@@ -94,8 +94,8 @@ class GreedySearch:
         self.gains = peaks.gains.copy()
         self.visible = peaks.areas.copy()
         # What a covered cell no longer adds to the gain of the others, and to what is visible of them.
-        self._lost = np.stack([np.maximum(foreground - cost, 0.0), weight], axis=-1)
-        self._covers = np.zeros(weight.shape, dtype=np.int32)
+        self._cell_values = np.stack([np.maximum(foreground - cost, 0.0), weight], axis=-1)
+        self._cover_counts = np.zeros(weight.shape, dtype=np.int32)
         self._extent = peaks.parts.extent
 
     def select_people(self) -> list[int]:
@@ -107,7 +107,7 @@ class GreedySearch:
                 break
             chosen.append(best)
             self.add(best)
-        for _ in range(_MOVES):
+        for _ in range(_REFINEMENTS):
             before = list(chosen)
             for index in before:
                 self.remove(index)
@@ -122,24 +122,24 @@ class GreedySearch:
 
     def gain_per_area(self) -> npt.NDArray[np.float64]:
         """Return each candidate's gain per visible body area beside the selected, `(P,)`."""
-        least = _LEAST_VISIBLE * self._peaks.areas
+        least = _MIN_VISIBLE * self._peaks.areas
         return np.asarray(self._peaks.priors * self.gains / np.maximum(self.visible, least))
 
     def add(self, index: int) -> None:
         """Add a candidate to the selected: it covers its cells."""
         place, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
-        self._lose(place, inside & (self._covers[place] == 0), -1.0)
-        self._covers[place] += inside
+        self._update(place, inside & (self._cover_counts[place] == 0), -1.0)
+        self._cover_counts[place] += inside
 
     def remove(self, index: int) -> None:
         """Remove a candidate from the selected."""
         place, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
-        self._covers[place] -= inside
-        self._lose(place, inside & (self._covers[place] == 0), 1.0)
+        self._cover_counts[place] -= inside
+        self._update(place, inside & (self._cover_counts[place] == 0), 1.0)
 
-    def _lose(self, place: tuple[slice, slice], cells: npt.NDArray[np.bool_], sign: float) -> None:
+    def _update(self, place: tuple[slice, slice], cells: npt.NDArray[np.bool_], sign: float) -> None:
         """Update gains and visible areas of the bodies that overlap the changed cells."""
-        lost = integral_image(self._lost[place] * cells[..., None].astype(np.float32))
+        lost = integral_image(self._cell_values[place] * cells[..., None].astype(np.float32))
         (top, bottom), (left, right) = ((it.start, it.stop) for it in place)
         lefts, tops, rights, bottoms = self._extent
         near = np.flatnonzero((lefts < right) & (rights > left) & (tops < bottom) & (bottoms > top))
@@ -158,7 +158,7 @@ class GreedySearch:
         return best if np.isfinite(gains[best]) else None
 
 
-def _runners_up(
+def _alternatives(
     boxes: npt.NDArray[np.float64], chosen: list[int], settings: ForegroundFitSettings
 ) -> list[int]:
     """Return the next best candidates that overlap neither each other nor the selected too much."""

@@ -102,11 +102,11 @@ class HeightModelEstimator:
         self._settings = settings
         self._prior = height_prior(settings, floor, rows)
         self._samples: deque[tuple[float, float]] = deque(maxlen=settings.max_samples)
-        self._anew = SampleNoveltyFilter()
+        self._novelty_filter = SampleNoveltyFilter()
         self._frames = 0
         self._fitted_on = 0
-        self._seen = 0
-        self._together = 1
+        self._sample_count = 0
+        self._max_people = 1
         self.model: HeightModel | None = None
         if settings.enabled:
             self.model = self._prior.model
@@ -117,7 +117,7 @@ class HeightModelEstimator:
         line = self.model
         if line is None or self._prior.model is not None:
             return line is not None
-        return line.level_std <= _SURE * (line.slope * line.center + line.offset)
+        return line.level_std <= _RELIABLE * (line.slope * line.center + line.offset)
 
     def observe(self, foreground: Mask, visible: Mask, frames: int = 1) -> None:
         """Add the isolated people of one frame's foreground `(H, W)`; `visible` is 0 in ignored areas.
@@ -128,37 +128,37 @@ class HeightModelEstimator:
         if not self._settings.enabled or self._frames % self._settings.sample_every:
             return
         people = find_isolated_people(foreground, visible)
-        self._together = max(self._together, len(people))
+        self._max_people = max(self._max_people, len(people))
         worth = max(round(frames / _FRAMES), 1)
-        for person in self._anew.new_samples(people, frames * self._settings.sample_every):
+        for person in self._novelty_filter.new_samples(people, frames * self._settings.sample_every):
             self._samples.extend([(person.foot, person.height)] * worth)
-            self._seen += worth
+            self._sample_count += worth
         # Refit when the samples have grown by a tenth: early often, later seldom.
-        if len(self._samples) >= self._settings.min_samples and self._seen >= 1.1 * self._fitted_on:
-            self._fitted_on = self._seen
+        if len(self._samples) >= self._settings.min_samples and self._sample_count >= 1.1 * self._fitted_on:
+            self._fitted_on = self._sample_count
             samples = np.asarray(self._samples, dtype=np.float64)
-            self.model = fit_height_model(samples, self._settings, self._prior, self._together)
+            self.model = fit_height_model(samples, self._settings, self._prior, self._max_people)
 
 
 # Who walks gives a sample in so many frames, and so many samples are worth one independent one.
 _FRAMES = 4
-_ALIKE = 6.0
+_CORRELATED_SAMPLES = 6.0
 # Standard deviation of a sample, in heights: strides, what is missing of the outline.
 _NOISE = 0.06
 # Standard deviation of a person's own height, in heights: it is the same in all samples of theirs.
 _STATURE = 0.04
 # Deviation, in heights, from which a sample counts as no whole person, or two.
-_WILD = 0.16
+_OUTLIER = 0.16
 _ROUNDS = 5
 # People may be this much smaller than the low quantile of those that were seen alone.
-_SMALLER, _LOW = 0.8, 0.05
+_MIN_HEIGHT_SHARE, _LOW_QUANTILE = 0.8, 0.05
 _SLOPES = np.linspace(-2.0, 2.0, 17)
 _SAMPLES_A_SLOPE = 40
 # Standard deviation of a measured line at the horizon, in picture heights: heights are no straight line
 # where a camera looks steeply down, and homographies not exact.
 _HORIZON = 0.02
 # Standard deviation of a line, in heights, up to which it is sure.
-_SURE = 0.06
+_RELIABLE = 0.06
 # Standard deviation of a measured slope, in slopes.
 _MEASURED = 0.06
 
@@ -211,11 +211,11 @@ def fit_height_model(
     for _ in range(_ROUNDS):
         expected = slope * foot + offset
         deviation = (height - (1.0 + taller) * expected) / height
-        weight = np.maximum(1.0 - (deviation / _WILD) ** 2, 0.0) ** 2
+        weight = np.maximum(1.0 - (deviation / _OUTLIER) ** 2, 0.0) ** 2
         if not weight.any():
             return prior.model
         center = float(np.average(foot, weights=weight))
-        weight = weight / (_ALIKE * (_NOISE * height) ** 2)
+        weight = weight / (_CORRELATED_SAMPLES * (_NOISE * height) ** 2)
         terms = np.stack([np.ones_like(foot), foot - center, expected])
         evidence = (terms * weight) @ terms.T + precision
         pull = (terms * weight) @ height + precision @ [0.0, prior.slope, 0.0]
@@ -225,18 +225,18 @@ def fit_height_model(
         level, slope, taller = (float(value) for value in np.linalg.solve(evidence, pull))
         offset = level - slope * center
     seen = (1.0 + taller) * (slope * foot + offset)
-    scatter = _median(np.abs(height - seen) / height, _says(height))
+    scatter = _median(np.abs(height - seen) / height, _sample_weights(height))
     # Upright cameras see people grow towards the bottom of the picture; anything else is a misfit.
     if slope <= 0.0 or scatter > settings.max_scatter:
         return prior.model
     (level, mixed), (_, steep) = np.linalg.inv(evidence)[:2, :2]
-    smallest = _SMALLER * float(np.quantile(height[weight > 0.0], _LOW))
+    smallest = _MIN_HEIGHT_SHARE * float(np.quantile(height[weight > 0.0], _LOW_QUANTILE))
     # Level and slope are uncorrelated, and the line known best, a little off the mean of the feet.
     spread = float(np.sqrt(max(level - mixed**2 / steep, 0.0)))
     return HeightModel(slope, offset, center - float(mixed / steep), spread, float(np.sqrt(steep)), smallest)
 
 
-def _says(height: Floats) -> Floats:
+def _sample_weights(height: Floats) -> Floats:
     """Return the weight of each sample, 1 on average: tall ones more, since parts of people are small."""
     return np.asarray(height / height.mean())
 
@@ -256,7 +256,12 @@ def _best_of_grid(foot: Floats, height: Floats, prior: HeightPrior) -> tuple[flo
     if prior.horizon is not None:
         offsets = np.concatenate([offsets, -slopes[:, None] * prior.horizon], axis=1)
     deviation = (height - slopes[:, None, None] * foot - offsets[..., None]) / height
-    loss = np.minimum((deviation / _WILD) ** 2, 1.0) @ _says(height) * (_WILD / _NOISE) ** 2 / _ALIKE
+    loss = (
+        np.minimum((deviation / _OUTLIER) ** 2, 1.0)
+        @ _sample_weights(height)
+        * (_OUTLIER / _NOISE) ** 2
+        / _CORRELATED_SAMPLES
+    )
     loss += (_SLOPES**2)[:, None]
     if prior.horizon is not None:
         loss += ((offsets + slopes[:, None] * prior.horizon) / prior.horizon_std) ** 2

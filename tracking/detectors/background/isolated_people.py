@@ -44,7 +44,7 @@ def find_isolated_people(foreground: Mask, visible: Mask) -> list[IsolatedPerson
         if not (upright and inside and height >= _LEAST_HEIGHT * rows):
             continue
         around = visible[top - _MARGIN : top + height + _MARGIN, left - _MARGIN : left + width + _MARGIN]
-        if around.all() and not _crowded(blobs, label):
+        if around.all() and not _has_neighbor(blobs, label):
             found.append(IsolatedPerson(left + width / 2.0, float(top + height), float(height)))
     return found
 
@@ -55,7 +55,7 @@ def _blob(outline: npt.NDArray[Any]) -> tuple[int, ...]:
     return (*cv2.boundingRect(outline), round(cv2.contourArea(outline) + around) + 1)
 
 
-def _crowded(blobs: npt.NDArray[np.int64], label: int) -> bool:
+def _has_neighbor(blobs: npt.NDArray[np.int64], label: int) -> bool:
     """Return whether another large blob is near this one: probably parts of one person."""
     left, top, width, height, area = blobs[label].tolist()
     reach = height // 8
@@ -76,22 +76,22 @@ class SampleNoveltyFilter:
     """Drops samples of people who stand where a sample was just taken."""
 
     def __init__(self) -> None:
-        self._places = np.empty((0, 3))
-        self._since = np.empty(0)
+        self._positions = np.empty((0, 3))
+        self._ages = np.empty(0)
         """Frames since somebody was there."""
 
     def new_samples(self, people: Sequence[IsolatedPerson], frames: int = 1) -> list[IsolatedPerson]:
         """Return the people who count as new samples; the previous frame was `frames` ago."""
-        self._since += frames
-        anew: list[IsolatedPerson] = []
+        self._ages += frames
+        new: list[IsolatedPerson] = []
         for person in people:
             place = np.array([person.middle, person.foot, person.foot - person.height])
-            same = np.abs(self._places - place).max(axis=1, initial=0.0) <= _STEP * person.height
-            self._since[same] = 0.0
+            same = np.abs(self._positions - place).max(axis=1, initial=0.0) <= _STEP * person.height
+            self._ages[same] = 0.0
             if not same.any():
-                anew.append(person)
-                self._places = np.concatenate([self._places, place[None]])
-                self._since = np.append(self._since, 0.0)
-        kept = self._since <= _FORGET
-        self._places, self._since = self._places[kept], self._since[kept]
-        return anew
+                new.append(person)
+                self._positions = np.concatenate([self._positions, place[None]])
+                self._ages = np.append(self._ages, 0.0)
+        kept = self._ages <= _FORGET
+        self._positions, self._ages = self._positions[kept], self._ages[kept]
+        return new

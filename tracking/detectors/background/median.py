@@ -44,10 +44,10 @@ class MedianBackground:
     """
 
     def __init__(
-        self, settings: MedianSettings, ghosts: StaticForegroundSettings, shadows: ShadowSettings
+        self, settings: MedianSettings, static: StaticForegroundSettings, shadows: ShadowSettings
     ) -> None:
         self._settings = settings
-        self._ghosts = StaticForegroundFilter(ghosts)
+        self._static_filter = StaticForegroundFilter(static)
         self._shadows = shadows
         self._samples: list[Image] = []
         self._frames = 0
@@ -67,7 +67,7 @@ class MedianBackground:
 
     def segment_still(self, image: Image) -> Segmentation | None:
         """Segment an image that is not the next frame."""
-        return None if self._rounded is None else self._compared(image, self._rounded)[0]
+        return None if self._rounded is None else self._compare(image, self._rounded)[0]
 
     def segment(self, image: Image) -> Segmentation | None:
         """Segment the next frame; `None` while the background is not known yet."""
@@ -75,9 +75,9 @@ class MedianBackground:
         self._frames += 1
         if self._rounded is None:
             return None
-        split, gains = self._compared(image, self._rounded)
+        split, gains = self._compare(image, self._rounded)
         self._last = image, gains
-        self._watch_for_new_light(split.foreground | split.shadow)
+        self._relearn_on_light_change(split.foreground | split.shadow)
         return split
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
@@ -89,22 +89,22 @@ class MedianBackground:
         """
         if self._exact is None or self._rounded is None or self._last is None:
             return
-        looks, learns = self._ghosts.is_due(), self._frames % self._settings.learn_every == 0
-        if not (looks or learns):
+        checks_static, updates = self._static_filter.is_due(), self._frames % self._settings.learn_every == 0
+        if not (checks_static or updates):
             return
         # The frame as it would look at the background's gain.
         level = apply_gains(self._last[0], 1.0 / self._last[1])
-        ghosts = self._ghosts.find(level, self._rounded, foreground) if looks else None
-        if ghosts is not None:
-            self._exact[ghosts > 0] = level[ghosts > 0]
-        if learns:
+        static = self._static_filter.find(level, self._rounded, foreground) if checks_static else None
+        if static is not None:
+            self._exact[static > 0] = level[static > 0]
+        if updates:
             free = cv2.bitwise_not(occupied)
             cv2.accumulateWeighted(level, self._exact, self._settings.learn_rate, mask=free)
-        elif ghosts is None:
+        elif static is None:
             return
         self._rounded = np.rint(self._exact).astype(np.uint8)
 
-    def _compared(self, image: Image, background: Image) -> tuple[Segmentation, npt.NDArray[np.float64]]:
+    def _compare(self, image: Image, background: Image) -> tuple[Segmentation, npt.NDArray[np.float64]]:
         """Return the segmentation against the background at the image's gains, and the gains."""
         gains = channel_gains(image, background)
         expected = apply_gains(background, gains)
@@ -138,7 +138,7 @@ class MedianBackground:
         self._rounded = np.asarray(ordered[len(ordered) // 2], dtype=np.uint8)
         self._exact = self._rounded.astype(np.float32)
 
-    def _watch_for_new_light(self, mask: Mask) -> None:
+    def _relearn_on_light_change(self, mask: Mask) -> None:
         flooded = cv2.countNonZero(mask) > self._settings.relearn_share * mask.size
         self._flooded = self._flooded + 1 if flooded else 0
         if self._flooded >= self._settings.relearn_frames:

@@ -55,7 +55,7 @@ class StaticForegroundFilter:
         self._frames = 0
         self._last: Mask | None = None
         self._still: Mask | None = None
-        self._agreed: Mask = np.zeros((1, 1), dtype=np.uint8)
+        self._background_checks: Mask = np.zeros((1, 1), dtype=np.uint8)
 
     def is_due(self) -> bool:
         """Count a frame; return whether it is one to check."""
@@ -72,26 +72,28 @@ class StaticForegroundFilter:
         """
         gray = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         still = self._count_still(gray, foreground)
-        self._agreed = np.minimum(self._agreed, np.uint8(200)) + (foreground == 0).astype(np.uint8)
-        sure = self._agreed >= self._settings.settled_after_checks
+        self._background_checks = np.minimum(self._background_checks, np.uint8(200)) + (
+            foreground == 0
+        ).astype(np.uint8)
+        sure = self._background_checks >= self._settings.settled_after_checks
         waited = np.asarray(
             still >= np.where(sure, self._settings.settled_still_checks, self._settings.still_checks)
         )
         if not waited.any():
             return None
-        return self._judge(image, background, foreground, waited)
+        return self._check_regions(image, background, foreground, waited)
 
     def _count_still(self, gray: Mask, foreground: Mask) -> Mask:
         if self._last is None or self._still is None:
             self._still = np.zeros_like(gray)
         else:
-            calm = (cv2.absdiff(gray, self._last) < self._settings.motion_threshold) & (foreground > 0)
+            motionless = (cv2.absdiff(gray, self._last) < self._settings.motion_threshold) & (foreground > 0)
             grown = np.minimum(self._still, np.uint8(200)) + np.uint8(1)
-            self._still = np.where(calm, grown, np.uint8(0)).astype(np.uint8)
+            self._still = np.where(motionless, grown, np.uint8(0)).astype(np.uint8)
         self._last = gray
         return self._still
 
-    def _judge(
+    def _check_regions(
         self, image: Image, background: Image, foreground: Mask, waited: npt.NDArray[np.bool_]
     ) -> Mask | None:
         """Check the motionless regions one by one."""

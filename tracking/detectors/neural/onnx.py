@@ -63,11 +63,11 @@ class OnnxDetector:
     warming_up = False
 
     def __init__(
-        self, settings: OnnxSettings, looks: AppearanceExtractor | None = None, ignore: Polygons = ()
+        self, settings: OnnxSettings, appearance: AppearanceExtractor | None = None, ignore: Polygons = ()
     ) -> None:
         self.settings = settings
-        self._looks = looks or AppearanceExtractor()
-        self._ignored = IgnoreFilter(ignore)
+        self._appearance = appearance or AppearanceExtractor()
+        self._ignore_filter = IgnoreFilter(ignore)
         if settings.model is None:
             raise ValueError("no model is named: the path of an ONNX file")
         self._session = _opened(settings.model, settings.threads)
@@ -81,7 +81,7 @@ class OnnxDetector:
     @property
     def bins(self) -> int:
         """The length of a row of the histograms."""
-        return self._looks.bins
+        return self._appearance.bins
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
         """Return the people detected in a frame, best first.
@@ -94,10 +94,10 @@ class OnnxDetector:
         found = decode_output(self._run(planes), self.settings.output_layout, self.settings.classes)
         limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)
         boxes = np.clip((found.boxes - bars) / factor, 0.0, limits)
-        kept = (found.scores >= self.settings.min_score) & self._ignored.keep(image.shape, boxes)
+        kept = (found.scores >= self.settings.min_score) & self._ignore_filter.keep(image.shape, boxes)
         boxes, scores = boxes[kept], found.scores[kept]
         best = non_maximum_suppression(boxes, scores, self.settings.nms_iou, self.settings.max_detections)
-        return Detections(boxes[best], scores[best], self._looks.histograms(image, boxes[best]))
+        return Detections(boxes[best], scores[best], self._appearance.histograms(image, boxes[best]))
 
     def _run(self, planes: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
         try:
