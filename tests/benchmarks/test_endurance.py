@@ -28,7 +28,7 @@ def test_the_tracker_holds_no_more_after_hundreds_of_frames() -> None:
     try:
         for frame, seen in enumerate(itertools.islice(scene, FRAMES)):
             result = tracker.push(frame, seen)
-            assert len(tracker._seen) <= settings.window
+            assert len(tracker._detections) <= settings.window
             assert len(tracker._objects) <= settings.max_objects
             if result is not None:
                 objects = max([objects, *(track.id for track in result.tracks)])

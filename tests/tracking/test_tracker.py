@@ -197,7 +197,7 @@ def test_memory_is_bounded_by_the_window_and_the_list() -> None:
     for n in range(600):
         people = [Stroll(60.0 * k, 40.0, 0.0, (n // 40 + k) % 8) for k in range(5)]
         tracked.push(n, seen_at(people if n % 40 < 25 else [], n))
-        assert len(tracked._seen) <= window.window + window.stride
+        assert len(tracked._detections) <= window.window + window.stride
         assert len(tracked._objects) <= window.max_objects
 
 

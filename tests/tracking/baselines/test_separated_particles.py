@@ -105,7 +105,7 @@ def test_only_who_is_dressed_otherwise_hides_somebody_without_driving_them_away(
     (left, top), (other, _) = (apart.where(person, 0)[:2].astype(int) for person in range(2))
     covered[top : top + 44, left : left + 18] = covered[top : top + 44, other : other + 18]
     field = PartHistograms(covered, np.array([0.0, 0.0, 200.0, 120.0]))
-    assert method._behind_another(field, people[0]) is behind
+    assert method._is_occluded(field, people[0]) is behind
 
 
 @pytest.mark.parametrize("wrong", [{"particles": 0}, {"rows": 0}, {"cell_pixels": 0}, {"sharpness": 0.0}])

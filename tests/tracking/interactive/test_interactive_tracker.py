@@ -165,7 +165,7 @@ def test_a_small_doubt_that_is_forgotten_keeps_no_later_pointing_from_mending() 
         if n == 20:
             beside = _at(ALIKE[0], 15, 1)
             assert tracked.apply_corrections([replace(beside, x=beside.x + 0.3**0.5 * WIDTH)]) is None
-            assert tracked._doubtful == [15]
+            assert tracked._contradicted_frames == [15]
     mended = tracked.apply_corrections([_at(ALIKE[1], n, 1) for n in range(60, 70)])
     assert mended is not None
     assert mended.revised_from is not None
@@ -180,7 +180,7 @@ def test_the_memory_is_bounded() -> None:
     assert len(memory.detections) <= 40 + WindowSettings().window + 1
     assert len(memory.assignments) <= len(memory.detections)
     assert len(memory.snapshots) <= 40 // WindowSettings().stride + 2
-    assert len(tracked._pointings) <= 41
+    assert len(tracked._corrections) <= 41
 
 
 def test_after_a_long_gap_nothing_before_it_is_remembered() -> None:
