@@ -1,1 +1,1 @@
-"""How good view choices are, against ground truth."""
+"""Evaluation of view selections against ground truth."""

@@ -1,4 +1,4 @@
-"""Which numbers stand for which people, when both were seen by several cameras."""
+"""Matching of published objects with ground-truth people over several cameras."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ NO_PERSON = -1
 
 
 def match_objects_to_people(matches: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Let each object stand for one person and each person have one object, the best way round.
+    """Assign each object to one person and each person to one object, with the largest total of matches.
 
-    The total of the matches is largest, as for IDF1 (Ristani et al., 2016), over all cameras together.
+    As for IDF1 (Ristani et al., 2016), over all cameras together.
 
     Args:
-        matches: (K, O) in how many frames of all cameras each of K people was at each of O objects' boxes.
+        matches: (K, O) number of frames of all cameras in which each of K people was at each of O objects'
+            boxes.
 
     Returns:
-        (O,) the index of each object's person; -1 where it is nobody's.
+        (O,) the index of each object's person; -1: none.
 
     Raises:
         ValueError: matches that are no table.
@@ -27,6 +28,6 @@ def match_objects_to_people(matches: NDArray[np.int64]) -> NDArray[np.int64]:
         raise ValueError(f"matches have shape {matches.shape}, not (people, objects)")
     people = np.full(matches.shape[1], NO_PERSON, dtype=np.int64)
     rows, columns = scipy.optimize.linear_sum_assignment(matches, maximize=True)
-    met = matches[rows, columns] > 0
-    people[columns[met]] = rows[met]
+    matched = matches[rows, columns] > 0
+    people[columns[matched]] = rows[matched]
     return people

@@ -1,4 +1,4 @@
-"""What the best view of everybody is in truth: every view's quality from the boxes that are really there."""
+"""Ground truth of view quality, from ground-truth boxes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from bestview.view_selection.selection import NO_CAMERA, select_views
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewGroundTruth:
-    """How well every camera shows every person at every frame, K people, N frames, C cameras.
+    """True quality of every view of K people, N frames, C cameras.
 
     Attributes:
         cost: (K, N, C) float64, view cost in [0, 1]: the share of the best view's size quality that the view
@@ -26,7 +26,7 @@ class ViewGroundTruth:
 
     @property
     def evaluated(self) -> NDArray[np.bool_]:
-        """(K, N) frames that count: those in which some camera could show the person."""
+        """(K, N) frames that are evaluated: those in which some camera could show the person."""
         return np.asarray(self.visible.any(axis=2))
 
 
@@ -61,21 +61,23 @@ def view_ground_truth(
 
 
 def optimal_views(truth: ViewGroundTruth, switch_cost: float) -> NDArray[np.int64]:
-    """Give the exact offline optimum of section III: the whole recording is known, a cut may be anywhere.
+    """Compute the exact offline optimum of section III: the whole recording is known, a cut may be anywhere.
 
-    Frames that do not count are left out: those around such a gap are taken as neighbours.
+    Frames that are not evaluated are left out: those around such a gap are taken as neighbors.
 
     Returns:
-        (K, N) camera indices; -1 in frames that do not count.
+        (K, N) camera indices; -1 in frames that are not evaluated.
 
     Raises:
         ValueError: the switching cost is negative, or no number.
     """
     views = np.full(truth.visible.shape[:2], NO_CAMERA, dtype=np.int64)
-    for mine, counted, cost in zip(views, truth.evaluated, truth.cost, strict=True):
-        frames = int(np.count_nonzero(counted))
+    for person_views, evaluated, cost in zip(views, truth.evaluated, truth.cost, strict=True):
+        frames = int(np.count_nonzero(evaluated))
         anywhere = np.ones(frames, dtype=bool)
-        mine[counted] = select_views(cost[None, counted], _UNKNOWN, switch_cost, anywhere).views[0]
+        person_views[evaluated] = select_views(cost[None, evaluated], _UNKNOWN, switch_cost, anywhere).views[
+            0
+        ]
     return views
 
 

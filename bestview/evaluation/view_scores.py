@@ -1,4 +1,4 @@
-"""How good are given view choices, beside the best that could have been made knowing everything."""
+"""Scores of a view selection, beside the offline optimum."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class ViewScore:
 
 @dataclass(frozen=True, slots=True)
 class _ObjectTotals:
-    """Sums over the frames of one object that count."""
+    """Sums over the evaluated frames of one object."""
 
     frames: int
     agreed: int
@@ -67,14 +67,14 @@ def score_views(
 ) -> ViewScore:
     """Score `views` against the exact offline optimum of section III over the whole recording.
 
-    Frames in which nobody could show the object are left out, of the choice and of the optimum alike;
-    the frames around such a gap are taken as neighbours. A frame without a choice costs 1, and no cut
-    is counted to it or from it to the camera before.
+    Frames in which no camera could show the object are left out, of the selection and of the optimum alike;
+    the frames around such a gap are taken as neighbors. A frame without a view costs 1, and no cut is counted
+    to it or from it to the camera before.
 
     Args:
         cost: (K, N, C) true view cost in [0, 1] per object, frame and camera.
         visible: (K, N, C) where the object really is visible.
-        views: (K, N) the choice, a camera index or -1.
+        views: (K, N) the selection, a camera index or -1.
         switch_cost: lambda, cost of a cut in units of one frame's view cost.
         fps: frames per second.
 
@@ -89,11 +89,13 @@ def score_views(
         raise ValueError(f"the choice names a camera outside -1 .. {cost.shape[2] - 1}")
     truth = ViewGroundTruth(cost, visible)
     totals = [
-        _object_totals(cost[k][on], visible[k][on], views[k][on], optimum[on], switch_cost)
-        for k, (on, optimum) in enumerate(
+        _object_totals(
+            cost[k][evaluated], visible[k][evaluated], views[k][evaluated], optimum[evaluated], switch_cost
+        )
+        for k, (evaluated, optimum) in enumerate(
             zip(truth.evaluated, optimal_views(truth, switch_cost), strict=True)
         )
-        if on.any()
+        if evaluated.any()
     ]
     frames = sum(total_of_object.frames for total_of_object in totals)
     per_minute = _SECONDS_PER_MINUTE * fps / max(frames, 1)
@@ -126,7 +128,7 @@ def _object_totals(
     best: NDArray[np.int64],
     switch_cost: float,
 ) -> _ObjectTotals:
-    """Sum up one object's (F, C) costs, its (F,) views and the best ones, all of whose frames count."""
+    """Sum up one object's (F, C) costs, its (F,) views and the optimal ones, over its evaluated frames."""
     chosen, row = views >= 0, np.arange(len(cost))
     cuts, best_cuts = cut_frames(views), cut_frames(best)
     return _ObjectTotals(
@@ -142,13 +144,13 @@ def _object_totals(
 
 
 def _share(extra: float, whole: float) -> float:
-    """Give a part of the whole; of a whole that is nothing but for rounding, nothing or infinitely much."""
+    """Return a part of the whole; of a whole that is 0 but for rounding, 0 or infinity."""
     if whole > _ROUNDING:
         return float(extra / whole)
     return float("inf") if extra > _ROUNDING else 0.0
 
 
 def cut_frames(views: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Give the frames at which (F,) views change the camera; to a frame without a choice is no change."""
-    shown = np.flatnonzero(views >= 0)
-    return np.asarray(shown[1:][views[shown[1:]] != views[shown[:-1]]])
+    """Return the frames at which (F,) views change the camera; to a frame without a view is no change."""
+    selected = np.flatnonzero(views >= 0)
+    return np.asarray(selected[1:][views[selected[1:]] != views[selected[:-1]]])

@@ -1,1 +1,1 @@
-"""The ground plane, and what cameras can see of people who stand on it."""
+"""Geometry of calibrated cameras: ground plane, projections between views, and detection probability."""

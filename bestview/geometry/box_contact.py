@@ -1,4 +1,4 @@
-"""Which boxes touch any of others, roughly: on a raster, however many there are."""
+"""Approximate overlap tests of many boxes, on a raster."""
 
 from __future__ import annotations
 
@@ -14,22 +14,27 @@ _ROWS, _COLUMNS = 36, 64
 
 
 def boxes_touching_others(
-    boxes: Floats, picture: Ints, others: Floats, theirs: Ints, pictures: int, size: tuple[float, float]
+    boxes: Floats,
+    picture: Ints,
+    others: Floats,
+    other_pictures: Ints,
+    picture_count: int,
+    size: tuple[float, float],
 ) -> Mask:
-    """Tell which boxes have a cell in common with any other box in the same picture, (V,).
+    """Return which boxes share a raster cell with any other box in the same picture, (V,).
 
     Args:
-        boxes: (V, 4) pixels, nobody hidden.
-        picture: (V,) which picture each is in.
+        boxes: (V, 4) pixels, without hidden ones.
+        picture: (V,) picture that each is in.
         others: (B, 4) likewise.
-        theirs: (B,) which picture each of these is in.
-        pictures: how many there are.
+        other_pictures: (B,) picture that each of these is in.
+        picture_count: how many pictures there are.
         size: width and height of each, pixels.
     """
     left, top, right, bottom = _cells(others, size)
-    edges = np.zeros((pictures, _ROWS + 1, _COLUMNS + 1), dtype=np.int64)
+    edges = np.zeros((picture_count, _ROWS + 1, _COLUMNS + 1), dtype=np.int64)
     for row, column, sign in ((top, left, 1), (bottom, right, 1), (top, right, -1), (bottom, left, -1)):
-        np.add.at(edges, (theirs, row, column), sign)
+        np.add.at(edges, (other_pictures, row, column), sign)
     covered = edges.cumsum(axis=1).cumsum(axis=2)[:, :-1, :-1] > 0
     # Summed up from the corner, any rectangle is four look-ups.
     summed = np.zeros_like(edges)
@@ -40,7 +45,7 @@ def boxes_touching_others(
 
 
 def _cells(boxes: Floats, size: tuple[float, float]) -> tuple[Ints, Ints, Ints, Ints]:
-    """Give the first column and row of each box, and the first ones after it; those outside are cut off."""
+    """Return the first column and row of each box, and those after its last; clipped to the picture."""
     sides = boxes / np.array([*size, *size]) * np.array([_COLUMNS, _ROWS, _COLUMNS, _ROWS])
     most = np.array([_COLUMNS, _ROWS])
     first = np.clip(np.floor(sides[:, :2]), 0, most).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Where in its picture a camera finds people, learned from those whom other cameras see there."""
+"""Detection probability by image position, learned from people whom other cameras see there."""
 
 from __future__ import annotations
 
@@ -13,46 +13,51 @@ Mask = NDArray[np.bool_]
 _ROWS, _COLUMNS = 18, 32
 """Cells of a picture, for feet: a cell is about as wide as somebody who is not near."""
 _AROUND = 3
-"""Cells that are read together, each way: places are known no better."""
+"""Cells that are averaged in each direction: places are known no better."""
 _GOOD = 0.5
-"""The share that is asked of a camera: one that finds fewer is not taken for a measure of its places."""
+"""Detection rate of a camera below which its places are not compared with it."""
 _HIDDEN, _MORE = 0.04, 0.02
 """The share of looks in which people are really hidden, and misses beyond it by which a camera is known."""
 
 
 class DetectionProbabilityMap:
-    """Counts in which share of the looks each camera finds somebody who is known to stand at a place.
+    """Estimates how likely each camera detects a person who stands at a place.
 
-    A place's share is ``(found + few own) / (looks + few)`` over the cells around it, and the camera's *own*
-    ``(found + many prior) / (looks + many)`` over all of its picture: what is not known of a place is taken
-    from the camera, and of the camera from the prior.
+    The probability at a place is ``(found + w camera) / (trials + w)`` over the cells around it, with `w` the
+    `cell_prior_weight`, and the camera's ``(found + v prior) / (trials + v)`` over all of its picture, with
+    `v` the `camera_prior_weight`.
 
     Args:
         cameras: C.
         size: width and height of the pictures, pixels.
-        prior: the share where nothing is known.
-        few: looks at a place after which it speaks for itself.
-        many: the same of a camera.
+        prior: the probability where nothing is known.
+        cell_prior_weight: trials at a place after which it outweighs the camera.
+        camera_prior_weight: trials of a camera after which it outweighs the prior.
     """
 
     def __init__(
-        self, cameras: int, size: tuple[float, float], prior: float, few: float, many: float
+        self,
+        cameras: int,
+        size: tuple[float, float],
+        prior: float,
+        cell_prior_weight: float,
+        camera_prior_weight: float,
     ) -> None:
-        self._size, self._prior, self._few, self._many = size, prior, few, many
+        self._size, self._prior, self._few, self._many = size, prior, cell_prior_weight, camera_prior_weight
         self._counts = np.zeros((2, cameras, _ROWS, _COLUMNS))
         """Looks, and those in which somebody was found."""
         self._own = np.full(cameras, prior)
         self._shares = np.full((cameras, _ROWS, _COLUMNS), prior)
 
     def learn(self, camera: Ints, feet: Floats, found: Mask, looks: Floats | float, kept: float) -> None:
-        """Take in whom cameras were to find, and whether they did.
+        """Count trials: people who stand in a camera's view, and whether it detected them.
 
         Args:
-            camera: (V,) whose look each is.
-            feet: (V, 2) where in its picture, pixels.
+            camera: (V,) camera of each trial.
+            feet: (V, 2) position in its picture, pixels.
             found: (V,).
-            looks: that each of them stands for, (V,) or all of them.
-            kept: the share of what was known that is not forgotten by now.
+            looks: weight of each trial, (V,) or of all of them.
+            kept: factor on all earlier counts.
         """
         cells = self._cells(camera, feet)
         self._counts *= kept
@@ -68,22 +73,22 @@ class DetectionProbabilityMap:
         self._shares = (around[1] + self._few * self._own[:, None, None]) / (around[0] + self._few)
 
     def probability(self, camera: Ints, feet: Floats) -> Floats:
-        """Give in which share of the looks cameras (V,) find people at (V, 2) pixels of their pictures."""
+        """Return the probability that cameras (V,) detect people at (V, 2) pixels of their pictures."""
         return self._shares.reshape(-1)[self._cells(camera, feet)]
 
     def trust(self, camera: Ints, feet: Floats) -> Floats:
-        """Say how surely cameras (V,) show who stands at (V, 2) pixels and is not found: (V,) in [0, 1].
+        """Return how surely cameras (V,) show undetected people at (V, 2) pixels: (V,) in [0, 1].
 
-        ``min(share / max(own, 0.5), 1) · min(max((1 - own - 0.04) / 0.02, 0), 1)``: by what the camera finds
-        there of what it finds elsewhere, and whether it misses anybody at all. Whom a camera does not find
-        that finds nearly everybody is hidden.
+        ``min(p / max(own, 0.5), 1) · min(max((1 - own - 0.04) / 0.02, 0), 1)``, with `p` the probability
+        there and `own` that of the whole camera. If a camera detects nearly everybody, whom it does not
+        detect is occluded.
         """
         place = np.minimum(self.probability(camera, feet) / np.maximum(self._own, _GOOD)[camera], 1.0)
         misses = np.clip((1.0 - self._own - _HIDDEN) / _MORE, 0.0, 1.0)
         return np.asarray(place * misses[camera])
 
     def _cells(self, camera: Ints, feet: Floats) -> Ints:
-        """Give the cells of places, (V,); those outside the picture count as at its edge."""
+        """Return the cells of positions, (V,); those outside the picture are clipped to its edge."""
         width, height = self._size
         column = np.clip(feet[..., 0] * (_COLUMNS / width), 0, _COLUMNS - 1).astype(np.int64)
         row = np.clip(feet[..., 1] * (_ROWS / height), 0, _ROWS - 1).astype(np.int64)

@@ -1,4 +1,4 @@
-"""From the picture to the ground plane: foot points through homographies."""
+"""Ground plane: foot points through homographies, person heights, horizon."""
 
 from __future__ import annotations
 
@@ -42,29 +42,29 @@ def validate_homography(matrix: ArrayLike, name: str) -> NDArray[np.float64]:
 
 
 def foot_points(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Foot point of each box, the middle of its lower edge: (..., 4) -> (..., 2) in pixels."""
+    """Return the foot point of each box, the middle of its lower edge: (..., 4) -> (..., 2) in pixels."""
     return np.stack([(boxes[..., 0] + boxes[..., 2]) / 2.0, boxes[..., 3]], axis=-1)
 
 
 def upright_from_overhead(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turn boxes of people seen from straight above into those of people who stand upright there: (..., 4).
+    """Convert boxes of people seen from straight above to boxes of people who stand upright there: (..., 4).
 
-    Who is seen from above stands in the middle of their box, not on its lower edge, and shows shoulders and
-    steps instead of their height. The box given back has its foot in the middle, and is as tall as they are.
+    A person seen from above stands in the middle of the box, not on its lower edge, and shows shoulders and
+    steps instead of height. The box returned has its foot point in the middle and is as tall as the person.
     """
     left, top, right, bottom = np.moveaxis(boxes, -1, 0)
     foot = (top + bottom) / 2.0
     # A box that was predicted or measured badly may be inside out: nobody stands there, no taller than zero.
-    tall = _HEIGHT_OF_SPAN * np.sqrt(np.maximum((right - left) * (bottom - top), 0.0))
-    return np.stack([left, foot - tall, right, foot], axis=-1)
+    height = _HEIGHT_OF_SPAN * np.sqrt(np.maximum((right - left) * (bottom - top), 0.0))
+    return np.stack([left, foot - height, right, foot], axis=-1)
 
 
 def to_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Map image points to the ground plane: (..., 2) pixels -> (..., 2) ground units.
 
-    A point on or above the horizon stands nowhere on the ground and becomes NaN, as does a NaN point.
-    The ground is taken to lie below the horizon in the picture (a camera that is not upside down).
-    Here and below, the homography is one for all, (3, 3), or has leading axes that fit: (..., 3, 3).
+    A point on or above the horizon has no ground point and becomes NaN, as does a NaN point. The ground is
+    taken to lie below the horizon in the picture (a camera that is not upside down). Here and below, the
+    homography is one for all, (3, 3), or has leading axes that broadcast: (..., 3, 3).
     """
     mapped = _homogeneous(homography, points)
     depth = _depth(homography, mapped)
@@ -72,28 +72,28 @@ def to_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) -> N
 
 
 def from_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Map places on the ground back into the picture: (..., 2) ground units -> (..., 2) pixels.
+    """Map ground points to the picture: (..., 2) ground units -> (..., 2) pixels.
 
-    A place that the camera has behind it, and a NaN, becomes NaN.
+    A point behind the camera, and a NaN, becomes NaN.
     """
     mapped = _homogeneous(np.asarray(np.linalg.inv(homography), dtype=np.float64), points)
     pixels = mapped[..., :2] / np.where(mapped[..., 2] != 0, mapped[..., 2], np.nan)[..., None]
     # Behind the camera lines of sight meet the picture upside down: above the horizon.
-    there = _depth(homography, _homogeneous(homography, pixels)) > 0
-    return np.where(there[..., None], pixels, np.nan)
+    in_front = _depth(homography, _homogeneous(homography, pixels)) > 0
+    return np.where(in_front[..., None], pixels, np.nan)
 
 
 def horizon_row(homography: NDArray[np.float64], x: float) -> float | None:
-    """Give the row of the picture's column `x` in which the ground plane ends, in pixels; None: in no row."""
+    """Return the row of the horizon in the picture's column `x`, in pixels; None: it has none."""
     down = float(homography[2, 1])
     row = -(float(homography[2, 0]) * x + float(homography[2, 2])) / down if down else np.inf
     return row if np.isfinite(row) else None
 
 
 def shows_ground(homography: NDArray[np.float64], size: tuple[int, int]) -> bool:
-    """Tell whether anything of a picture (width, height) lies below the horizon, and so can be floor.
+    """Return whether any of a picture (width, height) lies below the horizon, and so can show the ground.
 
-    Nothing does of a camera that is tilted past straight down, or hangs upside down: its floor ends below.
+    Nothing does if the camera is tilted past straight down, or hangs upside down: its ground ends below.
     """
     width, height = size
     corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
@@ -101,7 +101,7 @@ def shows_ground(homography: NDArray[np.float64], size: tuple[int, int]) -> bool
 
 
 def ground_handedness(homography: NDArray[np.float64]) -> int:
-    """Say how the ground's axes turn in the picture, below the horizon: 1 as the picture's own, -1 against.
+    """Return how the ground's axes turn in the picture, below the horizon: 1 as its own, -1 against.
 
     It is the same in every picture of a floor that is seen from above (Hartley and Zisserman, 2.4.1: the sign
     of a homography's Jacobian is that of its determinant over the third coordinate cubed).
@@ -112,10 +112,10 @@ def ground_handedness(homography: NDArray[np.float64]) -> int:
 
 
 def camera_height(homography: NDArray[np.float64], x: float) -> float | None:
-    """Guess how high above the ground the camera is, in ground units; None: unknown. `x` is any column.
+    """Estimate the height of the camera above the ground, in ground units; None: unknown. `x` is any column.
 
-    At a foot so many rows below the horizon as somebody is tall in the picture, they are as tall as the
-    camera is high (square pixels, little roll): ground units per sideways pixel times rows below the horizon.
+    At a foot point as many rows below the horizon as a person is tall in the picture, the person is as tall
+    as the camera is high (square pixels, little roll).
     """
     row = horizon_row(homography, x)
     if row is None:
@@ -127,20 +127,18 @@ def camera_height(homography: NDArray[np.float64], x: float) -> float | None:
 def feet_cut_off(
     boxes: NDArray[np.float64], picture_height: float | NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Tell whose feet the picture's lower edge cuts off: (..., 4), and heights that fit -> (...).
+    """Return whose feet the picture's lower edge cuts off: (..., 4), and heights that broadcast -> (...).
 
-    They stand below it, and nowhere that is known. A box that reaches beyond the edge was guessed by
-    somebody who knew, and is believed.
+    They have no ground point. A box that reaches beyond the edge was extrapolated, and is trusted.
     """
     return np.asarray(np.abs(boxes[..., 3] / picture_height - 1.0) < _EDGE)
 
 
 def person_heights(homography: NDArray[np.float64], boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Guess the height of the person in each box in ground units: (..., 4) -> (...), NaN where unknown.
+    """Estimate the height of the person in each box in ground units: (..., 4) -> (...), NaN where unknown.
 
-    At the foot point one pixel to the side is as long as one pixel upwards on a standing person (square
-    pixels, a camera without much roll or tilt): box height times ground units per sideways pixel. It
-    tells what a "step" is in a ground plane of any unit.
+    At the foot point one pixel sideways is as long as one pixel upwards on a standing person (square pixels,
+    a camera without much roll or tilt): box height times ground units per sideways pixel.
     """
     sideways = _pixel_steps(homography, foot_points(boxes))[..., 0]
     return np.asarray(np.hypot(sideways[..., 0], sideways[..., 1]) * (boxes[..., 3] - boxes[..., 1]))
@@ -149,15 +147,14 @@ def person_heights(homography: NDArray[np.float64], boxes: NDArray[np.float64]) 
 def foot_covariance(
     homography: NDArray[np.float64], boxes: NDArray[np.float64], sideways: float, upwards: float
 ) -> NDArray[np.float64]:
-    """Covariance of each foot point on the ground: (..., 4) -> (..., 2, 2) ground units squared.
+    """Compute the covariance of each foot point on the ground: (..., 4) -> (..., 2, 2) ground units squared.
 
-    A box is found to within `sideways` and `upwards` (standard deviations, shares of its height). On the
-    ground the latter is long, and along the line of sight: how far off somebody stands is what a
-    camera knows least.
+    Boxes are accurate to within `sideways` and `upwards` (standard deviations, shares of their height). On
+    the ground the latter is long and along the line of sight: distance is what a camera knows least.
     """
-    tall = boxes[..., 3] - boxes[..., 1]
+    height = boxes[..., 3] - boxes[..., 1]
     axes = (
-        _pixel_steps(homography, foot_points(boxes)) * tall[..., None, None] * np.array([sideways, upwards])
+        _pixel_steps(homography, foot_points(boxes)) * height[..., None, None] * np.array([sideways, upwards])
     )
     x, y = axes[..., 0, :], axes[..., 1, :]
     xx, xy, yy = (x * x).sum(axis=-1), (x * y).sum(axis=-1), (y * y).sum(axis=-1)
@@ -165,7 +162,7 @@ def foot_covariance(
 
 
 def _pixel_steps(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Ground vectors of one pixel to the right and one down, as columns: (..., 2) -> (..., 2, 2)."""
+    """Return ground vectors of one pixel to the right and one down, as columns: (..., 2) -> (..., 2, 2)."""
     mapped = _homogeneous(homography, points)
     w = np.where(_depth(homography, mapped) > 0, mapped[..., 2], np.nan)[..., None, None]
     # d(X/w) = (dX w - X dw) / w^2, both pixel axes at once.
@@ -180,7 +177,7 @@ def _homogeneous(homography: NDArray[np.float64], points: NDArray[np.float64]) -
 
 
 def _depth(homography: NDArray[np.float64], mapped: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Homogeneous third coordinate, signed so that it is positive below the horizon."""
+    """Return the homogeneous third coordinate, signed so that it is positive below the horizon."""
     # Far down the picture the y term rules the sign; a plan view (no y term) has no horizon.
     down = homography[..., 2, 1]
     sign = np.where(down != 0, np.sign(down), np.sign(mapped[..., 2]))

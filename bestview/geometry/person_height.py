@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 class PersonHeightEstimate:
-    """How long a person's height is in units of the ground plane, from the boxes seen so far."""
+    """Running estimate of a person's height in units of the ground plane."""
 
     _REMEMBERED = 200
 
@@ -17,7 +17,7 @@ class PersonHeightEstimate:
         self._medians: deque[float] = deque(maxlen=self._REMEMBERED)
 
     def learn(self, heights: NDArray[np.float64]) -> None:
-        """Take in guessed heights of any shape, NaN where unknown."""
+        """Add estimated heights of any shape, NaN where unknown."""
         known = heights[np.isfinite(heights) & (heights > 0)]
         if known.size:
             self._medians.append(float(np.median(known)))

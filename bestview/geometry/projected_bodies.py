@@ -1,4 +1,4 @@
-"""How people would look in cameras that do not find them, by where other cameras see them stand."""
+"""Projection of people into cameras that do not detect them, from where other cameras see them stand."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _SIDEWAYS, _UPWARDS = 0.05, 0.15
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyEstimates:
-    """Where people stand and how large they are: M moments, each one person in one frame.
+    """Position and size of people at M moments, each one person in one frame.
 
     Attributes:
-        ground_point: (M, 2) ground units; NaN where no camera knows.
-        height: (M,) height in ground units, likewise.
+        ground_point: (M, 2) ground units; NaN: no camera knows.
+        height: (M,) in ground units, likewise.
         aspect_ratio: (M,) width of the box over its height, likewise.
-        known_by: (M, C) whether that camera knows.
+        known_by: (M, C) whether that camera localized the person.
     """
 
     ground_point: Floats
@@ -44,62 +44,62 @@ class BodyEstimates:
 def estimate_bodies(
     boxes: Floats, camera: Ints, moment: Ints, moments: int, homographies: Floats, bottom: Floats
 ) -> BodyEstimates:
-    """Gather what boxes say of bodies: means over the cameras, each weighed by how well it knows the place.
+    """Estimate bodies from boxes: means over the cameras, weighted by precision of the foot point.
 
-    That is 1 over the trace of the foot point's covariance on the ground: a camera that somebody is near to
-    says more. Feet that the picture's lower edge cuts off stand nowhere that is known.
+    The weight is 1 over the trace of the foot point's covariance on the ground. Boxes whose feet the lower
+    edge cuts off are left out.
 
     Args:
-        boxes: (B, 4) pixels, nobody hidden.
-        camera: (B,) whose each is.
-        moment: (B,) who it is and when, as one index.
+        boxes: (B, 4) pixels, without hidden ones.
+        camera: (B,) of each box.
+        moment: (B,) person and frame, as one index.
         moments: M, how many there are.
         homographies: (C, 3, 3) pixels -> ground.
-        bottom: (C,) where each camera's own picture ends, pixels.
+        bottom: (C,) lower edge of each camera's own picture, pixels.
     """
     matrix = homographies[camera]
     place, tall = to_ground(matrix, foot_points(boxes)), person_heights(matrix, boxes)
     spread = np.trace(foot_covariance(matrix, boxes, _SIDEWAYS, _UPWARDS), axis1=-2, axis2=-1)
     with np.errstate(divide="ignore", invalid="ignore"):  # a box may have no height: it is left out below
         slim = (boxes[:, 2] - boxes[:, 0]) / (boxes[:, 3] - boxes[:, 1])
-    told = np.column_stack([place, tall, slim])
-    good = np.isfinite(told).all(axis=1) & (told[:, 2:] > 0.0).all(axis=1) & (spread > 0.0)
-    rows = np.flatnonzero(good & ~feet_cut_off(boxes, bottom[camera]))
-    of, weight = moment[rows], 1.0 / spread[rows]
+    measurements = np.column_stack([place, tall, slim])
+    valid = np.isfinite(measurements).all(axis=1) & (measurements[:, 2:] > 0.0).all(axis=1) & (spread > 0.0)
+    rows = np.flatnonzero(valid & ~feet_cut_off(boxes, bottom[camera]))
+    owner, weight = moment[rows], 1.0 / spread[rows]
 
     def summed(values: Floats) -> Floats:
         # bincount adds row after row, so that no sum depends on how many others there are.
-        return np.bincount(of, values, moments).astype(np.float64)
+        return np.bincount(owner, values, moments).astype(np.float64)
 
     total = summed(weight)
     total[total == 0.0] = np.nan
-    mean = [summed(weight * column[rows]) / total for column in told.T]
+    mean = [summed(weight * column[rows]) / total for column in measurements.T]
     known_by = np.zeros((moments, len(homographies)), dtype=np.bool_)
-    known_by[of, camera[rows]] = True
+    known_by[owner, camera[rows]] = True
     return BodyEstimates(np.stack(mean[:2], axis=1), mean[2], mean[3], known_by)
 
 
 def project_feet(of: BodyEstimates, homographies: Floats) -> Floats:
-    """Give where bodies stand in each camera's picture, (M, C, 2) pixels; NaN behind it, or where unknown.
+    """Project foot points into each camera's picture, (M, C, 2) pixels; NaN: behind it, or unknown.
 
     Args:
-        of: M of them.
+        of: M bodies.
         homographies: (C, 3, 3) pixels -> ground.
     """
     return from_ground(homographies, of.ground_point[:, None])
 
 
 def project_boxes(of: BodyEstimates, moment: Ints, foot: Floats, homographies: Floats) -> Floats:
-    """Give the boxes of (V,) of the bodies in the pictures where they stand at (V, 2) pixels: (V, 4).
+    """Project (V,) bodies into pictures in which their feet are at (V, 2) pixels: (V, 4) boxes.
 
     Args:
-        of: M of them.
-        moment: (V,) whose each is.
+        of: M bodies.
+        moment: (V,) body of each.
         foot: (V, 2) pixels.
-        homographies: (V, 3, 3) pixels -> ground, of the camera that each is seen by.
+        homographies: (V, 3, 3) pixels -> ground, of the camera of each.
     """
     x, y = foot[:, 0], foot[:, 1]
     pixel = person_heights(homographies, np.stack([x, y - 1.0, x, y], axis=1))
-    tall = of.height[moment] / pixel
-    half = tall * of.aspect_ratio[moment] / 2.0
-    return np.stack([x - half, y - tall, x + half, y], axis=1)
+    height = of.height[moment] / pixel
+    half_width = height * of.aspect_ratio[moment] / 2.0
+    return np.stack([x - half_width, y - height, x + half_width, y], axis=1)

@@ -1,4 +1,4 @@
-"""Which of many rectangles overlap, without asking every pair."""
+"""All overlapping pairs of many rectangles, by a plane sweep."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _BANDS = 0.5
 
 
 def overlapping(low: Floats, high: Floats) -> tuple[Ints, Ints]:
-    """Give the pairs of rectangles that overlap, each once: (P,) and (P,), the lower index first, in order.
+    """Return the pairs of rectangles that overlap, each once: (P,) and (P,), the lower index first, in order.
 
     The plane is cut into bands with as many rectangles in each, and in each band a line sweeps over them
-    (Bentley and Wood, 1980), so that the work goes with the number of rectangles where each meets a few.
+    (Bentley and Wood, 1980), so that time is linear in the number of rectangles if each meets a few.
 
     Args:
         low: (N, 2) lower corners.

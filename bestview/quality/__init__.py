@@ -1,4 +1,4 @@
-"""How well a view shows a person: the terms, each by itself, and all of them weighed into one quality."""
+"""View quality: how well a view shows a person, as the product of weighted terms."""
 
 from bestview.quality.combination import CameraLayout, TrackWindow, ViewQuality, compute_view_quality
 from bestview.quality.settings import QualitySettings

@@ -1,4 +1,4 @@
-"""All terms of view quality together."""
+"""View quality as the product of all weighted terms."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _SIDES = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraLayout:
-    """The cameras of a site, as far as view quality asks. All pixels are those of the boxes.
+    """The cameras of a site, as far as view quality needs them. All pixels are those of the boxes.
 
     Attributes:
         size: width and height of the picture that viewers are shown, pixels.
         picture_boxes: (C, 4) where each camera's own picture lies in it: left, top, right, bottom.
-        homographies: from those pixels to the ground, None where it is not known; C of them.
+        homographies: from those pixels to the ground, None: not calibrated; C of them.
         fps: frames per second.
     """
 
@@ -42,9 +42,9 @@ class TrackWindow:
 
     Attributes:
         boxes: (T, N, 4) pixels, NaN where hidden.
-        camera: (T,) whose each track is, by index.
-        confidence: (T,) in [0, 1], how surely each track is there.
-        sharpness: (T,) in [0, 1], how sharp its picture is; NaN where nobody has measured it: counts as 1.
+        camera: (T,) index of each track's camera.
+        confidence: (T,) in [0, 1], mean detection score.
+        sharpness: (T,) in [0, 1]; NaN: not measured, counts as 1.
     """
 
     boxes: Floats
@@ -55,11 +55,11 @@ class TrackWindow:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewQuality:
-    """How well each view shows whom it follows.
+    """Quality of each view.
 
     Attributes:
         quality: (T, N) in [0, 1]; NaN where hidden.
-        term_names: the terms that weigh something.
+        term_names: the terms with a weight.
         terms: (terms, T, N) in [0, 1], each of them; NaN where hidden.
     """
 
@@ -68,26 +68,26 @@ class ViewQuality:
     terms: Floats
 
 
-def compute_view_quality(seen: TrackWindow, looks: CameraLayout, settings: QualitySettings) -> ViewQuality:
-    """Weigh all terms: the product over the terms *t* of ``1 - weight (1 - t)``.
+def compute_view_quality(tracks: TrackWindow, layout: CameraLayout, settings: QualitySettings) -> ViewQuality:
+    """Multiply all terms: the product over the terms *t* of ``1 - weight (1 - t)``.
 
-    A product, since what spoils a view is not made good by anything else: somebody covered is not seen,
-    however large. The weight says how far a term can spoil it: at most by the share `weight`.
+    A product, since no term makes up for another: a person who is covered is not seen, however large. The
+    weight is the largest share by which a term can lower the quality.
 
     Raises:
         ValueError: shapes that do not fit.
     """
-    _check(seen, looks)
+    _check(tracks, layout)
     # In memory sides are apart, and in each of them frames: it is how the terms read them.
-    sides = np.ascontiguousarray(seen.boxes.transpose(2, 1, 0))
-    rows = _TermInputs(seen, looks, sides.transpose(2, 1, 0))
+    sides = np.ascontiguousarray(tracks.boxes.transpose(2, 1, 0))
+    inputs = _TermInputs(tracks, layout, sides.transpose(2, 1, 0))
     weights = settings.weights
     terms = np.empty((len(settings.terms), *sides.shape[1:])).transpose(0, 2, 1)
     quality = np.ones(sides.shape[1:]).T
-    for place, name in enumerate(settings.terms):
-        terms[place] = _TERMS[name](rows)
-        quality *= 1.0 - weights[name] * (1.0 - terms[place])
-    hidden = np.isnan(rows.boxes[..., 0])
+    for index, name in enumerate(settings.terms):
+        terms[index] = _TERMS[name](inputs)
+        quality *= 1.0 - weights[name] * (1.0 - terms[index])
+    hidden = np.isnan(inputs.boxes[..., 0])
     if hidden.any():
         quality[hidden] = terms[:, hidden] = np.nan
     return ViewQuality(quality, settings.terms, terms)
@@ -95,7 +95,7 @@ def compute_view_quality(seen: TrackWindow, looks: CameraLayout, settings: Quali
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _TermInputs:
-    """What the terms are worked out from; `boxes` are those of `seen`."""
+    """Inputs of the terms; `boxes` are those of `seen`, reordered in memory."""
 
     seen: TrackWindow
     looks: CameraLayout
@@ -103,7 +103,7 @@ class _TermInputs:
 
     @property
     def picture_boxes(self) -> Floats:
-        """(T, 1, 4): where the picture of each track's camera lies."""
+        """(T, 1, 4): picture of each track's camera."""
         return self.looks.picture_boxes[self.seen.camera][:, None]
 
 
@@ -112,8 +112,8 @@ def _facing(rows: _TermInputs) -> Floats:
     whole_window = np.full(len(camera), NEUTRAL)
     for column, homography in enumerate(rows.looks.homographies):
         if homography is not None:
-            mine = camera == column
-            whole_window[mine] = facing_score(rows.seen.boxes[mine], homography, rows.looks.fps)
+            own_tracks = camera == column
+            whole_window[own_tracks] = facing_score(rows.seen.boxes[own_tracks], homography, rows.looks.fps)
     return whole_window[:, None]
 
 
@@ -126,21 +126,21 @@ _TERMS: dict[str, Callable[[_TermInputs], Floats]] = {
     "facing": _facing,
     "confidence": lambda rows: rows.seen.confidence[:, None],
 }
-"""Each (T, N), or (T, 1) where it is the same in all frames; anything where hidden."""
+"""Each (T, N), or (T, 1) where it is the same in all frames; any value where hidden."""
 
 
-def _check(seen: TrackWindow, looks: CameraLayout) -> None:
-    shape, cameras = seen.boxes.shape, len(looks.picture_boxes)
+def _check(tracks: TrackWindow, layout: CameraLayout) -> None:
+    shape, cameras = tracks.boxes.shape, len(layout.picture_boxes)
     if len(shape) != 3 or shape[2] != _SIDES:  # noqa: PLR2004 — tracks, frames, sides
         raise ValueError(f"boxes have shape {shape}, not (tracks, frames, 4)")
     for name, values in (
-        ("camera", seen.camera),
-        ("confidence", seen.confidence),
-        ("sharpness", seen.sharpness),
+        ("camera", tracks.camera),
+        ("confidence", tracks.confidence),
+        ("sharpness", tracks.sharpness),
     ):
         if values.shape != shape[:1]:
             raise ValueError(f"{name} has shape {values.shape}, not ({shape[0]},)")
-    if shape[0] and not 0 <= seen.camera.min() <= seen.camera.max() < cameras:
+    if shape[0] and not 0 <= tracks.camera.min() <= tracks.camera.max() < cameras:
         raise ValueError(f"a track is of a camera outside 0 .. {cameras - 1}")
-    if len(looks.homographies) != cameras:
-        raise ValueError(f"there are {len(looks.homographies)} homographies for {cameras} cameras")
+    if len(layout.homographies) != cameras:
+        raise ValueError(f"there are {len(layout.homographies)} homographies for {cameras} cameras")

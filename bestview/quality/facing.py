@@ -1,4 +1,4 @@
-"""Whether somebody walks towards the camera or away from it."""
+"""Facing term of view quality: walking towards the camera or away from it."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from bestview.geometry.ground_plane import foot_points, person_heights, to_groun
 from bestview.quality.boxes import Floats
 
 _HALF_CONFIDENCE_SPEED = 0.15
-"""Heights a second (about 0.25 m/s): at this speed the way somebody goes tells half of what it can."""
+"""Heights a second (about 0.25 m/s): at this speed the walking direction counts half."""
 
 _PIXEL_DOWN = np.array([0.0, 1.0])
 
 NEUTRAL = 0.5
-"""Of somebody who stands, goes across, or of whom the ground is not known."""
+"""For people who stand, cross the view, or whose ground point is not known."""
 
 
 def facing_score(boxes: Floats, homography: Floats, fps: float) -> Floats:
-    """1 for who walks towards the camera, 0 for who walks away, 1/2 for who stands or goes across.
+    """Return 1 for walking towards the camera, 0 for walking away, 1/2 for standing or crossing.
 
     With *v* the velocity of the feet on the ground over the frames given (least squares) and *u* the ground
     direction that points down the picture at the feet, which is towards the camera::
@@ -34,15 +34,17 @@ def facing_score(boxes: Floats, homography: Floats, fps: float) -> Floats:
     """
     ground = to_ground(homography, foot_points(boxes))
     known = ~np.isnan(ground[..., 0])
-    count = known.sum(axis=1)
-    enough = count > 1
-    weight = known / np.maximum(count, 1)[:, None]
+    frame_count = known.sum(axis=1)
+    enough = frame_count > 1
+    weight = known / np.maximum(frame_count, 1)[:, None]
     time = np.arange(boxes.shape[1]) / fps
-    away = time - (weight * time).sum(axis=1, keepdims=True)
-    spread = (weight * away**2).sum(axis=1)
+    centered_time = time - (weight * time).sum(axis=1, keepdims=True)
+    spread = (weight * centered_time**2).sum(axis=1)
     # Hidden frames have no weight; a number must stand there all the same.
-    place = np.where(known[..., None], ground, 0.0)
-    velocity = ((weight * away)[..., None] * place).sum(axis=1) / np.where(enough, spread, 1.0)[:, None]
+    ground_point = np.where(known[..., None], ground, 0.0)
+    velocity = ((weight * centered_time)[..., None] * ground_point).sum(axis=1) / np.where(
+        enough, spread, 1.0
+    )[:, None]
 
     middle = (weight[..., None] * np.where(known[..., None], boxes, 0.0)).sum(axis=1)
     foot = foot_points(middle)
@@ -52,6 +54,6 @@ def facing_score(boxes: Floats, homography: Floats, fps: float) -> Floats:
     along = (velocity * down).sum(axis=1)
     # cos |v| / (|v| + stroll): the speed in the cosine's divisor goes out.
     divisor = length * (speed + _HALF_CONFIDENCE_SPEED * person_heights(homography, middle))
-    known_way = enough & (divisor > 0)
-    towards = np.divide(along, divisor, out=np.zeros(len(boxes)), where=known_way)
+    valid = enough & (divisor > 0)
+    towards = np.divide(along, divisor, out=np.zeros(len(boxes)), where=valid)
     return np.asarray(NEUTRAL + NEUTRAL * towards)

@@ -1,4 +1,4 @@
-"""How much each term of view quality weighs."""
+"""Weights of the terms of view quality (`view.quality`)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 @dataclass(frozen=True, slots=True)
 class QualitySettings:
-    """For each term, the share of a view's worth that is lost where the term is at its worst: 0 to 1.
+    """For each term, the largest share of a view's quality that it can take away: 0 to 1.
 
     0 leaves the term out; with ``size`` 1 and all others 0 the quality is the paper's (as a length).
 
@@ -38,5 +38,5 @@ class QualitySettings:
 
     @property
     def terms(self) -> tuple[str, ...]:
-        """The terms that weigh something."""
+        """The terms with a weight above 0."""
         return tuple(name for name, weight in self.weights.items() if weight > 0)

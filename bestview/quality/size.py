@@ -1,4 +1,4 @@
-"""How large a view shows a person: the paper's view quality, as a length."""
+"""Size term of view quality: the paper's, as a length."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from bestview.quality.boxes import Floats, areas_inside_picture
 
 
 def size_quality(boxes: Floats, width: float, height: float) -> NDArray[np.float64]:
-    """Linear size of the part of each box inside the picture: ``sqrt(box area / picture area)``.
+    """Return the linear size of the part of each box inside the picture: ``sqrt(box area / picture area)``.
 
-    The paper's view quality is the size of the bounding box (section III); the root makes it grow with
-    how near the object is instead of with the square of that, so that one very near view does not
-    make all the others look equally bad.
+    The paper's view quality is the size of the bounding box (section III). The root makes it proportional to
+    nearness instead of its square, so that one very near view does not make all others look equally bad.
 
     Args:
         boxes: (..., 4) left, top, right, bottom in pixels; NaN where the object is hidden.

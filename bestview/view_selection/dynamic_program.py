@@ -1,4 +1,4 @@
-"""The dynamic program of section III over GOPs, for all objects at once."""
+"""Dynamic program of section III over GOPs, for all objects at once."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 
 NO_CAMERA = -1
 NO_VIEW_COST = 1.0
-"""What a frame costs in which no camera can be shown: as much as a view of nobody."""
+"""Cost of a frame without any view: as much as a view that does not show the object."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GopCosts:
-    """What the S GOPs of a window cost.
+    """Costs of the S GOPs of a window.
 
     Attributes:
-        cost: S times (C, K), the sum over the GOP's frames; infinite where a camera cannot be shown. Objects
-            are innermost: they are the long axis, so that every step of the program is one vector operation.
+        cost: S times (C, K), the sum over the GOP's frames; infinite: the camera cannot be shown. Objects are
+            innermost: they are the long axis, so that every step of the program is one vector operation.
         frames: (S,) float64, how many frames each GOP stands for.
-        shows_nobody: S times (C, K), where a camera shows nobody, or cannot be shown; None where nobody asks.
+        shows_nobody: S times (C, K), where a camera does not show the object; None where it is not needed.
     """
 
     cost: Sequence[NDArray[np.float64]]
@@ -29,7 +29,7 @@ class GopCosts:
     shows_nobody: Sequence[NDArray[np.bool_] | None]
 
     def for_people(self, people: NDArray[np.int64]) -> GopCosts:
-        """Give the same for some of the people, by index."""
+        """Return the costs of some of the people, by index."""
         blind = [None if it is None else it[:, people] for it in self.shows_nobody]
         return GopCosts([it[:, people] for it in self.cost], self.frames, blind)
 
@@ -37,42 +37,44 @@ class GopCosts:
 def solve_dynamic_program(
     gops: GopCosts, previous: NDArray[np.int64], switch_cost: float, decided_gops: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Give the cameras (asked, K) of the first GOPs, -1 where none is possible, and what all cost (K,).
+    """Return the cameras (decided_gops, K) of the first GOPs, -1: none possible, and the total cost (K,).
 
-    The recursion runs backwards (cost still to come), so that the decisions are read forwards and a tie
-    can be given to the camera that is being shown, which the paper's forward recursion leaves open.
+    The recursion runs backwards (cost to go), so that the decisions are read forwards and a tie can be given
+    to the camera that is being shown, which the paper's forward recursion leaves open.
     """
     count, (cameras, objects) = len(gops.cost), gops.cost[0].shape
-    onward = np.empty((decided_gops, cameras, objects))  # the cost from GOP s on, by the camera shown in it
-    best = np.empty((count, objects))  # the least of these over the cameras
-    later = np.empty((cameras, objects))  # the same for GOPs that nobody asks for
-    ahead = np.zeros((cameras, objects))  # the least cost after GOP s, by the camera shown last
-    start = np.zeros(objects)  # the same where no camera was shown before
+    cost_to_go = np.empty((decided_gops, cameras, objects))  # cost from GOP s on, by camera
+    minimum = np.empty((count, objects))  # the least of these over the cameras
+    undecided = np.empty((cameras, objects))  # the same for GOPs that are not decided
+    next_cost = np.zeros((cameras, objects))  # the least cost after GOP s, by the camera shown last
+    first_cost = np.zeros(objects)  # the same where no camera was shown before
     if not objects:
-        return np.empty((decided_gops, 0), dtype=np.int64), start
+        return np.empty((decided_gops, 0), dtype=np.int64), first_cost
     for s in range(count - 1, -1, -1):
-        value = np.add(gops.cost[s], ahead, out=onward[s] if s < decided_gops else later)
-        np.minimum.reduce(value, axis=0, out=best[s])
-        if best[s].max() == np.inf:
-            hole = np.isinf(best[s])
-            none = NO_VIEW_COST * gops.frames[s]
-            ahead = np.where(hole, ahead + none, np.minimum(value, best[s] + switch_cost))
-            start = np.where(hole, start + none, best[s])
+        value = np.add(gops.cost[s], next_cost, out=cost_to_go[s] if s < decided_gops else undecided)
+        np.minimum.reduce(value, axis=0, out=minimum[s])
+        if minimum[s].max() == np.inf:
+            no_camera = np.isinf(minimum[s])
+            no_view_cost = NO_VIEW_COST * gops.frames[s]
+            next_cost = np.where(
+                no_camera, next_cost + no_view_cost, np.minimum(value, minimum[s] + switch_cost)
+            )
+            first_cost = np.where(no_camera, first_cost + no_view_cost, minimum[s])
         else:
-            np.minimum(value, best[s] + switch_cost, out=ahead)
-            start = best[s]
-    every = np.arange(objects)
-    total = np.where(previous >= 0, ahead[previous, every], start)
+            np.minimum(value, minimum[s] + switch_cost, out=next_cost)
+            first_cost = minimum[s]
+    object_index = np.arange(objects)
+    total = np.where(previous >= 0, next_cost[previous, object_index], first_cost)
 
-    possible = np.isfinite(best[:decided_gops])
-    leave = best[:decided_gops] + switch_cost
+    possible = np.isfinite(minimum[:decided_gops])
+    leave = minimum[:decided_gops] + switch_cost
     views = np.empty((decided_gops, objects), dtype=np.int64)
     current = previous.copy()
     for s in range(decided_gops):
-        goes_on = np.take(onward[s], np.maximum(current, 0) * objects + every) <= leave[s]
-        cut = np.flatnonzero(possible[s] & ~(goes_on & (current >= 0)))
+        stays = np.take(cost_to_go[s], np.maximum(current, 0) * objects + object_index) <= leave[s]
+        cut = np.flatnonzero(possible[s] & ~(stays & (current >= 0)))
         if cut.size:
-            current[cut] = np.argmin(np.take(onward[s], cut, axis=1), axis=0)
+            current[cut] = np.argmin(np.take(cost_to_go[s], cut, axis=1), axis=0)
         views[s] = current
     views[~possible] = NO_CAMERA
     return views, np.asarray(total)

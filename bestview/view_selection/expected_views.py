@@ -1,4 +1,4 @@
-"""Views that show somebody as far as is known from elsewhere, beside those that are found or missed."""
+"""Views inferred from other cameras, added to the detected and missed ones."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ Ints = NDArray[np.int64]
 
 
 def add_inferred_views(
-    views: VisibleViews, frame: Ints, camera: Ints, person: Ints, worth: Floats
+    views: VisibleViews, frame: Ints, camera: Ints, person: Ints, quality: Floats
 ) -> VisibleViews:
-    """Add V views that are expected to show somebody; where a view is only taken to, the larger worth counts.
+    """Add V inferred views; where a view was already inferred, the larger quality counts.
 
     Args:
-        views: those found, and then those that are only taken to be there.
-        frame: (V,) of each; none is found, or cannot be shown.
+        views: detected ones, and then inferred ones.
+        frame: (V,) of each; the camera does not detect the person, and can be shown.
         camera: (V,).
         person: (V,).
-        worth: (V,) in [0, 1].
+        quality: (V,) in [0, 1].
     """
     if not len(frame):
         return views
-    cameras, found = (
+    cameras, detected = (
         views.available.shape[1],
         len(views.frame) if views.detected_count is None else views.detected_count,
     )
@@ -34,18 +34,18 @@ def add_inferred_views(
         return np.asarray((frame * cameras + camera) * views.person_count + person)
 
     best = np.zeros(views.available.size * views.person_count)
-    best[cells(frame, camera, person)] = worth
-    taken = slice(found, None)
-    missed = cells(views.frame[taken], views.camera[taken], views.person[taken])
-    best[missed] = np.maximum(best[missed], views.quality[taken])
+    best[cells(frame, camera, person)] = quality
+    inferred = slice(detected, None)
+    missed = cells(views.frame[inferred], views.camera[inferred], views.person[inferred])
+    best[missed] = np.maximum(best[missed], views.quality[inferred])
     cell = np.flatnonzero(best)
-    moment, of = np.divmod(cell, views.person_count)
+    moment, person_index = np.divmod(cell, views.person_count)
     return VisibleViews(
-        np.concatenate([views.frame[:found], moment // cameras]),
-        np.concatenate([views.camera[:found], moment % cameras]),
-        np.concatenate([views.person[:found], of]),
-        np.concatenate([views.quality[:found], best[cell]]),
+        np.concatenate([views.frame[:detected], moment // cameras]),
+        np.concatenate([views.camera[:detected], moment % cameras]),
+        np.concatenate([views.person[:detected], person_index]),
+        np.concatenate([views.quality[:detected], best[cell]]),
         views.available,
         views.person_count,
-        detected_count=found,
+        detected_count=detected,
     )

@@ -1,4 +1,4 @@
-"""People whom a camera misses for a moment: found views are not all there are."""
+"""Views that are kept for a while after a detection was missed."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LastDetections:
-    """How each camera saw each person last before frame 0, C cameras and K people.
+    """Last detection of each person by each camera before frame 0, C cameras and K people.
 
     Attributes:
-        age: (C, K) frames before frame 0, at least 1; infinite: never, as far as is known.
+        age: (C, K) frames before frame 0, at least 1; infinite: never.
         quality: (C, K) of that view.
     """
 
@@ -26,7 +26,7 @@ class LastDetections:
     quality: Floats
 
     def advanced_to(self, views: VisibleViews, frames: int) -> LastDetections:
-        """Give the same before frame `frames`, those views seen that are before it."""
+        """Return the last detections before frame `frames`, given the views until then."""
         ago, worth = self.age + frames, self.quality.copy()
         rows = np.flatnonzero(views.frame < frames)
         at = views.camera[rows], views.person[rows]
@@ -35,48 +35,48 @@ class LastDetections:
         return LastDetections(ago, worth)
 
 
-def add_missed_detections(views: VisibleViews, last: LastDetections, lasts: float) -> VisibleViews:
-    """Take who is not found any more to be still there, less and less.
+def add_missed_detections(views: VisibleViews, last: LastDetections, decay_frames: float) -> VisibleViews:
+    """Keep views of people who are not detected any more, with decaying quality.
 
-    *n* frames after the last view a view is worth ``1 - n / lasts`` of it, until the camera finds the person
-    again or that is nothing. Detectors miss people for moments, and two cuts for that are two too many.
+    *n* frames after the last detection a view has ``1 - n / decay_frames`` of its quality, until the camera
+    detects the person again. Detectors miss people for moments, and two cuts for that are two too many.
 
     Args:
-        views: those that were found.
-        last: what was found before.
-        lasts: frames, 0 or more.
+        views: detected ones.
+        last: the last detections before.
+        decay_frames: 0 or more.
 
     Returns:
-        The views found, and then those missed, each of them rising by frame for a camera and person.
+        The detected views, and then the missed ones, each rising by frame for a camera and person.
     """
     (frames, cameras), people = views.available.shape, views.person_count
-    if not frames or lasts <= 1.0:
+    if not frames or decay_frames <= 1.0:
         return views
-    cell = views.camera * people + views.person
-    found = np.zeros((frames, cameras * people), dtype=np.bool_)
-    found[views.frame, cell] = True
-    at_start = np.flatnonzero((last.age.reshape(-1) < lasts) & ~found[0])
-    ends, of = np.divmod(np.flatnonzero(found[:-1] & ~found[1:]), cameras * people)
-    row = np.empty(found.shape, dtype=np.int32)
-    row[views.frame, cell] = np.arange(len(cell), dtype=np.int32)
-    cells = np.concatenate([at_start, of])
-    seen = np.concatenate([-last.age.reshape(-1)[at_start], ends])
-    worth = np.concatenate([last.quality.reshape(-1)[at_start], views.quality[row[ends, of]]])
+    key = views.camera * people + views.person
+    detected = np.zeros((frames, cameras * people), dtype=np.bool_)
+    detected[views.frame, key] = True
+    at_start = np.flatnonzero((last.age.reshape(-1) < decay_frames) & ~detected[0])
+    ends, missed_keys = np.divmod(np.flatnonzero(detected[:-1] & ~detected[1:]), cameras * people)
+    row = np.empty(detected.shape, dtype=np.int32)
+    row[views.frame, key] = np.arange(len(key), dtype=np.int32)
+    cells = np.concatenate([at_start, missed_keys])
+    last_seen = np.concatenate([-last.age.reshape(-1)[at_start], ends])
+    worth = np.concatenate([last.quality.reshape(-1)[at_start], views.quality[row[ends, missed_keys]]])
     begin = np.concatenate([np.zeros(len(at_start), dtype=np.int64), ends + 1])
-    again = found[:, cells] & (np.arange(frames)[:, None] >= begin)
-    until = np.where(again.any(axis=0), again.argmax(axis=0), frames)
-    until = np.minimum(until, np.ceil(seen + lasts).astype(np.int64))
+    redetected = detected[:, cells] & (np.arange(frames)[:, None] >= begin)
+    until = np.where(redetected.any(axis=0), redetected.argmax(axis=0), frames)
+    until = np.minimum(until, np.ceil(last_seen + decay_frames).astype(np.int64))
     count = np.maximum(until - begin, 0)
-    gap = np.repeat(np.arange(len(cells)), count)
-    frame = np.arange(len(gap)) + np.repeat(begin - (np.cumsum(count) - count), count)
-    left = worth[gap] * (1.0 - (frame - seen[gap]) / lasts)
-    camera, person = np.divmod(cells[gap], people)
-    there = (left > 0.0) & views.available[frame, camera]
+    owner = np.repeat(np.arange(len(cells)), count)
+    frame = np.arange(len(owner)) + np.repeat(begin - (np.cumsum(count) - count), count)
+    remaining = worth[owner] * (1.0 - (frame - last_seen[owner]) / decay_frames)
+    camera, person = np.divmod(cells[owner], people)
+    counts = (remaining > 0.0) & views.available[frame, camera]
     return VisibleViews(
-        np.concatenate([views.frame, frame[there]]),
-        np.concatenate([views.camera, camera[there]]),
-        np.concatenate([views.person, person[there]]),
-        np.concatenate([views.quality, left[there]]),
+        np.concatenate([views.frame, frame[counts]]),
+        np.concatenate([views.camera, camera[counts]]),
+        np.concatenate([views.person, person[counts]]),
+        np.concatenate([views.quality, remaining[counts]]),
         views.available,
         people,
         detected_count=len(views.frame),

@@ -1,4 +1,4 @@
-"""Which camera shows each object at each frame: the sliding-window dynamic program of section III."""
+"""View selection: the camera that shows each object at each frame (section III)."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ __all__ = ["NO_CAMERA", "NO_VIEW_COST", "ViewSelection", "select_views", "select
 
 @dataclass(frozen=True, slots=True)
 class ViewSelection:
-    """The cameras chosen for a window of N frames and K objects.
+    """Cameras selected for a window of N frames and K objects.
 
     Attributes:
-        views: (K, N) int64, the camera index b_n* per object and frame; -1 where no camera is possible. Fewer
-            frames where not all are asked for.
+        views: (K, N) int64, the camera index b_n* per object and frame; -1: no camera is possible. Fewer
+            frames if fewer GOPs are decided.
         costs: (K,) float64, the cost of the whole window: the view costs, plus the switching cost for every
             cut, plus ``NO_VIEW_COST`` for every frame without a camera.
     """
@@ -39,33 +39,36 @@ def select_views(
     weight: NDArray[np.float64] | None = None,
     decided_gops: int | None = None,
 ) -> ViewSelection:
-    """Minimise the sum of view costs and of cuts over the window, for all objects at once (section III).
+    """Minimize the sum of view costs and of cuts over the window, for all objects at once (section III).
 
     The cost is ``sum_n c(n, b_n) + lambda * sum_n [b_n != b_(n-1)]``. A cut may only happen at a frame
     where `cut_allowed` is true (a GOP start); with all of them true this is the paper's program.
 
-    * A camera that cannot be shown somewhere in a GOP cannot be shown in any of it. In a GOP that has
-      begun before the window, where there is nothing left to choose, the previous camera goes on until
-      the first frame in which it cannot be shown.
-    * Where no camera is possible, the view is -1. Such a hole is no cut: going on with the camera
-      from before the hole is free. An object without a previous camera starts, for free, at the
-      first frame where a cut is allowed.
-    * Between equally good sequences the one that stays longest with its camera wins, and then the
-      lowest camera index. There are no other ties, so the answer is the same on every machine.
-    * With a least shot no camera is left before it was shown for that many GOPs, unless it cannot be shown in
-      the GOP, or shows nobody in it (every frame costs at least ``NO_VIEW_COST``). A hole counts as shown.
+    * A camera that cannot be shown somewhere in a GOP cannot be shown in any of it. In a GOP that started
+    before
+      the window, the previous camera goes on until the first frame in which it cannot be shown.
+    * Where no camera is possible, the view is -1. Such a gap is no cut: continuing with the camera from
+    before
+      the gap is free. An object without a previous camera starts, for free, at the first frame where a cut is
+      allowed.
+    * Of equally good sequences the one that stays longest with its camera wins, and then the lowest camera
+      index, so the result is the same on every machine.
+    * With a minimum shot no camera is left before it was shown for that many GOPs, unless it cannot be shown
+    in
+      the GOP, or does not show the object in it (every frame costs at least ``NO_VIEW_COST``). A gap counts
+      as shown.
 
-    It is fastest where the costs lie in memory as (N, C, K), objects innermost.
+    Fastest if the costs lie in memory as (N, C, K), objects innermost.
 
     Args:
-        cost: (K, N, C) c(n, b) per object, frame and camera; infinite where it cannot be shown.
+        cost: (K, N, C) c(n, b) per object, frame and camera; infinite: it cannot be shown.
         previous: (K,) b_(-1), the camera index just before the window; -1: none yet.
         switch_cost: lambda, the cost of one cut, in units of one frame's view cost.
         cut_allowed: (N,) where a cut may happen; entry 0 says whether frame 0 may differ from `previous`.
-        minimum_shot_gops: GOPs that a shot lasts at least; up to 1 is the paper's program.
+        minimum_shot_gops: least length of a shot in GOPs; up to 1 is the paper's program.
         shot_ages: (K,) for how many GOPs `previous` has been shown, at least 1; None: long enough to be left.
-        weight: (N,) for how many frames each frame stands, above 0; None: one. Above 1 for the last ones, the
-            window is taken to go on as it ends: a view that stays better is worth a cut then.
+        weight: (N,) number of frames that each frame stands for, above 0; None: one. Above 1 for the last
+            ones the window is extrapolated: a view that stays better is worth a cut then.
         decided_gops: for how many GOPs views are returned, at least 1; None: for all. Saves time where the
             window moves on by one GOP and the rest is decided again.
 
@@ -86,21 +89,21 @@ def select_views(
     if not cameras or not frames:
         return ViewSelection(views, np.full(objects, NO_VIEW_COST * frame_weights.sum()))
     starts = np.flatnonzero(cut_allowed)
-    running = int(starts[0]) if starts.size else frames
+    running_frames = int(starts[0]) if starts.size else frames
     costs = (
-        _continue_running_gop(cost[:, :running], frame_weights[:running], previous, views)
-        if running
+        _continue_running_gop(cost[:, :running_frames], frame_weights[:running_frames], previous, views)
+        if running_frames
         else np.zeros(objects)
     )
     if starts.size:
         gops = _sum_by_gop(cost, frame_weights, starts, mark_empty=minimum_shot_gops > 1)
-        shown, ahead = select_views_by_gop(
+        selected, gop_costs = select_views_by_gop(
             gops, previous, switch_cost, minimum_shot_gops, shot_ages, decided_gops
         )
-        lengths = np.diff(starts, append=frames)[: len(shown)]
-        views = views[:, : running + int(lengths.sum())]
-        views[:, running:] = np.repeat(shown, lengths, axis=0).T
-        costs += ahead
+        lengths = np.diff(starts, append=frames)[: len(selected)]
+        views = views[:, : running_frames + int(lengths.sum())]
+        views[:, running_frames:] = np.repeat(selected, lengths, axis=0).T
+        costs += gop_costs
     return ViewSelection(views, costs)
 
 
@@ -112,10 +115,10 @@ def select_views_by_gop(
     shot_ages: NDArray[np.int64] | None = None,
     decided_gops: int | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Choose where the costs of whole GOPs are known; arguments as above.
+    """Select views from the costs of whole GOPs; arguments as in `select_views`.
 
     Returns:
-        (asked, K) cameras of the first GOPs, -1 where none is possible, and (K,) what the window costs.
+        (decided_gops, K) cameras of the first GOPs, -1: none possible, and (K,) the cost of the window.
     """
     count = len(gops.cost) if decided_gops is None else min(decided_gops, len(gops.cost))
     if minimum_shot_gops > 1:
@@ -156,16 +159,16 @@ def _continue_running_gop(
     previous: NDArray[np.int64],
     views: NDArray[np.int64],
 ) -> NDArray[np.float64]:
-    """Fill in the GOP that began before the window: (K, R, C) costs of its rest; no choice is left.
+    """Fill in the GOP that started before the window: (K, R, C) costs of its rest; nothing can be decided.
 
     Returns:
-        (K,) what those views cost.
+        (K,) the cost of those views.
     """
-    running = cost.shape[1]
-    mine = np.take_along_axis(cost, np.maximum(previous, 0)[:, None, None], axis=2)[:, :, 0]
-    shown = np.logical_and.accumulate(np.isfinite(mine) & (previous >= 0)[:, None], axis=1)
-    views[:, :running] = np.where(shown, previous[:, None], NO_CAMERA)
-    return np.asarray((np.where(shown, mine, NO_VIEW_COST) * frame_weights).sum(axis=1))
+    frames = cost.shape[1]
+    previous_cost = np.take_along_axis(cost, np.maximum(previous, 0)[:, None, None], axis=2)[:, :, 0]
+    continues = np.logical_and.accumulate(np.isfinite(previous_cost) & (previous >= 0)[:, None], axis=1)
+    views[:, :frames] = np.where(continues, previous[:, None], NO_CAMERA)
+    return np.asarray((np.where(continues, previous_cost, NO_VIEW_COST) * frame_weights).sum(axis=1))
 
 
 def _sum_by_gop(
@@ -175,19 +178,19 @@ def _sum_by_gop(
     *,
     mark_empty: bool,
 ) -> GopCosts:
-    """Sum the (K, N, C) costs, each frame as often as it lasts, over each GOP that starts in the window."""
+    """Sum the (K, N, C) costs, weighted by frame, over each GOP that starts in the window."""
     by_frame = cost.transpose(1, 2, 0)
     first = int(starts[0])
-    inside, starts, frame_weights = by_frame[first:], starts - first, frame_weights[first:]
+    window, starts, frame_weights = by_frame[first:], starts - first, frame_weights[first:]
     gop_costs, gops_without_object = [], []
-    for start, end in pairwise([*starts.tolist(), len(inside)]):
+    for start, end in pairwise([*starts.tolist(), len(window)]):
         # Frame after frame, so that the order of the sums does not depend on how many objects there are.
-        total = _weighted(inside[start], frame_weights[start])
+        total = _weighted(window[start], frame_weights[start])
         for n in range(start + 1, end):
-            total = total + _weighted(inside[n], frame_weights[n])
+            total = total + _weighted(window[n], frame_weights[n])
         gop_costs.append(total)
-        nobody = inside[start:end].min(axis=0) >= NO_VIEW_COST if mark_empty else None
-        gops_without_object.append(nobody if nobody is None else nobody | np.isinf(total))
+        empty = window[start:end].min(axis=0) >= NO_VIEW_COST if mark_empty else None
+        gops_without_object.append(empty if empty is None else empty | np.isinf(total))
     return GopCosts(gop_costs, np.add.reduceat(frame_weights, starts), gops_without_object)
 
 

@@ -1,4 +1,4 @@
-"""What GOPs cost, from the few views that show somebody: most cameras do not see most people."""
+"""GOP costs from a sparse list of views: most cameras do not see most people."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VisibleViews:
-    """R views that show somebody, of K people in N frames of C cameras. All other views are worth nothing.
+    """R views that show somebody, of K people in N frames of C cameras. All other views have quality 0.
 
-    Of one camera and person there is at most one view in a frame.
+    There is at most one view of a camera and person in a frame.
 
     Attributes:
         frame: (R,) 0 to N - 1.
         camera: (R,) by index.
         person: (R,) by index.
-        quality: (R,) above 0, at most 1: a view costs ``1 - worth``.
+        quality: (R,) above 0, at most 1: a view costs ``1 - quality``.
         available: (N, C) where a camera's frame can be shown at all; there are no views elsewhere.
         person_count: K.
-        detected_count: the first so many show somebody for sure, the others are only taken to; None: all do.
+        detected_count: the first so many are detected, the others inferred; None: all are detected.
     """
 
     frame: Ints
@@ -40,34 +40,34 @@ class VisibleViews:
     def gops(self, first: int, starts: NDArray[np.bool_], weight: Floats, *, mark_empty: bool) -> GopCosts:
         """Sum the costs over the GOPs of a window.
 
-        A GOP costs ``sum of w(n) - sum of w(n) worth(n)``, each sum view after view; infinitely much where
-        a camera cannot be shown in all of it.
+        A GOP costs ``sum of w(n) - sum of w(n) quality(n)``, each sum view after view; infinitely much if the
+        camera cannot be shown in all of it.
 
         Args:
-            first: frame at which the window begins, which is the first of a GOP.
-            starts: (M,) where GOPs begin in the window; the first entry is true.
-            weight: (M,) for how many frames each frame stands.
-            mark_empty: whether to tell where a camera is found to show nobody.
+            first: frame at which the window starts, which is the first of a GOP.
+            starts: (M,) where GOPs start in the window; the first entry is true.
+            weight: (M,) number of frames that each frame stands for.
+            mark_empty: whether to mark where a camera is known not to show the person.
         """
         frames, cameras = len(weight), self.available.shape[1]
         gop = np.cumsum(starts) - 1
         count = int(gop[-1]) + 1
         rows = np.flatnonzero((self.frame >= first) & (self.frame < first + frames))
-        at = self.frame[rows] - first
-        cell = (gop[at] * cameras + self.camera[rows]) * self.person_count + self.person[rows]
+        offset = self.frame[rows] - first
+        cell = (gop[offset] * cameras + self.camera[rows]) * self.person_count + self.person[rows]
         cells = count * cameras * self.person_count
         # bincount adds row after row, so that no sum depends on how many others there are.
-        saved = np.bincount(cell, self.quality[rows] * weight[at], cells).reshape(
+        gained = np.bincount(cell, self.quality[rows] * weight[offset], cells).reshape(
             count, cameras, self.person_count
         )
         frame_weights: Floats = np.bincount(gop, weight).astype(np.float64)
-        cost = NO_VIEW_COST * frame_weights[:, None, None] - saved
-        missing = ~np.logical_and.reduceat(
+        cost = NO_VIEW_COST * frame_weights[:, None, None] - gained
+        unavailable = ~np.logical_and.reduceat(
             self.available[first : first + frames], np.flatnonzero(starts), axis=0
         )
-        cost[missing] = np.inf
+        cost[unavailable] = np.inf
         if not mark_empty:
             return GopCosts(list(cost), frame_weights, [None] * count)
-        sure = cell if self.detected_count is None else cell[rows < self.detected_count]
-        nobody = np.bincount(sure, minlength=cells).reshape(cost.shape) == 0
-        return GopCosts(list(cost), frame_weights, list(nobody | missing[:, :, None]))
+        detected = cell if self.detected_count is None else cell[rows < self.detected_count]
+        empty = np.bincount(detected, minlength=cells).reshape(cost.shape) == 0
+        return GopCosts(list(cost), frame_weights, list(empty | unavailable[:, :, None]))

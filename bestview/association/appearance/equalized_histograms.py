@@ -26,9 +26,8 @@ class HistogramEqualizer:
     """Equalizes histograms, and learns how much the histograms of different people differ.
 
     The same coat is brighter in one camera than in another. If all cameras see about the same people, the
-    gray
-    level below which 30 % of all pixels lie is the same in each: a histogram is compared after its bins are
-    mapped through its camera's mean cumulative histogram (histogram equalization).
+    gray level below which 30 % of all pixels lie is the same in each: a histogram is compared after its bins
+    are mapped through its camera's mean cumulative histogram (histogram equalization).
     """
 
     def __init__(self) -> None:
@@ -62,8 +61,7 @@ class HistogramEqualizer:
         """Return the distance below which two histograms are likely of one person.
 
         At most `maximum`, and at most `share` of the lower quartile of the distances between different
-        people:
-        where everyone looks alike, appearance joins nobody.
+        people: where everyone looks alike, appearance joins nobody.
         """
         if len(self._different) < _ENOUGH_PAIRS:
             return maximum

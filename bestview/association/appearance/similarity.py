@@ -52,10 +52,8 @@ def score_camera_pairs(
     """Score the likeness of tracklets of two cameras without common ground.
 
     The tracklets of two cameras are assigned to each other as a whole, with the least total distance. A pair
-    of
-    that assignment counts for one person only if no exchange of partners would be nearly as good; a pair
-    further
-    apart than the gate counts against; all others score 0.
+    of that assignment counts for one person only if no exchange of partners would be nearly as good; a pair
+    further apart than the gate counts against; all others score 0.
 
     Args:
         cameras: rows of each camera's tracklets, rising.

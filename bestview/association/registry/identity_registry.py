@@ -55,8 +55,7 @@ class IdentityRegistry:
     Every few frames all tracklets of the last seconds are clustered (`cluster`), where two that are seen
     simultaneously in one camera are two people, and each cluster gets the id that most of its frames were
     published with. Older tracklets are settled: they keep their published id and take part as one known
-    person.
-    Ids count from 1 and are never reused. Deterministic.
+    person. Ids count from 1 and are never reused. Deterministic.
 
     Args:
         settings: of identity.
@@ -106,9 +105,9 @@ class IdentityRegistry:
     ) -> IdentityUpdate:
         """Take in the new final frames of all cameras' tracks, by now up to `last_frame`.
 
-        Single cameras may be ahead of it. A track that is missing may come back. `pictures` are the width
-        and height
-        in pixels of the cameras that have reported, even if they see nobody: only these can miss a person.
+        Single cameras may be ahead of it. A track that is missing may come back. `pictures` are the width and
+        height in pixels of the cameras that have reported, even if they see nobody: only these can miss a
+        person.
 
         Raises:
             ValueError: updates that do not advance, or invalid tracks (see `align_tracks`).
@@ -185,8 +184,7 @@ class IdentityRegistry:
         """Apply an operator's correction: two tracks of a camera swapped their people in this frame.
 
         From it on each continues what the other one was before. What other cameras have since taken for one
-        of the
-        two is swapped as well.
+        of the two is swapped as well.
 
         Args:
             first: a track.

@@ -19,10 +19,8 @@ def swap_tracks(
     """Let each of two tracks continue, from a frame on, what the other one was before.
 
     The tracklet that started in that frame or later becomes the other's person. If a track was not split
-    since,
-    its next observation starts a new tracklet. Tracklets of other cameras that started since and were taken
-    for
-    one of the two are swapped as well.
+    since, its next observation starts a new tracklet. Tracklets of other cameras that started since and were
+    taken for one of the two are swapped as well.
 
     Args:
         tracklets: all of them; changed in place.
@@ -33,8 +31,7 @@ def swap_tracks(
 
     Returns:
         The ids before and after of each tracklet that has another one now; of a track that is split only
-        later
-        as if a tracklet had started in that frame. Empty if one of the two had no id.
+        later as if a tracklet had started in that frame. Empty if one of the two had no id.
     """
     first, second = (
         tracklets.predecessor(track, frame, number) for track, number in zip(tracks, person_ids, strict=True)
