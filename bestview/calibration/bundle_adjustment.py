@@ -1,4 +1,4 @@
-"""All cameras at once, moved until feet agree as well as they can: least squares over everything."""
+"""Bundle adjustment: poses and time offsets of all cameras at once, by robust least squares."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from bestview.geometry.ground_plane import foot_points
 _HEIGHTS = 200
 """Boxes of each camera whose height counts."""
 _MOST_MATCHES = 600
-"""Matches of two cameras that count; evenly chosen of more."""
+"""Correspondences of two cameras that count; evenly chosen of more."""
 _OFF_FLOOR_ERROR = 20.0
 _SHARPEST = 0.2
-"""Standard deviations are never guessed to be smaller than this share of what the settings say."""
+"""Lower bound of the estimated foot error, as a share of what the settings say."""
 _OFFSET_SPREAD = 100.0
-"""Frames; a weak pull of offsets towards where they were, for cameras that nothing ties."""
+"""Frames; a weak prior that keeps offsets in place for cameras that nothing constrains."""
 _EVALUATIONS = 12
 
 
 @dataclass(frozen=True, slots=True)
 class Correspondences:
-    """Moments at which two cameras see one person.
+    """Samples in which two cameras see one person at the same pulse.
 
     Attributes:
-        one: the number of the one camera, and `other` of the other.
-        here: the sample of the one camera, (M,), and `there` of the other.
+        one: number of the one camera, and `other` of the other.
+        here: sample of the one camera, (M,), and `there` of the other.
         weight: how much of a new place each is, (M,).
     """
 
@@ -45,7 +45,7 @@ class Correspondences:
     weight: Floats
 
     def thinned(self) -> Correspondences:
-        """Leave out what is too much."""
+        """Return evenly chosen correspondences, at most `_MOST_MATCHES`."""
         step = max(1, -(-len(self.here) // _MOST_MATCHES))
         return replace(
             self, here=self.here[::step], there=self.there[::step], weight=self.weight[::step] * step
@@ -69,27 +69,27 @@ def adjust_bundle(
     sharpness: float = 1.0,
     in_step: bool = False,
 ) -> CameraRig:
-    """Move the cameras and their offsets; the first one's place, direction and offset stay.
+    """Optimize the cameras and their offsets; the first one's place, direction and offset stay.
 
     Args:
-        rig: where they are now; the samples are taken with its offsets.
+        rig: initial cameras; the samples are taken with its offsets.
         samples: one for each camera.
-        matches: who is one person.
-        settings: what counts how much.
-        sharpness: how much more exactly feet are found than the settings say.
+        matches: correspondences.
+        settings: weights and priors.
+        sharpness: how much more precise foot points are than the settings say.
         in_step: offsets are known and stay.
     """
     count = len(rig.cameras)
-    given = np.concatenate([camera.parameters for camera in rig.cameras])
+    parameters = np.concatenate([camera.parameters for camera in rig.cameras])
     free = np.ones(count * (PARAMETERS + 1), dtype=bool)
     free[POSE] = False
     free[count * PARAMETERS] = False
     if in_step:
         free[count * PARAMETERS :] = False
-    start = np.concatenate([given, np.zeros(count)])
-    thin = [it.thinned() for it in matches]
+    start = np.concatenate([parameters, np.zeros(count)])
+    thinned = [it.thinned() for it in matches]
     boxes = [select_moving_samples(it, _HEIGHTS) for it in samples]
-    tall = [
+    heights = [
         (it.feet[chosen], it.tall[chosen], it.weight[chosen])
         for it, chosen in zip(samples, boxes, strict=True)
     ]
@@ -100,14 +100,16 @@ def adjust_bundle(
         later = all_values[count * PARAMETERS :]
         cameras = _cameras(rig, all_values)
         parts = [later / _OFFSET_SPREAD]
-        for camera, (where, height, weight) in zip(cameras, tall, strict=True):
+        for camera, (where, height, weight) in zip(cameras, heights, strict=True):
             parts += [prior_errors(camera, settings), height_errors(camera, where, height, weight, settings)]
-        parts += [_match_errors(cameras, later, samples, it, settings, sharpness) for it in thin]
+        parts += [_match_errors(cameras, later, samples, it, settings, sharpness) for it in thinned]
         return np.concatenate(parts)
 
-    found = scipy.optimize.least_squares(errors, start[free], x_scale="jac", ftol=1e-5, max_nfev=_EVALUATIONS)
+    solution = scipy.optimize.least_squares(
+        errors, start[free], x_scale="jac", ftol=1e-5, max_nfev=_EVALUATIONS
+    )
     values = start.copy()
-    values[free] = found.x
+    values[free] = solution.x
     return CameraRig(tuple(_cameras(rig, values)), rig.offsets + values[count * PARAMETERS :])
 
 
@@ -118,7 +120,7 @@ def floor_residuals(
     it: Correspondences,
     settings: WalkSettings,
 ) -> Floats:
-    """How far apart the two cameras put each person, whitened, (M, 2); NaN where nowhere.
+    """Compute whitened floor distances between both cameras' foot points, (M, 2); NaN: off the floor.
 
     `later` is by how many frames each camera's offset is later than the samples were taken with, (C,).
     """
@@ -138,13 +140,13 @@ def _match_errors(
     settings: WalkSettings,
     sharpness: float,
 ) -> Floats:
-    off = floor_residuals(cameras, later, samples, it, settings) * sharpness
-    far = np.hypot(*off.T)
-    seen = np.isfinite(far)
-    far = np.where(seen, far, _OFF_FLOOR_ERROR)
-    off = np.where(seen[:, None], off, _OFF_FLOOR_ERROR)
-    less = robust(far) / np.maximum(far, 1e-9)
-    return np.asarray((off * (less * np.sqrt(it.weight))[:, None]).ravel())
+    residuals = floor_residuals(cameras, later, samples, it, settings) * sharpness
+    distance = np.hypot(*residuals.T)
+    valid = np.isfinite(distance)
+    distance = np.where(valid, distance, _OFF_FLOOR_ERROR)
+    residuals = np.where(valid[:, None], residuals, _OFF_FLOOR_ERROR)
+    robust_factor = robust(distance) / np.maximum(distance, 1e-9)
+    return np.asarray((residuals * (robust_factor * np.sqrt(it.weight))[:, None]).ravel())
 
 
 def _cameras(rig: CameraRig, values: Floats) -> list[Pinhole]:
@@ -154,7 +156,7 @@ def _cameras(rig: CameraRig, values: Floats) -> list[Pinhole]:
     ]
 
 
-def estimate_sharpness(off: Floats) -> float:
-    """How much more exactly feet agree than the settings say, from whitened distances, (M, 2)."""
-    typical = float(np.median(np.hypot(*off.T))) / 1.18 if len(off) else 1.0  # Rayleigh's median
+def estimate_sharpness(residuals: Floats) -> float:
+    """Return how much more precise foot points are than the settings say, from whitened distances, (M, 2)."""
+    typical = float(np.median(np.hypot(*residuals.T))) / 1.18 if len(residuals) else 1.0  # Rayleigh's median
     return 1.0 / min(max(typical, _SHARPEST), 1.0)

@@ -1,4 +1,4 @@
-"""All cameras: which belong together, and one floor for those that do."""
+"""Groups of cameras that share a floor, and their joint calibration."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ _ROUNDS = 3
 
 @dataclass(frozen=True, slots=True)
 class CameraPair:
-    """What was found out about two cameras, by their numbers; no link where nobody was in both at once."""
+    """Result of aligning two cameras, by their numbers; no alignment: nobody was in both at once."""
 
     one: int
     other: int
     alignment: PairAlignment | None
 
     def rejection(self, settings: WalkSettings) -> str | None:
-        """Say why the two cannot be laid on one floor; None if they can."""
+        """Return why the two cannot be placed on one floor; None if they can."""
         if self.alignment is None:
             return "nobody was seen walking by both at once"
         return next((words for holds, words in _rejection_reasons(self.alignment, settings) if holds), None)
 
 
 def _rejection_reasons(it: PairAlignment, settings: WalkSettings) -> Iterator[tuple[bool, str]]:
-    """Give what may speak against two cameras' being on one floor, and whether it does."""
+    """Yield each possible objection to two cameras' being on one floor, and whether it holds."""
     few = f"at only {it.places:.0f} steps of the walk people stand in one place"
     needed = f"{settings.minimum_places:.0f} are needed: walk longer where both see"
     yield it.places < settings.minimum_places, f"{few}; {needed}"
@@ -67,9 +67,9 @@ class CameraGroup:
 
     Attributes:
         members: their numbers, (C,).
-        rig: where they are; the first is at the origin, its offset 0.
+        rig: their poses; the first is at the origin, its offset 0.
         samples: one for each, taken with the rig's offsets.
-        matches: who is one person; cameras are numbered within the group.
+        matches: correspondences; cameras are numbered within the group.
     """
 
     members: tuple[int, ...]
@@ -79,7 +79,7 @@ class CameraGroup:
 
 
 def camera_hypotheses(walk: Walk, settings: WalkSettings) -> CameraHypotheses:
-    """Give the ways in which a camera may look down: one for a short, a usual and a long focal length."""
+    """Return possible tilts and heights of a camera: one for a short, a usual and a long focal length."""
     samples = sample_walk(walk, comparison_pulses((walk,), settings), 0.0, settings.step, settings.stride)
     if not len(samples.times):
         return CameraHypotheses(walk, ())
@@ -90,10 +90,10 @@ def camera_hypotheses(walk: Walk, settings: WalkSettings) -> CameraHypotheses:
 
 
 def align_camera_pairs(walks: Sequence[Walk], settings: WalkSettings) -> list[CameraPair]:
-    """Find out about every two cameras."""
-    seers = [camera_hypotheses(walk, settings) for walk in walks]
+    """Align every two cameras."""
+    hypotheses = [camera_hypotheses(walk, settings) for walk in walks]
     return [
-        CameraPair(a, b, pair_alignment(seers[a], seers[b], settings))
+        CameraPair(a, b, pair_alignment(hypotheses[a], hypotheses[b], settings))
         for a, b in combinations(range(len(walks)), 2)
     ]
 
@@ -101,21 +101,24 @@ def align_camera_pairs(walks: Sequence[Walk], settings: WalkSettings) -> list[Ca
 def group_cameras(
     walks: Sequence[Walk], pairs: Sequence[CameraPair], settings: WalkSettings
 ) -> list[CameraGroup]:
-    """Lay cameras that belong together on one floor; who belongs to nobody is in no group."""
-    good = [it for it in pairs if it.alignment is not None and it.rejection(settings) is None]
-    good.sort(key=lambda it: -_merit(it))
-    root = list(range(len(walks)))
+    """Group cameras that share a floor and calibrate each group; isolated cameras are in none."""
+    accepted = [it for it in pairs if it.alignment is not None and it.rejection(settings) is None]
+    accepted.sort(key=lambda it: -_merit(it))
+    group_of = list(range(len(walks)))
     tree = []
-    for it in good:
-        if root[it.one] != root[it.other]:
+    for it in accepted:
+        if group_of[it.one] != group_of[it.other]:
             tree.append(it)
-            gone, kept = max(root[it.one], root[it.other]), min(root[it.one], root[it.other])
-            root = [kept if number == gone else number for number in root]
+            removed, remaining = (
+                max(group_of[it.one], group_of[it.other]),
+                min(group_of[it.one], group_of[it.other]),
+            )
+            group_of = [remaining if number == removed else number for number in group_of]
     groups = []
-    for first in sorted(set(root)):
-        members = tuple(number for number, it in enumerate(root) if it == first)
+    for first in sorted(set(group_of)):
+        members = tuple(number for number, it in enumerate(group_of) if it == first)
         if len(members) > 1:
-            groups.append(_build_group(walks, members, tree, good, settings))
+            groups.append(_build_group(walks, members, tree, accepted, settings))
     return groups
 
 
@@ -127,19 +130,19 @@ def _build_group(
     walks: Sequence[Walk],
     members: tuple[int, ...],
     tree: Sequence[CameraPair],
-    good: Sequence[CameraPair],
+    accepted: Sequence[CameraPair],
     settings: WalkSettings,
 ) -> CameraGroup:
-    """Chain the tree's links, then move all cameras at once until they agree best."""
+    """Chain the tree's alignments, then adjust all cameras at once until they agree best."""
     rig = _chain_poses(members, tree)
     pulses = comparison_pulses([walks[number] for number in members], settings)
-    numbers = [(members.index(it.one), members.index(it.other)) for it in good if it.one in members]
-    samples, matches, sharp = _match_people(walks, members, rig, pulses, numbers, settings)
+    numbers = [(members.index(it.one), members.index(it.other)) for it in accepted if it.one in members]
+    samples, matches, sharpness = _match_people(walks, members, rig, pulses, numbers, settings)
     for _ in range(_ROUNDS):
         rig = adjust_bundle(
-            rig, samples, matches, settings, sharpness=sharp, in_step=settings.maximum_offset == 0
+            rig, samples, matches, settings, sharpness=sharpness, in_step=settings.maximum_offset == 0
         )
-        samples, matches, sharp = _match_people(walks, members, rig, pulses, numbers, settings)
+        samples, matches, sharpness = _match_people(walks, members, rig, pulses, numbers, settings)
     return CameraGroup(members, rig, tuple(samples), tuple(matches))
 
 
@@ -151,26 +154,30 @@ def _match_people(
     numbers: Sequence[tuple[int, int]],
     settings: WalkSettings,
 ) -> tuple[list[WalkSamples], list[Correspondences], float]:
-    """Look who is one person in every two cameras that are linked."""
+    """Match people between every two aligned cameras."""
     samples = [
         sample_walk(walks[number], pulses, float(offset), settings.step, settings.stride)
         for number, offset in zip(members, rig.offsets, strict=True)
     ]
-    matches, apart = [], [np.empty((0, 2))]
+    matches, residuals = [], [np.empty((0, 2))]
     for a, b in numbers:
-        meeting = candidate_matches(samples[a], samples[b])
+        candidates = candidate_matches(samples[a], samples[b])
         cameras = (rig.cameras[a], rig.cameras[b])
-        off, places = compare_samples(cameras, (samples[a], samples[b]), meeting, settings, settings.gate)
-        chosen = mutual_matches(off, places, samples[a], samples[b], meeting, settings.gate)
-        apart.append(off[chosen])
-        matches.append(
-            Correspondences(a, b, meeting.here[chosen], meeting.there[chosen], meeting.weight[chosen])
+        distances, places = compare_samples(
+            cameras, (samples[a], samples[b]), candidates, settings, settings.gate
         )
-    return samples, matches, estimate_sharpness(np.concatenate(apart))
+        matched = mutual_matches(distances, places, samples[a], samples[b], candidates, settings.gate)
+        residuals.append(distances[matched])
+        matches.append(
+            Correspondences(
+                a, b, candidates.here[matched], candidates.there[matched], candidates.weight[matched]
+            )
+        )
+    return samples, matches, estimate_sharpness(np.concatenate(residuals))
 
 
 def _chain_poses(members: tuple[int, ...], tree: Sequence[CameraPair]) -> CameraRig:
-    """Put camera after camera on the first one's floor; the best link of each says how it looks down."""
+    """Place camera after camera on the first one's floor, as tilted as its best alignment has it."""
     cameras: dict[int, Pinhole] = {}
     offsets: dict[int, float] = {members[0]: 0.0}
     for it in tree:  # the best first
@@ -184,23 +191,25 @@ def _chain_poses(members: tuple[int, ...], tree: Sequence[CameraPair]) -> Camera
         for it in tree:
             if it.alignment is None or (it.one in offsets) == (it.other in offsets):
                 continue
-            known, new, own, its = (it.one, it.other, 0, 1) if it.one in offsets else (it.other, it.one, 1, 0)
+            known, new, known_index, new_index = (
+                (it.one, it.other, 0, 1) if it.one in offsets else (it.other, it.one, 1, 0)
+            )
             pose = _pose_relative_to(
-                cameras[known], it.alignment.rig.cameras[own], it.alignment.rig.cameras[its]
+                cameras[known], it.alignment.rig.cameras[known_index], it.alignment.rig.cameras[new_index]
             )
             parameters = cameras[new].parameters.copy()
             parameters[POSE] = pose
             cameras[new] = replace(cameras[new], parameters=parameters)
             offsets[new] = offsets[known] + float(
-                it.alignment.rig.offsets[its] - it.alignment.rig.offsets[own]
+                it.alignment.rig.offsets[new_index] - it.alignment.rig.offsets[known_index]
             )
     return CameraRig(tuple(cameras[it] for it in members), np.array([offsets[it] for it in members]))
 
 
 def _pose_relative_to(known: Pinhole, linked: Pinhole, other: Pinhole) -> np.ndarray:
-    """Give the pose of the other camera on the floor on which the known one is, from their link, (3,)."""
+    """Return the pose of the other camera on the known one's floor, from their alignment, (3,)."""
     turn = known.parameters[PAN] - linked.parameters[PAN]
     cos, sin = np.cos(turn), np.sin(turn)
-    away = other.parameters[[EAST, NORTH]] - linked.parameters[[EAST, NORTH]]
-    east, north = known.parameters[[EAST, NORTH]] + np.array([[cos, -sin], [sin, cos]]) @ away
+    difference = other.parameters[[EAST, NORTH]] - linked.parameters[[EAST, NORTH]]
+    east, north = known.parameters[[EAST, NORTH]] + np.array([[cos, -sin], [sin, cos]]) @ difference
     return np.array([other.parameters[PAN] + turn, east, north])

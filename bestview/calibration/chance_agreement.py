@@ -1,4 +1,4 @@
-"""Walks in a wrong order of time: what cameras agree about then, they agree about by chance."""
+"""Walks in a wrong order of time: two cameras agree about them only by chance."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from bestview.calibration.walk import Walk, WalkTrack
 
 
 def time_reversed(walk: Walk) -> Walk:
-    """Give the same walk with time running backwards, within the same frames."""
+    """Return the walk with time running backwards, within the same frames."""
     return replace(
         walk, tracks=tuple(WalkTrack(walk.end_frame - it.end_frame, it.boxes[::-1]) for it in walk.tracks)
     )
 
 
 def halves_swapped(walk: Walk) -> Walk:
-    """Give the same walk with its second half before its first."""
+    """Return the walk with its second half before its first."""
     half = walk.end_frame // 2
     parts = []
     for it in walk.tracks:

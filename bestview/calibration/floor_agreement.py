@@ -1,4 +1,4 @@
-"""How well two cameras that are placed on one floor agree about who stands where."""
+"""Agreement of two cameras that are placed on one floor about who stands where."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ class FloorPositions:
     """One camera's samples on the floor.
 
     Attributes:
-        position: where each stands, (S, 2) person heights; NaN where nowhere.
-        covariance: how badly that is known: east-east, east-north and north-north covariances, (S, 3).
+        position: of each, (S, 2) person heights; NaN: off the floor.
+        covariance: east-east, east-north and north-north, (S, 3).
     """
 
     position: Floats
     covariance: Floats
 
     def transformed(self, turn: float, shift: Floats) -> FloorPositions:
-        """Turn about the origin (radians), then shift (2,)."""
+        """Rotate about the origin (radians), then translate (2,)."""
         cos, sin = np.cos(turn), np.sin(turn)
         east, north = self.position.T
         ee, en, nn = self.covariance.T
@@ -41,11 +41,13 @@ class FloorPositions:
         return FloorPositions(place, spread)
 
 
-def project_to_floor(camera: Pinhole, feet: Floats, tall: Floats, settings: WalkSettings) -> FloorPositions:
-    """Put feet (S, 2) of boxes so tall (S,) on the floor."""
+def project_to_floor(
+    camera: Pinhole, feet: Floats, heights: Floats, settings: WalkSettings
+) -> FloorPositions:
+    """Project foot points (S, 2) of boxes with heights (S,) to the floor."""
     place, steps = camera.floor_and_steps(feet)
-    across = steps[..., 0] * (settings.foot_sideways * tall)[:, None]
-    along = steps[..., 1] * (settings.foot_upwards * tall)[:, None]
+    across = steps[..., 0] * (settings.foot_sideways * heights)[:, None]
+    along = steps[..., 1] * (settings.foot_upwards * heights)[:, None]
     spread = np.column_stack(
         [
             across[:, 0] ** 2 + along[:, 0] ** 2,
@@ -56,54 +58,63 @@ def project_to_floor(camera: Pinhole, feet: Floats, tall: Floats, settings: Walk
     return FloorPositions(place, spread)
 
 
-def whitened_differences(one: FloorPositions, other: FloorPositions, settings: WalkSettings) -> Floats:
-    """How far apart places are, whitened: (P, 2), whose length is in standard deviations; NaN if nowhere."""
-    far = one.position - other.position
-    ee, en, nn = (one.covariance + other.covariance).T
+def whitened_differences(first: FloorPositions, second: FloorPositions, settings: WalkSettings) -> Floats:
+    """Compute whitened differences of positions: (P, 2), in standard deviations; NaN: off the floor."""
+    difference = first.position - second.position
+    ee, en, nn = (first.covariance + second.covariance).T
     ee, nn = ee + settings.foot_floor**2, nn + settings.foot_floor**2
     # Cholesky: with L Lᵀ the covariance, L⁻¹ of the distance.
-    first = np.sqrt(ee)
-    below = en / first
-    second = np.sqrt(np.maximum(nn - below**2, 1e-12))
-    x = far[:, 0] / first
-    return np.column_stack([x, (far[:, 1] - below * x) / second])
+    root_ee = np.sqrt(ee)
+    off_diagonal = en / root_ee
+    root_nn = np.sqrt(np.maximum(nn - off_diagonal**2, 1e-12))
+    x = difference[:, 0] / root_ee
+    return np.column_stack([x, (difference[:, 1] - off_diagonal * x) / root_nn])
 
 
-def select_positions(placed_: FloorPositions, index: NDArray[np.intp]) -> FloorPositions:
-    """Give some of the samples, in another order or repeated."""
-    return FloorPositions(placed_.position[index], placed_.covariance[index])
+def select_positions(positions: FloorPositions, index: NDArray[np.intp]) -> FloorPositions:
+    """Return some of the samples, in another order or repeated."""
+    return FloorPositions(positions.position[index], positions.covariance[index])
 
 
-def pair_agreement(off: Floats, meeting: CandidateMatches, gate: float) -> Floats:
-    """Count places at which each pair of tracks agrees, less those at which not: (P, 2) -> (K,)."""
-    near = 1.0 - (off**2).sum(axis=1) / gate**2
-    counted = np.clip(np.nan_to_num(near, nan=-1.0), -1.0, 1.0) * meeting.weight
-    return np.asarray(np.bincount(meeting.pair, counted, len(meeting.tracks)))
+def pair_agreement(distances: Floats, candidates: CandidateMatches, gate: float) -> Floats:
+    """Count places at which each pair of tracks agrees, less those at which it does not: (P, 2) -> (K,)."""
+    closeness = 1.0 - (distances**2).sum(axis=1) / gate**2
+    votes = np.clip(np.nan_to_num(closeness, nan=-1.0), -1.0, 1.0) * candidates.weight
+    return np.asarray(np.bincount(candidates.pair, votes, len(candidates.tracks)))
 
 
-def total_agreement(places: Floats, meeting: CandidateMatches) -> float:
-    """Count places at which the cameras agree on the whole; each track has one partner."""
-    agree = np.maximum(places, 0.0)
+def total_agreement(places: Floats, candidates: CandidateMatches) -> float:
+    """Count places at which the cameras agree in total; each track has one partner."""
+    agreement = np.maximum(places, 0.0)
     totals = []
-    for side in meeting.tracks.T:
+    for side in candidates.tracks.T:
         best = np.zeros(int(side.max(initial=0)) + 1)
-        np.maximum.at(best, side, agree)
+        np.maximum.at(best, side, agreement)
         totals.append(float(best.sum()))
     return min(totals)
 
 
 def mutual_matches(
-    off: Floats, places: Floats, one: WalkSamples, other: WalkSamples, meeting: CandidateMatches, gate: float
+    distances: Floats,
+    places: Floats,
+    first: WalkSamples,
+    second: WalkSamples,
+    candidates: CandidateMatches,
+    gate: float,
 ) -> NDArray[np.intp]:
-    """Choose who is one person: (M,) indices of meetings, one to one at each pulse.
+    """Match samples one to one at each pulse: (M,) indices of candidates.
 
-    Two samples are matched if they are near each other, and if their tracks agree more than either's does
-    with anybody else who is there at that pulse.
+    Two samples are matched if they are near each other, and if their tracks agree more than either does with
+    any other track that is present at that pulse.
     """
-    agree = places[meeting.pair]
-    best_here, best_there = np.zeros(len(one.times)), np.zeros(len(other.times))
-    np.maximum.at(best_here, meeting.here, agree)
-    np.maximum.at(best_there, meeting.there, agree)
-    near = (off**2).sum(axis=1) < gate**2
-    mutual = (agree > 0) & (agree >= best_here[meeting.here]) & (agree >= best_there[meeting.there])
+    agreement = places[candidates.pair]
+    best_here, best_there = np.zeros(len(first.times)), np.zeros(len(second.times))
+    np.maximum.at(best_here, candidates.here, agreement)
+    np.maximum.at(best_there, candidates.there, agreement)
+    near = (distances**2).sum(axis=1) < gate**2
+    mutual = (
+        (agreement > 0)
+        & (agreement >= best_here[candidates.here])
+        & (agreement >= best_there[candidates.there])
+    )
     return np.flatnonzero(near & mutual)

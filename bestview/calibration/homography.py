@@ -15,49 +15,49 @@ Floats = NDArray[np.float64]
 
 
 def fit_homography(source: Floats, target: Floats) -> Floats:
-    """Fit the homography that takes source to target points with the least squared error at the target.
+    """Fit the homography that maps source to target points with the least squared error at the target.
 
-    The direct linear transform on normalised points, bettered by Gauss and Newton's steps.
+    The direct linear transform on normalized points, refined by Gauss-Newton steps.
 
     Args:
         source: points, (N, 2), four at least.
-        target: where they go, (N, 2).
+        target: their images, (N, 2).
 
     Returns:
-        The (3, 3) matrix; its last entry is 1 where that can be.
+        The (3, 3) matrix; its last entry is 1 where that is possible.
 
     Raises:
-        ValueError: the points fix none: too few, or (all but one of) them on a line.
+        ValueError: the points determine none: too few, or (all but one of) them on a line.
     """
     if len(source) < LEAST_POINTS:
         raise ValueError(f"{len(source)} points: a homography takes {LEAST_POINTS}")
     to_source, from_target = _normalizer(source), _normalizer(target)
     x, y = _apply(to_source, source), _apply(from_target, target)
     # Without the left vectors that are not used: all of them would be a square of twice the points.
-    _, sizes, rows = np.linalg.svd(_equations(x, y), full_matrices=False)
-    if not sizes[7] > _LEAST_RANK * sizes[0]:
+    _, singular_values, rows = np.linalg.svd(_equations(x, y), full_matrices=False)
+    if not singular_values[7] > _LEAST_RANK * singular_values[0]:
         raise ValueError("the points, or all but one of them, are on a line")
-    found = _gauss_newton(rows[-1].reshape(3, 3), x, y)
-    found = np.linalg.inv(from_target) @ found @ to_source
-    size = np.abs(found).max()
-    last = found[2, 2]
-    return np.asarray(found / (last if abs(last) > 1e-9 * size else size))
+    homography = _gauss_newton(rows[-1].reshape(3, 3), x, y)
+    homography = np.linalg.inv(from_target) @ homography @ to_source
+    size = np.abs(homography).max()
+    last = homography[2, 2]
+    return np.asarray(homography / (last if abs(last) > 1e-9 * size else size))
 
 
 def apply_homography(homography: Floats, points: Floats) -> Floats:
-    """Take points through a homography: (..., 2) -> (..., 2); no horizon is looked for."""
+    """Map points through a homography: (..., 2) -> (..., 2); the horizon is not checked."""
     through = points @ homography[:, :2].T + homography[:, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(through[..., :2] / through[..., 2:])
 
 
 def _normalizer(points: Floats) -> Floats:
-    """Give the similarity that moves the points around 0 at a mean distance of the square root of 2."""
+    """Return the similarity that moves the points around 0 at a mean distance of the square root of 2."""
     middle = points.mean(axis=0)
-    far = float(np.hypot(*(points - middle).T).mean())
-    if not far > 0:
+    mean_distance = float(np.hypot(*(points - middle).T).mean())
+    if not mean_distance > 0:
         raise ValueError("all points are at one place")
-    scale = np.sqrt(2.0) / far
+    scale = np.sqrt(2.0) / mean_distance
     return np.array([[scale, 0, -scale * middle[0]], [0, scale, -scale * middle[1]], [0, 0, 1]])
 
 
@@ -66,7 +66,7 @@ def _apply(similarity: Floats, points: Floats) -> Floats:
 
 
 def _equations(x: Floats, y: Floats) -> Floats:
-    """Two linear equations in the nine entries for each pair, (2 N or 9, 9)."""
+    """Return two linear equations in the nine entries for each pair, (2 N or 9, 9)."""
     ones = np.column_stack([x, np.ones(len(x))])
     none = np.zeros_like(ones)
     above = np.column_stack([ones, none, -y[:, :1] * ones])
@@ -76,7 +76,7 @@ def _equations(x: Floats, y: Floats) -> Floats:
 
 
 def _gauss_newton(homography: Floats, x: Floats, y: Floats) -> Floats:
-    """Take Gauss and Newton's steps, as long as they better the error at the target."""
+    """Refine by Gauss-Newton steps, as long as they reduce the error at the target."""
     best = homography / np.linalg.norm(homography)
     least = _error(best, x, y)
     for _ in range(_STEPS):
@@ -84,22 +84,22 @@ def _gauss_newton(homography: Floats, x: Floats, y: Floats) -> Floats:
         if not (np.abs(w) > _STILL).all():
             return best
         ones = np.column_stack([x, np.ones(len(x))]) / w
-        none, at = np.zeros_like(ones), apply_homography(best, x)
+        zeros, image = np.zeros_like(ones), apply_homography(best, x)
         slopes = np.concatenate(
             [
-                np.column_stack([ones, none, -at[:, :1] * ones]),
-                np.column_stack([none, ones, -at[:, 1:] * ones]),
+                np.column_stack([ones, zeros, -image[:, :1] * ones]),
+                np.column_stack([zeros, ones, -image[:, 1:] * ones]),
             ]
         )
-        step = np.linalg.lstsq(slopes, (y - at).T.ravel(), rcond=1e-10)[0]
-        tried = best + step.reshape(3, 3)
-        tried = tried / np.linalg.norm(tried)
-        error = _error(tried, x, y)
+        step = np.linalg.lstsq(slopes, (y - image).T.ravel(), rcond=1e-10)[0]
+        candidate = best + step.reshape(3, 3)
+        candidate = candidate / np.linalg.norm(candidate)
+        error = _error(candidate, x, y)
         if not error < least:
             return best
-        settled = least - error <= _STILL * least
-        best, least = tried, error
-        if settled:
+        converged = least - error <= _STILL * least
+        best, least = candidate, error
+        if converged:
             break
     return best
 

@@ -1,4 +1,4 @@
-"""Which of a camera's marked points contradict the others."""
+"""Detection of marked points that contradict the others."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SEED = 1
 
 
 def image_errors(backwards: Floats, points: MarkedPoints) -> Floats:
-    """How far each floor point is from its place in the picture, (N,); infinite where it is nowhere."""
+    """Compute the distance of each floor point from its image, (N,); infinite: beyond the horizon."""
     off = apply_homography(backwards, points.floor) - points.image
     return np.asarray(np.nan_to_num(np.hypot(*off.T), nan=np.inf))
 
@@ -27,7 +27,7 @@ def image_errors(backwards: Floats, points: MarkedPoints) -> Floats:
 def describe_inconsistency(
     points: MarkedPoints, errors: Floats, allowed: float, settings: PointSettings
 ) -> str:
-    """Say which pairs are wrong, if that can be told."""
+    """Return an error message that names the inconsistent pairs, if they can be told."""
     count = len(points.image)
     fits = _consensus(points, allowed) if count >= _LEAST_TO_BLAME else np.ones(count, dtype=bool)
     wrong = np.flatnonzero(~fits)
@@ -55,7 +55,7 @@ def describe_inconsistency(
 
 
 def _consensus(points: MarkedPoints, allowed: float) -> NDArray[np.bool_]:
-    """Give which pairs the best homography through four of them agrees with, (N,)."""
+    """Return which pairs the best homography through four of them agrees with, (N,)."""
     count = len(points.image)
     best, best_score = np.ones(count, dtype=bool), (0, 0.0)
     for four in _point_quadruples(count):
@@ -71,7 +71,7 @@ def _consensus(points: MarkedPoints, allowed: float) -> NDArray[np.bool_]:
 
 
 def _point_quadruples(count: int) -> list[list[int]]:
-    """All fours of so many, or some of them where they are too many."""
+    """Return all quadruples of so many points, or a random sample of them."""
     if comb(count, LEAST_POINTS) <= _MOST_TRIALS:
         return [list(four) for four in combinations(range(count), LEAST_POINTS)]
     random = np.random.default_rng(_SEED)

@@ -1,4 +1,4 @@
-"""Marked points of a camera, and when they contradict each other."""
+"""Marked points of a camera, and the tolerance for contradictions between them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from bestview.calibration.homography import Floats
 
 
 class CalibrationError(ValueError):
-    """There is no calibration in what was given; the text is one line: why, and what would help."""
+    """No calibration is possible; the text is one line: why, and what would help."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class PointSettings:
 
 @dataclass(frozen=True, slots=True)
 class MarkedPoints:
-    """The pairs of one camera.
+    """The marked pairs of one camera.
 
     Attributes:
         camera: its name, for messages.

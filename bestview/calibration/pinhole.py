@@ -1,7 +1,7 @@
-"""A pinhole camera over the floor, in person heights: the model that a walk is explained by.
+"""Pinhole camera over the floor, in person heights: the model that is fitted to a walk.
 
-The floor is z = 0 and everybody is 1 tall. Eight numbers are as many as a homography has: nothing that a
-plane's picture can show is left out, but each number means something and can be guessed.
+The floor is z = 0 and everybody is 1 tall. Eight parameters are as many as a homography has: nothing that a
+plane's image can show is left out, but each parameter has a meaning and can be estimated.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ POSE = slice(PAN, PARAMETERS)
 
 
 _MOST_DEPTH = 1000.0
-"""Who is further off, in person heights, is too near the horizon to be anywhere."""
+"""Person heights beyond which a point is too near the horizon to have a position."""
 _LEAST_DEPTH = 1e-3
 
 
@@ -41,21 +41,21 @@ class Pinhole:
     size: tuple[int, int]
 
     def homography(self, person: float = 1.0) -> Floats:
-        """Give the map from pixels to the floor, (3, 3), in units of which a person is `person` tall."""
+        """Return the homography from pixels to the floor, (3, 3); people are `person` units tall."""
         back = np.diag([person, person, 1.0]) @ self._back()
         return np.asarray(back / np.abs(back).max())
 
     def floor(self, feet: Floats) -> Floats:
-        """Where feet are: (..., 2) pixels -> (..., 2) person heights; NaN at or above the horizon."""
+        """Map foot points to the floor: (..., 2) pixels -> (..., 2) person heights; NaN above the horizon."""
         back = self._back()
         through = feet @ back[:, :2].T + back[:, 2]
         return np.asarray(through[..., :2] / _near(through[..., 2:]))
 
     def floor_and_steps(self, feet: Floats) -> tuple[Floats, Floats]:
-        """Where feet are, and how far one pixel to the right and one down leads there.
+        """Map foot points to the floor, with the derivatives by the pixel's column and row.
 
-        (..., 2) pixels -> (..., 2) and (..., 2, 2) person heights. The last axis of the steps is the way in
-        the picture, the one before it east and north.
+        (..., 2) pixels -> (..., 2) and (..., 2, 2) person heights. The last axis of the derivatives is the
+        direction in the picture, the one before it east and north.
         """
         back = self._back()
         through = feet @ back[:, :2].T + back[:, 2]
@@ -65,13 +65,13 @@ class Pinhole:
         return place, steps
 
     def picture(self, place: Floats) -> Floats:
-        """Where feet are in the picture: (..., 2) person heights -> (..., 2) pixels; NaN behind it."""
+        """Map floor positions to the picture: (..., 2) person heights -> (..., 2) pixels; NaN behind it."""
         through = place @ self._projection()[:, :2].T + self._projection()[:, 3]
         depth = np.where(through[..., 2:] > _LEAST_DEPTH, through[..., 2:], np.nan)
         return np.asarray(through[..., :2] / depth)
 
     def heights(self, feet: Floats) -> Floats:
-        """How tall people appear who stand there: (..., 2) pixels -> (...) pixels; NaN where nobody can."""
+        """Return how tall people appear at foot points: (..., 2) pixels -> (...) pixels; NaN: no floor."""
         place = self.floor(feet)
         head = np.concatenate(
             [place, np.ones((*place.shape[:-1], 1)), np.ones((*place.shape[:-1], 1))], axis=-1
@@ -81,7 +81,7 @@ class Pinhole:
         return np.asarray(feet[..., 1] - through[..., 1] / depth)
 
     def _back(self) -> Floats:
-        """The (3, 3) matrix from pixels to the floor; its last row gives one over the depth."""
+        """Return the (3, 3) matrix from pixels to the floor; its last row gives one over the depth."""
         return np.asarray(np.linalg.inv(self._projection()[:, [0, 1, 3]]))
 
     def _focal(self) -> tuple[float, float]:
@@ -89,7 +89,7 @@ class Pinhole:
         return focal, focal * exp(self.parameters[ASPECT])
 
     def _axes(self) -> Floats:
-        """Right, down and forward, (3, 3) rows."""
+        """Return right, down and forward, (3, 3) rows."""
         tilt, roll, pan = self.parameters[[TILT, ROLL, PAN]].tolist()
         cos_pan, sin_pan, cos_tilt, sin_tilt = cos(pan), sin(pan), cos(tilt), sin(tilt)
         level = (sin_pan, -cos_pan, 0.0)
@@ -99,7 +99,7 @@ class Pinhole:
         return np.array([right, down, [cos_pan * cos_tilt, sin_pan * cos_tilt, -sin_tilt]])
 
     def _projection(self) -> Floats:
-        """The (3, 4) matrix from the world to pixels."""
+        """Return the (3, 4) projection from the world to pixels."""
         axes, (focal_x, focal_y) = self._axes(), self._focal()
         east, north, high = self.parameters[[EAST, NORTH, CAMERA_HEIGHT]].tolist()
         shift = -axes @ np.array([east, north, exp(high)])
@@ -109,5 +109,5 @@ class Pinhole:
 
 
 def _near(near: Floats) -> Floats:
-    """Leave out, as NaN, what has no depth or too much; `near` is one over the depth."""
+    """Set points without depth or with too much of it to NaN; `near` is one over the depth."""
     return np.where(near > 1.0 / _MOST_DEPTH, near, np.nan)

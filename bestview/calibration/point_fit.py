@@ -1,4 +1,4 @@
-"""From marked points, a place in the picture and the same place on the floor, to a homography."""
+"""Homography of a camera from marked points: a place in the picture and the same place on the floor."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bestview.geometry.ground_plane import to_ground, validate_homography
 
 @dataclass(frozen=True, slots=True)
 class PointFit:
-    """A camera's homography, and how far it is off at the marked points.
+    """A camera's homography, and its errors at the marked points.
 
     Attributes:
         homography: image to floor, (3, 3).
@@ -78,7 +78,7 @@ def fit_cameras(
 
 
 def is_mirrored(fit: PointFit, points: MarkedPoints) -> bool:
-    """Say whether going round clockwise in the picture is anticlockwise on the floor at the points."""
+    """Return whether clockwise in the picture is anticlockwise on the floor at the points."""
     middle = points.image.mean(axis=0)
     corners = to_ground(fit.homography, middle + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
     across, down = corners[1] - corners[0], corners[2] - corners[0]

@@ -1,4 +1,4 @@
-"""What is known of cameras and people before their feet are compared, as errors to be made small."""
+"""Priors of cameras and person heights, as residuals for least squares."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ from bestview.calibration.walk_settings import WalkSettings
 _OFF_FLOOR_ERROR = 3.0
 """The error, as a logarithm, of the height of somebody who stands above the horizon."""
 _MOST_HEIGHTS = 60.0
-"""Heights count as this many independent ones at most: who is tall is tall all the time."""
+"""Heights count as this many independent ones at most: tall people are always tall."""
 
 
 def prior_errors(camera: Pinhole, settings: WalkSettings) -> Floats:
-    """How unusual a camera is, (4,) standard deviations."""
-    given = camera.parameters
+    """Return how unusual a camera is, (4,) standard deviations."""
+    parameters = camera.parameters
     return np.array(
         [
-            (given[FOCAL] - np.log(settings.focal)) / settings.focal_spread,
-            given[ASPECT] / settings.aspect_spread,
-            given[ROLL] / settings.roll_spread,
-            (given[CAMERA_HEIGHT] - np.log(settings.camera_height)) / settings.camera_height_spread,
+            (parameters[FOCAL] - np.log(settings.focal)) / settings.focal_spread,
+            parameters[ASPECT] / settings.aspect_spread,
+            parameters[ROLL] / settings.roll_spread,
+            (parameters[CAMERA_HEIGHT] - np.log(settings.camera_height)) / settings.camera_height_spread,
         ]
     )
 
 
 def height_errors(
-    camera: Pinhole, feet: Floats, tall: Floats, weight: Floats, settings: WalkSettings
+    camera: Pinhole, feet: Floats, heights: Floats, weight: Floats, settings: WalkSettings
 ) -> Floats:
-    """How much taller or smaller people are than the camera says, (N,) standard deviations, robust."""
+    """Return robust errors of people's apparent heights, (N,) standard deviations."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        off = np.log(camera.heights(feet) / tall)
-    off = np.where(np.isfinite(off), off, _OFF_FLOOR_ERROR) / settings.person_height_spread
+        log_ratio = np.log(camera.heights(feet) / heights)
+    log_ratio = np.where(np.isfinite(log_ratio), log_ratio, _OFF_FLOOR_ERROR) / settings.person_height_spread
     share = weight * min(1.0, _MOST_HEIGHTS / max(float(weight.sum()), 1e-9))
-    return np.asarray(robust(off) * np.sqrt(share))
+    return np.asarray(robust(log_ratio) * np.sqrt(share))
 
 
-def robust(off: Floats) -> Floats:
-    """Cauchy's way to count errors: as they are where small, ever less where large; signs are kept."""
-    return np.asarray(np.sign(off) * np.sqrt(np.log1p(off * off)))
+def robust(errors: Floats) -> Floats:
+    """Return Cauchy's robust error: linear where small, logarithmic where large; signs are kept."""
+    return np.asarray(np.sign(errors) * np.sqrt(np.log1p(errors * errors)))

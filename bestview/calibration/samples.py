@@ -1,4 +1,4 @@
-"""Moments of a walk: everybody's boxes at the pulses at which cameras are compared, and who met whom."""
+"""Samples of a walk at the pulses of comparison, and candidate matches between two cameras."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bestview.geometry.ground_plane import foot_points
 Indices = NDArray[np.intp]
 
 LEAST_WEIGHT = 0.02
-"""What a moment counts in which nobody moves: who stands says little, however long."""
+"""Weight of a sample without movement: standing people say little, however long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +22,10 @@ class WalkSamples:
     """One camera's boxes at some pulses.
 
     Attributes:
-        times: the pulse of each, (S,), rising within a track.
-        track: the number of the track in the walk, (S,).
+        times: pulse of each, (S,), rising within a track.
+        track: index of the track in the walk, (S,).
         boxes: left, top, right, bottom in pixels, (S, 4).
-        speed: how the box moves per frame, (S, 4) pixels.
+        speed: movement of the box per frame, (S, 4) pixels.
         weight: how much of a new place each is, (S,), 0 to 1.
     """
 
@@ -37,21 +37,21 @@ class WalkSamples:
 
     @property
     def feet(self) -> Floats:
-        """Where they stand, (S, 2) pixels."""
+        """Foot points, (S, 2) pixels."""
         return foot_points(self.boxes)
 
     @property
     def tall(self) -> Floats:
-        """How tall the boxes are, (S,) pixels."""
+        """Heights of the boxes, (S,) pixels."""
         return np.asarray(self.boxes[:, 3] - self.boxes[:, 1])
 
 
 def sample_walk(walk: Walk, pulses: Floats, offset: float, step: int, stride: float) -> WalkSamples:
-    """Look at a walk at some pulses.
+    """Sample a walk at some pulses.
 
     Args:
-        walk: what the camera saw.
-        pulses: when to look, (T,), rising.
+        walk: of one camera.
+        pulses: sampled, (T,), rising.
         offset: the pulse at which the camera's frame 0 was taken.
         step: frames over which movement is measured, and between the pulses.
         stride: the movement that is a new place, in box heights.
@@ -79,12 +79,12 @@ def sample_walk(walk: Walk, pulses: Floats, offset: float, step: int, stride: fl
 
 @dataclass(frozen=True, slots=True)
 class CandidateMatches:
-    """All ways in which two cameras' samples of one pulse may be one person.
+    """All pairs of two cameras' samples of one pulse: each may be one person.
 
     Attributes:
-        here: the sample of the one camera, (P,).
-        there: the sample of the other, (P,).
-        pair: which pair of tracks it belongs to, (P,), 0 to K - 1.
+        here: sample of the one camera, (P,).
+        there: sample of the other, (P,).
+        pair: index of the pair of tracks, (P,), 0 to K - 1.
         tracks: the two tracks of each pair, (K, 2).
         weight: how much of a new place each is, (P,).
     """
@@ -97,7 +97,7 @@ class CandidateMatches:
 
 
 def candidate_matches(one: WalkSamples, other: WalkSamples) -> CandidateMatches:
-    """Pair everybody in the one camera with everybody in the other at the same pulse."""
+    """Pair every sample of the one camera with every sample of the other at the same pulse."""
     order = np.argsort(other.times, kind="stable")
     sorted_times = other.times[order]
     low = np.searchsorted(sorted_times, one.times, "left")
@@ -111,12 +111,12 @@ def candidate_matches(one: WalkSamples, other: WalkSamples) -> CandidateMatches:
     return CandidateMatches(here, there, pair.reshape(-1), tracks.reshape(-1, 2), weight)
 
 
-def select_moving_samples(samples: WalkSamples, most: int) -> Indices:
-    """Choose samples of people who walk, evenly, (N,) indices; of all, where hardly anybody does."""
+def select_moving_samples(samples: WalkSamples, maximum: int) -> Indices:
+    """Return evenly chosen samples of people who walk, (N,) indices; of all, if hardly anybody does."""
     walking = np.flatnonzero(samples.weight >= _WALKING)
     if len(walking) < _FEW:
         walking = np.arange(len(samples.times))
-    return walking[:: max(1, -(-len(walking) // most))]
+    return walking[:: max(1, -(-len(walking) // maximum))]
 
 
 _WALKING = 0.3

@@ -1,4 +1,4 @@
-"""What one camera's boxes tell of it: how it looks down on the floor, but for its focal length."""
+"""Tilt, roll and height of one camera from the heights of people's boxes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TILTS = (0.1, 0.35, 0.8)
 _START_HEIGHT = 1.7
 _MOMENTS = 600
 _FIXED = 0.01
-"""Spread of the focal length where it is given."""
+"""Standard deviation of the focal length where it is given."""
 
 
 def fit_tilt_and_height(
@@ -23,8 +23,8 @@ def fit_tilt_and_height(
 ) -> Pinhole:
     """Fit a camera of a given focal length (picture widths) to the heights of people, at the origin.
 
-    On a flat floor people of one height are as tall in the picture as they are near: where they would vanish
-    is the horizon, and how fast they grow towards the camera says how high it hangs.
+    On a flat floor the apparent height of people falls linearly to 0 at the horizon, and how fast they grow
+    towards the camera gives its height.
     """
     chosen = select_moving_samples(samples, _MOMENTS)
     feet, tall, weight = samples.feet[chosen], samples.tall[chosen], samples.weight[chosen]

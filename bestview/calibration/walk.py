@@ -1,4 +1,4 @@
-"""What one camera saw of the people who walked about: their boxes, track by track."""
+"""Walks: the tracks of people who walked about, as one camera saw them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bestview.calibration.homography import Floats
 
 @dataclass(frozen=True, slots=True)
 class WalkTrack:
-    """Somebody's boxes in successive frames.
+    """A person's boxes in successive frames.
 
     Attributes:
         first_frame: the frame of the first box.
@@ -28,7 +28,7 @@ class WalkTrack:
         return self.first_frame + len(self.boxes)
 
     def at(self, times: Floats) -> Floats:
-        """Give the boxes at times that may lie between frames: (N,) -> (N, 4), NaN where there is none."""
+        """Interpolate the boxes at times that may lie between frames: (N,) -> (N, 4), NaN: no box."""
         place = np.asarray(times, dtype=np.float64) - self.first_frame
         inside = (place >= 0) & (place <= len(self.boxes) - 1)
         low = np.clip(np.floor(place), 0, len(self.boxes) - 1).astype(np.intp)
@@ -43,12 +43,12 @@ class WalkTrack:
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """Everybody whom one camera saw.
+    """Tracks of one camera.
 
     Attributes:
         camera: its name.
         size: width and height of its picture, pixels.
-        tracks: who was seen.
+        tracks: of people.
     """
 
     camera: str
@@ -69,9 +69,9 @@ def build_walk(
     boxes: Floats,
     step: int = 5,
 ) -> Walk:
-    """Put rows of a file together to tracks, without the boxes that the picture's edge cuts off.
+    """Build tracks from the rows of a file, without the boxes that the picture's edge cuts off.
 
-    Boxes are averaged over about a step: a foot that is lifted is no step aside.
+    Boxes are averaged over about a step, so that a lifted foot is not a movement aside.
 
     Args:
         camera: its name.
@@ -79,23 +79,23 @@ def build_walk(
         frames: the frame of each row, (N,).
         ids: the track of each row, (N,).
         boxes: left, top, right, bottom of each row in pixels, (N, 4).
-        step: frames in which nobody walks far, as in `WalkSettings`. Somebody may be unseen for as many in
-            the middle of a track; the boxes between are drawn straight.
+        step: frames in which nobody walks far, as in `WalkSettings`. Longer gaps split a track; the boxes of
+            shorter ones are interpolated.
     """
-    at, who = np.asarray(frames, dtype=np.intp), np.asarray(ids, dtype=np.intp)
-    whole = ~boxes_at_edge(boxes, size)
+    frame, track_id = np.asarray(frames, dtype=np.intp), np.asarray(ids, dtype=np.intp)
+    inside = ~boxes_at_edge(boxes, size)
     tracks = []
-    for number in np.unique(who):
-        mine = np.flatnonzero((who == number) & whole)
-        mine = mine[np.argsort(at[mine], kind="stable")]
+    for number in np.unique(track_id):
+        rows = np.flatnonzero((track_id == number) & inside)
+        rows = rows[np.argsort(frame[rows], kind="stable")]
         # A gap that is long parts a track in two: who was hidden long may have come back as somebody else.
-        parts = np.split(mine, np.flatnonzero(np.diff(at[mine]) > step) + 1)
-        tracks += [_track(at[part], boxes[part], step) for part in parts if len(part) > 1]
+        parts = np.split(rows, np.flatnonzero(np.diff(frame[rows]) > step) + 1)
+        tracks += [_track(frame[part], boxes[part], step) for part in parts if len(part) > 1]
     return Walk(camera, size, tuple(sorted(tracks, key=lambda it: (it.first_frame, it.end_frame))))
 
 
 def boxes_at_edge(boxes: Floats, size: tuple[int, int]) -> np.ndarray:
-    """Tell which boxes reach the picture's edge, where neither foot nor height nor middle is known.
+    """Return which boxes reach the picture's edge, where foot point, height and middle are unknown.
 
     (N, 4) pixels of a picture of width and height -> (N,).
     """

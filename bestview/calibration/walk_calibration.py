@@ -1,4 +1,4 @@
-"""What calibration from walks found out, in numbers that mean something to a person."""
+"""Calibration of several cameras from a walk, with its errors and coverage."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from bestview.calibration.walk import Walk
 from bestview.calibration.walk_settings import WalkSettings
 
 _FLOOR_DISTANCE = 100.0
-"""Person heights between floors that no camera connects: further than anybody is mistaken by."""
+"""Person heights between floors that no camera connects, beyond any error."""
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorSummary:
-    """The middle and the ninth decile of some errors."""
+    """Median and ninth decile of errors."""
 
     median: float
     ninth_decile: float
@@ -29,19 +29,19 @@ class ErrorSummary:
 
 @dataclass(frozen=True, slots=True)
 class CameraCalibration:
-    """A camera that has been calibrated.
+    """A calibrated camera.
 
     Attributes:
         camera: its name.
-        floor: which floor it is on; cameras with one number share one.
+        floor: number of its floor; cameras with one number share one.
         homography: its pixels to the floor, (3, 3), a person being `person` tall.
         offset: the pulse at which its frame 0 was taken, frames, against the first camera of its floor.
         offset_error: the standard error of the offset, frames.
-        image: feet that another camera saw too, (N, 2) pixels.
-        position: where the two cameras have them in the middle, (N, 2) on the floor.
-        heights: how far apart the two have them on the floor, in person heights.
-        picture: how far off the other's place is in this picture, as a share of its diagonal.
-        thirds: what share of these feet was in the left, middle and right third of the picture, (3,).
+        image: foot points that another camera saw too, (N, 2) pixels.
+        position: mean of both cameras' positions of them, (N, 2) on the floor.
+        heights: distance between both positions on the floor, in person heights.
+        picture: distance of the other's position in this picture, as a share of its diagonal.
+        thirds: share of these foot points in the left, middle and right third of the picture, (3,).
         depth_ratio: how many times as tall the nearest of them appear as the farthest.
     """
 
@@ -60,7 +60,7 @@ class CameraCalibration:
 
 @dataclass(frozen=True, slots=True)
 class UncalibratedCamera:
-    """A camera that has no place on a floor, and why."""
+    """A camera without a place on a floor, and why."""
 
     camera: str
     reason: str
@@ -68,12 +68,12 @@ class UncalibratedCamera:
 
 @dataclass(frozen=True, slots=True)
 class WalkCalibration:
-    """All of it.
+    """Result of a calibration.
 
     Attributes:
-        cameras: who could be placed, in the order given.
-        uncalibrated: who not.
-        heights: how far apart two cameras have the same feet on the floor, in person heights, over all.
+        cameras: those that could be placed, in the order given.
+        uncalibrated: the others.
+        heights: distance between two cameras' positions of the same foot points, in person heights.
         picture: the same in the pictures, as a share of the diagonal.
     """
 
@@ -86,15 +86,15 @@ class WalkCalibration:
 def calibrate_from_walks(
     walks: Sequence[Walk], settings: WalkSettings | None = None, person: float = 1.75
 ) -> WalkCalibration:
-    """Lay cameras on one floor from what they saw of people who walked about while all of them ran.
+    """Calibrate cameras on one floor from what they saw of people who walked about while all of them ran.
 
     Args:
         walks: one for each camera, two at least.
-        settings: what counts how much.
+        settings: of the comparison.
         person: how tall people are in the unit of the floor.
 
     Raises:
-        CalibrationError: no two cameras could be laid on one floor, or not all at once; the text says why.
+        CalibrationError: no two cameras could be placed on one floor, or not all at once; the text says why.
     """
     settings = settings or WalkSettings()
     if len(walks) < 2:  # noqa: PLR2004 — two cameras
@@ -126,7 +126,7 @@ def calibrate_from_walks(
 
 @dataclass(frozen=True, slots=True)
 class _CorrespondenceErrors:
-    """Errors of one camera's matches with another, (M,) each, and where they are."""
+    """Errors of one camera's correspondences with another, (M,) each, and where they are."""
 
     heights: Floats
     picture: Floats
@@ -135,7 +135,7 @@ class _CorrespondenceErrors:
 
 
 def _correspondence_errors(group: CameraGroup, it: Correspondences, own: int) -> _CorrespondenceErrors:
-    """Give how far one of the two cameras of some matches is off."""
+    """Compute the errors of one of the two cameras of some correspondences."""
     index, across, there = (it.here, it.other, it.there) if own == it.one else (it.there, it.one, it.here)
     camera = group.rig.cameras[own]
     image = group.samples[own].feet[index]
@@ -183,7 +183,7 @@ def _summarize(errors: Sequence[Floats]) -> ErrorSummary:
 
 
 def _alignment_merit(pair: CameraPair) -> float:
-    """Rank pairs by how near they are to belonging together."""
+    """Return the merit of a pair's alignment; -1: none."""
     return -1.0 if pair.alignment is None else pair.alignment.merit
 
 

@@ -1,4 +1,4 @@
-"""The settings of calibration from walks."""
+"""Settings of calibration from walks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 @dataclass(frozen=True, slots=True)
 class WalkSettings:
-    """How people's feet are compared, and when that says enough.
+    """How people's foot points are compared, and when that is enough for a calibration.
 
     Lengths are in person heights, angles in radians.
 
