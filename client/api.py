@@ -41,7 +41,7 @@ async def choice(
 
     Raises:
         NotFoundError: there is no such object, or nothing is kept of that moment.
-        RefusedError: it is no moment.
+        RefusedError: it is not a time.
     """
     address = server_url(url) / f"api/objects/{number}/choice"
     return await get_json(address if at is None else address.with_query({"at": at}), Choice, settings)

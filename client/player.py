@@ -59,7 +59,7 @@ async def watch(
     Raises:
         ValueError: ``url`` is no address.
         NotFoundError: there is no such object.
-        RefusedError: ``start`` or ``end`` is no moment, or nothing is kept of that time.
+        RefusedError: ``start`` or ``end`` is not a time, or nothing is kept of that time.
         AwayError: the server could not be reached at all, or never sent any media.
         ContractError: what comes is not such a stream.
         OSError: the file cannot be written.

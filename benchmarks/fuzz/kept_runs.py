@@ -15,8 +15,8 @@ from benchmarks.fuzz.mutate import as_json, damaged, otherwise
 from benchmarks.fuzz.site import CAMERAS, Fed, feed_epoch, site
 from benchmarks.fuzz.target import Scripts, folder
 from server.service.recording.recorder import Recorder
-from server.service.recording.recording_session import INFO_FILE
 from server.service.recording.retention import RetentionLimits, RetentionPolicy
+from server.service.recording.session_files import INFO_FILE
 from server.service.time_shift.availability import (
     available_camera_ranges,
     available_ranges,
@@ -64,10 +64,10 @@ class Runs(Scripts):
         files = sorted(it for it in self._run.rglob("*") if it.is_file())
         self._right = {str(it.relative_to(self._run)): it.read_bytes() for it in files}
         when = {
-            "began": _PULSE0,
-            "numbers_since": _PULSE0,
-            "clock": "",
-            "clock0": 1.0,
+            "started": _PULSE0,
+            "person_numbers_since": _PULSE0,
+            "age_clock": "",
+            "age_clock_at_pulse0": 1.0,
         }  # inputs are the same in every run
         self._right[INFO_FILE] = as_json({**msgspec.json.decode(self._right[INFO_FILE]), **when})
         self._kinds = {it.suffix: [name for name in self._right if name.endswith(it.suffix)] for it in files}
@@ -111,7 +111,7 @@ class Runs(Scripts):
         service = self._service
         past = Recorder(self._config, service.frame_buffers, service.agreement, 10, service.sound)
         past.pulse0 = _PULSE0
-        store = past.store
+        store = past.folder
         assert store is not None
         store.open()
         lot = zlib.crc32(data)
@@ -119,10 +119,10 @@ class Runs(Scripts):
         try:
             found = bool(store.earlier)
             if found:
-                store.run = store.earlier.pop()
+                store.session = store.earlier.pop()
                 asked = bool(self._loop.run_until_complete(self._asked(past, lot // _DROPS_EVERY)))
             if drops:
-                size = sum(run.size for run in (*store.earlier, *([store.run] if store.run else [])))
+                size = sum(run.size for run in (*store.earlier, *([store.session] if store.session else [])))
                 for bounds in (
                     RetentionLimits(_LONG_S, (size - 1) * 8 / 7 / 1e6, 60.0),
                     RetentionLimits(-_LONG_S, 1e6, 60.0),
@@ -130,7 +130,7 @@ class Runs(Scripts):
                     store._retention = RetentionPolicy(
                         bounds, lambda: store._clock.now
                     )  # the oldest segment goes, then all
-                    store._retain()
+                    store._apply_retention()
                 assert self._precious.exists(), "what is not recorded was taken away"
         finally:
             store.close()
@@ -144,7 +144,7 @@ class Runs(Scripts):
     @staticmethod
     async def _asked(past: Recorder, lot: int) -> int:
         """Ask what is told of all; play one camera and one person: to play everybody takes twice as long."""
-        assert past.run is not None
+        assert past.session is not None
         lines = [it async for it in read_decision_lines(past, 0, _FAR)]
         sources: tuple[PlaybackSource, ...] = (
             CameraPlayback(past, CAMERAS[lot % 2]),

@@ -11,10 +11,10 @@ from benchmarks.fuzz.site import FPS, HEIGHT, STRIDE, WIDTH
 from benchmarks.fuzz.target import Target, folder
 from server.media.audio.audio_format import AudioFormat
 from server.media.rendering_messages import Canvas, RenderRequest
-from server.service.recording.audio_file import read_audio_frames
 from server.service.recording.media_files import read_gops
 from server.service.recording.playlist_file import RecordingPlaylist
 from server.service.rendering.worker.stream_renderer import StreamRenderer
+from server.service.time_shift.playback_audio import read_audio_frames
 
 _DRAWN = STRIDE + 1
 """Frames: a GOP, and the beginning of the next."""
@@ -79,7 +79,7 @@ class Kept(Target):
         path.write_bytes(data)
         playlist = RecordingPlaylist(path, "../cameras/", "init.mp4", FPS, 0.0, 60.0)
         playlist.read()
-        for stretch in playlist.tape.between(0, 100):
+        for stretch in playlist.index.between(0, 100):
             list(read_gops(path, stretch.offset, stretch.length, FPS, 5))
         found = list(read_gops(path, 0, len(data), FPS, 5))
         read_audio_frames(path, 0, len(data), 0, 20, self._form)

@@ -18,8 +18,8 @@ from server.messaging.messages import GopChoices
 from server.service.recording.age_clock import MachineClocks
 from server.service.recording.media_files import RecordedGop, _fragments
 from server.service.recording.recording_folder import GopRecord, RecordingFolder
-from server.service.recording.recording_session import InitSegments, SessionInfo
 from server.service.recording.retention import RetentionLimits
+from server.service.recording.session_files import InitSegments, SessionInfo
 from server.service.streaming.frame_buffer import FrameBuffer
 
 A, B = CAMERAS
@@ -93,9 +93,9 @@ def head(began: float = PULSE0, numbers_since: float | None = None) -> SessionIn
         height=HEIGHT,
         codec="avc1",
         cameras=list(CAMERAS),
-        began=began,
+        started=began,
         pulse0=PULSE0,
-        numbers_since=numbers_since,
+        person_numbers_since=numbers_since,
     )
 
 

@@ -28,11 +28,12 @@ from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets
 from server.media.h264.repeat_picture import UnsupportedParametersError, parse_repeatable
 from server.media.stream_format import StreamFormat
 from server.messaging.inbox import Message
-from server.service.recording.audio_file import read_audio_frames
 from server.service.recording.playlist_file import RecordingPlaylist
 from server.service.recording.recording_folder import RecordingFolder
-from server.service.recording.recording_session import InitSegments, RecordingSession, SessionInfo
+from server.service.recording.recording_session import RecordingSession
 from server.service.recording.retention import RetentionLimits
+from server.service.recording.session_files import InitSegments, SessionInfo
+from server.service.time_shift.playback_audio import read_audio_frames
 from server.service.service import BestViewService
 from server.system.errors import UserError
 
@@ -196,7 +197,7 @@ def test_a_playlist_that_names_no_place_in_a_file_is_passed_over(tmp_path: Path)
     path.write_text(f"#EXTINF:1,p0+5\n#EXT-X-BYTERANGE:4@{'9' * 30}\n../cameras/c0/0.mp4\n")
     playlist = RecordingPlaylist(path, "", "", 25.0, None, 60.0)
     playlist.read()
-    assert playlist.tape.all == ()
+    assert playlist.index.all == ()
 
 
 @pytest.mark.parametrize("camera", ["../../../precious", "/precious", "a\0b", "c" * 300, "", "..", "c0\n"])
@@ -205,14 +206,14 @@ def test_a_recorded_run_whose_cameras_no_site_has_is_left_alone(tmp_path: Path, 
     precious.parent.mkdir()
     precious.write_bytes(b"nobody's")
     head = SessionInfo(
-        site="hall", fps=25.0, width=64, height=48, codec="avc1", cameras=["c0"], began=0.0, pulse0=0.0
+        site="hall", fps=25.0, width=64, height=48, codec="avc1", cameras=["c0"], started=0.0, pulse0=0.0
     )
     run = tmp_path / "kept" / "20260101T000000Z"
     run.parent.mkdir()
-    RecordingSession.begin(run, head, InitSegments(b""), 60.0)
+    RecordingSession.create(run, head, InitSegments(b""), 60.0)
     (run / "index" / "000000000000.jsonl").write_bytes(b"")
-    told = json.loads((run / "run.json").read_bytes())
-    (run / "run.json").write_text(json.dumps({**told, "cameras": ["c0", camera]}))
+    told = json.loads((run / "session.json").read_bytes())
+    (run / "session.json").write_text(json.dumps({**told, "cameras": ["c0", camera]}))
     store = RecordingFolder(tmp_path / "kept", RetentionLimits(-1e9, 1.0, 60.0))
     store.open()
     store.close()
@@ -226,7 +227,7 @@ def test_a_playlist_that_leads_to_no_camera_is_passed_over(tmp_path: Path, camer
     path.write_text(f"#EXTINF:1,p0+5\n#EXT-X-BYTERANGE:4@0\n../cameras/{camera}/000000000000.mp4\n")
     playlist = RecordingPlaylist(path, "", "", 25.0, None, 60.0)
     playlist.read()
-    assert playlist.tape.all == ()
+    assert playlist.index.all == ()
 
 
 def test_a_playlist_of_a_time_that_no_calendar_has_is_written_without_it(tmp_path: Path) -> None:
@@ -234,7 +235,7 @@ def test_a_playlist_of_a_time_that_no_calendar_has_is_written_without_it(tmp_pat
     path.write_text(f"#EXTINF:1,p{'9' * 15}+5\n#EXT-X-BYTERANGE:4@0\n../cameras/c0/000000000000.mp4\n")
     playlist = RecordingPlaylist(path, "../cameras/", "", 0.001, 1.7e9, 60.0)
     playlist.read()
-    playlist.tidy()
+    playlist.rewrite()
     assert f"p{'9' * 15}+5" in path.read_text()
     assert "DATE-TIME" not in path.read_text()
 

@@ -1,1 +1,1 @@
-"""The past: what was streamed, kept on the disk and for a moment in memory, and found again by pulse."""
+"""The recording on the disk: written GOP by GOP, found again by pulse, and deleted when it is too old."""

@@ -1,4 +1,4 @@
-"""The cameras' files: whole GOPs as fragments behind one header, written and found again."""
+"""Media files of the recording (fragmented MP4): appending whole GOPs, and reading them by pulse."""
 
 from __future__ import annotations
 
@@ -18,24 +18,22 @@ from server.media.rendering_messages import TIMESCALE
 from server.media.stream_format import StreamFormat
 from server.system.private_files import FOLDER, open_private
 
-Given = ParamSpec("Given")
+Args = ParamSpec("Args")
 Read = TypeVar("Read")
 
-_AT_ONCE = 8
-_THREADS = ThreadPoolExecutor(_AT_ONCE, "past")
+_READER_THREADS = 8
+_EXECUTOR = ThreadPoolExecutor(_READER_THREADS, "recording-reader")
 
 
-async def run_in_reader_thread(
-    read: Callable[Given, Read], *args: Given.args, **kwargs: Given.kwargs
-) -> Read:
-    """Read something in one of these threads."""
-    return await asyncio.get_running_loop().run_in_executor(_THREADS, partial(read, *args, **kwargs))
+async def run_in_reader_thread(read: Callable[Args, Read], *args: Args.args, **kwargs: Args.kwargs) -> Read:
+    """Run a blocking read in one of a few threads: a disk that hangs holds up nothing but time shift."""
+    return await asyncio.get_running_loop().run_in_executor(_EXECUTOR, partial(read, *args, **kwargs))
 
 
 _HEAD = 8
-"""Bytes of a box's size and kind."""
-_TIMES_WITHIN = 128
-"""Bytes of a fragment in which its decode time and its first sample's flags stand."""
+"""Bytes of a box's size and type."""
+_HEAD_LENGTH = 128
+"""The first bytes of a fragment, which contain its decode time and its first sample's flags."""
 _NOT_SYNC = 0x00010000
 """sample_is_non_sync_sample (ISO/IEC 14496-12, 8.8.3.1)."""
 
@@ -54,32 +52,32 @@ class RecordedGop:
 
     @property
     def data(self) -> bytes:
-        """Its bytes."""
+        """All fragments joined."""
         return b"".join(self.fragments)
 
 
 def pictures_of_gop(gop: RecordedGop, agreement: StreamFormat) -> list[EncodedPicture]:
-    """Give a GOP's pictures as the site's streams have them."""
-    told = agreement.told_by(gop.fragments[0])
+    """Return a GOP's pictures for the site's streams."""
+    parameters = agreement.told_by(gop.fragments[0])
     return [
-        EncodedPicture(gop.first + place, is_key(fragment), fragment, boot=0, parameters=told)
+        EncodedPicture(gop.first + place, is_key(fragment), fragment, boot=0, parameters=parameters)
         for place, fragment in enumerate(gop.fragments)
     ]
 
 
 class MediaFile:
-    """One camera's file: the header, then GOPs.
+    """A media file: the init segment, then GOPs.
 
-    A process that is killed in the middle of a GOP leaves a file that plays: until a GOP is there as a
-    whole, it is a ``free`` box, which players pass over, and eight bytes at once make it what it is. The
-    file itself is there from its first GOP on: a header alone does not play.
+    A process that is killed while it writes leaves a file that plays: until a GOP is written completely, it
+    is a ``free`` box, which players skip; its first eight bytes are written last. The file appears with its
+    first GOP: an init segment alone does not play.
 
     Raises:
         OSError: the disk does not take it.
     """
 
     def __init__(self, path: Path, header: bytes) -> None:
-        path.parent.mkdir(mode=FOLDER, exist_ok=True)  # that of the run is there, or was removed
+        path.parent.mkdir(mode=FOLDER, exist_ok=True)  # not its parents: the session may have been removed
         self._path, self._draft = path, path.with_suffix(".new")
         self._handle = open_private(self._draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         self._is_empty = True
@@ -92,7 +90,7 @@ class MediaFile:
         self.size = len(header)
 
     def append(self, gop: RecordedGop) -> tuple[int, int]:
-        """Append a GOP; give where it is: offset and length.
+        """Append a GOP; return offset and length in bytes.
 
         Raises:
             OSError: the disk does not take it; the file is as before.
@@ -113,26 +111,26 @@ class MediaFile:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is no GOP in it yet."""
+        """Whether it has no GOP yet."""
         return self._is_empty
 
     @property
-    def is_there(self) -> bool:
-        """Whether it is still where it was made: what is written to a file that was removed is lost."""
+    def exists(self) -> bool:
+        """Whether it is still at its path: what is written to a removed file is lost."""
         return is_same_file(self._handle, self._draft if self._is_empty else self._path)
 
     def close(self) -> None:
-        """Close the file; without a GOP there is none."""
+        """Close the file, and remove it if it has no GOP."""
         try:
             os.close(self._handle)
         finally:
             if self._is_empty:
-                with contextlib.suppress(OSError):  # its folder may be gone, or closed
+                with contextlib.suppress(OSError):  # its folder may be removed, or not writable
                     self._draft.unlink(missing_ok=True)
 
 
 def is_same_file(handle: int, path: Path) -> bool:
-    """Tell whether an open file is what a path leads to: it may have been removed, or be on another disk."""
+    """Return whether a path leads to an open file; it may have been removed or replaced."""
     try:
         return os.path.samestat(os.fstat(handle), path.stat())
     except (FileNotFoundError, NotADirectoryError):
@@ -140,7 +138,7 @@ def is_same_file(handle: int, path: Path) -> bool:
 
 
 def write_at(handle: int, data: bytes, offset: int) -> None:
-    """Write all of it.
+    """Write all of the data.
 
     Raises:
         OSError: the disk does not take it; part of it may be there.
@@ -152,8 +150,8 @@ def write_at(handle: int, data: bytes, offset: int) -> None:
 
 
 def pulse_of(fragment: bytes, fps: float) -> int:
-    """Give the pulse of a fragment's first frame; -1 where it does not say."""
-    at = fragment.find(b"tfdt", 0, _TIMES_WITHIN)
+    """Return the pulse of a fragment's first frame; -1 if it has no time."""
+    at = fragment.find(b"tfdt", 0, _HEAD_LENGTH)
     if at < 0 or len(fragment) < at + 16:
         return -1
     time: int = struct.unpack_from(">Q", fragment, at + 8)[0]
@@ -163,10 +161,10 @@ def pulse_of(fragment: bytes, fps: float) -> int:
 def read_gops(
     path: Path, offset: int, length: int, fps: float, pulse: int = 0
 ) -> Generator[RecordedGop, None, None]:
-    """Read the GOPs of a piece of a camera's file, from the one that holds a pulse on.
+    """Yield the GOPs of a piece of a media file, from the one that holds a pulse on.
 
     Raises:
-        OSError: the file cannot be read: retention may have taken it away.
+        OSError: the file cannot be read: retention may have deleted it.
     """
     with path.open("rb") as file:
         skipped = _last_key(file, offset, length, fps, pulse) - offset
@@ -182,11 +180,11 @@ def read_gops(
 
 
 def _last_key(file: BinaryIO, offset: int, length: int, fps: float, pulse: int) -> int:
-    """Say where the last key frame up to a pulse is in a piece of a file; pictures are passed over."""
+    """Return the offset of the last keyframe up to a pulse; only the heads of fragments are read."""
     found, at = offset, offset
     while at + _HEAD <= offset + length:
         file.seek(at)
-        start = file.read(_TIMES_WITHIN)
+        start = file.read(_HEAD_LENGTH)
         if len(start) < _HEAD:
             break
         size, kind = struct.unpack_from(">I4s", start)
@@ -199,8 +197,8 @@ def _last_key(file: BinaryIO, offset: int, length: int, fps: float, pulse: int) 
 
 
 def is_key(fragment: bytes) -> bool:
-    """Tell whether a fragment begins with a key frame."""
-    at = fragment.find(b"trun", 0, _TIMES_WITHIN)
+    """Return whether a fragment begins with a keyframe."""
+    at = fragment.find(b"trun", 0, _HEAD_LENGTH)
     if at < 0 or len(fragment) < at + 28:
         return False
     (flags,) = struct.unpack_from(">I", fragment, at + 24)

@@ -1,7 +1,7 @@
-"""A stream's playlist on the disk: references into the cameras' files (RFC 8216, HTTP Live Streaming).
+"""The HLS playlist of one recorded stream on the disk: references into the cameras' files (RFC 8216).
 
-It ends with EXT-X-ENDLIST at every moment, so that any player plays what is there and stops; what is added
-is written over that line. The title of each entry says which pulses it is.
+It always ends with EXT-X-ENDLIST, so that any player plays it to the end; new entries are written over that
+line. The title of each entry names its pulses.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ _NAME_DIGITS = 12
 
 
 def file_name(pulse: int) -> str:
-    """Name a camera's file by its first pulse, so that names sort as pulses do."""
+    """Return the name of a media file by its first pulse; names sort as pulses do."""
     return f"{pulse:0{_NAME_DIGITS}}.mp4"
 
 
 class RecordingPlaylist:
-    """One stream's references, in memory and on the disk.
+    """One stream's playlist, in memory (``index``) and on the disk.
 
-    ``cameras`` is the way from the playlist to the folder of the cameras, ``header`` that to what their files
-    begin with; ``pulse0`` is when pulse 0 was due (unix seconds), None where nobody knows.
+    ``cameras`` is the relative path to the folder of the cameras, ``header`` that to their init segment;
+    ``pulse0`` is when pulse 0 was due (unix seconds), None if not known.
     """
 
     def __init__(
@@ -50,12 +50,12 @@ class RecordingPlaylist:
         self._fps = fps
         self._pulse0 = pulse0
         self._longest_s = longest_s
-        self.tape = SegmentIndex()
+        self.index = SegmentIndex()
         self._tail: int | None = None
-        """Where the end line begins in the file; None: there is no file yet."""
+        """Where EXT-X-ENDLIST begins in the file; None: the file must be written anew."""
         self._end: int | None = None
-        self.stale = False
-        """The file has more entries than it needs, or such as refer to what is gone: :meth:`tidy` is due."""
+        self.is_stale = False
+        """Whether the file needs :meth:`rewrite`: entries can be joined, or refer to deleted files."""
 
     @property
     def bytes(self) -> int:
@@ -63,50 +63,50 @@ class RecordingPlaylist:
         return self._tail or 0
 
     def read(self) -> None:
-        """Take over what the file says."""
+        """Read the index from the file."""
         text = self.path.read_text(encoding="utf-8", errors="replace")
-        self.tape = SegmentIndex(_parsed(text))
-        stretches = self.tape.all
-        self._end = stretches[-1].end if stretches else None
+        self.index = SegmentIndex(_parse(text))
+        entries = self.index.all
+        self._end = entries[-1].end if entries else None
 
     def drop(self, files: Collection[int]) -> None:
-        """Forget what is in these files; the playlist's own file is as it was, until it is tidied."""
+        """Drop the entries of segments, by first pulse; the file on the disk becomes stale."""
         if files:
-            self.stale |= self.tape.drop(files)
+            self.is_stale |= self.index.drop(files)
 
-    def drop_pieces(self, gone: Collection[tuple[str, int]]) -> None:
-        """Forget what is in these cameras' files, likewise; any thread may say so."""
-        if gone and self.tape.drop_pieces(gone):
-            self.stale = True
+    def drop_files(self, missing: Collection[tuple[str, int]]) -> None:
+        """Drop the entries of files, by camera and first pulse, likewise; any thread may call it."""
+        if missing and self.index.drop_files(missing):
+            self.is_stale = True
 
-    def append(self, stretch: IndexEntry) -> None:
-        """Add to the file, then to what is known.
+    def append(self, entry_: IndexEntry) -> None:
+        """Add an entry to the file, then to the index.
 
         Raises:
             OSError: the disk does not take it; file and memory are as before.
         """
-        entry = self._entry(stretch, self._end)
-        if self._tail is not None and self._add(entry, self._tail):
+        entry = self._entry(entry_, self._end)
+        if self._tail is not None and self._append_to_file(entry, self._tail):
             self._tail += len(entry.encode())
         else:
-            self._replace(stretch)
-        self.tape.add(stretch)
-        self._end = stretch.end
+            self._write_anew(entry_)
+        self.index.add(entry_)
+        self._end = entry_.end
 
-    def tidy(self) -> None:
-        """Write the file anew, with as few entries as there are stretches; none: no file.
+    def rewrite(self) -> None:
+        """Write the file anew from the index, with joined entries; remove it if there are none.
 
         Raises:
             OSError: the disk does not take it; the file is as before.
         """
-        if self.tape.all:
-            self._replace()
+        if self.index.all:
+            self._write_anew()
         else:
             self.path.unlink(missing_ok=True)
-            self._tail, self.stale = None, False
+            self._tail, self.is_stale = None, False
 
-    def _add(self, entry: str, tail: int) -> bool:
-        """Write an entry over the end line; tell whether the file is there, and is as it was left."""
+    def _append_to_file(self, entry: str, tail: int) -> bool:
+        """Write an entry over the end line; return False if the file is missing or was changed."""
         try:
             handle = os.open(self.path, os.O_WRONLY)
         except FileNotFoundError:
@@ -116,16 +116,16 @@ class RecordingPlaylist:
                 return False
             write_at(handle, (entry + _END).encode(), tail)
         except OSError:
-            self._tail = None  # it may be half there: written anew next time
+            self._tail = None  # it may be written in part: it is written anew next time
             raise
         finally:
             os.close(handle)
         return True
 
-    def _replace(self, *added: IndexEntry) -> None:
-        self.stale = False  # before it is looked at what there is: more may be found gone meanwhile
-        stretches = [*self.tape.all, *added]
-        longest = max([self._longest_s, *(it.frames / self._fps for it in stretches)])
+    def _write_anew(self, *added: IndexEntry) -> None:
+        self.is_stale = False  # before the index is read: another thread may drop entries meanwhile
+        entries = [*self.index.all, *added]
+        longest = max([self._longest_s, *(it.frames / self._fps for it in entries)])
         text = (
             "#EXTM3U\n#EXT-X-VERSION:7\n"
             f"#EXT-X-TARGETDURATION:{math.ceil(longest)}\n"
@@ -133,35 +133,37 @@ class RecordingPlaylist:
             f'#EXT-X-MAP:URI="{self._header}"\n'
         )
         end = None
-        for stretch in stretches:
-            text += self._entry(stretch, end)
-            end = stretch.end
+        for entry_ in entries:
+            text += self._entry(entry_, end)
+            end = entry_.end
         draft = self.path.with_suffix(".new")
         try:
             write_private(draft, (text + _END).encode())
             draft.replace(self.path)
         except OSError:
-            self.stale = True
+            self.is_stale = True
             with contextlib.suppress(OSError):
                 draft.unlink(missing_ok=True)
             raise
         self._tail = len(text.encode())
 
-    def _entry(self, stretch: IndexEntry, end: int | None) -> str:
-        hole = "" if end in (None, stretch.first) else "#EXT-X-DISCONTINUITY\n"
+    def _entry(self, entry_: IndexEntry, end: int | None) -> str:
+        gap = "" if end in (None, entry_.first) else "#EXT-X-DISCONTINUITY\n"
         date = ""
-        if end != stretch.first and self._pulse0 is not None:
-            with contextlib.suppress(OverflowError, ValueError, OSError):  # a damaged file's year 9999999
-                moment = datetime.fromtimestamp(self._pulse0 + stretch.first / self._fps, UTC)
+        if end != entry_.first and self._pulse0 is not None:
+            with contextlib.suppress(
+                OverflowError, ValueError, OSError
+            ):  # the year 9999999 of a damaged file
+                moment = datetime.fromtimestamp(self._pulse0 + entry_.first / self._fps, UTC)
                 date = f"#EXT-X-PROGRAM-DATE-TIME:{moment.strftime('%Y-%m-%dT%H:%M:%S.%f')[:-3]}Z\n"
         return (
-            f"{hole}{date}#EXTINF:{stretch.frames / self._fps:.6f},p{stretch.first}+{stretch.frames}\n"
-            f"#EXT-X-BYTERANGE:{stretch.length}@{stretch.offset}\n"
-            f"{self._cameras}{stretch.camera}/{file_name(stretch.file)}\n"
+            f"{gap}{date}#EXTINF:{entry_.frames / self._fps:.6f},p{entry_.first}+{entry_.frames}\n"
+            f"#EXT-X-BYTERANGE:{entry_.length}@{entry_.offset}\n"
+            f"{self._cameras}{entry_.camera}/{file_name(entry_.file)}\n"
         )
 
 
-def _parsed(text: str) -> Iterable[IndexEntry]:
-    for found in _ENTRY.finditer(text):
-        first, frames, length, offset, camera, file = found.groups()
+def _parse(text: str) -> Iterable[IndexEntry]:
+    for match in _ENTRY.finditer(text):
+        first, frames, length, offset, camera, file = match.groups()
         yield IndexEntry(camera, int(file), int(offset), int(length), int(first), int(frames))

@@ -1,4 +1,4 @@
-"""The last decisions, in memory: what was shown of whom as long as the frames are on the shelves."""
+"""The last decided GOPs in memory: fragments by person or camera while their frames are in the frame buffers."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from server.service.streaming.frame_buffer import FrameBuffer
 
 
 class RecentGops:
-    """Finds GOPs on the shelves, of cameras and of people. ``gop`` is the length of a GOP in frames."""
+    """Finds GOPs of cameras and of persons in the frame buffers. ``gop`` is the frames of a GOP."""
 
     def __init__(self, frame_buffers: Mapping[str, FrameBuffer], gop: int, frames: int) -> None:
         self._shelves, self._gop, self._frames = frame_buffers, gop, frames
         self._choices: deque[GopChoices] = deque()
 
     def put(self, choices: GopChoices) -> None:
-        """Remember a decision for as long as its frames are."""
+        """Keep a decision as long as its frames."""
         if self._choices and choices.first < self._choices[-1].first:
-            self._choices.clear()  # pulses have begun anew
+            self._choices.clear()  # the pulses started again
         self._choices.append(choices)
         while self._choices[0].first < choices.first - self._frames:
             self._choices.popleft()
@@ -31,54 +31,54 @@ class RecentGops:
         return self._choices[-1].first + self._choices[-1].frames if self._choices else 0
 
     def end_of_camera(self, camera: str) -> int:
-        """Give the pulse after a camera's newest frame."""
+        """Return the pulse after a camera's newest frame."""
         return self._shelves[camera].newest + 1
 
     def choices(self, pulse: int) -> list[GopChoices]:
-        """Give the decisions about a pulse and those after it."""
+        """Return the decisions about a pulse and later ones."""
         return [it for it in self._choices if it.first + it.frames > pulse]
 
-    def of_object(self, number: int, pulse: int) -> RecordedGop | None:
-        """Give somebody's GOP that holds a pulse, or the next one; None where nothing follows."""
-        followed = (it for it in self._choices if it.first + it.frames > pulse)
-        return next((gop for it in followed if (gop := self._whole(number, it)) is not None), None)
+    def of_person(self, number: int, pulse: int) -> RecordedGop | None:
+        """Return a person's GOP that holds a pulse, or the next one; None if nothing follows."""
+        later = (it for it in self._choices if it.first + it.frames > pulse)
+        return next((gop for it in later if (gop := self._complete(number, it)) is not None), None)
 
-    def of_object_before(self, number: int, pulse: int) -> RecordedGop | None:
-        """Give somebody's last GOP that ends before a pulse; None where there is none."""
+    def of_person_before(self, number: int, pulse: int) -> RecordedGop | None:
+        """Return a person's last GOP that ends before a pulse; None if there is none."""
         before = (it for it in reversed(self._choices) if it.first + it.frames <= pulse)
-        return next((gop for it in before if (gop := self._whole(number, it)) is not None), None)
+        return next((gop for it in before if (gop := self._complete(number, it)) is not None), None)
 
-    def _whole(self, number: int, choices: GopChoices) -> RecordedGop | None:
+    def _complete(self, number: int, choices: GopChoices) -> RecordedGop | None:
         camera = choices.choices.get(number)
-        gop = None if camera is None else self.delivered(camera, choices.first, choices.frames)
+        gop = None if camera is None else self.arrived(camera, choices.first, choices.frames)
         return gop if gop is not None and len(gop.fragments) == choices.frames else None
 
     def of_camera(self, camera: str, pulse: int) -> RecordedGop | None:
-        """Give a camera's GOP that holds a pulse, or the next one, as far as it has come."""
+        """Return the frames that arrived of a camera's GOP that holds a pulse, or of the next one."""
         frame_buffer = self._shelves[camera]
         earliest = max(pulse, frame_buffer.newest - self._frames)
         for first in range(earliest // self._gop * self._gop, frame_buffer.newest + 1, self._gop):
-            gop = self.delivered(camera, first, self._gop)
+            gop = self.arrived(camera, first, self._gop)
             if gop is not None and gop.end > pulse:
                 return gop
         return None
 
     def of_camera_before(self, camera: str, pulse: int) -> RecordedGop | None:
-        """Give a camera's last GOP that begins before a pulse, up to there; None where there is none."""
+        """Return a camera's last GOP that begins before a pulse, cut there; None if there is none."""
         newest = self._shelves[camera].newest
         begin = (min(pulse, newest + 1) - 1) // self._gop * self._gop
         for first in range(begin, max(-1, newest - self._frames), -self._gop):
-            gop = self.delivered(camera, first, self._gop)
+            gop = self.arrived(camera, first, self._gop)
             if gop is not None:
                 return RecordedGop(gop.first, gop.fragments[: pulse - gop.first])
         return None
 
-    def delivered(self, camera: str, first: int, frames: int) -> RecordedGop | None:
-        """Give what a camera delivered of a GOP up to the first missing frame; None: not even that."""
-        found: list[bytes] = []
+    def arrived(self, camera: str, first: int, frames: int) -> RecordedGop | None:
+        """Return a camera's frames of a GOP up to the first missing one; None if there are none."""
+        fragments: list[bytes] = []
         for pulse in range(first, first + frames):
             frame = self._shelves[camera].get(pulse)
-            if frame is None or (not found and not frame.key):
+            if frame is None or (not fragments and not frame.key):
                 break
-            found.append(frame.fragment)
-        return RecordedGop(first, tuple(found)) if found else None
+            fragments.append(frame.fragment)
+        return RecordedGop(first, tuple(fragments)) if fragments else None

@@ -1,4 +1,4 @@
-"""What the best-view service keeps of the past: a moment in memory, more on the disk where configured."""
+"""Records every decided GOP: the newest in memory, all of them on the disk if configured."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from server.media.stream_format import StreamFormat
 from server.messaging.messages import GopChoices
 from server.service.recording.recent_gops import RecentGops
 from server.service.recording.recording_folder import GopRecord, RecordingFolder
-from server.service.recording.recording_session import InitSegments, RecordingSession, SessionInfo
+from server.service.recording.recording_session import RecordingSession
 from server.service.recording.retention import RetentionLimits
+from server.service.recording.session_files import InitSegments, SessionInfo
 from server.service.recording.writer_thread import WriterThread
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
@@ -25,12 +26,12 @@ from server.system.private_files import rights_of_others
 
 log = logging.getLogger(__name__)
 
-_SAME_S = 0.5
-"""Pulses whose numbers mean the same time but for so much are the same: the pulse server may be another."""
+_PULSE0_TOLERANCE_S = 0.5
+"""Pulse 0 may differ by so much between sessions of the same pulses, after a restart of the pulse server."""
 
 
 class Recorder:
-    """Takes every decision over as it is made, and finds it again. ``frames`` is what the shelves keep."""
+    """Takes in every decision, and finds recorded sessions. ``frames`` is the size of the frame buffers."""
 
     def __init__(
         self,
@@ -38,157 +39,172 @@ class Recorder:
         frame_buffers: Mapping[str, FrameBuffer],
         agreement: StreamFormat,
         frames: int,
-        sound: AudioBuffer | None = None,
+        audio_buffer: AudioBuffer | None = None,
     ) -> None:
         self._config, self._agreement = config, agreement
-        self.sound = sound
-        """The newest sound; None: the site has none."""
+        self.audio_buffer = audio_buffer
+        """The newest audio; None at a site without."""
         self.recent = RecentGops(frame_buffers, config.encode.gop, frames)
         self.pulse0: float | None = None
-        self.numbers_since: float | None = None
-        self._held: deque[GopChoices] = deque()
-        """Decided, but not all cameras' pictures have come."""
-        self._patience = frames // 2
-        self._begin: tuple[ParameterSets, InitSegments] | None = None
-        """What this service's files begin with, made of these parameters: every GOP that is played asks."""
+        self.person_numbers_since: float | None = None
+        self._pending: deque[GopChoices] = deque()
+        """Decided GOPs that wait for late pictures."""
+        self._max_late_frames = frames // 2
+        self._init_of_parameters: tuple[ParameterSets, InitSegments] | None = None
+        """The init segments of these parameters, kept since every GOP that is played needs them."""
         self.viewers = 0
-        """How many are watching the past."""
+        """The number of viewers of time shift."""
         record = config.record
-        self.store: RecordingFolder | None = None
+        self.folder: RecordingFolder | None = None
         self.writer: WriterThread | None = None
         if record.folder is not None:
-            bounds = RetentionLimits(record.keep_s, record.most_mb, record.segment_s, record.trust_clock)
-            self.store = store = RecordingFolder(record.folder, bounds)
-            most = max(4, frames // config.encode.gop)  # no more than the shelves hold anyway
+            limits = RetentionLimits(record.keep_s, record.most_mb, record.segment_s, record.trust_clock)
+            self.folder = folder = RecordingFolder(record.folder, limits)
+            max_queued = max(4, frames // config.encode.gop)  # no more than the frame buffers hold anyway
             self.writer = WriterThread(
-                self._write, store.abandon, store.close, most, where=str(record.folder)
+                self._write, folder.abandon, folder.close, max_queued, where=str(record.folder)
             )
 
     def open(self) -> None:
-        """Begin to record, where that is configured.
+        """Start recording, if configured.
 
         Raises:
             UserError: the folder cannot be written, or another process records there.
         """
-        if self.store is None or self.writer is None:
+        if self.folder is None or self.writer is None:
             return
         try:
-            self.store.open()
+            self.folder.open()
         except BlockingIOError as error:
-            raise UserError(f"record.folder: {self.store.folder}: another process records there") from error
+            raise UserError(f"record.folder: {self.folder.folder}: another process records there") from error
         except OSError as error:
             raise UserError(
-                f"record.folder: {self.store.folder}: cannot write there: {error.strerror}"
+                f"record.folder: {self.folder.folder}: cannot write there: {error.strerror}"
             ) from error
         self.writer.start()
-        log.info("recording to %s", self.store.folder)
-        if mode := rights_of_others(self.store.folder):
+        log.info("recording to %s", self.folder.folder)
+        if mode := rights_of_others(self.folder.folder):
             log.warning(
                 "record.folder: %s has mode %s: others on this machine may see when it was recorded, "
                 "not what; chmod 700 closes it",
-                self.store.folder,
+                self.folder.folder,
                 mode,
             )
 
-    def put(self, choices: GopChoices, pulse0: float | None, numbers_since: float | None = None) -> None:
-        """Take a decision over, and since when pulses and people's numbers are these; never waits."""
-        self.pulse0, self.numbers_since = pulse0, numbers_since
+    def put(
+        self, choices: GopChoices, pulse0: float | None, person_numbers_since: float | None = None
+    ) -> None:
+        """Record a decision without blocking; the times tell when pulses and person numbers began."""
+        self.pulse0, self.person_numbers_since = pulse0, person_numbers_since
         self.recent.put(choices)
         if self.writer is None:
             return
-        self._held.append(choices)
-        while self._held and self._has_come(self._held[0]):
+        self._pending.append(choices)
+        while self._pending and self._is_settled(self._pending[0]):
             self._hand_over(self.writer)
 
     def close(self) -> None:
         """End the recording."""
         if self.writer is not None:
-            while self._held:
+            while self._pending:
                 self._hand_over(self.writer)
             self.writer.close()
 
-    def _has_come(self, choices: GopChoices) -> bool:
-        """Tell whether nothing is to be waited for: a busy camera's pictures may come after the decision."""
+    def _is_settled(self, choices: GopChoices) -> bool:
+        """Return whether no more pictures are expected; a busy camera's may come after the decision."""
         end = choices.first + choices.frames
-        if end <= self.recent.end - self._patience:
+        if end <= self.recent.end - self._max_late_frames:
             return True
         newest = [self.recent.end_of_camera(camera) for camera in self._config.camera_ids]
-        return all(it >= end or it < choices.first - self._patience for it in newest)
+        return all(it >= end or it < choices.first - self._max_late_frames for it in newest)
 
     def _hand_over(self, writer: WriterThread) -> None:
-        choices = self._held.popleft()
-        delivered = {
-            camera: self.recent.delivered(camera, choices.first, choices.frames)
+        choices = self._pending.popleft()
+        arrived = {
+            camera: self.recent.arrived(camera, choices.first, choices.frames)
             for camera in self._config.camera_ids
         }
-        cameras = {camera: gop for camera, gop in delivered.items() if gop is not None}
+        cameras = {camera: gop for camera, gop in arrived.items() if gop is not None}
         end = choices.first + choices.frames
-        heard = None if self.sound is None else self.sound.audio_between(choices.first, end)
-        writer.put(GopRecord(choices, cameras, heard))
+        audio = None if self.audio_buffer is None else self.audio_buffer.audio_between(choices.first, end)
+        writer.put(GopRecord(choices, cameras, audio))
 
     @property
-    def run(self) -> RecordingSession | None:
-        """What this service has recorded; None: nothing."""
-        return None if self.store is None else self.store.run
+    def session(self) -> RecordingSession | None:
+        """The session of this service; None if it has not recorded yet."""
+        return None if self.folder is None else self.folder.session
 
     @property
-    def runs(self) -> list[RecordingSession]:
-        """What this service and those before it have recorded by the same pulses and parameters."""
-        if self.store is None:
+    def sessions(self) -> list[RecordingSession]:
+        """This session and the earlier ones of the same pulses and parameter sets, the oldest first."""
+        if self.folder is None:
             return []
-        current = [] if self.store.run is None else [self.store.run]
-        own = self._headers
-        return [*(run for run in tuple(self.store.earlier) if self._fits(run, own)), *current]
+        current = [] if self.folder.session is None else [self.folder.session]
+        own = self._init
+        return [*(session for session in tuple(self.folder.earlier) if self._fits(session, own)), *current]
 
     @property
-    def numbered(self) -> list[RecordingSession]:
-        """Those of them in which people's numbers are the same people's as now."""
-        return [run for run in self.runs if run is self.run or self._same_people(run)]
+    def sessions_with_same_persons(self) -> list[RecordingSession]:
+        """Those of :attr:`sessions` in which person numbers mean the same persons as now."""
+        return [
+            session for session in self.sessions if session is self.session or self._has_same_persons(session)
+        ]
 
     @property
-    def sounding(self) -> list[RecordingSession]:
-        """Those of them whose sound is that of this site."""
-        own = self._headers
-        return [] if own is None else [run for run in self.runs if run.headers.sound == own.sound]
+    def sessions_with_same_audio(self) -> list[RecordingSession]:
+        """Those of :attr:`sessions` with the audio format of this site."""
+        own = self._init
+        return (
+            [] if own is None else [session for session in self.sessions if session.init.audio == own.audio]
+        )
 
-    def _same_people(self, run: RecordingSession) -> bool:
-        return self.numbers_since is not None and run.head.numbers_since == self.numbers_since
+    def _has_same_persons(self, session: RecordingSession) -> bool:
+        return (
+            self.person_numbers_since is not None
+            and session.info.person_numbers_since == self.person_numbers_since
+        )
 
-    def _fits(self, run: RecordingSession, own: InitSegments | None) -> bool:
+    def _fits(self, session: RecordingSession, own: InitSegments | None) -> bool:
         pulse0 = self.pulse0
-        if own is None or pulse0 is None or run.head.pulse0 is None:
+        if own is None or pulse0 is None or session.info.pulse0 is None:
             return False
-        same = run.head.fps == self._config.site.fps and abs(run.head.pulse0 - pulse0) < _SAME_S
-        return same and run.headers.pictures == own.pictures
+        same = (
+            session.info.fps == self._config.site.fps
+            and abs(session.info.pulse0 - pulse0) < _PULSE0_TOLERANCE_S
+        )
+        return same and session.init.pictures == own.pictures
 
     @property
-    def _headers(self) -> InitSegments | None:
-        """What this service's files begin with; None: nobody knows yet."""
+    def _init(self) -> InitSegments | None:
+        """The init segments of this service's files; None before the first keyframe."""
         parameters, site, sound = self._agreement.parameters, self._config.site, self._config.sound.format
         if parameters is None:
             return None
-        begin = self._begin
-        if begin is None or begin[0] != parameters:
+        known_init = self._init_of_parameters
+        if known_init is None or known_init[0] != parameters:
             pictures = init_segment(parameters, site.width, site.height)
-            begin = parameters, InitSegments(pictures, b"" if sound is None else audio_init_segment(sound))
-            self._begin = begin
-        return begin[1]
+            known_init = (
+                parameters,
+                InitSegments(pictures, b"" if sound is None else audio_init_segment(sound)),
+            )
+            self._init_of_parameters = known_init
+        return known_init[1]
 
-    def _write(self, piece: GopRecord) -> None:
-        """Write a piece, in the writer's thread."""
-        parameters, headers, site = self._agreement.parameters, self._headers, self._config.site
-        if self.store is None or parameters is None or headers is None:
+    def _write(self, record: GopRecord) -> None:
+        """Write a GOP; called in the writer thread."""
+        parameters, init, site = self._agreement.parameters, self._init, self._config.site
+        if self.folder is None or parameters is None or init is None:
             return
-        head = SessionInfo(
+        info = SessionInfo(
             site=site.name,
             fps=site.fps,
             width=site.width,
             height=site.height,
             codec=parameters.codec,
             cameras=list(self._config.camera_ids),
-            sound=None if self.sound is None else self.sound.format.codec,
-            began=time.time(),
+            sound=None if self.audio_buffer is None else self.audio_buffer.format.codec,
+            started=time.time(),
             pulse0=self.pulse0,
-            numbers_since=self.numbers_since,
+            person_numbers_since=self.person_numbers_since,
         )
-        self.store.write(piece, head, headers)
+        self.folder.write(record, info, init)

@@ -1,6 +1,6 @@
-"""The folder that a site is recorded in: the run that grows, the runs before it, and what may stay.
+"""The folder that a site is recorded to: the session in progress and the earlier ones.
 
-Everything here waits for the disk: it is for one thread of its own.
+All of it blocks on the disk, and sessions in a thread of its own (:mod:`~server.service.recording.writer_thread`).
 """
 
 from __future__ import annotations
@@ -21,22 +21,17 @@ from server.media.audio.audio_chunk import AudioChunk
 from server.messaging.messages import GopChoices
 from server.service.recording.age_clock import AgeClock, MachineClocks
 from server.service.recording.media_files import RecordedGop, is_same_file
-from server.service.recording.recording_session import (
-    InitSegments,
-    RecordingSegment,
-    RecordingSession,
-    SessionInfo,
-)
+from server.service.recording.recording_session import RecordingSegment, RecordingSession
 from server.service.recording.retention import SEGMENTS_PER_DISK_QUOTA, RetentionLimits, RetentionPolicy
 from server.service.recording.segment_writer import SegmentWriter
 from server.service.recording.session_discovery import assign_age, find_sessions
-from server.service.recording.session_files import remove_session_files
+from server.service.recording.session_files import InitSegments, SessionInfo, remove_session_files
 from server.system.private_files import make_private_folder, open_private
 
 log = logging.getLogger(__name__)
 
-_NOT_THE_RUNS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
-"""No room, no more files, no memory: another folder has no more of it. After anything else a run is left."""
+_NO_RESOURCES = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
+"""Errors that a new session would meet, too: no space, files or memory. After others, one is created."""
 _LOCK = ".lock"
 _MEGA = 1_000_000
 _MACHINE = MachineClocks()
@@ -48,87 +43,89 @@ class GopRecord:
 
     choices: GopChoices
     cameras: dict[str, RecordedGop]
-    """What each camera delivered of it, from its first frame on."""
-    heard: AudioChunk | None = None
-    """What is to be heard meanwhile; None at a site without sound."""
+    """By camera, the frames that arrived, up to the first that is missing."""
+    audio: AudioChunk | None = None
+    """The audio of the GOP; None at a site without audio."""
 
 
 class RecordingFolder:
-    """Writes one run after the other, and takes away what is too old or too much."""
+    """Writes one session after another, and deletes what exceeds the retention limits."""
 
-    def __init__(self, folder: Path, bounds: RetentionLimits, machine: MachineClocks = _MACHINE) -> None:
-        self.folder, self._bounds = folder, bounds
-        self._clock = AgeClock(folder, machine, trusted=bounds.trust_clock)
-        self._retention = RetentionPolicy(bounds, lambda: self._clock.now)
+    def __init__(self, folder: Path, limits: RetentionLimits, machine: MachineClocks = _MACHINE) -> None:
+        self.folder, self._limits = folder, limits
+        self._clock = AgeClock(folder, machine, trusted=limits.trust_clock)
+        self._retention = RetentionPolicy(limits, lambda: self._clock.now)
         self._lock: int | None = None
         self.earlier: list[RecordingSession] = []
-        """By age; never changed, but replaced: other threads look at it."""
-        self.run: RecordingSession | None = None
+        """By age. The list is replaced, never changed: other threads read it."""
+        self.session: RecordingSession | None = None
         self._open: SegmentWriter | None = None
         self._end = 0
         self._closed_bytes = 0
-        self._left, self._stuck = LogThrottle(), LogThrottle()
+        self._abandoned_sessions = LogThrottle()
 
     def open(self) -> None:
-        """Take the folder, and what earlier runs left in it.
+        """Lock the folder, and read the sessions in it.
 
         Raises:
             OSError: it cannot be written; a BlockingIOError where another process records there.
         """
-        self._take()
-        self._retain()
+        self._lock_folder()
+        self._apply_retention()
 
-    def write(self, piece: GopRecord, head: SessionInfo, headers: InitSegments) -> None:
-        """Write a GOP; ``head`` and ``headers`` are what a run begins with, if it has not begun.
+    def write(self, record: GopRecord, info: SessionInfo, init: InitSegments) -> None:
+        """Write a GOP; ``info`` and ``init`` are for a new session, if one begins with it.
 
-        Where the run cannot be written on, but for want of room, another one is begun: its folder, or one in
-        it, may have been removed, closed, or be on a disk that is not there any more.
+        If the session cannot be continued, for another reason than a lack of space, a new one is created: its
+        folder may have been removed, made unwritable, or be on a disk that is no longer mounted.
 
         Raises:
             OSError: the disk does not take it; :meth:`abandon` is to be called.
         """
-        first = piece.choices.first
-        self._hold_folder()
-        if self._open is not None and (self._begins(first) or self._is_full(self._open.segment, first)):
-            self._finish()
+        first = record.choices.first
+        self._check_folder()
+        if self._open is not None and (
+            self._begins_session(first) or self._is_full(self._open.segment, first)
+        ):
+            self._close_segment()
         if self._open is None:
-            self._retain()  # before anything that takes space: the disk may be full
+            self._apply_retention()  # before anything that takes space: the disk may be full
         try:
-            self._put(piece, head, headers)
+            self._append(record, info, init)
         except OSError as error:
-            if error.errno in _NOT_THE_RUNS:
+            if error.errno in _NO_RESOURCES:
                 raise
-            self._leave(error.strerror or str(error))
-            self._hold_folder()
-            self._put(piece, head, headers)
+            self._leave_session(error.strerror or str(error))
+            self._check_folder()
+            self._append(record, info, init)
 
     def abandon(self) -> None:
-        """Let go of the segment that could not be written on; what is in it stays."""
+        """Give up the segment that could not be continued; its files stay."""
         ended, self._open = self._open, None
-        run = self.run
+        session = self.session
         try:
             if ended is not None:
-                if run is not None and ended.is_empty:
-                    run.segments = [it for it in run.segments if it is not ended.segment]
+                if session is not None and ended.is_empty:
+                    session.segments = [it for it in session.segments if it is not ended.segment]
                 ended.close()
         finally:
-            if run is not None and not run.segments:
-                self.run = None
-                run.remove()
+            if session is not None and not session.segments:
+                self.session = None
+                session.remove()
 
     def close(self) -> None:
-        """End the run; the playlists become short."""
+        """End the session, and rewrite its playlists."""
         try:
-            self._finish()
+            self._close_segment()
             if self._lock is not None and is_same_file(self._lock, self.folder / _LOCK):
-                self._look_at_the_clock()
+                self._update_age_clock()
         finally:
             if self._lock is not None:
                 os.close(self._lock)
                 self._lock = None
 
-    def _take(self) -> None:
-        """Make the folder if there is none, take it for this process, and look what is in it.
+    def _lock_folder(self) -> None:
+        """Create the folder if there is none, lock it for this process, and read the sessions in it.
 
         Raises:
             OSError: it cannot be written; a BlockingIOError where another process records there.
@@ -146,150 +143,145 @@ class RecordingFolder:
         if self._lock is not None:
             os.close(self._lock)
         self._lock = lock
-        self._look()
+        self._find_sessions()
 
-    def _look(self) -> None:
-        """See which runs there are: those that were known and are there, and such as were not known."""
-        runs = [run for run in self.earlier if run.is_there]
-        current = self.run if self.run is not None and self.run.is_there else None
-        known = {run.folder for run in (*runs, current) if run is not None}
-        found = find_sessions(self.folder, known, self._bounds.segment_s)
-        if not known:  # else it is their clock that goes
+    def _find_sessions(self) -> None:
+        """Drop sessions that do not exist any more, and add those that were not known."""
+        sessions = [session for session in self.earlier if session.exists]
+        current = self.session if self.session is not None and self.session.exists else None
+        known = {session.folder for session in (*sessions, current) if session is not None}
+        discovered = find_sessions(self.folder, known, self._limits.segment_s)
+        if not known:  # else the age clock is running
             self._clock.open()
-        for run in found:
-            if run.head.clock != self._clock.id:
-                assign_age(run, self._clock)
-            run.stamp(self._clock.now)
+        for session in discovered:
+            if session.info.age_clock != self._clock.id:
+                assign_age(session, self._clock)
+            session.date_segments(self._clock.now)
         self.earlier = sorted(
-            [*runs, *found], key=lambda run: run.segments[-1].written if run.segments else 0.0
+            [*sessions, *discovered],
+            key=lambda session: session.segments[-1].written if session.segments else 0.0,
         )
 
-    def _hold_folder(self) -> None:
-        """Take the folder again if it is another one than before, and let go of a run that is not there.
+    def _check_folder(self) -> None:
+        """Lock the folder again if it is another one than before, and leave a session that was removed.
 
         Raises:
             OSError: it cannot be written; a BlockingIOError where another process records there.
         """
         if self._lock is None or not is_same_file(self._lock, self.folder / _LOCK):
-            self._take()
-        if self.run is not None and not self.run.is_there:
-            self._leave("it is not there any more")
+            self._lock_folder()
+        if self.session is not None and not self.session.exists:
+            self._leave_session("it does not exist any more")
 
-    def _leave(self, why: str) -> None:
-        """End a run that cannot be written on. What there still is of it can be seen on, and gets old."""
-        run = self.run
-        if run is not None and (more := self._left.record(why)) is not None:
-            log.warning("recording: cannot go on in %s: %s%s; a new folder is begun", run.folder, why, more)
+    def _leave_session(self, reason: str) -> None:
+        """End a session that cannot be continued; what is left of it is played and ages like others."""
+        session = self.session
+        if session is not None and (more := self._abandoned_sessions.record(reason)) is not None:
+            log.warning(
+                "recording: cannot continue in %s: %s%s; starting a new folder", session.folder, reason, more
+            )
         with contextlib.suppress(OSError):
             self.abandon()
-        if run is None or self.run is None:
+        if session is None or self.session is None:
             return
-        self.run = None
-        if not run.is_in_place:
+        self.session = None
+        if not session.is_in_place:
             return
         with contextlib.suppress(OSError):
-            run.forget_missing()
-        run.recount()
-        if not run.segments:
-            run.remove()
+            session.forget_missing()
+        session.recount()
+        if not session.segments:
+            session.remove()
             return
-        run.tidy()
-        if not run.is_there:
+        session.rewrite_playlists()
+        if not session.exists:
             with contextlib.suppress(OSError):
-                run.restore_head()
-        self.earlier = [*self.earlier, run]
+                session.restore_info()
+        self.earlier = [*self.earlier, session]
 
-    def _put(self, piece: GopRecord, head: SessionInfo, headers: InitSegments) -> None:
-        first, now = piece.choices.first, self._clock.now
-        if self._begins(first):
-            dated = msgspec.structs.replace(head, clock=self._clock.id, clock0=now - first / head.fps)
-            self._begin(dated, headers, first)
-        run = self.run
-        assert run is not None  # noqa: S101 — it has begun
-        if run.head.numbers_since != head.numbers_since:
-            run.number_since(head.numbers_since)
+    def _append(self, record: GopRecord, info: SessionInfo, init: InitSegments) -> None:
+        first, now = record.choices.first, self._clock.now
+        if self._begins_session(first):
+            dated_info = msgspec.structs.replace(
+                info, age_clock=self._clock.id, age_clock_at_pulse0=now - first / info.fps
+            )
+            self._begin_session(dated_info, init, first)
+        session = self.session
+        assert session is not None  # noqa: S101 — it was created above
+        if session.info.person_numbers_since != info.person_numbers_since:
+            session.set_person_numbers_since(info.person_numbers_since)
         if self._open is None:
-            self._open = SegmentWriter(run, RecordingSegment(first, 0, now), headers)
-            run.segments.append(self._open.segment)
-        self._open.write(piece.choices, piece.cameras, piece.heard, now)
-        self._end = first + piece.choices.frames
+            self._open = SegmentWriter(session, RecordingSegment(first, 0, now), init)
+            session.segments.append(self._open.segment)
+        self._open.write(record.choices, record.cameras, record.audio, now)
+        self._end = first + record.choices.frames
 
-    def _begins(self, first: int) -> bool:
-        """Tell whether a GOP is the first of a run: pulses may begin anew."""
-        return self.run is None or first < self._end
+    def _begins_session(self, first: int) -> bool:
+        """Return whether a GOP begins a session: the pulses may have started again."""
+        return self.session is None or first < self._end
 
-    def _begin(self, head: SessionInfo, headers: InitSegments, first: int) -> None:
-        name = datetime.fromtimestamp(head.began, UTC).strftime("%Y%m%dT%H%M%SZ")
-        taken = {it.name for it in self.folder.glob(f"{name}*")}
-        if name in taken:
-            name = next(it for number in range(1, len(taken) + 2) if (it := f"{name}-{number}") not in taken)
+    def _begin_session(self, info: SessionInfo, init: InitSegments, first: int) -> None:
+        name = datetime.fromtimestamp(info.started, UTC).strftime("%Y%m%dT%H%M%SZ")
+        existing = {it.name for it in self.folder.glob(f"{name}*")}
+        if name in existing:
+            name = next(
+                it for number in range(1, len(existing) + 2) if (it := f"{name}-{number}") not in existing
+            )
         folder = self.folder / name
         try:
-            begun = RecordingSession.begin(folder, head, headers, self._bounds.segment_s)
+            created = RecordingSession.create(folder, info, init, self._limits.segment_s)
         except FileExistsError:
-            raise  # it is somebody else's
+            raise  # not made by this process
         except OSError:
             remove_session_files(folder)
             raise
-        if self.run is not None:
-            self.earlier = [*self.earlier, self.run]
-        self.run, self._end = begun, first
-        self._closed_bytes = sum(run.size for run in self.earlier)
+        if self.session is not None:
+            self.earlier = [*self.earlier, self.session]
+        self.session, self._end = created, first
+        self._closed_bytes = sum(session.size for session in self.earlier)
 
     def _is_full(self, segment: RecordingSegment, first: int) -> bool:
-        run = self.run
-        assert run is not None  # noqa: S101 — a segment is of a run
-        long_enough = first - segment.first >= self._bounds.segment_s * run.head.fps
-        return long_enough or segment.bytes * SEGMENTS_PER_DISK_QUOTA >= self._bounds.most_mb * _MEGA
+        session = self.session
+        assert session is not None  # noqa: S101 — a segment belongs to a session
+        long_enough = first - segment.first >= self._limits.segment_s * session.info.fps
+        return long_enough or segment.bytes * SEGMENTS_PER_DISK_QUOTA >= self._limits.most_mb * _MEGA
 
-    def _finish(self) -> None:
-        """End the open segment; the playlists that have grown in it become short, if the disk takes it."""
+    def _close_segment(self) -> None:
+        """End the open segment, and rewrite the playlists that it has grown, if the disk takes it."""
         if self._open is None:
             return
-        for playlist in self._open.grown:
-            playlist.stale = True
+        for playlist in self._open.playlists:
+            playlist.is_stale = True
         self.abandon()
-        if self.run is not None:
-            self.run.tidy()
+        if self.session is not None:
+            self.session.rewrite_playlists()
 
-    def _retain(self) -> None:
-        """Take away what is too old, and as much of the oldest as one more segment needs.
+    def _apply_retention(self) -> None:
+        """Delete what is too old, and as much of the oldest as one more segment needs.
 
-        What cannot be taken away is tried again each time, and keeps nobody from recording.
+        What cannot be deleted is tried again each time, and does not stop the recording.
         """
-        self._look_at_the_clock()
-        runs = [*self.earlier, *([self.run] if self.run else [])]
-        due = self._retention.due(runs)
-        failed: OSError | None = None
-        for run, segments in due.segments:
-            try:
-                run.drop(segments)
-            except OSError as error:
-                failed = error
-        if failed is None:
-            self._retention.tell(due)
-            self._stuck.end()
-        elif (more := self._stuck.record(failed.strerror or "")) is not None:
-            what = f"{failed.filename}: {failed.strerror or failed}{more}"
-            log.error("recording: cannot take away what has to go: %s; it is tried again each time", what)
-        for run in self.earlier:
-            if not run.segments:
-                run.remove()
-        self.earlier = [run for run in self.earlier if run.segments]
-        self._closed_bytes = sum(run.size for run in runs)
+        self._update_age_clock()
+        sessions = [*self.earlier, *([self.session] if self.session else [])]
+        self._retention.delete_expired(sessions)
+        for session in self.earlier:
+            if not session.segments:
+                session.remove()
+        self.earlier = [session for session in self.earlier if session.segments]
+        self._closed_bytes = sum(session.size for session in sessions)
 
-    def _look_at_the_clock(self) -> None:
-        """Count the time that the machine was off, if it is known now; what came since is no older by it."""
+    def _update_age_clock(self) -> None:
+        """Count the time that the machine was off, once it is known; newer sessions do not age by it."""
         anchored = self._clock.anchored
-        if (away := self._clock.look()) > 0:
-            for run in (*self.earlier, *([self.run] if self.run else [])):
-                if run is self.run or run.begun >= anchored:
-                    run.put_off(away)
-        with contextlib.suppress(OSError):  # it goes on from what was written last
-            self._clock.keep()
+        if (away := self._clock.update()) > 0:
+            for session in (*self.earlier, *([self.session] if self.session else [])):
+                if session is self.session or session.started >= anchored:
+                    session.make_younger(away)
+        with contextlib.suppress(OSError):  # a restart continues from what was written last
+            self._clock.save()
 
     @property
     def bytes(self) -> int:
         """Bytes on the disk."""
-        growing = self._open  # another thread may ask
-        return self._closed_bytes + (growing.segment.bytes if growing else 0)
+        writer = self._open  # another thread may read it
+        return self._closed_bytes + (writer.segment.bytes if writer else 0)

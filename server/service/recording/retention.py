@@ -1,8 +1,8 @@
-"""What of the recordings has to go: what is older than it may be, and the oldest of what is too much.
+"""Deletes old recordings: segments older than ``record.keep_s``, and the oldest beyond ``record.most_mb``.
 
-What is too old goes in parts, an eighth of it in a pass, and a pass is as long as a segment: should a clock
-or a setting be wrong all the same, the log says so while most of it is still there. What is too much goes at
-once.
+Segments that are too old are deleted in several passes, an eighth of them in each, and there is one pass per
+segment: should a clock or a setting be wrong, the log says so while most of them still exist. What exceeds
+the size is deleted at once.
 """
 
 from __future__ import annotations
@@ -12,19 +12,18 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from logthrottle import LogThrottle
 from server.service.recording.recording_session import RecordingSegment, RecordingSession
 
 log = logging.getLogger(__name__)
 
 SEGMENTS_PER_DISK_QUOTA = 8
-"""A segment takes at most this part of the disk that the recording may take: only whole segments go."""
+"""A segment takes at most this part of ``record.most_mb``: only whole segments are deleted."""
 _MEGA = 1_000_000
 _PASSES = 8
-"""What is too old goes in so many passes,"""
-_AT_LEAST = 10
-"""of so many segments at least."""
-_TOLD_EVERY_S = 3600.0
-"""A recording that is full loses a segment for each new one: that is told so seldom."""
+_MIN_SEGMENTS_PER_PASS = 10
+_LOG_EVERY_S = 3600.0
+"""A full recording loses a segment for each new one: that is logged so seldom."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,90 +34,107 @@ class RetentionLimits:
     most_mb: float
     segment_s: float
     trust_clock: bool = False
-    """The time that the machine was off counts by its clock, whoever keeps that."""
+    """Whether the time that the machine was off counts by its own clock, synchronized or not."""
 
 
 @dataclass(slots=True)
 class ExpiredSegments:
-    """What has to go in one pass."""
+    """The segments to delete in one pass."""
 
     segments: list[tuple[RecordingSession, list[RecordingSegment]]] = field(default_factory=list)
-    """The oldest run first, and in each the oldest segment."""
-    old: int = 0
-    """Segments that go because of their age,"""
-    held: int = 0
-    """and such that are as old, and go later."""
-    over: int = 0
-    """Segments that go because of what they take."""
+    """By session, the oldest first; in each, the oldest segment first."""
+    too_old: int = 0
+    """The number of segments because of their age."""
+    postponed: int = 0
+    """The number of segments that are too old, too, and are deleted in a later pass."""
+    beyond_size: int = 0
+    """The number of segments because of the size of the recording."""
 
     @property
     def last(self) -> tuple[RecordingSession, RecordingSegment] | None:
         """The newest of them."""
-        return next(((run, them[-1]) for run, them in reversed(self.segments) if them), None)
+        return next(((session, old[-1]) for session, old in reversed(self.segments) if old), None)
 
 
 class RetentionPolicy:
-    """Says what has to go. ``now`` is the recording's own clock."""
+    """Deletes what exceeds the limits. ``now`` returns the seconds of the age clock."""
 
-    def __init__(self, bounds: RetentionLimits, now: Callable[[], float]) -> None:
-        self._bounds, self._now = bounds, now
-        self._quota: int | None = None
-        """Segments that go in a pass while there are more of them than may go at once."""
-        self._untold_old = self._untold_over = 0
-        self._told_at = -math.inf
+    def __init__(self, limits: RetentionLimits, now: Callable[[], float]) -> None:
+        self._limits, self._now = limits, now
+        self._segments_per_pass: int | None = None
+        """What is deleted in a pass while more segments are too old than one pass may delete."""
+        self._unlogged_old = self._unlogged_beyond_size = 0
+        self._logged_at = -math.inf
+        self._failures = LogThrottle()
 
-    def due(self, runs: Sequence[RecordingSession]) -> ExpiredSegments:
-        """Say what has to go of the recordings, which are sorted by age."""
-        oldest = self._now() - self._bounds.keep_s
-        most = self._bounds.most_mb * _MEGA
-        too_much = sum(run.size for run in runs) - (most - most / SEGMENTS_PER_DISK_QUOTA)
-        old = sum(it.written < oldest and not it.is_stuck for run in runs for it in run.segments)
-        quota = self._share_of(old)
-        due = ExpiredSegments()
-        for run in runs:
-            goes: list[RecordingSegment] = []
-            for segment in run.segments:
-                is_old = segment.written < oldest and (due.old < quota or segment.is_stuck)
-                if not is_old and too_much <= 0:
+    def delete_expired(self, sessions: Sequence[RecordingSession]) -> None:
+        """Delete the expired segments of sessions, the oldest first; failures are logged and tried again."""
+        expired = self.expired(sessions)
+        failed: OSError | None = None
+        for session, segments in expired.segments:
+            try:
+                session.delete(segments)
+            except OSError as error:
+                failed = error
+        if failed is None:
+            self._log_deleted(expired)
+            self._failures.end()
+        elif (more := self._failures.record(failed.strerror or "")) is not None:
+            what = f"{failed.filename}: {failed.strerror or failed}{more}"
+            log.error("recording: cannot delete expired segments: %s; tried again each time", what)
+
+    def expired(self, sessions: Sequence[RecordingSession]) -> ExpiredSegments:
+        """Return what must be deleted of sessions that are sorted by age."""
+        oldest = self._now() - self._limits.keep_s
+        most = self._limits.most_mb * _MEGA
+        excess = sum(session.size for session in sessions) - (most - most / SEGMENTS_PER_DISK_QUOTA)
+        old = sum(it.written < oldest and not it.is_stuck for session in sessions for it in session.segments)
+        quota = self._quota(old)
+        expired = ExpiredSegments()
+        for session in sessions:
+            segments: list[RecordingSegment] = []
+            for segment in session.segments:
+                is_old = segment.written < oldest and (expired.too_old < quota or segment.is_stuck)
+                if not is_old and excess <= 0:
                     break
-                goes.append(segment)
+                segments.append(segment)
                 if segment.is_stuck:
-                    continue  # it is tried again, but may not be in the way of others
-                too_much -= segment.bytes
-                due.old += is_old
-                due.over += not is_old
-            due.segments.append((run, goes))
-        due.held = max(0, old - due.old - due.over)
-        return due
+                    continue  # it is tried again, but does not count: others must not wait for it
+                excess -= segment.bytes
+                expired.too_old += is_old
+                expired.beyond_size += not is_old
+            expired.segments.append((session, segments))
+        expired.postponed = max(0, old - expired.too_old - expired.beyond_size)
+        return expired
 
-    def tell(self, due: ExpiredSegments) -> None:
-        """Say in the log what has gone, and why."""
-        self._untold_old += due.old
-        self._untold_over += due.over
-        last = due.last
-        if last is None or (not due.held and self._now() - self._told_at < _TOLD_EVERY_S):
+    def _log_deleted(self, expired: ExpiredSegments) -> None:
+        self._unlogged_old += expired.too_old
+        self._unlogged_beyond_size += expired.beyond_size
+        last = expired.last
+        if last is None or (not expired.postponed and self._now() - self._logged_at < _LOG_EVERY_S):
             return
-        self._told_at = self._now()
-        run, segment = last
-        whys = [
-            f"{count} {why}"
-            for count, why in (
-                (self._untold_old, f"older than record.keep_s ({self._bounds.keep_s:.0f} s)"),
-                (self._untold_over, f"beyond record.most_mb ({self._bounds.most_mb:.0f} MB)"),
+        self._logged_at = self._now()
+        session, segment = last
+        reasons = [
+            f"{count} {reason}"
+            for count, reason in (
+                (self._unlogged_old, f"older than record.keep_s ({self._limits.keep_s:.0f} s)"),
+                (self._unlogged_beyond_size, f"beyond record.most_mb ({self._limits.most_mb:.0f} MB)"),
             )
             if count
         ]
-        self._untold_old = self._untold_over = 0
-        level = logging.WARNING if due.held else logging.INFO
-        later = f"; {due.held} more are too old and go in the next passes" if due.held else ""
-        text = "recording: took away the oldest segments, up to %s/%d: %s%s"
-        log.log(level, text, run.folder.name, segment.first, ", ".join(whys), later)
+        self._unlogged_old = self._unlogged_beyond_size = 0
+        level = logging.WARNING if expired.postponed else logging.INFO
+        count = expired.postponed
+        later = f"; {count} more are too old and are deleted in the next passes" if count else ""
+        text = "recording: deleted the oldest segments, up to %s/%d: %s%s"
+        log.log(level, text, session.folder.name, segment.first, ", ".join(reasons), later)
 
-    def _share_of(self, old: int) -> int:
-        """Say how many segments may go because of their age in this pass."""
-        if self._quota is None:
-            self._quota = max(_AT_LEAST, math.ceil(old / _PASSES))
-        quota = self._quota
+    def _quota(self, old: int) -> int:
+        """Return how many segments may be deleted because of their age in this pass."""
+        if self._segments_per_pass is None:
+            self._segments_per_pass = max(_MIN_SEGMENTS_PER_PASS, math.ceil(old / _PASSES))
+        quota = self._segments_per_pass
         if old <= quota:
-            self._quota = None
+            self._segments_per_pass = None
         return quota

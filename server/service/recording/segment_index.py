@@ -1,4 +1,4 @@
-"""What is recorded of one stream: pieces of the cameras' files, in order."""
+"""The index of one recorded stream: which frames are in which piece of which file, in order of pulses."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class IndexEntry:
         """The pulse after its last frame."""
         return self.first + self.frames
 
-    def goes_on_in(self, other: IndexEntry) -> bool:
-        """Tell whether the other one is the very next piece of the same file."""
+    def continues_in(self, other: IndexEntry) -> bool:
+        """Return whether the other entry is the next piece of the same file."""
         return (other.camera, other.file, other.offset, other.first) == (
             self.camera,
             self.file,
@@ -38,7 +38,7 @@ class IndexEntry:
 
 @dataclass(frozen=True, slots=True)
 class PulseRange:
-    """Frames of a stream without a hole: ``first … end - 1``."""
+    """The pulses ``first … end - 1`` of a stream, without a gap."""
 
     first: int
     end: int
@@ -46,7 +46,7 @@ class PulseRange:
 
 @dataclass(frozen=True, slots=True)
 class CameraRange:
-    """Frames of one camera that a stream has shown: ``first … end - 1``."""
+    """The pulses ``first … end - 1``, in which a stream shows one camera."""
 
     camera: str
     first: int
@@ -54,68 +54,68 @@ class CameraRange:
 
 
 class SegmentIndex:
-    """The stretches of one stream by pulse. One thread adds to it and takes away, others look."""
+    """The index entries of one stream by pulse. One thread adds and removes, others read."""
 
-    def __init__(self, stretches: Iterable[IndexEntry] = ()) -> None:
+    def __init__(self, entries: Iterable[IndexEntry] = ()) -> None:
         self._lock = threading.Lock()
-        self._stretches: list[IndexEntry] = []
-        for stretch in stretches:
-            self.add(stretch)
+        self._entries: list[IndexEntry] = []
+        for entry in entries:
+            self.add(entry)
 
     def add(self, new: IndexEntry) -> None:
-        """Add what follows all that is there; what goes on in the same file becomes one stretch."""
+        """Append an entry; one that continues the last in the same file is joined to it."""
         with self._lock:
-            last = self._stretches[-1] if self._stretches else None
-            if last is not None and last.goes_on_in(new):
-                self._stretches[-1] = replace(
+            last = self._entries[-1] if self._entries else None
+            if last is not None and last.continues_in(new):
+                self._entries[-1] = replace(
                     last, length=last.length + new.length, frames=last.frames + new.frames
                 )
             else:
-                self._stretches.append(new)
+                self._entries.append(new)
 
     def drop(self, files: Collection[int]) -> bool:
-        """Take away what is in these files; tell whether there was anything."""
+        """Remove the entries of segments, by first pulse; return whether there were any."""
         with self._lock:
-            before = len(self._stretches)
-            self._stretches = [it for it in self._stretches if it.file not in files]
-            return len(self._stretches) < before
+            before = len(self._entries)
+            self._entries = [entry for entry in self._entries if entry.file not in files]
+            return len(self._entries) < before
 
-    def drop_pieces(self, gone: Collection[tuple[str, int]]) -> bool:
-        """Take away what is in these cameras' files, of a camera and by first pulse; tell likewise."""
+    def drop_files(self, missing: Collection[tuple[str, int]]) -> bool:
+        """Remove the entries of files, by camera and first pulse; return whether there were any."""
         with self._lock:
-            before = len(self._stretches)
-            self._stretches = [it for it in self._stretches if (it.camera, it.file) not in gone]
-            return len(self._stretches) < before
+            before = len(self._entries)
+            self._entries = [it for it in self._entries if (it.camera, it.file) not in missing]
+            return len(self._entries) < before
 
     def at_or_after(self, pulse: int) -> IndexEntry | None:
-        """Give the stretch that holds a pulse, or the next one; None where nothing follows."""
+        """Return the entry that holds a pulse, or the next one; None if nothing follows."""
         with self._lock:
-            place = bisect_right(self._stretches, pulse, key=lambda it: it.end)
-            return self._stretches[place] if place < len(self._stretches) else None
+            place = bisect_right(self._entries, pulse, key=lambda entry: entry.end)
+            return self._entries[place] if place < len(self._entries) else None
 
     def before(self, pulse: int) -> IndexEntry | None:
-        """Give the last stretch that begins before a pulse; None where there is none."""
+        """Return the last entry that begins before a pulse; None if there is none."""
         with self._lock:
-            place = bisect_left(self._stretches, pulse, key=lambda it: it.first)
-            return self._stretches[place - 1] if place else None
+            place = bisect_left(self._entries, pulse, key=lambda entry: entry.first)
+            return self._entries[place - 1] if place else None
 
     def between(self, start: int, end: int) -> list[IndexEntry]:
-        """Give the stretches that hold some of the pulses ``start … end - 1``, in order."""
+        """Return the entries that hold any of the pulses ``start … end - 1``, in order."""
         with self._lock:
-            place = bisect_right(self._stretches, start, key=lambda it: it.end)
-            return [it for it in self._stretches[place:] if it.first < end]
+            place = bisect_right(self._entries, start, key=lambda entry: entry.end)
+            return [entry for entry in self._entries[place:] if entry.first < end]
 
     @property
     def all(self) -> tuple[IndexEntry, ...]:
-        """All stretches in order."""
+        """All entries in order."""
         with self._lock:
-            return tuple(self._stretches)
+            return tuple(self._entries)
 
 
-def merge_camera_ranges(found: Iterable[IndexEntry | CameraRange]) -> list[CameraRange]:
-    """Join what one camera shows on and on; in order, and of no frame two."""
+def merge_camera_ranges(ranges: Iterable[IndexEntry | CameraRange]) -> list[CameraRange]:
+    """Join adjacent ranges of one camera; return them in order and without overlap."""
     joined: list[CameraRange] = []
-    for it in sorted(found, key=lambda it: it.first):
+    for it in sorted(ranges, key=lambda it: it.first):
         last = joined[-1] if joined else None
         first = it.first if last is None else max(it.first, last.end)
         if first >= it.end:
@@ -127,10 +127,10 @@ def merge_camera_ranges(found: Iterable[IndexEntry | CameraRange]) -> list[Camer
     return joined
 
 
-def merge_pulse_ranges(stretches: Iterable[IndexEntry | PulseRange]) -> list[PulseRange]:
-    """Join what follows without a hole; in order, and nothing twice."""
+def merge_pulse_ranges(ranges: Iterable[IndexEntry | PulseRange]) -> list[PulseRange]:
+    """Join adjacent and overlapping ranges; return them in order."""
     joined: list[PulseRange] = []
-    for it in sorted(stretches, key=lambda it: it.first):
+    for it in sorted(ranges, key=lambda it: it.first):
         if joined and it.first <= joined[-1].end:
             joined[-1] = PulseRange(joined[-1].first, max(joined[-1].end, it.end))
         else:

@@ -1,4 +1,4 @@
-"""The segment that grows: a file per camera, the sound and the index beside them, and what refers to them."""
+"""Writes the segment in progress: a file per camera, the audio, the decisions, and the playlists' entries."""
 
 from __future__ import annotations
 
@@ -12,68 +12,68 @@ import msgspec
 
 from server.media.audio.audio_chunk import AudioChunk
 from server.messaging.messages import GopChoices
-from server.service.recording.audio_file import AUDIO_NAME as SOUND
 from server.service.recording.media_files import MediaFile, RecordedGop, is_same_file, write_at
 from server.service.recording.playlist_file import RecordingPlaylist
-from server.service.recording.recording_session import InitSegments, RecordingSegment, RecordingSession
+from server.service.recording.recording_session import RecordingSegment, RecordingSession
 from server.service.recording.segment_index import IndexEntry
+from server.service.recording.session_files import AUDIO, InitSegments
 from server.system.private_files import open_private
 
 
 class SegmentWriter:
-    """Takes GOP after GOP. Pictures and sound are written once, however many people they go with.
+    """Appends GOP after GOP. Pictures and audio are written once, however many persons refer to them.
 
     Raises:
         OSError: the disk does not take it; what was written before still plays.
     """
 
-    def __init__(self, run: RecordingSession, segment: RecordingSegment, headers: InitSegments) -> None:
+    def __init__(self, session: RecordingSession, segment: RecordingSegment, init: InitSegments) -> None:
         self.segment = segment
-        self._run, self._headers = run, headers
+        self._session, self._init = session, init
         self._files: dict[Path, MediaFile] = {}
-        self._grown: dict[str, RecordingPlaylist] = {}
-        self._index_path = run.index_file(segment.first)
+        self._playlists: dict[str, RecordingPlaylist] = {}
+        self._index_path = session.paths.index_file(segment.first)
         self._index = open_private(self._index_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
         self._index_bytes = 0
 
     @property
-    def grown(self) -> list[RecordingPlaylist]:
+    def playlists(self) -> list[RecordingPlaylist]:
         """The playlists that refer to this segment."""
-        return list(self._grown.values())
+        return list(self._playlists.values())
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is in it that could be found again."""
+        """Whether it holds nothing that could be played."""
         return not self._index_bytes and all(file.is_empty for file in self._files.values())
 
     def write(
-        self, choices: GopChoices, cameras: Mapping[str, RecordedGop], heard: AudioChunk | None, now: float
+        self, choices: GopChoices, cameras: Mapping[str, RecordedGop], audio: AudioChunk | None, now: float
     ) -> None:
-        """Write a GOP: pictures and sound first, then what is said about them, then people's references.
+        """Write a GOP: pictures and audio, then the decision, then the entries of persons' playlists.
 
         Raises:
             OSError: the disk does not take it.
         """
-        self._check_that_it_is_there()
+        self._check_files_exist()
         self.segment.written = now
-        if heard is not None and heard.frames:
-            self._write_sound(heard, choices)
-        whole: dict[str, IndexEntry] = {}
+        if audio is not None and audio.frames:
+            self._write_audio(audio, choices)
+        complete: dict[str, IndexEntry] = {}
         for camera, gop in cameras.items():
-            stretch = self._write_camera(camera, gop)
-            self._refer(self._run.cameras[camera], stretch)
-            if stretch.frames == choices.frames:
-                whole[camera] = stretch
+            entry = self._write_camera(camera, gop)
+            self._append_entry(self._session.cameras[camera], entry)
+            if entry.frames == choices.frames:
+                complete[camera] = entry
         self._write_index(msgspec.json.encode(choices) + b"\n")
         for number, camera in choices.choices.items():
-            if camera in whole:
-                self._refer(self._run.object(number), whole[camera])
+            if camera in complete:
+                self._append_entry(self._session.person(number), complete[camera])
 
     def close(self) -> None:
-        """Close the files; nothing stays of a segment that is empty.
+        """Close the files; an empty segment leaves none.
 
         Raises:
-            OSError: the disk did not take all of it; they are closed all the same.
+            OSError: the disk did not take all of it; the files are closed all the same.
         """
         with contextlib.ExitStack() as closing:
             if self.is_empty:
@@ -83,32 +83,32 @@ class SegmentWriter:
                 closing.callback(file.close)
 
     def _remove_index(self) -> None:
-        with contextlib.suppress(OSError):  # its folder may be gone, or closed
+        with contextlib.suppress(OSError):  # its folder may be removed, or not writable
             self._index_path.unlink(missing_ok=True)
 
-    def _check_that_it_is_there(self) -> None:
-        """See that the files were not removed under our hands: what is written to them would be lost."""
-        paths = [path for path, file in self._files.items() if not file.is_there]
+    def _check_files_exist(self) -> None:
+        """Raise if an open file was removed: what is written to it would be lost."""
+        paths = [path for path, file in self._files.items() if not file.exists]
         if not is_same_file(self._index, self._index_path):
             paths.append(self._index_path)
         if paths:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(paths[0]))
 
     def _write_camera(self, camera: str, gop: RecordedGop) -> IndexEntry:
-        path = self._run.camera_file(camera, self.segment.first)
-        offset, length = self._append(path, self._headers.pictures, gop)
+        path = self._session.paths.camera_file(camera, self.segment.first)
+        offset, length = self._append(path, self._init.pictures, gop)
         return IndexEntry(camera, self.segment.first, offset, length, gop.first, len(gop.fragments))
 
-    def _write_sound(self, heard: AudioChunk, choices: GopChoices) -> None:
-        """Write the sound of a GOP, which is referred to as if it were as long as the GOP."""
-        path = self._run.sound_file(self.segment.first)
-        gop = RecordedGop(choices.first, (heard.fragment,))
-        offset, length = self._append(path, self._headers.sound, gop)
-        stretch = IndexEntry(SOUND, self.segment.first, offset, length, choices.first, choices.frames)
-        self._refer(self._run.sound, stretch)
+    def _write_audio(self, audio: AudioChunk, choices: GopChoices) -> None:
+        """Write the audio of a GOP; its playlist entry has the GOP's duration."""
+        path = self._session.paths.audio_file(self.segment.first)
+        gop = RecordedGop(choices.first, (audio.fragment,))
+        offset, length = self._append(path, self._init.audio, gop)
+        entry = IndexEntry(AUDIO, self.segment.first, offset, length, choices.first, choices.frames)
+        self._append_entry(self._session.audio, entry)
 
     def _append(self, path: Path, header: bytes, gop: RecordedGop) -> tuple[int, int]:
-        """Append to a file, which begins with the header; give where it is: offset and length."""
+        """Append to a file, which begins with the header; return offset and length in bytes."""
         file = self._files.get(path)
         if file is None:
             file = self._files[path] = MediaFile(path, header)
@@ -126,6 +126,6 @@ class SegmentWriter:
         self._index_bytes += len(line)
         self.segment.bytes += len(line)
 
-    def _refer(self, playlist: RecordingPlaylist, stretch: IndexEntry) -> None:
-        playlist.append(stretch)
-        self._grown[str(playlist.path)] = playlist
+    def _append_entry(self, playlist: RecordingPlaylist, entry: IndexEntry) -> None:
+        playlist.append(entry)
+        self._playlists[str(playlist.path)] = playlist

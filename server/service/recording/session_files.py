@@ -1,31 +1,135 @@
-"""What of a run is on the disk: its folder may have been removed, closed, or be on a disk that is gone."""
+"""The files of one recording session: names, layout, and what is really on the disk.
+
+Pulses and person numbers may start again with the service, so every session has a folder of its own.
+
+=========================================  ================================================================
+``SESSION/session.json``                   :class:`SessionInfo`
+``SESSION/cameras/init.mp4``               the init segment of the cameras' files
+``SESSION/cameras/c0/000000001250.mp4``    a camera's frames from pulse 1250 on
+``SESSION/cameras/c0.m3u8``                the playlist of that camera
+``SESSION/sound/000000001250.mp4``         the site's audio from pulse 1250 on, and ``init.mp4``, likewise
+``SESSION/sound.m3u8``                     the playlist of the audio
+``SESSION/objects/3.m3u8``                 the best view of person 3
+``SESSION/index/000000001250.jsonl``       a line per GOP from pulse 1250 on: choices, boxes, cuts
+=========================================  ================================================================
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from server.service.recording.audio_file import AUDIO_NAME as SOUND
-from server.service.recording.playlist_file import CAMERA_PATTERN
+import msgspec
 
+from server.service.recording.playlist_file import CAMERA_PATTERN, file_name
+
+INFO_FILE = "session.json"
+INIT_FILE = "init.mp4"
+AUDIO = "sound"
+"""The folder of the audio, and what a reference to it has instead of a camera."""
 MISSING = (FileNotFoundError, NotADirectoryError, IsADirectoryError)
-"""What the system says of a file that is not there, or where something else has its name."""
-_MEDIA = re.compile(r"[0-9]{1,15}\.mp4")
-_OURS = re.compile(
-    rf"[0-9]{{1,15}}\.(mp4|jsonl|m3u8|new)|\.?run\.json|init\.mp4|{CAMERA_PATTERN}\.(m3u8|new)"
+"""The errors of a file that does not exist, or whose name something else has."""
+_MEDIA_NAME = re.compile(r"[0-9]{1,15}\.mp4")
+_SESSION_NAME = re.compile(
+    rf"[0-9]{{1,15}}\.(mp4|jsonl|m3u8|new)|\.?session\.json|init\.mp4|{CAMERA_PATTERN}\.(m3u8|new)"
 )
-"""Names of the files that are in a run's folder."""
+"""Names of the files in a session's folder."""
+_MAX_AGE_S = 1e12
+"""No clock has counted so far: a larger value is damaged."""
+
+CameraName = Annotated[str, msgspec.Meta(pattern=rf"^{CAMERA_PATTERN}\Z")]
+"""Camera names are part of paths: the pattern keeps a damaged file from leading out of the folder."""
+
+
+class SessionInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """The content of ``session.json``: what holds for a whole session."""
+
+    site: str
+    fps: Annotated[float, msgspec.Meta(ge=0.001, le=1000)]
+    width: int
+    height: int
+    codec: str
+    cameras: list[CameraName]
+    sound: str | None = None
+    """The codec of the audio; null: the site had none."""
+    started: float
+    """When the first GOP was written, unix seconds."""
+    pulse0: float | None
+    """When pulse 0 was due, unix seconds; null if not known."""
+    person_numbers_since: float | None = None
+    """When the person numbers began, unix seconds: sessions with the same value number persons alike."""
+    age_clock: str = ""
+    """The id of the age clock (:mod:`~server.service.recording.age_clock`)."""
+    age_clock_at_pulse0: Annotated[float, msgspec.Meta(ge=-_MAX_AGE_S, le=_MAX_AGE_S)] = 0.0
+    """The seconds of the age clock at pulse 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class InitSegments:
+    """The first bytes of a session's media files: ``ftyp`` and ``moov``."""
+
+    pictures: bytes
+    audio: bytes = b""
+    """Empty at a site without audio."""
+
+
+@dataclass(frozen=True, slots=True)
+class SessionPaths:
+    """Where the files of a session are."""
+
+    folder: Path
+    cameras: Sequence[str]
+
+    def camera_file(self, camera: str, first: int) -> Path:
+        """Return the file of a camera's frames from a pulse on."""
+        return self.folder / "cameras" / camera / file_name(first)
+
+    def audio_file(self, first: int) -> Path:
+        """Return the file of the audio from a pulse on."""
+        return self.folder / AUDIO / file_name(first)
+
+    def index_file(self, first: int) -> Path:
+        """Return the file of the decisions from a pulse on."""
+        return (self.folder / "index" / file_name(first)).with_suffix(".jsonl")
+
+    def segment_files(self, first: int) -> list[Path]:
+        """Return all files of a segment; there is none of a camera that was disconnected."""
+        cameras = (self.camera_file(camera, first) for camera in self.cameras)
+        return [*cameras, self.audio_file(first), self.index_file(first)]
+
+    def segment_starts(self) -> set[int]:
+        """Return the first pulses of the segments on the disk, from the names of their files."""
+        media = (*self.folder.glob("cameras/*/*.mp4"), *self.folder.glob(f"{AUDIO}/*.mp4"))
+        names = [path.stem for path in (*media, *self.folder.glob("index/*.jsonl"))]
+        return {int(name) for name in names if name.isdecimal()}
+
+    def camera_sizes(self) -> dict[str, dict[int, int]]:
+        """Return the sizes of the cameras' files, by camera and first pulse.
+
+        Raises:
+            OSError: a folder cannot be read.
+        """
+        return {camera: media_sizes(self.folder / "cameras" / camera) for camera in self.cameras}
+
+    def init_segments(self) -> InitSegments:
+        """Read the init segments; empty where there is none."""
+        return InitSegments(
+            _read(self.folder / "cameras" / INIT_FILE), _read(self.folder / AUDIO / INIT_FILE)
+        )
 
 
 def remove_session_files(folder: Path) -> None:
-    """Take away what a run has in a folder, and the folder if nothing else is in it; what is left stays."""
+    """Delete a session's files, and its folder if nothing else is in it; errors are passed over."""
     if folder.is_symlink():
         return
     for inside, folders, names in os.walk(folder, topdown=False):
         for name in names:
-            if _OURS.fullmatch(name):
+            if _SESSION_NAME.fullmatch(name):
                 with contextlib.suppress(OSError):
                     Path(inside, name).unlink()
         for name in folders:
@@ -36,27 +140,27 @@ def remove_session_files(folder: Path) -> None:
 
 
 def has_media(folder: Path) -> bool:
-    """Tell whether pictures or sound are in a folder that is laid out as a run."""
-    files = (*folder.glob("cameras/*/*.mp4"), *folder.glob(f"{SOUND}/*.mp4"))
-    return any(it.stem.isdecimal() for it in files)
+    """Return whether a folder with the layout of a session holds pictures or audio."""
+    files = (*folder.glob("cameras/*/*.mp4"), *folder.glob(f"{AUDIO}/*.mp4"))
+    return any(path.stem.isdecimal() for path in files)
 
 
 def media_sizes(folder: Path) -> dict[int, int]:
-    """Return the sizes of a folder's files, by the first pulse that they are named by.
+    """Return the sizes of a folder's media files, by first pulse.
 
     Raises:
-        OSError: it cannot be read.
+        OSError: the folder cannot be read.
     """
     try:
         with os.scandir(folder) as entries:
-            names = [(it.name, it) for it in entries if _MEDIA.fullmatch(it.name)]
-            return {int(name[:-4]): file_size(it) for name, it in names}
+            files = [entry for entry in entries if _MEDIA_NAME.fullmatch(entry.name)]
+            return {int(entry.name[:-4]): file_size(entry) for entry in files}
     except MISSING:
         return {}
 
 
 def identity_of(folder: Path) -> tuple[int, int] | None:
-    """Return what a folder is told by, whatever else gets its name: its disk and its number there."""
+    """Return the device and inode of a folder, which tell it from another of the same name."""
     try:
         status = folder.stat()
     except OSError:
@@ -65,7 +169,7 @@ def identity_of(folder: Path) -> tuple[int, int] | None:
 
 
 def is_missing(path: Path) -> bool:
-    """Tell whether there surely is no such file: where nobody can tell, there may be one."""
+    """Return whether a file certainly does not exist; False if that cannot be found out."""
     try:
         path.lstat()
     except MISSING:
@@ -76,8 +180,15 @@ def is_missing(path: Path) -> bool:
 
 
 def file_size(file: Path | os.DirEntry[str]) -> int:
-    """Return a file's size; 0 where there is none."""
+    """Return a file's size in bytes; 0 if there is none."""
     try:
         return file.stat().st_size
     except OSError:
         return 0
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError:  # mostly since the site had no audio
+        return b""

@@ -1,4 +1,4 @@
-"""What there is of a stream's past; days of it are not gone through to answer for one moment."""
+"""Which pulses of a stream can be played, from disk and memory, and whether their files still exist."""
 
 from __future__ import annotations
 
@@ -17,67 +17,76 @@ from server.service.time_shift.playback import PlaybackSource, SessionEntries
 
 
 def available_ranges(source: PlaybackSource, start: int = 0, end: int = sys.maxsize) -> list[PulseRange]:
-    """Say what there is of the pulses ``start … end - 1``, on the disk and in memory."""
-    found: list[IndexEntry | PulseRange] = [*_recorded(source, start, end)]
-    gop = source.recall(start)
+    """Return which of the pulses ``start … end - 1`` can be played, from the disk or from memory."""
+    ranges: list[IndexEntry | PulseRange] = [*_recorded(source, start, end)]
+    gop = source.gop_in_memory(start)
     while gop is not None and gop.first < end:
-        found.append(PulseRange(gop.first, gop.end))
-        gop = source.recall(gop.end)
-    return [replace(it, first=max(it.first, start), end=min(it.end, end)) for it in merge_pulse_ranges(found)]
+        ranges.append(PulseRange(gop.first, gop.end))
+        gop = source.gop_in_memory(gop.end)
+    return [
+        replace(it, first=max(it.first, start), end=min(it.end, end)) for it in merge_pulse_ranges(ranges)
+    ]
 
 
 def available_camera_ranges(
     source: PlaybackSource, start: int = 0, end: int = sys.maxsize
 ) -> list[CameraRange]:
-    """Say which cameras' frames they are, as far as they are known: on the disk, and after it in memory."""
-    remembered = [it for it in source.remembered if it.end > start and it.first < end]
-    found = merge_camera_ranges([*_recorded(source, start, end), *remembered])
-    return [replace(it, first=max(it.first, start), end=min(it.end, end)) for it in found]
+    """Return which cameras they show: of the entries on the disk, then of the decisions in memory."""
+    in_memory = [it for it in source.ranges_in_memory if it.end > start and it.first < end]
+    ranges = merge_camera_ranges([*_recorded(source, start, end), *in_memory])
+    return [replace(it, first=max(it.first, start), end=min(it.end, end)) for it in ranges]
 
 
 def first_available(source: PlaybackSource, pulse: int) -> int | None:
-    """Give the first pulse, this one or one after it, that something is kept of; None where nothing is."""
-    tapes = [it.first for one in source.recorded if (it := one.tape.at_or_after(pulse)) is not None]
-    gop = source.recall(pulse)
-    first = min([*tapes, *([] if gop is None else [gop.first])], default=None)
+    """Return the first pulse from this one on that can be played; None if there is none.
+
+    Only the ends of indexes are looked at: a recording may be days long.
+    """
+    firsts = [
+        it.first for recorded in source.recorded if (it := recorded.index.at_or_after(pulse)) is not None
+    ]
+    gop = source.gop_in_memory(pulse)
+    first = min([*firsts, *([] if gop is None else [gop.first])], default=None)
     return None if first is None else max(first, pulse)
 
 
 def end_of_available(source: PlaybackSource) -> int:
-    """Give the pulse after the last that is kept; 0 where nothing is."""
-    tapes = [it.end for one in source.recorded if (it := one.tape.before(sys.maxsize)) is not None]
-    gop = source.recall_before(sys.maxsize)
-    return max([*tapes, *([] if gop is None else [gop.end])], default=0)
+    """Return the pulse after the last that can be played; 0 if there is none."""
+    firsts = [
+        it.end for recorded in source.recorded if (it := recorded.index.before(sys.maxsize)) is not None
+    ]
+    gop = source.gop_in_memory_before(sys.maxsize)
+    return max([*firsts, *([] if gop is None else [gop.end])], default=0)
 
 
 def _recorded(source: PlaybackSource, start: int, end: int) -> Iterator[IndexEntry]:
-    for one in source.recorded:
-        yield from one.tape.between(start, end)
+    for recorded in source.recorded:
+        yield from recorded.index.between(start, end)
 
 
 def forget_missing_ends(source: PlaybackSource, start: int, end: int | None = None) -> None:
-    """See that the first and the last of what is recorded of ``start … end - 1`` are there, or forget them.
+    """Check the first and the last files of the pulses ``start … end - 1``; drop entries without a file.
 
-    So what is played begins with something. Whatever is missing in between is a hole like others.
+    So playback begins with a picture; what is missing in between is a gap like others.
 
     Raises:
-        OSError: nobody can tell: it may not be read, or the disk fails.
+        OSError: it cannot be ranges out: no permission, or the disk fails.
     """
-    for one in source.recorded:
-        ends = one.tape.at_or_after(start), one.tape.before(sys.maxsize if end is None else end)
-        _check(one, {it for it in ends if it is not None})
+    for recorded in source.recorded:
+        ends = recorded.index.at_or_after(start), recorded.index.before(sys.maxsize if end is None else end)
+        _check(recorded, {it for it in ends if it is not None})
 
 
 def forget_missing(source: PlaybackSource, start: int, end: int) -> None:
-    """See that all of what is recorded of ``start … end - 1`` is there, or forget what is not.
+    """Check all files of the pulses ``start … end - 1``; drop entries without a file.
 
     Raises:
-        OSError: nobody can tell.
+        OSError: it cannot be ranges out.
     """
-    for one in source.recorded:
-        _check(one, {(it.camera, it.file): it for it in one.tape.between(start, end)}.values())
+    for recorded in source.recorded:
+        _check(recorded, {(it.camera, it.file): it for it in recorded.index.between(start, end)}.values())
 
 
-def _check(one: SessionEntries, stretches: Iterable[IndexEntry]) -> None:
-    if not all(map(one.run.holds, stretches)):
-        one.run.forget_missing()
+def _check(recorded: SessionEntries, entries: Iterable[IndexEntry]) -> None:
+    if not all(map(recorded.session.has_file_of, entries)):
+        recorded.session.forget_missing()

@@ -1,4 +1,4 @@
-"""What was said about the past: who was where, and which camera showed whom."""
+"""Reads the recorded decisions: who was where, and which camera was chosen for whom."""
 
 from __future__ import annotations
 
@@ -15,47 +15,47 @@ from server.service.recording.recorder import Recorder
 
 @dataclass(frozen=True, slots=True)
 class LoggedDecision:
-    """What was said about one GOP."""
+    """The decision about one GOP."""
 
     choices: GopChoices
     is_numbered: bool = True
-    """Whether people's numbers in it are the same people's as now."""
+    """Whether its person numbers mean the same persons as now."""
     line: bytes | None = None
-    """As it is told; None: it is not on the disk yet."""
+    """Its line of JSON; None: it is not on the disk yet."""
 
 
-async def read_decisions(past: Recorder, start: int, end: int) -> AsyncIterator[LoggedDecision]:
-    """Return what was said about pulses ``start … end - 1``, in order."""
-    at, numbered = start, past.numbered
-    for run in past.runs:
-        name = run.folder.name.encode()
-        for path in run.index_of(at, end):
+async def read_decisions(recorder: Recorder, start: int, end: int) -> AsyncIterator[LoggedDecision]:
+    """Yield the decisions about pulses ``start … end - 1``, in order."""
+    at, same_persons = start, recorder.sessions_with_same_persons
+    for session in recorder.sessions:
+        name = session.folder.name.encode()
+        for path in session.index_files(at, end):
             for line, choices in await run_in_reader_thread(_lines, path, at, end):
-                if run in numbered:
+                if session in same_persons:
                     yield LoggedDecision(choices, line=line)
                 else:
                     yield LoggedDecision(choices, is_numbered=False, line=b'{"run":"%b",' % name + line[1:])
                 at = choices.first + choices.frames
-    for choices in past.recent.choices(at):
+    for choices in recorder.recent.choices(at):
         if choices.first < end:
             yield LoggedDecision(choices)
 
 
-async def read_decision_lines(past: Recorder, start: int, end: int) -> AsyncIterator[bytes]:
-    """Give the choices about pulses ``start … end - 1`` in order, each as a line of JSON (event ``gop``).
+async def read_decision_lines(recorder: Recorder, start: int, end: int) -> AsyncIterator[bytes]:
+    """Yield the decisions about pulses ``start … end - 1`` in order, each as a line of JSON (event ``gop``).
 
-    What an earlier run has said has that run's name in it, where its numbers are other people's.
+    Lines of an earlier session whose numbers mean other persons carry that session's name as ``run``.
     """
-    async for it in read_decisions(past, start, end):
+    async for it in read_decisions(recorder, start, end):
         yield msgspec.json.encode(it.choices) + b"\n" if it.line is None else it.line
 
 
 def _lines(path: Path, start: int, end: int) -> list[tuple[bytes, GopChoices]]:
-    """Read an index; a line that is not whole is being written now."""
-    found = []
+    """Read a decision file; an incomplete last line is being written now."""
+    lines = []
     try:
         data = path.read_bytes()
-    except OSError:  # retention has just taken it away, or it cannot be read
+    except OSError:  # deleted by retention, or not readable
         return []
     for line in data.splitlines(keepends=True):
         try:
@@ -63,5 +63,5 @@ def _lines(path: Path, start: int, end: int) -> list[tuple[bytes, GopChoices]]:
         except DECODE_ERRORS:
             continue
         if choices.first + choices.frames > start and choices.first < end:
-            found.append((line, choices))
-    return found
+            lines.append((line, choices))
+    return lines

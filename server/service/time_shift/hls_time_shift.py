@@ -1,6 +1,6 @@
-"""The past in segments (HLS), cut and numbered by pulses as the live ones are (`streams/reel.py`).
+"""Time shift by HLS: recorded segments, cut and numbered by pulses like the live ones.
 
-So a segment has one address, whether it is new or long past, and who plays the past comes to the present.
+So a segment has the same URL while it is live and later, and a player of the past reaches the present.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from server.service.time_shift.presence_history import visible_pictures
 
 @dataclass(frozen=True, slots=True)
 class SegmentList:
-    """Consecutive segments of ``frames`` pulses, as far as they are in ``first … until - 1``."""
+    """The segments of a playlist: ``frames`` pulses each, as far as they are in ``first … until - 1``."""
 
     numbers: range
     frames: int
@@ -31,105 +31,106 @@ class SegmentList:
     until: int
 
     def pulses_of(self, number: int) -> range:
-        """Give the pulses of one of them."""
+        """Return the pulses of a segment."""
         begin = number * self.frames
         return range(max(self.first, begin), min(self.until, begin + self.frames))
 
     @property
     def end(self) -> int:
-        """The pulse after the last segment's last."""
+        """The pulse after the last segment."""
         return self.pulses_of(self.numbers[-1]).stop
 
     def since(self, number: int) -> SegmentList:
-        """Leave out those before one."""
+        """Return the list without the segments before one."""
         return replace(self, numbers=range(max(number, self.numbers.start), self.numbers.stop))
 
 
 class TimeShift:
-    """One stream's past, in GOPs of ``gop`` pulses; ``timeline`` and ``hearing`` are asked for each segment.
+    """One stream's recorded segments; ``timeline`` and ``audio`` are made anew for each segment.
 
-    ``decided`` is the pulse after the newest that a segment can have; ``over``: nothing follows what is kept.
+    ``gop`` is the length of a GOP in pulses, ``decided`` the pulse after the newest decided one;
+    ``has_ended``: the stream gets no new pictures.
     """
 
     def __init__(
         self,
         source: PlaybackSource,
-        plan: SegmentLayout,
+        layout: SegmentLayout,
         timeline: Callable[[], GaplessTimeline],
-        hearing: Callable[[], PlaybackAudio | None],
+        audio: Callable[[], PlaybackAudio | None],
         *,
         gop: int,
         decided: int,
-        over: bool,
+        has_ended: bool,
     ) -> None:
-        self._source, self._plan, self._gop = source, plan, gop
-        self._timeline, self._hearing = timeline, hearing
-        self.over = over
-        self.end = min(decided, end_of_available(source)) if over else decided
-        """The pulse after the last that there is, or will ever be where it is over."""
+        self._source, self._layout, self._gop = source, layout, gop
+        self._timeline, self._audio = timeline, audio
+        self.has_ended = has_ended
+        self.end = min(decided, end_of_available(source)) if has_ended else decided
+        """The pulse after the last that can be played."""
 
-    def listing(self, start: int, end: int | None) -> SegmentList | None:
-        """List the segments from the one that holds pulse ``start``, or what is kept after it, to the end.
+    def segments(self, start: int, end: int | None) -> SegmentList | None:
+        """Return the segments from the one that holds pulse ``start``, or the first after it, to the end.
 
-        Only whole ones, and the last one where it is over. In between, the last picture stands where
-        nothing was shown: no number is left out. None where there is none.
+        Only complete ones, and the last one of a stream that has ended. No number is left out: in gaps the
+        last picture is repeated. None if there is no segment.
         """
-        frames = self._plan.segment_frames
+        frames = self._layout.segment_frames
         begin, earliest = first_available(self._source, start), first_available(self._source, 0)
         if begin is None or earliest is None:
             return None
-        last = -(-self.end // frames) if self.over else self.end // frames
+        last = -(-self.end // frames) if self.has_ended else self.end // frames
         last = last if end is None else min(last, -(-end // frames))
         numbers = range(begin // frames, last)
         return SegmentList(numbers, frames, earliest, self.end) if numbers else None
 
     async def segment(self, number: int) -> HlsSegment | None:
-        """Put a segment together; None where it is not whole yet, or nothing is kept of it or before it."""
-        first, until = number * self._plan.segment_frames, (number + 1) * self._plan.segment_frames
-        until = min(until, self.end) if self.over else until
+        """Return a segment; None if it is not complete yet, or there is no picture in or before it."""
+        first, until = number * self._layout.segment_frames, (number + 1) * self._layout.segment_frames
+        until = min(until, self.end) if self.has_ended else until
         if not first < until <= self.end:
             return None
         lead = await last_gop_before(self._source, first)
-        timeline, hearing = self._timeline(), self._hearing()
+        timeline, playback_audio = self._timeline(), self._audio()
         agreement = timeline.agreement
-        led = (
+        lead_pictures = (
             []
             if lead is None
-            else (await visible_pictures(lead, self._source, agreement, self._plan.fps)).pictures
+            else (await visible_pictures(lead, self._source, agreement, self._layout.fps)).pictures
         )
-        if led:  # as if it had been shown just now: what repeats it does not say how old it is
-            timeline.advance_past(replace(led[-1], pulse=first - 1))
-        came, heard_from = await self._came(first, until, agreement)
-        footage: list[MediaChunk] = []
+        if lead_pictures:  # as if it were shown just now: a repetition does not show how old it is
+            timeline.advance_past(replace(lead_pictures[-1], pulse=first - 1))
+        arrived, audible = await self._read(first, until, agreement)
+        chunks: list[MediaChunk] = []
         for begin in range(first, until, self._gop):
             end = min(begin + self._gop, until)
-            pictures = [it for one in came if begin <= one.pulse < end for it in timeline.push(one)]
+            pictures = [it for one in arrived if begin <= one.pulse < end for it in timeline.push(one)]
             pictures += timeline.fill(end)
             if pictures:
-                heard = None if hearing is None else await hearing.beside(begin, end)
-                if heard is not None and self._source.presence is not None and begin not in heard_from:
-                    heard = heard.silenced
-                footage.append(MediaChunk(pictures, self._plan.fps, ContinuityCounters(), audio=heard))
-        if not footage:
+                audio = None if playback_audio is None else await playback_audio.next_audio(begin, end)
+                if audio is not None and self._source.presence is not None and begin not in audible:
+                    audio = audio.silenced
+                chunks.append(MediaChunk(pictures, self._layout.fps, ContinuityCounters(), audio=audio))
+        if not chunks:
             return None
-        lead_footage = MediaChunk(led, self._plan.fps, ContinuityCounters()) if led else footage[0]
-        segment = HlsSegment(number, self._plan, lead_footage)
-        for it in footage:
+        lead_chunk = MediaChunk(lead_pictures, self._layout.fps, ContinuityCounters()) if lead_pictures else chunks[0]
+        segment = HlsSegment(number, self._layout, lead_chunk)
+        for it in chunks:
             segment.add(it)
         return segment
 
-    async def _came(
+    async def _read(
         self, first: int, until: int, agreement: StreamFormat
     ) -> tuple[list[EncodedPicture], frozenset[int]]:
-        """Give the pictures that there are of some pulses, and the first pulses of GOPs that may be heard."""
-        came: list[EncodedPicture] = []
-        heard_from: set[int] = set()
+        """Return the pictures of some pulses, and the first pulses of GOPs whose audio may be heard."""
+        arrived: list[EncodedPicture] = []
+        audible: set[int] = set()
         async with aclosing(play_gops(self._source, first)) as gops:
             async for gop in gops:
                 if gop.first >= until:
                     break
-                shown = await visible_pictures(gop, self._source, agreement, self._plan.fps)
-                came += shown.pictures
-                if not shown.silent:
-                    heard_from.add(gop.first)
-        return came, frozenset(heard_from)
+                shown = await visible_pictures(gop, self._source, agreement, self._layout.fps)
+                arrived += shown.pictures
+                if not shown.is_muted:
+                    audible.add(gop.first)
+        return arrived, frozenset(audible)

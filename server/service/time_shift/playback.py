@@ -1,4 +1,4 @@
-"""Playing the past: GOP after GOP from the disk and from memory, up to the present."""
+"""Playback of recorded recorded stream: GOP after GOP, from the disk and from memory, up to the present."""
 
 from __future__ import annotations
 
@@ -14,38 +14,38 @@ from server.service.recording.recording_session import RecordingSession
 from server.service.recording.segment_index import CameraRange, IndexEntry, SegmentIndex
 from server.service.time_shift.presence_history import PresenceHistory
 
-_AT_ONCE = 8
-"""GOPs read from the disk in one go."""
+_GOPS_PER_READ = 8
+"""GOPs read from the disk in recorded call."""
 
 
 @dataclass(frozen=True, slots=True)
 class SessionEntries:
-    """What a run has recorded of a stream."""
+    """The index of a stream in recorded session."""
 
-    run: RecordingSession
-    tape: SegmentIndex
+    session: RecordingSession
+    index: SegmentIndex
 
 
 class PlaybackSource(Protocol):
-    """One stream's past."""
+    """One stream that can be played, on the disk and in memory."""
 
     @property
     def presence(self) -> PresenceHistory | None:
-        """What it is shown by to who may see one person alone; None: all of it is shown."""
+        """Decides what a viewer with access to one person is shown; None: everything is shown."""
 
     @property
     def recorded(self) -> Sequence[SessionEntries]:
-        """What there is of it on the disk."""
+        """Its indexes on the disk, by session."""
 
-    def recall(self, pulse: int) -> RecordedGop | None:
-        """Give the GOP in memory that holds a pulse, or the next one; None where nothing follows."""
+    def gop_in_memory(self, pulse: int) -> RecordedGop | None:
+        """Return the GOP in memory that holds a pulse, or the next one; None if nothing follows."""
 
-    def recall_before(self, pulse: int) -> RecordedGop | None:
-        """Give the last GOP in memory that ends before a pulse; None where there is none."""
+    def gop_in_memory_before(self, pulse: int) -> RecordedGop | None:
+        """Return the last GOP in memory that ends before a pulse; None if there is none."""
 
     @property
-    def remembered(self) -> Sequence[CameraRange]:
-        """What it shows in memory, by camera."""
+    def ranges_in_memory(self) -> Sequence[CameraRange]:
+        """The ranges in memory, by camera."""
 
     @property
     def end(self) -> int:
@@ -54,40 +54,42 @@ class PlaybackSource(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class PersonPlayback:
-    """Somebody's past. ``numbers``: theirs now, and the one that was asked for."""
+    """A person's best view. ``numbers``: the present one, and the one of the request if it was merged."""
 
-    past: Recorder
+    recorder: Recorder
     numbers: tuple[int, ...]
     presence: PresenceHistory | None = None
     """As of :class:`PlaybackSource`."""
 
     @property
     def recorded(self) -> Sequence[SessionEntries]:
-        """What there is of them on the disk: of no run whose numbers are other people's."""
+        """The person's indexes on the disk, of sessions in which numbers mean the same persons."""
         return [
-            SessionEntries(run, run.objects[number].tape)
-            for run in self.past.numbered
+            SessionEntries(session, session.objects[number].index)
+            for session in self.recorder.sessions_with_same_persons
             for number in self.numbers
-            if number in run.objects
+            if number in session.objects
         ]
 
-    def recall(self, pulse: int) -> RecordedGop | None:
-        """Give their GOP in memory that holds a pulse, or the next one."""
-        found = [gop for it in self.numbers if (gop := self.past.recent.of_object(it, pulse)) is not None]
-        return min(found, key=lambda gop: gop.first, default=None)
+    def gop_in_memory(self, pulse: int) -> RecordedGop | None:
+        """Return the person's GOP in memory that holds a pulse, or the next one."""
+        candidates = [
+            gop for it in self.numbers if (gop := self.recorder.recent.of_person(it, pulse)) is not None
+        ]
+        return min(candidates, key=lambda gop: gop.first, default=None)
 
-    def recall_before(self, pulse: int) -> RecordedGop | None:
-        """Give their last GOP in memory that ends before a pulse."""
-        recent = self.past.recent
-        found = [gop for it in self.numbers if (gop := recent.of_object_before(it, pulse)) is not None]
-        return max(found, key=lambda gop: gop.first, default=None)
+    def gop_in_memory_before(self, pulse: int) -> RecordedGop | None:
+        """Return the person's last GOP in memory that ends before a pulse."""
+        recent = self.recorder.recent
+        candidates = [gop for it in self.numbers if (gop := recent.of_person_before(it, pulse)) is not None]
+        return max(candidates, key=lambda gop: gop.first, default=None)
 
     @property
-    def remembered(self) -> Sequence[CameraRange]:
-        """What was chosen for them, as far as it is remembered."""
+    def ranges_in_memory(self) -> Sequence[CameraRange]:
+        """The cameras chosen for the person, as far as in memory."""
         return [
             CameraRange(it.choices[number], it.first, it.first + it.frames)
-            for it in self.past.recent.choices(0)
+            for it in self.recorder.recent.choices(0)
             for number in self.numbers
             if number in it.choices
         ]
@@ -95,84 +97,89 @@ class PersonPlayback:
     @property
     def end(self) -> int:
         """The pulse after the newest decided frame."""
-        return self.past.recent.end
+        return self.recorder.recent.end
 
 
 @dataclass(frozen=True, slots=True)
 class CameraPlayback:
-    """A camera's past."""
+    """A camera's stream."""
 
-    past: Recorder
+    recorder: Recorder
     camera: str
     presence: None = None
 
     @property
     def recorded(self) -> Sequence[SessionEntries]:
-        """What there is of it on the disk, also of earlier runs by the same pulses."""
-        runs = [run for run in self.past.runs if self.camera in run.cameras]
-        return [SessionEntries(run, run.cameras[self.camera].tape) for run in runs]
+        """Its indexes on the disk, also of earlier sessions of the same pulses."""
+        sessions = [session for session in self.recorder.sessions if self.camera in session.cameras]
+        return [SessionEntries(session, session.cameras[self.camera].index) for session in sessions]
 
-    def recall(self, pulse: int) -> RecordedGop | None:
-        """Give its GOP in memory that holds a pulse, or the next one, as far as it has come."""
-        return self.past.recent.of_camera(self.camera, pulse)
+    def gop_in_memory(self, pulse: int) -> RecordedGop | None:
+        """Return its GOP in memory that holds a pulse, or the next one, as far as it has arrived."""
+        return self.recorder.recent.of_camera(self.camera, pulse)
 
-    def recall_before(self, pulse: int) -> RecordedGop | None:
-        """Give its last GOP in memory that ends before a pulse."""
-        return self.past.recent.of_camera_before(self.camera, pulse)
+    def gop_in_memory_before(self, pulse: int) -> RecordedGop | None:
+        """Return its last GOP in memory that ends before a pulse."""
+        return self.recorder.recent.of_camera_before(self.camera, pulse)
 
     @property
-    def remembered(self) -> Sequence[CameraRange]:
-        """What it delivered, as far as it is in memory."""
-        found = []
-        gop = self.recall(0)
+    def ranges_in_memory(self) -> Sequence[CameraRange]:
+        """What has arrived from it, as far as in memory."""
+        candidates = []
+        gop = self.gop_in_memory(0)
         while gop is not None:
-            found.append(CameraRange(self.camera, gop.first, gop.end))
-            gop = self.recall(gop.end)
-        return found
+            candidates.append(CameraRange(self.camera, gop.first, gop.end))
+            gop = self.gop_in_memory(gop.end)
+        return candidates
 
     @property
     def end(self) -> int:
         """The pulse after its newest frame."""
-        return self.past.recent.end_of_camera(self.camera)
+        return self.recorder.recent.end_of_camera(self.camera)
 
 
-def recorded_audio(past: Recorder) -> Sequence[SessionEntries]:
-    """Say what there is of the site's sound on the disk."""
-    return [SessionEntries(run, run.sound.tape) for run in past.sounding]
+def recorded_audio(recorder: Recorder) -> Sequence[SessionEntries]:
+    """Return the indexes of the site's audio on the disk."""
+    return [SessionEntries(session, session.audio.index) for session in recorder.sessions_with_same_audio]
 
 
 async def play_gops(source: PlaybackSource, start: int) -> AsyncGenerator[RecordedGop, None]:
-    """Give the GOPs from the one that holds pulse ``start`` to the newest; nothing is given twice.
+    """Yield the GOPs from the recorded that holds pulse ``start`` to the newest, each once.
 
-    Between its last GOP and its end nothing is awaited: whoever joins the stream at once misses nothing.
+    Nothing is awaited between the last GOP and the end: a caller that then subscribes to the live stream
+    misses nothing.
     """
     at = start
-    fresh = True
+    is_first = True
     while True:
         on_disk = _next_on_disk(source, at)
-        gop = source.recall(at)
+        gop = source.gop_in_memory(at)
         if gop is not None and (on_disk is None or gop.first <= max(at, on_disk[1].first)):
-            yield gop if fresh else _from(gop, at)
-            at, fresh = gop.end, False
+            yield gop if is_first else _rest_of(gop, at)
+            at, is_first = gop.end, False
         elif on_disk is not None:
-            run, stretch = on_disk
-            async with contextlib.aclosing(_read(run, stretch, at)) as reading:
+            session, entry = on_disk
+            async with contextlib.aclosing(_read(session, entry, at)) as reading:
                 async for gop in reading:
                     yield gop
-                    at, fresh = gop.end, False
-            at = max(at, stretch.end)  # also where retention has just taken the file away
+                    at, is_first = gop.end, False
+            at = max(at, entry.end)  # also if retention has just deleted the file
         else:
             return
 
 
 async def last_gop_before(source: PlaybackSource, pulse: int) -> RecordedGop | None:
-    """Give the last GOP that begins before a pulse, up to there; None where nothing is kept of that time."""
-    found = [(one.run, it) for one in source.recorded if (it := one.tape.before(pulse)) is not None]
-    run, stretch = max(found, key=lambda it: it[1].first, default=(None, None))
-    gop = source.recall_before(pulse)
-    if run is None or stretch is None or (gop is not None and gop.end >= min(stretch.end, pulse)):
+    """Return the last GOP that begins before a pulse, cut there; None if there is none."""
+    candidates = [
+        (recorded.session, it)
+        for recorded in source.recorded
+        if (it := recorded.index.before(pulse)) is not None
+    ]
+    session, entry = max(candidates, key=lambda it: it[1].first, default=(None, None))
+    gop = source.gop_in_memory_before(pulse)
+    if session is None or entry is None or (gop is not None and gop.end >= min(entry.end, pulse)):
         return gop
-    async with contextlib.aclosing(_read(run, stretch, min(stretch.end, pulse) - 1)) as reading:
+    async with contextlib.aclosing(_read(session, entry, min(entry.end, pulse) - 1)) as reading:
         async for last in reading:
             if gop is None or last.first > gop.first:
                 return RecordedGop(last.first, last.fragments[: pulse - last.first])
@@ -180,32 +187,36 @@ async def last_gop_before(source: PlaybackSource, pulse: int) -> RecordedGop | N
 
 
 def _next_on_disk(source: PlaybackSource, pulse: int) -> tuple[RecordingSession, IndexEntry] | None:
-    found = [(one.run, it) for one in source.recorded if (it := one.tape.at_or_after(pulse)) is not None]
-    return min(found, key=lambda it: max(it[1].first, pulse), default=None)
+    candidates = [
+        (recorded.session, it)
+        for recorded in source.recorded
+        if (it := recorded.index.at_or_after(pulse)) is not None
+    ]
+    return min(candidates, key=lambda it: max(it[1].first, pulse), default=None)
 
 
-def _from(gop: RecordedGop, pulse: int) -> RecordedGop:
-    """Leave out what has been given already of a GOP that was not whole yet."""
+def _rest_of(gop: RecordedGop, pulse: int) -> RecordedGop:
+    """Return the rest of a GOP of which the frames before a pulse were yielded already."""
     return RecordedGop(max(gop.first, pulse), gop.fragments[max(0, pulse - gop.first) :])
 
 
-async def _read(run: RecordingSession, stretch: IndexEntry, pulse: int) -> AsyncGenerator[RecordedGop, None]:
-    path = run.camera_file(stretch.camera, stretch.file)
-    reading = read_gops(path, stretch.offset, stretch.length, run.head.fps, pulse)
+async def _read(
+    session: RecordingSession, entry: IndexEntry, pulse: int
+) -> AsyncGenerator[RecordedGop, None]:
+    path = session.paths.camera_file(entry.camera, entry.file)
+    reading = read_gops(path, entry.offset, entry.length, session.info.fps, pulse)
     try:
-        while some := await run_in_reader_thread(_some, reading, pulse):
+        while some := await run_in_reader_thread(_read_some, reading, pulse):
             for gop in some:
                 yield gop
     finally:
-        with contextlib.suppress(
-            ValueError
-        ):  # whoever left did so while it was being read: it closes by itself
+        with contextlib.suppress(ValueError):  # cancelled during a read in the thread: it closes by itself
             reading.close()
 
 
-def _some(reading: Generator[RecordedGop, None, None], pulse: int) -> list[RecordedGop]:
-    """Read some GOPs that end after a pulse; none where there are no more, or they cannot be read."""
+def _read_some(reading: Generator[RecordedGop, None, None], pulse: int) -> list[RecordedGop]:
+    """Read some GOPs that end after a pulse; none at the end, or if they cannot be read."""
     try:
-        return list(islice((gop for gop in reading if gop.end > pulse), _AT_ONCE))
+        return list(islice((gop for gop in reading if gop.end > pulse), _GOPS_PER_READ))
     except OSError:
         return []

@@ -1,12 +1,15 @@
-"""What one viewer of the past hears: unbroken from the first picture on, whatever is shown of it."""
+"""The audio of entries time-shift stream: gapless from the first picture on, from memory or the disk."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from io import BufferedReader
+from itertools import accumulate, pairwise
+from pathlib import Path
 
 from server.media.audio.audio_chunk import AudioChunk
 from server.media.audio.audio_format import AudioFormat
-from server.service.recording.audio_file import read_audio_frames
 from server.service.recording.media_files import run_in_reader_thread
 from server.service.recording.segment_index import IndexEntry
 from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
@@ -15,10 +18,10 @@ from server.service.time_shift.playback import SessionEntries
 
 
 class PlaybackAudio:
-    """Finds sound in memory, else on the disk; what was not kept is silent, what may come yet is waited for.
+    """Finds audio in memory, else on the disk; missing audio is silent, late audio is waited for.
 
-    ``recorded`` gives what there is on the disk, ``now`` the pulse after the newest frame of the pictures;
-    without it nothing is waited for.
+    ``recorded`` returns what is on the disk, ``now`` the pulse after the newest picture; without it no audio
+    is waited for.
     """
 
     def __init__(
@@ -27,17 +30,17 @@ class PlaybackAudio:
         recorded: Callable[[], Sequence[SessionEntries]],
         now: Callable[[], int] | None = None,
     ) -> None:
-        self._shelf, self._recorded, self._now = buffer, recorded, now
+        self._buffer, self._recorded, self._now = buffer, recorded, now
         self._next: int | None = None
-        self._live: AudioFollower | None = None
+        self._follower: AudioFollower | None = None
 
-    async def beside(self, first: int, until: int) -> AudioChunk:
-        """Give what follows what was heard, now that the pulses ``first … until - 1`` are shown."""
-        buffer = self._shelf
+    async def next_audio(self, first: int, until: int) -> AudioChunk:
+        """Return the next audio frames, as the pulses ``first … until - 1`` are shown."""
+        buffer = self._buffer
         form = buffer.format
         begin, end = form.frame_at(first, buffer.fps), form.frame_at(until, buffer.fps)
         longest = form.frame_at(round(LONGEST_GAP_S * buffer.fps), buffer.fps)
-        if self._next is None or begin > self._next + longest:  # nor is such a hole bridged by pictures
+        if self._next is None or begin > self._next + longest:  # pictures do not fill such a gap either
             self._next = begin
         begin = self._next
         late = end if self._now is None else form.frame_at(self._now(), buffer.fps) - buffer.max_late_frames
@@ -46,29 +49,88 @@ class PlaybackAudio:
         if missing and (recorded := self._recorded()):
             frames |= await run_in_reader_thread(self._read, recorded, missing[0], missing[-1] + 1)
         self._next = next((it for it in missing if it >= late and frames[it] is None), max(begin, end))
-        heard = (frames[number] or form.silence for number in range(begin, self._next))
-        return AudioChunk(begin, tuple(heard), form)
+        audio = (frames[number] or form.silence for number in range(begin, self._next))
+        return AudioChunk(begin, tuple(audio), form)
 
     def live(self, first: int, until: int) -> AudioChunk:
-        """Go on with the present: nothing is looked up any more."""
-        if self._live is None:
-            self._live = AudioFollower(self._shelf, self._next)
-        return self._live.next_audio(first, until)
+        """Return the next audio frames of the live stream: nothing is read from the disk any more."""
+        if self._follower is None:
+            self._follower = AudioFollower(self._buffer, self._next)
+        return self._follower.next_audio(first, until)
 
     def _read(self, recorded: Sequence[SessionEntries], begin: int, end: int) -> dict[int, bytes]:
-        form, fps = self._shelf.format, self._shelf.fps
-        found: dict[int, bytes] = {}
-        for one in recorded:
-            for it in one.tape.between(*form.pulses(begin, end, fps)):
-                found |= _frames_of(one, it, begin, end, form)
-        return found
+        form, fps = self._buffer.format, self._buffer.fps
+        frames: dict[int, bytes] = {}
+        for recording in recorded:
+            for it in recording.index.between(*form.pulses(begin, end, fps)):
+                frames |= _frames_of(recording, it, begin, end, form)
+        return frames
 
 
 def _frames_of(
-    recorded: SessionEntries, stretch: IndexEntry, begin: int, end: int, form: AudioFormat
+    recorded: SessionEntries, entry: IndexEntry, begin: int, end: int, form: AudioFormat
 ) -> dict[int, bytes]:
-    path = recorded.run.sound_file(stretch.file)
+    path = recorded.session.paths.audio_file(entry.file)
     try:
-        return read_audio_frames(path, stretch.offset, stretch.length, begin, end, form)
-    except OSError:  # retention has just taken it away, or it cannot be read: it is silent
+        return read_audio_frames(path, entry.offset, entry.length, begin, end, form)
+    except OSError:  # deleted by retention, or not readable: silent
         return {}
+
+
+_HEAD = 8
+"""Bytes of a box's size and type."""
+
+
+def read_audio_frames(
+    path: Path, offset: int, length: int, begin: int, end: int, form: AudioFormat
+) -> dict[int, bytes]:
+    """Read the frames ``begin … end - 1``, as far as they are in a piece of an audio file.
+
+    Frames are numbered by their samples (:mod:`server.media.audio.audio_format`), the time of a fragment: so
+    they are found by number, whatever was shown meanwhile.
+
+    Raises:
+        OSError: the file cannot be read: retention may have deleted it.
+    """
+    frames: dict[int, bytes] = {}
+    with path.open("rb") as file:
+        for sample, sizes, at in _fragments(file, offset, offset + length):
+            number = sample // form.samples
+            if number >= end:
+                break
+            if number + len(sizes) <= begin:
+                continue
+            file.seek(at)
+            data = file.read(sum(sizes))
+            edges = pairwise(accumulate(sizes, initial=0))
+            frames |= {number + place: data[edge:until] for place, (edge, until) in enumerate(edges)}
+    return {number: data for number, data in frames.items() if begin <= number < end}
+
+
+def _fragments(file: BufferedReader, at: int, end: int) -> Iterator[tuple[int, tuple[int, ...], int]]:
+    """Yield each fragment's first sample, the sizes of its frames, and their offset."""
+    moof = b""
+    while at + _HEAD <= end:
+        file.seek(at)
+        head = file.read(_HEAD)
+        if len(head) < _HEAD:
+            return
+        size, box_type = struct.unpack(">I4s", head)
+        if not _HEAD <= size <= end - at:
+            return
+        if box_type == b"moof":
+            moof = file.read(size - _HEAD)
+        elif box_type == b"mdat" and (times := _times_of(moof)) is not None and sum(times[1]) <= size - _HEAD:
+            yield *times, at + _HEAD
+        at += size
+
+
+def _times_of(moof: bytes) -> tuple[int, tuple[int, ...]] | None:
+    """Return the first sample of a fragment and the sizes of its frames; None if it is damaged."""
+    try:
+        (sample,) = struct.unpack_from(">Q", moof, moof.index(b"tfdt") + 8)
+        at = moof.index(b"trun") + 8
+        (count,) = struct.unpack_from(">I", moof, at)
+        return sample, struct.unpack_from(f">{count}I", moof, at + 8)
+    except (ValueError, struct.error):
+        return None

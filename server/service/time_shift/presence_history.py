@@ -1,4 +1,4 @@
-"""Whether somebody had been seen lately, at any moment of the past: for who may see that person alone."""
+"""Whether a person had been seen lately at a time in the recorder: for viewers with access to that person alone."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
     from server.service.time_shift.playback import PlaybackSource
 
 _AHEAD_S = 60.0
-"""So much more is read than is asked for: as a rule, the next moment is asked for next."""
+"""How far ahead decisions are read: playback asks for the following time next."""
 
 
 class PresenceHistory:
-    """Says it by what was said about GOPs when they were decided; lately is ``unseen`` frames before."""
+    """Looks up recorded decisions; "lately" is within ``unseen`` frames before."""
 
-    def __init__(self, past: Recorder, numbers: tuple[int, ...], unseen: int, fps: float) -> None:
-        self._past, self._numbers, self._unseen = past, numbers, unseen
+    def __init__(self, recorder: Recorder, numbers: tuple[int, ...], unseen: int, fps: float) -> None:
+        self._recorder, self._numbers, self._unseen = recorder, numbers, unseen
         self._ahead = round(_AHEAD_S * fps)
         self._known = range(0)
         self._seen: list[int] = []
-        """Of each known GOP, the last frame in which some camera saw the person, in order."""
+        """By known GOP, the last frame in which a camera saw the person, in order."""
 
     async def had_been_seen(self, first: int, end: int) -> bool:
-        """Tell whether some camera saw the person in the pulses ``first … end - 1``, or lately before."""
+        """Return whether a camera saw the person in the pulses ``first … end - 1``, or lately before."""
         begin = max(0, first - self._unseen)
         if begin < self._known.start or end > self._known.stop:
             await self._read(begin, end)
@@ -39,10 +39,10 @@ class PresenceHistory:
         return place < len(self._seen) and self._seen[place] < end
 
     async def _read(self, begin: int, end: int) -> None:
-        decided = self._past.recent.end
+        decided = self._recorder.recent.end
         until = max(end, min(end + self._ahead, decided))
         seen: list[int] = []
-        async for it in read_decisions(self._past, begin, until):
+        async for it in read_decisions(self._recorder, begin, until):
             if it.is_numbered:
                 last = last_seen_offsets(it.choices.boxes)
                 seen += [it.choices.first + last[number] for number in self._numbers if number in last]
@@ -51,18 +51,18 @@ class PresenceHistory:
 
 @dataclass(frozen=True, slots=True)
 class VisiblePictures:
-    """Some pictures of the past, as somebody may see them."""
+    """Recorded pictures as the viewer may see them."""
 
     pictures: list[EncodedPicture]
-    silent: bool
-    """Whether nothing may be heard meanwhile."""
+    is_muted: bool
+    """Whether the audio must be muted."""
 
 
 async def visible_pictures(
     gop: RecordedGop, source: PlaybackSource, agreement: StreamFormat, fps: float
 ) -> VisiblePictures:
-    """Return a GOP's pictures, or grey ones, if there are any, where the person had not been seen lately."""
+    """Return a GOP's pictures; gray ones, if there are any, where the person had not been seen lately."""
     pictures, presence = pictures_of_gop(gop, agreement), source.presence
     if presence is None or await presence.had_been_seen(gop.first, gop.end):
-        return VisiblePictures(pictures, silent=False)
-    return VisiblePictures(agreement.blank(pictures[0], gop.first, gop.end - gop.first, fps), silent=True)
+        return VisiblePictures(pictures, is_muted=False)
+    return VisiblePictures(agreement.blank(pictures[0], gop.first, gop.end - gop.first, fps), is_muted=True)

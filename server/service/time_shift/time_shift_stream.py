@@ -1,4 +1,4 @@
-"""A stream that begins in the past: paced as it was, and the live stream from where it meets the present."""
+"""A continuous stream that begins in the past: played at its own rate, then the live stream."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from server.service.time_shift.playback_audio import PlaybackAudio
 from server.service.time_shift.presence_history import VisiblePictures, visible_pictures
 
 _LEAD_S = 4.0
-"""Seconds of the past that are sent at once: what a player likes to have before it begins."""
-_BRIDGED_S = 4.0
-"""A hole is bridged so many seconds at a time."""
+"""Seconds that are sent at once: what a player buffers before it starts."""
+_FILL_STEP_S = 4.0
+"""A gap is filled so many seconds at a time."""
 _LATE_S = 1.0
-"""Seconds for which pictures of a time that is decided may still come."""
+"""Seconds for which pictures of a decided time may still arrive."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlaybackRange:
-    """What somebody wants to see: pulses ``start … end - 1``; without an end it goes on with the present."""
+    """The requested pulses ``start … end - 1``; without an end, the live stream follows."""
 
     start: int
     end: int | None = None
 
 
 class TimeShiftStream:
-    """One viewer's stream, without a hole in its time.
+    """One subscriber's stream, without a gap in its time.
 
-    ``live`` gives the stream's channel when the present is reached; None: there is none any more. ``hearing``
-    is None at a site without sound.
+    ``live`` returns the live stream when the present is reached; None: it has ended. ``audio`` is None at a
+    site without audio.
     """
 
     def __init__(
@@ -45,98 +45,102 @@ class TimeShiftStream:
         timeline: GaplessTimeline,
         fps: float,
         live: Callable[[], Broadcaster | None],
-        hearing: PlaybackAudio | None = None,
+        audio: PlaybackAudio | None = None,
     ) -> None:
         self._source, self._timeline, self._fps, self._live = source, timeline, fps, live
-        self._hearing = hearing
-        self._tally = TsContinuity(fps)
+        self._audio = audio
+        self._ts = TsContinuity(fps)
 
-    async def send(self, wish: PlaybackRange) -> AsyncGenerator[MediaChunk, None]:
-        """Give the past in real time after its first seconds; where it has an end, as fast as it is read."""
-        at, pace = wish.start, _RealTimePacer(_LEAD_S)
-        async with aclosing(play_gops(self._source, wish.start)) as gops:
+    async def send(self, requested: PlaybackRange) -> AsyncGenerator[MediaChunk, None]:
+        """Yield the chunks, in real time after the first seconds; as fast as possible if there is an end."""
+        at, pace = requested.start, _RealTimePacer(_LEAD_S)
+        async with aclosing(play_gops(self._source, requested.start)) as gops:
             async for gop in gops:
-                if wish.end is not None and gop.first >= wish.end:
+                if requested.end is not None and gop.first >= requested.end:
                     return
-                came = await visible_pictures(gop, self._source, self._timeline.agreement, self._fps)
-                pictures = [it for it in came.pictures if wish.end is None or it.pulse < wish.end]
-                for shown in self._shown(VisiblePictures(pictures, came.silent)):
-                    footage = await self._recalled(shown)
-                    if wish.end is None:
-                        await pace.wait((footage.until - footage.first) / self._fps)
-                    yield footage
+                visible = await visible_pictures(gop, self._source, self._timeline.agreement, self._fps)
+                pictures = [
+                    it for it in visible.pictures if requested.end is None or it.pulse < requested.end
+                ]
+                for shown in self._decodable(VisiblePictures(pictures, visible.is_muted)):
+                    chunk = await self._recorded_chunk(shown)
+                    if requested.end is None:
+                        await pace.wait((chunk.until - chunk.first) / self._fps)
+                    yield chunk
                 at = gop.end
-        if wish.end is not None and max(at, self._source.end - _LATE_S * self._fps) >= wish.end:
-            return  # of that time nothing more will come
-        channel = self._live()
-        if channel is not None:  # nothing was awaited since the newest GOP: none can have come between
-            async with aclosing(self._joined(channel, at, wish.end)) as joined:
-                async for footage in joined:
-                    yield footage
+        if requested.end is not None and max(at, self._source.end - _LATE_S * self._fps) >= requested.end:
+            return  # no more pictures of that time will arrive
+        broadcaster = self._live()
+        if broadcaster is not None:  # nothing was awaited since the newest GOP: none is missed
+            async with aclosing(self._live_chunks(broadcaster, at, requested.end)) as joined:
+                async for chunk in joined:
+                    yield chunk
 
-    async def _joined(
-        self, channel: Broadcaster, at: int, end: int | None
+    async def _live_chunks(
+        self, broadcaster: Broadcaster, at: int, end: int | None
     ) -> AsyncGenerator[MediaChunk, None]:
-        viewer = channel.subscribe()
-        begun = False
+        subscriber = broadcaster.subscribe()
+        has_started = False
         try:
-            async for piece in viewer.chunks():
-                came = piece.pictures if isinstance(piece, MediaChunk) else ()
-                pictures = [it for it in came if begun or it.pulse >= at]
+            async for chunk in subscriber.chunks():
+                visible = chunk.pictures if isinstance(chunk, MediaChunk) else ()
+                pictures = [it for it in visible if has_started or it.pulse >= at]
                 if not pictures:
                     continue
-                over = end is not None and pictures[-1].until >= end
+                is_last = end is not None and pictures[-1].until >= end
                 pictures = [it for it in pictures if end is None or it.pulse < end]
-                if not begun and pictures:
-                    for shown in self._bridged(pictures[0].pulse):
-                        yield await self._recalled(shown)
-                    begun = True
+                if not has_started and pictures:
+                    for shown in self._filler(pictures[0].pulse):
+                        yield await self._recorded_chunk(shown)
+                    has_started = True
                 if pictures:
-                    yield self._present(pictures, silent=isinstance(piece, MediaChunk) and piece.is_muted)
-                if over:
+                    yield self._live_chunk(
+                        pictures, is_muted=isinstance(chunk, MediaChunk) and chunk.is_muted
+                    )
+                if is_last:
                     return
         finally:
-            channel.unsubscribe(viewer)
+            broadcaster.unsubscribe(subscriber)
 
-    def _shown(self, gop: VisiblePictures) -> Iterator[VisiblePictures]:
-        """Give a GOP's pictures as they can be shown, behind what repeats the picture before them."""
+    def _decodable(self, gop: VisiblePictures) -> Iterator[VisiblePictures]:
+        """Yield a GOP's decodable pictures, behind the filler of a gap before them."""
         if not gop.pictures:
             return
-        yield from self._bridged(gop.pictures[0].pulse)
+        yield from self._filler(gop.pictures[0].pulse)
         shown = [it for picture in gop.pictures for it in self._timeline.push(picture)]
         if shown:
-            yield VisiblePictures(shown, gop.silent)
+            yield VisiblePictures(shown, gop.is_muted)
 
-    def _bridged(self, until: int) -> Iterator[VisiblePictures]:
-        """Repeat the last picture up to a pulse, a few seconds at a time: sound goes on meanwhile.
+    def _filler(self, until: int) -> Iterator[VisiblePictures]:
+        """Yield repetitions of the last picture up to a pulse, a few seconds at a time.
 
-        Not for who may see one person alone, of whom nothing was kept then.
+        They are muted for viewers with access to one person: nothing of that person was recorded then.
         """
-        most = round(_BRIDGED_S * self._fps)
+        most = round(_FILL_STEP_S * self._fps)
         while (at := self._timeline.until) is not None and at < until <= at + LONGEST_GAP_S * self._fps:
             shown = self._timeline.fill(min(until, at + most))
             if not shown:
                 return
-            yield VisiblePictures(shown, silent=self._source.presence is not None)
+            yield VisiblePictures(shown, is_muted=self._source.presence is not None)
 
-    async def _recalled(self, shown: VisiblePictures) -> MediaChunk:
-        hearing, first, until = self._hearing, shown.pictures[0].pulse, shown.pictures[-1].until
-        heard = None if hearing is None else await hearing.beside(first, until)
-        return self._footage(shown.pictures, heard, silent=shown.silent)
+    async def _recorded_chunk(self, shown: VisiblePictures) -> MediaChunk:
+        playback_audio, first, until = self._audio, shown.pictures[0].pulse, shown.pictures[-1].until
+        audio = None if playback_audio is None else await playback_audio.next_audio(first, until)
+        return self._chunk(shown.pictures, audio, is_muted=shown.is_muted)
 
-    def _present(self, pictures: list[EncodedPicture], *, silent: bool) -> MediaChunk:
-        hearing, first, until = self._hearing, pictures[0].pulse, pictures[-1].until
-        heard = None if hearing is None else hearing.live(first, until)
-        return self._footage(pictures, heard, silent=silent)
+    def _live_chunk(self, pictures: list[EncodedPicture], *, is_muted: bool) -> MediaChunk:
+        playback_audio, first, until = self._audio, pictures[0].pulse, pictures[-1].until
+        audio = None if playback_audio is None else playback_audio.live(first, until)
+        return self._chunk(pictures, audio, is_muted=is_muted)
 
-    def _footage(
-        self, pictures: list[EncodedPicture], heard: AudioChunk | None, *, silent: bool
+    def _chunk(
+        self, pictures: list[EncodedPicture], audio: AudioChunk | None, *, is_muted: bool
     ) -> MediaChunk:
-        return self._tally.chunk(pictures, heard.silenced if silent and heard is not None else heard)
+        return self._ts.chunk(pictures, audio.silenced if is_muted and audio is not None else audio)
 
 
 class _RealTimePacer:
-    """Lets ``lead_s`` seconds of media through at once, the rest in real time."""
+    """Lets ``lead_s`` seconds of media pass at once, the rest in real time."""
 
     def __init__(self, lead_s: float) -> None:
         self._clock = asyncio.get_running_loop().time

@@ -161,7 +161,7 @@ def _ffmpeg(*arguments: str) -> bytes:
 
 async def test_a_moment_that_is_none_leaves_no_file(hall: Hall, tmp_path: Path) -> None:
     url = f"http://127.0.0.1:{hall.port}"
-    with pytest.raises(client.RefusedError, match="'soon' is no moment"):
+    with pytest.raises(client.RefusedError, match="'soon' is not a time"):
         await client.watch(url, 1, tmp_path / "one.mp4", start="soon")
     with pytest.raises(
         client.RefusedError, match="of object 1 nothing is kept from p99 on; there is p0 to p29"

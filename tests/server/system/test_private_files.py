@@ -20,7 +20,7 @@ from server.media.letterbox import Letterbox
 from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 from server.service.recording.recording_folder import RecordingFolder
-from server.service.recording.recording_session import InitSegments
+from server.service.recording.session_files import InitSegments
 from server.system.private_files import make_private_folder
 
 FITS = dict.fromkeys(CAMERAS, Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)))
@@ -59,8 +59,8 @@ def test_recordings_are_closed_to_others(tmp_path: Path, who: str, mask: int) ->
             RecordingFolder(around / "site" / "kept", AMPLE), [piece(gop, {1: A}) for gop in range(7)]
         )
         assert modes(around) == {True: {0o700}, False: {0o600}}
-        assert store.run is not None
-        store.run.number_since(5.0)
+        assert store.session is not None
+        store.session.set_person_numbers_since(5.0)
         store.close()
         assert modes(around) == {True: {0o700}, False: {0o600}}
 

@@ -102,7 +102,7 @@ async def test_a_choice_of_the_last_minute_is_explained_from_the_first_question_
         ("1/choice?at=p0", 404, "nothing is kept"),
         ("1/choice?at=p999999", 404, "nothing is kept"),
         ("9/choice?at=-1", 404, "object 9"),
-        ("1/choice?at=soon", 400, "at: 'soon' is no moment"),
+        ("1/choice?at=soon", 400, "at: 'soon' is not a time"),
     ):
         code, content = await busy.get(f"/api/objects/{asked}")
         assert code == expected

@@ -67,14 +67,14 @@ async def test_no_playlist_promises_that_nothing_is_taken_from_it(hall: Hall) ->
     shows(hall, range(16))
     await until_written(hall, 16)
     forget(hall)
-    run = hall.service.past.run
+    run = hall.service.past.session
     assert run is not None
     for query in ("from=p10&to=live", "from=p10&to=p80"):
         path = f"/objects/1/hls/index.m3u8?{query}"
         before = await text(hall, path)
         assert "PLAYLIST-TYPE" not in before
         assert numbers(before)[0] == 1
-    run.drop(run.segments[:2])
+    run.delete(run.segments[:2])
     for query in ("from=p10&to=live", "from=p10&to=p80"):
         after = await text(hall, f"/objects/1/hls/index.m3u8?{query}")
         assert numbers(after)[0] == 5

@@ -12,8 +12,8 @@ import pytest
 from fakes.cameras import CAMERAS, FPS, GOP, FedService, small_config
 from fakes.recordings import A, ClocksByHand, filled, head, piece
 from server.service.recording.recording_folder import RecordingFolder
-from server.service.recording.recording_session import InitSegments
 from server.service.recording.retention import RetentionLimits
+from server.service.recording.session_files import InitSegments
 
 KEEP_S = 20.0
 BOUNDS = RetentionLimits(keep_s=KEEP_S, most_mb=1e6, segment_s=0.2)
@@ -108,7 +108,7 @@ def test_a_clock_that_is_ahead_at_the_start_takes_nothing_away(
     store = opened(tmp_path, clocks)
     assert kept(tmp_path) == list(range(10))
     (told,) = [it for it in caplog.messages if "does not count" in it]
-    assert "nobody keeps the clock right (NTP)" in told
+    assert "the clock is not synchronized (NTP)" in told
     for gop in range(10, 18):
         records(store, clocks, range(gop, gop + 1))
         clocks.now += TRIAL_S / 1000
@@ -158,7 +158,7 @@ def test_after_a_week_off_what_is_too_old_goes_soon_after_the_start_if_the_clock
         records(store, clocks, range(gop, gop + 1))
         gone.append(30 - len([it for it in kept(tmp_path) if it < 30]))
     assert gone == [10, 20, 30, 30], "in parts"
-    told = [it for it in caplog.messages if "took away" in it]
+    told = [it for it in caplog.messages if "deleted the oldest" in it]
     assert "10 older than record.keep_s (86400 s); 20 more are too old and go in the next passes" in told[0]
     store.close()
 
@@ -198,7 +198,7 @@ def test_a_service_that_is_killed_counts_on_from_its_last_segment(
     clocks.now += KEEP_S - 4.5 * STEP_S
     opened(tmp_path, clocks).close()
     assert kept(tmp_path) == list(range(5, 10))
-    assert store.run is not None
+    assert store.session is not None
 
 
 def test_a_machine_without_a_clock_of_its_own_counts_when_the_network_has_told_it(
@@ -258,7 +258,7 @@ def test_what_takes_too_much_goes_by_age_though_the_clock_went_back(
     store.close()
     early = next(it.name for it in tmp_path.iterdir() if it.is_dir() and it.name != late)
     assert early < late, "names are by the clock"
-    size = sum(run.size for run in (*store.earlier, store.run) if run is not None)
+    size = sum(run.size for run in (*store.earlier, store.session) if run is not None)
     again = opened(tmp_path, clocks, RetentionLimits(KEEP_S, size / 1e6, 0.2))
     gone = sorted(set(range(20)) - set(kept(tmp_path)))
     assert gone
@@ -269,15 +269,15 @@ def test_what_takes_too_much_goes_by_age_though_the_clock_went_back(
 def test_recordings_of_an_earlier_version_are_dated_once(tmp_path: Path, clocks: ClocksByHand) -> None:
     recorded(tmp_path, clocks)
     (tmp_path / "clock.json").unlink()
-    (path,) = tmp_path.glob("*/run.json")
+    (path,) = tmp_path.glob("*/session.json")
     told = json.loads(path.read_bytes())
-    del told["clock0"], told["clock"]
+    del told["age_clock_at_pulse0"], told["age_clock"]
     path.write_text(json.dumps(told))
     for index in path.parent.glob("index/*"):
         os.utime(index, (clocks.wall, clocks.wall))
     clocks.now += KEEP_S / 2
     opened(tmp_path, clocks).close()
-    assert "clock0" in json.loads(path.read_bytes())
+    assert "age_clock_at_pulse0" in json.loads(path.read_bytes())
     clocks.now += KEEP_S / 2 - 4.5 * STEP_S
     opened(tmp_path, clocks).close()
     assert kept(tmp_path) == list(range(5, 10)), "by when they were written"
@@ -295,13 +295,15 @@ def test_a_damaged_ledger_takes_nothing_away(tmp_path: Path, clocks: ClocksByHan
     store.close()
 
 
-@pytest.mark.parametrize("clock0", [1e9, -1e9])
+@pytest.mark.parametrize("age_clock_at_pulse0", [1e9, -1e9])
 def test_a_run_of_another_clock_takes_no_other_one_away_and_is_not_kept_for_ever(
     tmp_path: Path, clocks: ClocksByHand, clock0: float
 ) -> None:
     recorded(tmp_path, clocks, 5)
-    (path,) = tmp_path.glob("*/run.json")
-    path.write_text(json.dumps({**json.loads(path.read_bytes()), "clock": "another", "clock0": clock0}))
+    (path,) = tmp_path.glob("*/session.json")
+    path.write_text(
+        json.dumps({**json.loads(path.read_bytes()), "age_clock": "another", "age_clock_at_pulse0": clock0})
+    )
     clocks.now += 1.0
     store = opened(tmp_path, clocks)
     records(store, clocks, range(10, 15))
@@ -320,7 +322,7 @@ def test_what_a_pass_takes_away_is_told_seldom_and_says_why(
     records(store, clocks, range(20))
     clocks.now += 3600
     records(store, clocks, range(20, 21))
-    (first, second) = [it for it in caplog.messages if "took away" in it]
+    (first, second) = [it for it in caplog.messages if "deleted the oldest" in it]
     assert first.endswith("/0: 1 older than record.keep_s (1 s)")
     assert second.endswith("/95: 19 older than record.keep_s (1 s)")
     store.close()

@@ -35,10 +35,10 @@ from server.media.audio.audio_chunk import AudioChunk
 from server.media.audio.audio_format import AudioFormat
 from server.media.containers.mp4_audio import audio_fragment
 from server.messaging.messages import GopChoices
-from server.service.recording.audio_file import read_audio_frames
 from server.service.recording.recording_folder import GopRecord, RecordingFolder
-from server.service.recording.recording_session import InitSegments
 from server.service.recording.retention import RetentionLimits
+from server.service.recording.session_files import InitSegments
+from server.service.time_shift.playback_audio import read_audio_frames
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 FORM = AudioFormat(48_000, 2)
@@ -167,10 +167,10 @@ async def test_what_retention_took_away_or_nobody_kept_is_silent(hall: Hall, rec
     shows(hall, recording, range(GOPS))
     await until_written(hall.service, GOPS)
     forget(hall.service)
-    run = hall.service.past.run
+    run = hall.service.past.session
     assert run is not None
     gone = run.segments[6].first
-    run.sound_file(gone).unlink()
+    run.paths.audio_file(gone).unlink()
     data = await download(hall, f"/objects/1/best.mp4?from=p0&to=p{FRAMES}")
     unbroken(data)
     _, samples = heard(data)
@@ -211,19 +211,19 @@ async def test_sound_goes_with_the_segments_it_is_of(tmp_path: Path) -> None:
         begin, end = (FORM.frame_at(pulse, FPS) for pulse in (gop * GOP, (gop + 1) * GOP))
         heard = AudioChunk(begin, tuple(bytes([number % 251]) * 9 for number in range(begin, end)), FORM)
         store.write(GopRecord(it.choices, it.cameras, heard), head(), InitSegments(b"pictures", b"sound"))
-    run = store.run
+    run = store.session
     assert run is not None
     firsts = [it.first for it in run.segments]
     assert firsts[0] > 0
     assert sorted(int(it.stem) for it in (run.folder / "sound").glob("0*.mp4")) == firsts
-    assert run.sound.tape.all[0].first == firsts[0]
+    assert run.audio.index.all[0].first == firsts[0]
     assert run.size == pytest.approx(
         sum(it.stat().st_size for it in run.folder.rglob("*") if it.is_file()), abs=3000
     )
     store.close()
     again = RecordingFolder(tmp_path, AMPLE)
     again.open()
-    assert again.earlier[0].sound.tape.all == run.sound.tape.all
+    assert again.earlier[0].audio.index.all == run.audio.index.all
 
 
 @needs_ffprobe
@@ -231,9 +231,9 @@ async def test_the_sound_plays_from_the_disk_by_itself(hall: Hall, recording: Pa
     sends(hall.service, recording)
     shows(hall, recording, range(GOPS))
     await until_written(hall.service, GOPS)
-    run = hall.service.past.run
+    run = hall.service.past.session
     assert run is not None
-    for path in (run.sound.path, run.sound_file(0)):
+    for path in (run.audio.path, run.paths.audio_file(0)):
         ((codec, frames, *_),) = probed(path, "codec_name,nb_read_frames")
         assert codec == "aac"
         assert int(frames) >= 18
@@ -245,10 +245,10 @@ async def test_a_site_without_sound_keeps_none(tmp_path: Path, recording: Path) 
         hall.service.come(*CAMERAS)
         shows(hall, recording, range(4))
         await until_written(hall.service, 4)
-        run = hall.service.past.run
+        run = hall.service.past.session
         assert run is not None
         assert not (run.folder / "sound").exists()
-        assert not run.sound.path.exists()
+        assert not run.audio.path.exists()
         assert b"soun" not in await download(hall, "/objects/1/best.mp4?from=p0&to=p20")
 
 

@@ -16,8 +16,9 @@ from fakes.site import Hall, opened
 from fakes.system.full_disk import files_of_at_most
 from fakes.system.unprivileged import nobodys_folder
 from server.service.recording.recording_folder import RecordingFolder
-from server.service.recording.recording_session import InitSegments, RecordingSession
+from server.service.recording.recording_session import RecordingSession
 from server.service.recording.retention import RetentionLimits
+from server.service.recording.session_files import InitSegments
 
 NOTHING = "of object 1 nothing is kept from p0 on; there is nothing"
 Harm = Callable[[Path, Path], None]
@@ -69,7 +70,7 @@ def cut_short(name: str) -> Harm:
 
 LEVELS = [".", "RUN", "RUN/cameras", "RUN/cameras/c0", "RUN/index", "RUN/objects"]
 FILES = [
-    "RUN/run.json",
+    "RUN/session.json",
     "RUN/cameras/c0/000000000000.mp4",
     "RUN/index/000000000000.jsonl",
     "RUN/cameras/c0.m3u8",
@@ -93,10 +94,14 @@ def nothing_is_orphaned(folder: Path) -> None:
     store.open()
     store.close()
     assert {it for it in folder.rglob("*") if it.is_file()} == before, "nothing had to be tidied up"
-    named = {it for run in store.earlier for first in run.segments for it in run.files(first.first)}
+    named = {
+        it for run in store.earlier for first in run.segments for it in run.paths.segment_files(first.first)
+    }
     lists = {it.path for run in store.earlier for it in (*run.cameras.values(), *run.objects.values())}
     fixed = {
-        run.folder / it for run in store.earlier for it in ("run.json", "cameras/init.mp4", "sound/init.mp4")
+        run.folder / it
+        for run in store.earlier
+        for it in ("session.json", "cameras/init.mp4", "sound/init.mp4")
     }
     strange = before - named - lists - fixed - {folder / ".lock", folder / "clock.json"}
     assert {it for it in strange if it.read_bytes() != b"somebody's\n"} == set()
@@ -118,7 +123,10 @@ def shown(folder: Path) -> list[int]:
         *(pytest.param(moved(it), id=f"moved {it}") for it in LEVELS),
         *(pytest.param(made_anew(it), id=f"anew {it}") for it in LEVELS),
         *(pytest.param(made_a_file(it), id=f"a file {it}") for it in LEVELS[1:]),
-        *(pytest.param(cut_short(it), id=f"short {it}") for it in ["RUN/cameras/c0.m3u8", "RUN/run.json"]),
+        *(
+            pytest.param(cut_short(it), id=f"short {it}")
+            for it in ["RUN/cameras/c0.m3u8", "RUN/session.json"]
+        ),
     ],
 )
 def test_it_goes_on_at_once_and_leaves_nothing_that_nobody_knows_of(tmp_path: Path, harm: Harm) -> None:
@@ -126,8 +134,8 @@ def test_it_goes_on_at_once_and_leaves_nothing_that_nobody_knows_of(tmp_path: Pa
     store = RecordingFolder(folder, AMPLE)
     store.open()
     records(store, range(3))
-    assert store.run is not None
-    harm(folder, store.run.folder)
+    assert store.session is not None
+    harm(folder, store.session.folder)
     records(store, range(3, 9))
     store.close()
     assert set(range(3 * GOP, 9 * GOP)) <= set(shown(folder)), "nothing is lost but what was taken away"
@@ -157,13 +165,13 @@ def test_a_disk_that_comes_back_is_gone_on_with_and_its_runs_are_known(tmp_path:
     records(store, range(3))
     folder.rename(away)
     records(store, range(3, 6))
-    assert store.run is not None
+    assert store.session is not None
     assert store.earlier == []
     shutil.rmtree(folder)
     away.rename(folder)
     records(store, range(6, 9))
     (earlier,) = store.earlier
-    assert [(it.first, it.end) for it in earlier.objects[1].tape.all] == [(0, 3 * GOP)]
+    assert [(it.first, it.end) for it in earlier.objects[1].index.all] == [(0, 3 * GOP)]
     store.close()
     assert shown(folder) == [*range(3 * GOP), *range(6 * GOP, 9 * GOP)]
     nothing_is_orphaned(folder)
@@ -193,8 +201,8 @@ def test_where_it_may_not_write_nothing_is_left_and_when_it_may_it_goes_on(close
         store = RecordingFolder(folder, RetentionLimits(1e6, 1e6, 2 * GOP / FPS))
         store.open()
         records(store, range(3))
-        assert store.run is not None
-        path = Path(str(folder / closed).replace("RUN", store.run.folder.name))
+        assert store.session is not None
+        path = Path(str(folder / closed).replace("RUN", store.session.folder.name))
         path.chmod(0o500)
         records(store, range(3, 8))
         path.chmod(0o700)
@@ -223,9 +231,9 @@ def test_old_recordings_that_cannot_be_taken_away_keep_nobody_from_recording(
         records(store, range(20, 24))
         for it in closed:
             it.chmod(0o700)
-        assert store.run is not None
-        assert [(it.first, it.end) for it in store.run.cameras[A].tape.all] == [(100, 120)]
-        told = [it for it in caplog.messages if "cannot take away" in it]
+        assert store.session is not None
+        assert [(it.first, it.end) for it in store.session.cameras[A].index.all] == [(100, 120)]
+        told = [it for it in caplog.messages if "cannot delete expired segments" in it]
         assert len(told) == 1
         assert "Permission denied" in told[0]
         store.close()
@@ -249,8 +257,8 @@ def test_a_full_disk_leaves_nothing_at_any_try_and_then_it_goes_on(tmp_path: Pat
 def test_what_is_left_of_runs_that_hardly_began_goes_and_media_without_a_head_are_told_of(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    RecordingSession.begin(tmp_path / "20260101T000000Z", head(), InitSegments(b"x"), 1.0)
-    (tmp_path / "20260101T000000Z" / "run.json").unlink()
+    RecordingSession.create(tmp_path / "20260101T000000Z", head(), InitSegments(b"x"), 1.0)
+    (tmp_path / "20260101T000000Z" / "session.json").unlink()
     media = tmp_path / "20260102T000000Z" / "cameras" / "c0" / "000000000000.mp4"
     mine = tmp_path / "holiday" / "notes.txt"
     for it in (media, mine):
@@ -262,7 +270,7 @@ def test_what_is_left_of_runs_that_hardly_began_goes_and_media_without_a_head_ar
     assert not (tmp_path / "20260101T000000Z").exists()
     assert media.exists()
     assert mine.exists()
-    assert "20260102T000000Z has no run.json" in caplog.text
+    assert "20260102T000000Z has no session.json" in caplog.text
 
 
 def test_what_is_lost_without_the_choices_is_kept_and_gets_old(tmp_path: Path) -> None:
@@ -270,8 +278,8 @@ def test_what_is_lost_without_the_choices_is_kept_and_gets_old(tmp_path: Path) -
     store.open()
     records(store, range(12))
     store.close()
-    assert store.run is not None
-    shutil.rmtree(store.run.folder / "index")
+    assert store.session is not None
+    shutil.rmtree(store.session.folder / "index")
     again = RecordingFolder(tmp_path, AMPLE)
     again.open()
     again.close()
@@ -284,12 +292,12 @@ def test_that_a_new_folder_is_begun_is_one_line(tmp_path: Path, caplog: pytest.L
     store.open()
     for gop in range(20):
         records(store, range(gop, gop + 1))
-        assert store.run is not None
-        shutil.rmtree(store.run.folder / "cameras" / "c0")
+        assert store.session is not None
+        shutil.rmtree(store.session.folder / "cameras" / "c0")
     store.close()
     lines = [it for it in caplog.records if it.levelno >= logging.WARNING]
     assert len(lines) == 1
-    assert lines[0].getMessage().endswith(": No such file or directory; a new folder is begun")
+    assert lines[0].getMessage().endswith(": No such file or directory; starting a new folder")
 
 
 @pytest.fixture
@@ -328,11 +336,11 @@ async def asked(hall: Hall, path: str) -> tuple[int, bytes]:
 
 @pytest.mark.parametrize("harm", [gone("."), gone("RUN"), moved("."), made_anew("RUN"), made_a_file("RUN")])
 async def test_nobody_is_promised_what_is_gone(hall: Hall, harm: Harm) -> None:
-    store = hall.service.past.store
+    store = hall.service.past.folder
     assert store is not None
-    assert store.run is not None
+    assert store.session is not None
     assert (await asked(hall, "/objects/1/best.mp4?from=p0&to=p10"))[0] == 200
-    harm(store.folder, store.run.folder)
+    harm(store.folder, store.session.folder)
     for path in (
         "/objects/1/best.mp4?from=p0&to=p10",
         "/objects/1/best.ts?from=p0&to=p10",
@@ -363,7 +371,7 @@ async def test_nobody_is_promised_what_is_gone(hall: Hall, harm: Harm) -> None:
 async def test_who_is_nowhere_else_is_gone_with_what_was_recorded(
     hall: Hall, path: str, status: int, error: str
 ) -> None:
-    store = hall.service.past.store
+    store = hall.service.past.folder
     assert store is not None
     hall.service.past.recent._choices.clear()
     hall.service.splicer.forget([], [])
@@ -375,11 +383,11 @@ async def test_who_is_nowhere_else_is_gone_with_what_was_recorded(
 
 
 async def test_a_part_that_is_gone_is_a_hole(hall: Hall) -> None:
-    store = hall.service.past.store
+    store = hall.service.past.folder
     assert store is not None
-    assert store.run is not None
-    store.run.camera_file(A, 0).unlink()
-    (store.run.camera_file(A, 2 * GOP)).write_bytes(b"cut short")
+    assert store.session is not None
+    store.session.paths.camera_file(A, 0).unlink()
+    (store.session.paths.camera_file(A, 2 * GOP)).write_bytes(b"cut short")
     spans = (await hall.get_json("/api/cameras/c0/past"))["spans"]
     assert [it["first"] for it in spans] == [4 * GOP]
     assert [it["first"] for it in (await hall.get_json("/api/cameras/c1/past"))["spans"]] == [0]
@@ -392,19 +400,19 @@ async def test_what_may_not_be_read_is_told_in_one_line() -> None:
     with nobodys_folder() as tmp_path:
         async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
             await shows(hall)
-            store = hall.service.past.store
+            store = hall.service.past.folder
             assert store is not None
-            assert store.run is not None
-            (store.run.folder / "cameras" / "c0").chmod(0)
+            assert store.session is not None
+            (store.session.folder / "cameras" / "c0").chmod(0)
             error = {"error": "what is recorded cannot be read: Permission denied"}
             assert await hall.get("/cameras/c0/live.mp4?from=p0&to=p10") == (503, error)
             assert await hall.get("/api/cameras/c0/past") == (503, error)
-            (store.run.folder / "cameras" / "c0").chmod(0o700)
+            (store.session.folder / "cameras" / "c0").chmod(0o700)
             assert (await asked(hall, "/cameras/c0/live.mp4?from=p0&to=p10"))[0] == 200
 
 
 async def test_that_recording_stands_is_told_and_that_it_goes_on(hall: Hall) -> None:
-    store, writer = hall.service.past.store, hall.service.past.writer
+    store, writer = hall.service.past.folder, hall.service.past.writer
     assert store is not None
     assert writer is not None
     writer._retry_s = 0.0

@@ -10,9 +10,10 @@ from fakes.cameras import CAMERAS, FPS, GOP, FedService, small_config
 from fakes.recordings import AMPLE, PULSE0, A, ClocksByHand, filled, head, pictures, piece
 from fakes.system.full_disk import files_of_at_most
 from server.service.recording.recording_folder import RecordingFolder
-from server.service.recording.recording_session import InitSegments, RecordingSession
+from server.service.recording.recording_session import RecordingSession
 from server.service.recording.retention import RetentionLimits
 from server.service.recording.segment_index import IndexEntry
+from server.service.recording.session_files import InitSegments
 
 BOUNDS = RetentionLimits(keep_s=3.0, most_mb=1e6, segment_s=1.0)
 SEGMENT = 25  # pulses
@@ -55,7 +56,7 @@ def on_disk(folder: Path) -> list[int]:
 
 def files_in(run: RecordingSession) -> set[int]:
     """Return the files that the playlists in memory refer to."""
-    tapes = [it.tape for it in (*run.cameras.values(), *run.objects.values())]
+    tapes = [it.index for it in (*run.cameras.values(), *run.objects.values())]
     return {stretch.file for tape in tapes for stretch in tape.all}
 
 
@@ -72,7 +73,7 @@ def test_what_is_too_old_goes_from_a_disk_that_takes_nothing(tmp_path: Path, clo
     record(store, clock, range(20))
     assert on_disk(tmp_path) == [0, 25, 50, 75]
     refused(store, clock, 27)
-    run = store.run
+    run = store.session
     assert run is not None
     assert on_disk(tmp_path) == [50, 75], "those before ended more than three seconds ago"
     assert [it.first for it in run.segments if it.bytes] == [50, 75]
@@ -107,7 +108,7 @@ def test_what_gets_too_old_goes_before_a_run_begins(tmp_path: Path, clock: Clock
     assert on_disk(tmp_path) == [0, 25, 50, 75]
     refused(again, clock, 27)
     assert on_disk(tmp_path) == [50, 75]
-    assert again.run is None, "it could not begin"
+    assert again.session is None, "it could not begin"
     again.close()
 
 
@@ -117,10 +118,10 @@ def test_what_playlists_refer_to_in_vain_is_not_known_after_a_restart(
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
     refused(store, clock, 27)
-    assert store.run is not None
+    assert store.session is not None
     with files_of_at_most(0):
         leave(store)
-    assert files_told(store.run) == {0, 25, 50, 75}
+    assert files_told(store.session) == {0, 25, 50, 75}
     again = opened(tmp_path, clock, AMPLE)
     (earlier,) = again.earlier
     assert files_in(earlier) == {50, 75} == files_told(earlier)
@@ -135,11 +136,11 @@ def test_what_cannot_be_taken_away_is_not_forgotten(
 ) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
-    run, real = store.run, Path.unlink
+    run, real = store.session, Path.unlink
     assert run is not None
 
     def unlink(path: Path, *, missing_ok: bool = False) -> None:
-        if path == run.camera_file(A, 0):
+        if path == run.paths.camera_file(A, 0):
             raise PermissionError(1, "Operation not permitted", str(path))
         real(path, missing_ok=missing_ok)
 
@@ -149,7 +150,7 @@ def test_what_cannot_be_taken_away_is_not_forgotten(
     assert on_disk(tmp_path) == [0, 50, 75, 135], "and it is recorded all the same"
     assert [it.first for it in run.segments] == [0, 50, 75, 135]
     assert files_in(run) == {50, 75, 135}, "its pictures are not played any more"
-    assert f"{run.camera_file(A, 0)}: Operation not permitted" in caplog.text
+    assert f"{run.paths.camera_file(A, 0)}: Operation not permitted" in caplog.text
     record(store, clock, range(33, 34))
     assert on_disk(tmp_path) == [75, 135, 165]
     store.close()
@@ -173,14 +174,14 @@ def test_a_playlist_that_could_not_be_written_tells_so_until_it_is(
 ) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(12))
-    assert store.run is not None
-    playlist = store.run.cameras[A]
+    assert store.session is not None
+    playlist = store.session.cameras[A]
     playlist.drop({0})
     with files_of_at_most(0), pytest.raises(OSError, match="large"):
-        playlist.tidy()
-    assert playlist.stale
+        playlist.rewrite()
+    assert playlist.is_stale
     playlist.append(IndexEntry(A, 50, 9_999, 10, 100, 5))
-    assert playlist.stale, "what was added stands behind what is gone"
-    playlist.tidy()
-    assert not playlist.stale
+    assert playlist.is_stale, "what was added stands behind what is gone"
+    playlist.rewrite()
+    assert not playlist.is_stale
     store.close()

@@ -31,8 +31,8 @@ from fakes.recordings import (
 from fakes.system.full_disk import files_of_at_most
 from server.service.recording.media_files import MediaFile, read_gops
 from server.service.recording.recording_folder import RecordingFolder
-from server.service.recording.recording_session import InitSegments
 from server.service.recording.retention import RetentionLimits
+from server.service.recording.session_files import InitSegments
 
 
 def only_run(folder: Path) -> Path:
@@ -110,7 +110,7 @@ def test_the_index_says_who_was_where(tmp_path: Path) -> None:
 
 def test_of_a_gop_that_did_not_come_whole_the_beginning_is_kept_and_shown_to_nobody(tmp_path: Path) -> None:
     pieces = [piece(0, {1: A}), piece(1, {1: A}, frames=3), piece(2, {1: A})]
-    run = written(RecordingFolder(tmp_path, AMPLE), pieces).run
+    run = written(RecordingFolder(tmp_path, AMPLE), pieces).session
     assert run is not None
     assert [pulse for pulse, _ in pictures(run.cameras[A].path)] == [
         0,
@@ -127,7 +127,7 @@ def test_of_a_gop_that_did_not_come_whole_the_beginning_is_kept_and_shown_to_nob
         13,
         14,
     ]
-    assert [(it.first, it.end) for it in run.objects[1].tape.all] == [(0, 5), (10, 15)]
+    assert [(it.first, it.end) for it in run.objects[1].index.all] == [(0, 5), (10, 15)]
 
 
 def test_a_service_that_begins_again_goes_on_beside_what_is_there(tmp_path: Path) -> None:
@@ -135,8 +135,8 @@ def test_a_service_that_begins_again_goes_on_beside_what_is_there(tmp_path: Path
     second = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: B}) for gop in range(3)])
     assert len([it for it in tmp_path.iterdir() if it.is_dir()]) == 2
     (earlier,) = second.earlier
-    assert [(it.first, it.end) for it in earlier.objects[1].tape.all] == [(0, 15)]
-    for run, camera in ((earlier, A), (second.run, B)):
+    assert [(it.first, it.end) for it in earlier.objects[1].index.all] == [(0, 15)]
+    for run, camera in ((earlier, A), (second.session, B)):
         assert run is not None
         for pulse, picture in pictures(run.objects[1].path):
             np.testing.assert_array_equal(picture, own_pictures(camera)[pulse])
@@ -144,9 +144,9 @@ def test_a_service_that_begins_again_goes_on_beside_what_is_there(tmp_path: Path
 
 def test_pulses_that_begin_anew_are_another_run(tmp_path: Path) -> None:
     store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in (5, 6, 0, 1)])
-    assert store.run is not None
-    assert [(it.first, it.end) for it in store.run.objects[1].tape.all] == [(0, 10)]
-    assert [(it.first, it.end) for it in store.earlier[0].objects[1].tape.all] == [(25, 35)]
+    assert store.session is not None
+    assert [(it.first, it.end) for it in store.session.objects[1].index.all] == [(0, 10)]
+    assert [(it.first, it.end) for it in store.earlier[0].objects[1].index.all] == [(25, 35)]
 
 
 def test_two_processes_do_not_record_into_one_folder(tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ def test_what_is_too_old_goes_in_whole_segments_with_what_refers_to_it(tmp_path:
         clocks.now = PULSE0 + gop * GOP / FPS
         store.write(piece(gop, {1: A, 2 if gop < 10 else 3: B}), head(), InitSegments(filled()[1]))
     store.close()
-    run = store.run
+    run = store.session
     assert run is not None
     assert [it.first for it in run.segments] == [100, 125, 150, 175]
     assert sorted(run.objects) == [1, 3]
@@ -194,15 +194,15 @@ def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_
     store.close()
     again = RecordingFolder(folder, AMPLE)
     again.open()
-    assert store.run is not None
-    found = {number: it.tape.all for run in again.earlier for number, it in run.objects.items()}
-    assert found == {number: it.tape.all for number, it in store.run.objects.items()}
+    assert store.session is not None
+    found = {number: it.index.all for run in again.earlier for number, it in run.objects.items()}
+    assert found == {number: it.index.all for number, it in store.session.objects.items()}
     for number, tape in found.items():
         expected = [gop for gop, choices in enumerate(shown) if number in choices]
         kept = [pulse // GOP for it in tape for pulse in range(it.first, it.end, GOP)]
         assert kept == expected[len(expected) - len(kept) :], "the newest, without a hole of our own"
         for it in tape:
-            path = again.earlier[0].camera_file(it.camera, it.file)
+            path = again.earlier[0].paths.camera_file(it.camera, it.file)
             assert [gop.first for gop in read_gops(path, it.offset, it.length, FPS)] == list(
                 range(it.first, it.end, GOP)
             )
@@ -211,19 +211,19 @@ def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_
 
 def test_when_the_disk_is_full_what_is_there_plays_and_later_it_goes_on(tmp_path: Path) -> None:
     store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(2)])
-    assert store.run is not None
-    size = store.run.camera_file(A, 0).stat().st_size
+    assert store.session is not None
+    size = store.session.paths.camera_file(A, 0).stat().st_size
     with files_of_at_most(size + 300), pytest.raises(OSError, match="large") as refused:
         store.write(piece(2, {1: A}), head(), InitSegments(filled()[1]))
     assert refused.value.errno == errno.EFBIG
     store.abandon()
-    assert store.run.camera_file(A, 0).stat().st_size == size
+    assert store.session.paths.camera_file(A, 0).stat().st_size == size
     with files_of_at_most(len(filled()[1]) + 300), pytest.raises(OSError, match="large"):
         store.write(piece(3, {1: A}), head(), InitSegments(filled()[1]))
     store.abandon()
     store.write(piece(4, {1: A}), head(), InitSegments(filled()[1]))
     store.close()
-    assert [pulse // GOP for pulse, _ in pictures(store.run.objects[1].path)][::GOP] == [0, 1, 4]
+    assert [pulse // GOP for pulse, _ in pictures(store.session.objects[1].path)][::GOP] == [0, 1, 4]
     for path in everything_that_plays(tmp_path):
         decodes_without_errors(path)
 

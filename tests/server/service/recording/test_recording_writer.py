@@ -82,12 +82,12 @@ def test_a_full_disk_is_told_once_tried_again_and_counted(caplog: pytest.LogCapt
         assert disk.asked.acquire(timeout=PATIENCE)
     while writer.lost < 3:
         threading.Event().wait(0.001)
-    assert writer.trouble == "No space left on device"
+    assert writer.error_text == "No space left on device"
     disk.refuses = False
     writer.put(piece(3, {1: A}))
     writer.close()
     assert (disk.taken, disk.abandoned) == ([15, -1], 3)
-    assert (writer.written, writer.lost, writer.trouble) == (1, 3, "")
+    assert (writer.written, writer.lost, writer.error_text) == (1, 3, "")
     told, goes_on = (it.getMessage() for it in caplog.records)
     assert told.startswith("recording: cannot write: No space left on device; nothing is recorded")
     assert goes_on.startswith("recording: goes on, after ")
@@ -122,12 +122,12 @@ def test_a_disk_that_does_not_answer_is_told_of() -> None:
     writer = writer_on(disk)
     writer.put(piece(0, {1: A}))
     assert disk.asked.acquire(timeout=PATIENCE)
-    assert writer._since is not None
-    writer._since -= 1000.0
-    assert writer.stands.startswith("the disk has not answered for 10")
+    assert writer._writing_since is not None
+    writer._writing_since -= 1000.0
+    assert writer.problem.startswith("the disk has not answered for 10")
     disk.open.set()
     until(lambda: writer.written == 1)
-    until(lambda: not writer.stands)
+    until(lambda: not writer.problem)
     writer.close()
 
 
@@ -145,7 +145,7 @@ def test_a_mistake_does_not_end_the_recording(caplog: pytest.LogCaptureFixture) 
         writer.put(piece(gop, {1: A}))
     writer.close()
     assert disk.taken == [-2, 5, 10, -1]
-    assert (writer.written, writer.lost, writer.trouble) == (2, 1, "")
+    assert (writer.written, writer.lost, writer.error_text) == (2, 1, "")
     assert "a mistake in MyView" in caplog.text
 
 
@@ -172,7 +172,7 @@ def test_a_service_records_what_it_decides(tmp_path: Path) -> None:
     for epoch in range(7):
         service.feed(epoch, {A: {1: SMALL}, B: {}})
     service.close()
-    run = service.past.run
+    run = service.past.session
     assert run is not None
     assert [pulse for pulse, _ in pictures(run.objects[1].path)] == list(range(6 * GOP))
     assert [pulse for pulse, _ in pictures(run.cameras[B].path)] == list(range(6 * GOP))
@@ -187,7 +187,7 @@ def test_pictures_that_come_after_the_decision_are_recorded_too(tmp_path: Path) 
         service.intake.video(video(B, unit))
     service.feed(7, {A: {1: SMALL}})
     service.close()
-    run = service.past.run
+    run = service.past.session
     assert run is not None
     decided = service.past.recent.end
     assert decided >= 5 * GOP
@@ -209,5 +209,5 @@ def test_a_folder_that_cannot_be_used_is_told_in_one_line(tmp_path: Path) -> Non
 def test_nothing_is_written_where_no_folder_is_named() -> None:
     service = FedService(small_config())
     service.past.open()
-    assert service.past.run is None
+    assert service.past.session is None
     service.close()

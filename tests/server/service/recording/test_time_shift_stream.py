@@ -39,8 +39,8 @@ from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
 from server.service.recording.media_files import pulse_of
 from server.service.recording.recording_folder import RecordingFolder
-from server.service.recording.recording_session import InitSegments
 from server.service.recording.segment_index import PulseRange
+from server.service.recording.session_files import InitSegments
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.gapless_timeline import GaplessTimeline
 from server.service.streaming.media_chunk import MediaChunk
@@ -50,7 +50,7 @@ from server.service.time_shift.playback import CameraPlayback, PersonPlayback, S
 from server.service.time_shift.time_reference import TimeReferenceError, parse_time_reference
 from server.service.time_shift.time_shift_stream import PlaybackRange, TimeShiftStream
 
-MOMENT = "say seconds back (-60), a pulse (p1250) or a time (2026-11-21T16:13:36Z)"
+MOMENT = "use seconds ago (-60), a pulse (p1250) or a time (2026-11-21T16:13:36Z)"
 IN_A: Mapping[str, Mapping[int, Box | None]] = {A: {1: LARGE}, B: {1: SMALL}}
 IN_B: Mapping[str, Mapping[int, Box | None]] = {A: {1: SMALL}, B: {1: LARGE}}
 
@@ -173,18 +173,18 @@ async def test_without_a_recording_the_memory_is_the_past(busy: Hall) -> None:
         (
             "/objects/1/best.mp4?from=yesterday",
             400,
-            f"from: 'yesterday' is no moment; {MOMENT}",
+            f"from: 'yesterday' is not a time; {MOMENT}",
         ),
         ("/objects/1/best.mp4?from=p9&to=p9", 400, "to: p9 is not after from, which is p9"),
         ("/objects/1/best.mp4?to=p9", 400, "from: is missing; it says from when on, such as ?from=-60"),
         (
             "/objects/1/best.mp4?from=2025-11-21",
             400,
-            "from: the time of no pulse is known yet; say seconds back (-60) or a pulse (p1250)",
+            "from: no pulse has been received yet; use seconds ago (-60) or a pulse (p1250)",
         ),
         ("/api/objects/9/past", 404, "nothing is kept of object 9"),
         ("/api/objects/1/past?from=p9&to=p9", 400, "to: p9 is not after from, which is p9"),
-        ("/api/cameras/c0/past?to=yesterday", 400, f"to: 'yesterday' is no moment; {MOMENT}"),
+        ("/api/cameras/c0/past?to=yesterday", 400, f"to: 'yesterday' is not a time; {MOMENT}"),
     ],
 )
 async def test_what_cannot_be_played_is_told_in_one_line(
@@ -303,8 +303,10 @@ async def test_any_part_of_any_past_is_played_without_a_hole(
     folder = tmp_path_factory.mktemp("part")
     pieces = [piece(gop, {} if camera is None else {1: camera}) for gop, camera in enumerate(shown)]
     store = written(RecordingFolder(folder, AMPLE), pieces)
-    assert store.run is not None
-    tapes = [SessionEntries(store.run, store.run.objects[1].tape)] if 1 in store.run.objects else []
+    assert store.session is not None
+    tapes = (
+        [SessionEntries(store.session, store.session.objects[1].index)] if 1 in store.session.objects else []
+    )
     source = OnDisk(*tapes, end=len(shown) * GOP)
     agreement, header = site_of(store)
     stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
@@ -332,9 +334,9 @@ async def test_any_part_of_any_past_is_played_without_a_hole(
 
 async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -> None:
     store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(12)])
-    assert store.run is not None
-    store.run.camera_file(A, 25).unlink()
-    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=60)
+    assert store.session is not None
+    store.session.paths.camera_file(A, 25).unlink()
+    source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=60)
     agreement, header = site_of(store)
     stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
     data = b"".join([it.data async for it in stream.send(PlaybackRange(0, 60))])
@@ -348,8 +350,8 @@ async def test_who_is_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, e
     store = written(
         RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(now // GOP)]
     )
-    assert store.run is not None
-    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=now)
+    assert store.session is not None
+    source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=now)
     agreement, header = site_of(store)
     stream = TimeShiftStream(
         source, GaplessTimeline(agreement, FPS, GOP), FPS, Broadcaster
@@ -362,8 +364,8 @@ async def test_who_comes_back_after_the_end_does_not_make_the_past_longer(tmp_pa
     store = written(
         RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(4)]
     )
-    assert store.run is not None
-    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=4 * GOP)
+    assert store.session is not None
+    source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=4 * GOP)
     agreement, header = site_of(store)
     channel, back = Broadcaster(), piece(8, {1: A}).cameras[A]
     came = [Shown(back.first + at, not at, it, boot=1) for at, it in enumerate(back.fragments)]
@@ -378,7 +380,7 @@ async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(40)])
-    assert store.run is not None
+    assert store.session is not None
     now, loop = [100.0], asyncio.get_running_loop()
 
     async def slept(seconds: float) -> None:
@@ -387,7 +389,7 @@ async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
     monkeypatch.setattr(loop, "time", lambda: now[0])
     monkeypatch.setattr(asyncio, "sleep", slept)
     agreement, _ = site_of(store)
-    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=200)
+    source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=200)
     stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
     arrived = [now[0] - 100.0 async for _ in stream.send(PlaybackRange(0))]
     lead = 4.0
@@ -417,7 +419,7 @@ async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path
         async with hall.session.get("/api/past?from=p7") as answer:
             lines = [json.loads(line) async for line in answer.content]
         assert [line["first"] for line in lines] == [5, 10, 15, 25, 30]
-        (earlier,) = hall.service.past.store.earlier
+        (earlier,) = hall.service.past.folder.earlier
         assert [line.get("run") for line in lines] == [earlier.folder.name] * 3 + [None] * 2
     other = RecordingFolder(tmp_path / "kept", AMPLE)
     other.open()
