@@ -1,4 +1,4 @@
-"""The last decided GOPs in memory: fragments by person or camera while their frames are in the frame buffers."""
+"""The last decided GOPs, by person or camera, while their frames are in the frame buffers."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The folder that a site is recorded to: the session in progress and the earlier ones.
 
-All of it blocks on the disk, and sessions in a thread of its own (:mod:`~server.service.recording.writer_thread`).
+All of it blocks on the disk, and runs in the writer thread.
 """
 
 from __future__ import annotations

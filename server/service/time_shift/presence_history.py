@@ -1,4 +1,4 @@
-"""Whether a person had been seen lately at a time in the recorder: for viewers with access to that person alone."""
+"""Whether a person had been seen lately in the past: for viewers with access to that person alone."""
 
 from __future__ import annotations
 
