@@ -206,7 +206,7 @@ def is_key(fragment: bytes) -> bool:
 
 
 def _fragments(read: Callable[[int], bytes], length: int) -> Iterator[bytes]:
-    """Give the fragments among the boxes of the next ``length`` bytes."""
+    """Yield the fragments among the boxes of the next ``length`` bytes."""
     moof = b""
     while length >= _HEAD:
         head = read(_HEAD)

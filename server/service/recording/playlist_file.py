@@ -79,19 +79,19 @@ class RecordingPlaylist:
         if missing and self.index.drop_files(missing):
             self.is_stale = True
 
-    def append(self, entry_: IndexEntry) -> None:
+    def append(self, entry: IndexEntry) -> None:
         """Add an entry to the file, then to the index.
 
         Raises:
             OSError: the disk does not take it; file and memory are as before.
         """
-        entry = self._entry(entry_, self._end)
-        if self._tail is not None and self._append_to_file(entry, self._tail):
-            self._tail += len(entry.encode())
+        lines = self._lines_of(entry, self._end)
+        if self._tail is not None and self._append_to_file(lines, self._tail):
+            self._tail += len(lines.encode())
         else:
-            self._write_anew(entry_)
-        self.index.add(entry_)
-        self._end = entry_.end
+            self._write_anew(entry)
+        self.index.add(entry)
+        self._end = entry.end
 
     def rewrite(self) -> None:
         """Write the file anew from the index, with joined entries; remove it if there are none.
@@ -105,7 +105,7 @@ class RecordingPlaylist:
             self.path.unlink(missing_ok=True)
             self._tail, self.is_stale = None, False
 
-    def _append_to_file(self, entry: str, tail: int) -> bool:
+    def _append_to_file(self, lines: str, tail: int) -> bool:
         """Write an entry over the end line; return False if the file is missing or was changed."""
         try:
             handle = os.open(self.path, os.O_WRONLY)
@@ -114,7 +114,7 @@ class RecordingPlaylist:
         try:
             if os.fstat(handle).st_size != tail + len(_END):
                 return False
-            write_at(handle, (entry + _END).encode(), tail)
+            write_at(handle, (lines + _END).encode(), tail)
         except OSError:
             self._tail = None  # it may be written in part: it is written anew next time
             raise
@@ -133,9 +133,9 @@ class RecordingPlaylist:
             f'#EXT-X-MAP:URI="{self._header}"\n'
         )
         end = None
-        for entry_ in entries:
-            text += self._entry(entry_, end)
-            end = entry_.end
+        for entry in entries:
+            text += self._lines_of(entry, end)
+            end = entry.end
         draft = self.path.with_suffix(".new")
         try:
             write_private(draft, (text + _END).encode())
@@ -147,19 +147,19 @@ class RecordingPlaylist:
             raise
         self._tail = len(text.encode())
 
-    def _entry(self, entry_: IndexEntry, end: int | None) -> str:
-        gap = "" if end in (None, entry_.first) else "#EXT-X-DISCONTINUITY\n"
+    def _lines_of(self, entry: IndexEntry, end: int | None) -> str:
+        gap = "" if end in (None, entry.first) else "#EXT-X-DISCONTINUITY\n"
         date = ""
-        if end != entry_.first and self._pulse0 is not None:
+        if end != entry.first and self._pulse0 is not None:
             with contextlib.suppress(
                 OverflowError, ValueError, OSError
             ):  # the year 9999999 of a damaged file
-                moment = datetime.fromtimestamp(self._pulse0 + entry_.first / self._fps, UTC)
+                moment = datetime.fromtimestamp(self._pulse0 + entry.first / self._fps, UTC)
                 date = f"#EXT-X-PROGRAM-DATE-TIME:{moment.strftime('%Y-%m-%dT%H:%M:%S.%f')[:-3]}Z\n"
         return (
-            f"{gap}{date}#EXTINF:{entry_.frames / self._fps:.6f},p{entry_.first}+{entry_.frames}\n"
-            f"#EXT-X-BYTERANGE:{entry_.length}@{entry_.offset}\n"
-            f"{self._cameras}{entry_.camera}/{file_name(entry_.file)}\n"
+            f"{gap}{date}#EXTINF:{entry.frames / self._fps:.6f},p{entry.first}+{entry.frames}\n"
+            f"#EXT-X-BYTERANGE:{entry.length}@{entry.offset}\n"
+            f"{self._cameras}{entry.camera}/{file_name(entry.file)}\n"
         )
 
 

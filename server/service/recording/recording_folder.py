@@ -76,7 +76,7 @@ class RecordingFolder:
     def write(self, record: GopRecord, info: SessionInfo, init: InitSegments) -> None:
         """Write a GOP; ``info`` and ``init`` are for a new session, if one begins with it.
 
-        If the session cannot be continued, for another reason than a lack of space, a new one is created: its
+        If the session cannot be continued, for another reason than a lack of space, a new one begins: its
         folder may have been removed, made unwritable, or be on a disk that is no longer mounted.
 
         Raises:

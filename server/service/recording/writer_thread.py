@@ -21,7 +21,7 @@ _PATIENCE_S = 1.0
 
 
 class WriterThread:
-    """Passes GOPs to ``write`` in a thread of its own; at max_queued ``max_queued`` wait, further ones are lost.
+    """Passes GOPs to ``write`` in a thread of its own; at most ``max_queued`` wait, more are lost.
 
     When ``write`` fails, ``abandon`` is called once, and writing is tried again after ``retry_s``. ``where``
     is named in the log.

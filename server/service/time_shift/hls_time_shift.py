@@ -113,7 +113,8 @@ class TimeShift:
                 chunks.append(MediaChunk(pictures, self._layout.fps, ContinuityCounters(), audio=audio))
         if not chunks:
             return None
-        lead_chunk = MediaChunk(lead_pictures, self._layout.fps, ContinuityCounters()) if lead_pictures else chunks[0]
+        fps = self._layout.fps
+        lead_chunk = MediaChunk(lead_pictures, fps, ContinuityCounters()) if lead_pictures else chunks[0]
         segment = HlsSegment(number, self._layout, lead_chunk)
         for it in chunks:
             segment.add(it)

@@ -1,4 +1,4 @@
-"""Playback of recorded recorded stream: GOP after GOP, from the disk and from memory, up to the present."""
+"""Playback of one recorded stream: GOP after GOP, from the disk and from memory, up to the present."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from server.service.recording.segment_index import CameraRange, IndexEntry, Segm
 from server.service.time_shift.presence_history import PresenceHistory
 
 _GOPS_PER_READ = 8
-"""GOPs read from the disk in recorded call."""
+"""GOPs read from the disk in one call."""
 
 
 @dataclass(frozen=True, slots=True)
 class SessionEntries:
-    """The index of a stream in recorded session."""
+    """The index of a stream in one session."""
 
     session: RecordingSession
     index: SegmentIndex
@@ -144,7 +144,7 @@ def recorded_audio(recorder: Recorder) -> Sequence[SessionEntries]:
 
 
 async def play_gops(source: PlaybackSource, start: int) -> AsyncGenerator[RecordedGop, None]:
-    """Yield the GOPs from the recorded that holds pulse ``start`` to the newest, each once.
+    """Yield the GOPs from the one that holds pulse ``start`` to the newest, each once.
 
     Nothing is awaited between the last GOP and the end: a caller that then subscribes to the live stream
     misses nothing.

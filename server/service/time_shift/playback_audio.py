@@ -1,4 +1,4 @@
-"""The audio of entries time-shift stream: gapless from the first picture on, from memory or the disk."""
+"""The audio of one time-shift stream: gapless from the first picture on, from memory or the disk."""
 
 from __future__ import annotations
 
