@@ -129,7 +129,7 @@ async def test_a_list_that_would_be_too_long_is_refused_with_what_would_do(
 async def test_live_is_an_end_of_hls_alone(hall: Hall) -> None:
     shows(hall, range(GOPS))
     status, told = await hall.get("/objects/1/best.mp4?from=p5&to=live")
-    assert (status, told["error"][:22]) == (400, "to: 'live' is no momen")
+    assert (status, told["error"][:22]) == (400, "to: 'live' is not a ti")
 
 
 def test_the_time_of_day_is_told_of_the_first_and_of_some_others() -> None:

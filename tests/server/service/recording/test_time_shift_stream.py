@@ -278,10 +278,10 @@ class OnDisk:
     def __init__(self, *recorded: SessionEntries, end: int) -> None:
         self.recorded, self.end = recorded, end
 
-    def recall(self, pulse: int) -> None:
+    def gop_in_memory(self, pulse: int) -> None:
         del pulse
 
-    def recall_before(self, pulse: int) -> None:
+    def gop_in_memory_before(self, pulse: int) -> None:
         del pulse
 
 
