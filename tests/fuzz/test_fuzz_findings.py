@@ -33,8 +33,8 @@ from server.service.recording.recording_folder import RecordingFolder
 from server.service.recording.recording_session import RecordingSession
 from server.service.recording.retention import RetentionLimits
 from server.service.recording.session_files import InitSegments, SessionInfo
-from server.service.time_shift.playback_audio import read_audio_frames
 from server.service.service import BestViewService
+from server.service.time_shift.playback_audio import read_audio_frames
 from server.system.errors import UserError
 
 CAMERA = {"id": "c0", "source": "scene:room"}

@@ -56,10 +56,10 @@ async def time_shift_playlist(request: web.Request, stream: HlsStream) -> web.Re
     if missing is not None:
         return missing
     rewound, plan = recorded.time_shift(over=stream.is_over), service.streams.segment_plan
-    listing = rewound.listing(playback.start, playback.end)
+    listing = rewound.segments(playback.start, playback.end)
     if listing is None:
         return unavailable("the first segment is not whole yet")
-    grows = not rewound.over and (playback.end is None or playback.end > rewound.end)
+    grows = not rewound.has_ended and (playback.end is None or playback.end > rewound.end)
     if playback.end is not None:
         most = MOST_GROWING if grows else MOST
         until = (listing.numbers.start + most) * plan.segment_frames
@@ -68,7 +68,7 @@ async def time_shift_playlist(request: web.Request, stream: HlsStream) -> web.Re
     if not (_PULSE.fullmatch(request.query["from"]) and _EXPLICIT_END.fullmatch(request.query.get("to", ""))):
         return _multivariant(service, stream, _address(playback, listing, has_end="to" in request.query))
     listing = trimmed(listing) if playback.end is None else listing
-    over = rewound.over or (playback.end is not None and listing.end >= playback.end)
+    over = rewound.has_ended or (playback.end is not None and listing.end >= playback.end)
     extra = [] if over else ["#EXT-X-START:TIME-OFFSET=0"]
     return playlist_response(long_playlist(listing, plan, service.pulse0, extra, ended=over))
 

@@ -100,7 +100,7 @@ class RecordedStream:
         self, playback: PlaybackRange, live: Callable[[], Broadcaster | None]
     ) -> AsyncGenerator[MediaChunk, None]:
         """Play GOP after GOP from a moment on; ``live`` returns the stream to go on with at the present."""
-        fps, audio = self._pipeline.config.site.fps, self._pipeline.past.sound
+        fps, audio = self._pipeline.config.site.fps, self._pipeline.past.audio_buffer
         hearing = None if audio is None else PlaybackAudio(audio, self._recorded_audio, lambda: self.end)
         stream = TimeShiftStream(self._source, self._timeline(), fps, live, hearing)
         return stream.send(playback)
@@ -115,17 +115,17 @@ class RecordedStream:
             self._hearing,
             gop=pipeline.config.encode.gop,
             decided=pipeline.past.recent.end,
-            over=over,
+            has_ended=over,
         )
 
     def peak_bit_rate(self) -> float:
         """Return the most bits a second of video, by whole files on disk and GOPs in memory."""
         source = self._source
-        rates = [8 * it.length / it.frames for one in source.recorded for it in one.tape.all]
-        gop = source.recall(0)
+        rates = [8 * it.length / it.frames for one in source.recorded for it in one.index.all]
+        gop = source.gop_in_memory(0)
         while gop is not None:
             rates.append(8 * sum(map(len, gop.fragments)) / len(gop.fragments))
-            gop = source.recall(gop.end)
+            gop = source.gop_in_memory(gop.end)
         return self._pipeline.config.site.fps * max(rates, default=0.0)
 
     def _timeline(self) -> GaplessTimeline:
@@ -133,7 +133,7 @@ class RecordedStream:
         return GaplessTimeline(self._pipeline.agreement, config.site.fps, config.encode.gop)
 
     def _hearing(self) -> PlaybackAudio | None:
-        audio = self._pipeline.past.sound
+        audio = self._pipeline.past.audio_buffer
         return None if audio is None else PlaybackAudio(audio, self._recorded_audio)
 
     def _recorded_audio(self) -> Sequence[SessionEntries]:
@@ -155,7 +155,7 @@ class RecordingService:
     def status(self) -> RecordingStatus:
         """Whether streams are recorded to disk."""
         writer = self._past.writer
-        return RecordingStatus(writer is not None, "" if writer is None else writer.stands)
+        return RecordingStatus(writer is not None, "" if writer is None else writer.problem)
 
     def of_person(self, number: int, *, scoped: bool) -> RecordedStream:
         """Return what is kept of a person, ``scoped``: blanked where nobody saw them."""

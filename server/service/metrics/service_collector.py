@@ -56,7 +56,7 @@ class ServiceCollector(Collector):
         waiting = GaugeMetricFamily("myview_waiting", "What waits, by queue.", labels=["queue"])
         waiting.add_metric(["messages"], sum(inbox.waiting for inbox in pipeline.inboxes))
         waiting.add_metric(["windows"], pipeline.aligner.waiting)
-        waiting.add_metric(["recording"], writer.waiting if writer else 0)
+        waiting.add_metric(["recording"], writer.queued if writer else 0)
         for queue, length in self._more_queues.items():
             waiting.add_metric([queue], length())
         yield waiting
@@ -81,8 +81,8 @@ class ServiceCollector(Collector):
 
     def _recording(self) -> Iterable[Metric]:
         past = self._pipeline.past
-        size, writer = past.store.bytes if past.store else 0, past.writer
-        well = writer is not None and not writer.stands
+        size, writer = past.folder.bytes if past.folder else 0, past.writer
+        well = writer is not None and not writer.problem
         yield GaugeMetricFamily("myview_recording", "What is streamed is being recorded.", value=float(well))
         yield GaugeMetricFamily("myview_recorded_bytes", "Recorded, on the disk.", value=size)
         yield CounterMetricFamily(
