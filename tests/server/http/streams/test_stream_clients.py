@@ -163,10 +163,10 @@ async def test_a_viewer_who_is_gone_while_the_server_waits_for_it_is_forgotten(b
 
 async def test_a_transport_stream_is_packed_only_when_somebody_watches_one(busy: Hall) -> None:
     kept = busy.service.splicer.persons[1]._backlog
-    assert not any("ts" in vars(piece) for piece in kept)
+    assert not any("mpegts" in vars(piece) for piece in kept)
     async with busy.session.get("/objects/1/best.ts") as one, busy.session.get("/objects/1/best.ts") as two:
         data = await one.content.readexactly(188 * 16)
         assert await two.content.readexactly(188 * 16) == data
         assert data[0] == data[188] == 0x47
-    assert all("ts" in vars(piece) for piece in kept)
+    assert all("mpegts" in vars(piece) for piece in kept)
     assert len(kept[0].pictures) == GOP  # type: ignore[attr-defined]
