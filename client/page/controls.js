@@ -1,14 +1,14 @@
 /** What buttons, keys and presses do. */
 
-import { element } from './element.js';
-import { listenToKeys } from './keys.js';
-import { copy, pictureInPicture, saveSnapshot } from './tools.js';
+import { element } from './shared/element.js';
+import { listenToKeys } from './shared/keys.js';
+import { copy, pictureInPicture, saveSnapshot } from './shared/tools.js';
 
-/** @import {Banner} from './banner.js' */
-/** @import {Explaining} from './explaining.js' */
-/** @import {Overlay} from './overlay.js' */
-/** @import {Painter} from './painter.js' */
-/** @import {Strip} from './strip.js' */
+/** @import {Banner} from './operator/assist/flag_banner.js' */
+/** @import {Explaining} from './people/cost_queries.js' */
+/** @import {Overlay} from './player/overlay.js' */
+/** @import {Painter} from './player/painter.js' */
+/** @import {Strip} from './timeline/band.js' */
 /** @import {Viewer} from './viewer.js' */
 
 const SKIP_S = 5;

@@ -1,24 +1,24 @@
 /** Puts the parts on the page. */
 
-import { Banner } from './banner.js';
-import { Cameras } from './cameras.js';
+import { Banner } from './operator/assist/flag_banner.js';
+import { Cameras } from './people/cameras.js';
 import { listenToControls } from './controls.js';
-import { element } from './element.js';
-import { ServerEvents } from './events.js';
-import { Explaining } from './explaining.js';
-import { person } from './names.js';
-import { Overlay } from './overlay.js';
-import { Painter } from './painter.js';
-import { People } from './people.js';
-import { Pointing } from './pointing.js';
-import { Reason } from './reason.js';
-import { SignIn } from './sign_in.js';
-import { Span } from './span.js';
-import { Strip } from './strip.js';
-import { Tiles } from './tiles.js';
-import { Timekeeper } from './timekeeper.js';
+import { element } from './shared/element.js';
+import { ServerEvents } from './shared/events.js';
+import { Explaining } from './people/cost_queries.js';
+import { person } from './people/names.js';
+import { Overlay } from './player/overlay.js';
+import { Painter } from './player/painter.js';
+import { People } from './people/people.js';
+import { Pointing } from './operator/assist/pointing.js';
+import { Reason } from './people/selection_reason.js';
+import { SignIn } from './shared/sign_in.js';
+import { Span } from './timeline/span.js';
+import { Strip } from './timeline/band.js';
+import { Tiles } from './people/tiles.js';
+import { Timekeeper } from './player/timekeeper.js';
 import { Viewer } from './viewer.js';
-import { Why } from './why.js';
+import { Why } from './people/selection_costs.js';
 
 const READOUT_MS = 250;
 const DELAY_FRAMES = 25; // whose median is shown

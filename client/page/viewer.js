@@ -1,24 +1,24 @@
 /** What the page knows and what follows from it: the one place where the parts meet. */
 
-import { onAddress, watchedInAddress, writeAddress } from './address.js';
-import { Beside } from './beside.js';
-import { Decisions } from './decisions.js';
-import { Kept } from './kept.js';
-import { learnNames } from './names.js';
-import { Notice } from './notice.js';
-import { NowShown } from './now_shown.js';
-import { Override } from './override.js';
-import { Palette } from './palette.js';
-import { playerOf } from './players.js';
-import { Probe } from './probe.js';
-import { Recall } from './recall.js';
-import { describe } from './status.js';
-import { Travel } from './travel.js';
+import { onAddress, watchedInAddress, writeAddress } from './shared/address.js';
+import { Beside } from './people/nearby_people.js';
+import { Decisions } from './timeline/decisions.js';
+import { Kept } from './timeline/available_past.js';
+import { learnNames } from './people/names.js';
+import { Notice } from './shared/notice.js';
+import { NowShown } from './player/current_frame.js';
+import { Override } from './people/view_preference.js';
+import { Palette } from './people/palette.js';
+import { playerOf } from './player/players.js';
+import { Probe } from './player/probe.js';
+import { Recall } from './timeline/past_decisions.js';
+import { describe } from './shared/status.js';
+import { Travel } from './timeline/time_shift.js';
 
-/** @import {Camera, Gop, Person, Site} from './contract.js' */
-/** @import {View} from './kept.js' */
-/** @import {Form} from './players.js' */
-/** @import {Status} from './status.js' */
+/** @import {Camera, Gop, Person, Site} from './shared/contract.js' */
+/** @import {View} from './timeline/available_past.js' */
+/** @import {Form} from './player/players.js' */
+/** @import {Status} from './shared/status.js' */
 
 const LANDING_MS = 1500; // for which the old picture may go on after somebody else was chosen
 const RECENT_S = 10; // after this out of view a person belongs to the earlier ones

@@ -41,7 +41,7 @@ async def run(page: Page, module: str, code: str) -> Any:
 async def test_a_stream_is_cut_into_the_same_segments_however_it_arrives(page: Page, size: int) -> None:
     cut = await run(
         page,
-        "mp4.js",
+        "player/media/mp4.js",
         f"""
         const response = await fetch('/recording.mp4?first={FIRST}&end={FIRST + 20}');
         const all = new Uint8Array(await response.arrayBuffer());
@@ -66,7 +66,7 @@ async def test_a_stream_is_cut_into_the_same_segments_however_it_arrives(page: P
 async def test_what_is_no_video_is_refused(page: Page, damage: str) -> None:
     error = await run(
         page,
-        "mp4.js",
+        "player/media/mp4.js",
         f"""
         try {{ new m.SegmentSplitter().push(new Uint8Array({damage})); }}
         catch (error) {{ return error.message; }}
@@ -79,9 +79,9 @@ async def test_old_video_is_let_go(page: Page) -> None:
     seconds = 90
     ranges = await run(
         page,
-        "buffer.js",
+        "player/media/buffer.js",
         f"""
-        const {{ SegmentSplitter, join }} = await import('/page/mp4.js');
+        const {{ SegmentSplitter, join }} = await import('/page/player/media/mp4.js');
         const source = new MediaSource();
         const video = document.createElement('video');
         video.src = URL.createObjectURL(source);

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { mock, test } from 'node:test';
 
-import { arrived } from '../../../../client/page/frames.js';
+import { arrived } from '../../../../client/page/player/frames.js';
 
 class Video {
   paused = false;

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { Backoff } from '../../../../client/page/backoff.js';
+import { Backoff } from '../../../../client/page/shared/backoff.js';
 
 test('soon at first, never longer than two seconds, and soon again once it worked', () => {
   const backoff = new Backoff();

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { ServerClock } from '../../../../client/page/clock.js';
+import { ServerClock } from '../../../../client/page/player/clock.js';
 
 test('the quickest answer is believed', () => {
   const clock = new ServerClock();

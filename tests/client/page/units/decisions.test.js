@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { Decisions } from '../../../../client/page/decisions.js';
+import { Decisions } from '../../../../client/page/timeline/decisions.js';
 
 test('decisions are kept for a minute, in order and once', () => {
   const decisions = new Decisions(25);

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { ignoreLines, missing, pointsFile, toOwn, toSite } from '../../../../client/page/operator_drawn.js';
+import { ignoreLines, missing, pointsFile, toOwn, toSite } from '../../../../client/page/operator/drawing.js';
 
 const PICTURE = { width: 1280, height: 960, scale: 0.375, left: 80, top: 0 };
 
@@ -21,7 +21,7 @@ test('shapes without an area are left out', () => {
 });
 
 test('pairs that are whole are in the file, and what is missing is said', () => {
-  /** @type {import('../../../../client/page/operator_drawn.js').Pair[]} */
+  /** @type {import('../../../../client/page/operator/drawing.js').Pair[]} */
   const pairs = [1, 2, 3].map((at) => ({ image: [at, 0], floor: [String(at), '-0.5'] }));
   const half = { image: /** @type {[number, number]} */ ([9, 9]), floor: /** @type {[string, string]} */ (['1', ' ']) };
   const file = JSON.parse(pointsFile(new Map([['c0', [...pairs, half]], ['c1', [half]]]), 'm'));

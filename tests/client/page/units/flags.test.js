@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 
-import { Flags, when, words } from '../../../../client/page/flags.js';
+import { Flags, when, words } from '../../../../client/page/operator/assist/flag_priority.js';
 
 const FPS = 25;
 

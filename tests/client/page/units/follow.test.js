@@ -3,12 +3,12 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { Follow } from '../../../../client/page/follow.js';
+import { Follow } from '../../../../client/page/player/viewport_follow.js';
 
 const PICTURE = { width: 640, height: 360 };
 const FRAME = 0.04; // seconds
 
-/** @import {Part} from '../../../../client/page/follow.js' */
+/** @import {Part} from '../../../../client/page/player/viewport_follow.js' */
 
 /**
  * @param {Part} part

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 
-import { Kept } from '../../../../client/page/kept.js';
+import { Kept } from '../../../../client/page/timeline/available_past.js';
 
 test('views are cut to the time that is asked for', async () => {
   globalThis.fetch = async () => Response.json({

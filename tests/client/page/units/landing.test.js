@@ -3,8 +3,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { begunAnew, landingOf } from '../../../../client/page/landing.js';
-import { Run } from '../../../../client/page/run.js';
+import { begunAnew, landingOf } from '../../../../client/page/player/cut_over.js';
+import { Run } from '../../../../client/page/player/media/stream_download.js';
 
 const ANYBODY = { object: 1, camera: null, prefer: null, past: null };
 const GOP_S = 0.4;

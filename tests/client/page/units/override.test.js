@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 
-import { Override } from '../../../../client/page/override.js';
+import { Override } from '../../../../client/page/people/view_preference.js';
 
 function override(camera = null, prefer = null) {
   const made = new Override({ object: 1, camera, prefer, beside: [] });

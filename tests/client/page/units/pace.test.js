@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { Pace } from '../../../../client/page/pace.js';
+import { Pace } from '../../../../client/page/player/pace.js';
 
 /**
  * Play for some seconds against a stream that arrives `burst` seconds at a time.

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { place, Ways } from '../../../../client/page/operator_place.js';
+import { place, Ways } from '../../../../client/page/operator/positions.js';
 
 const SITE = { fps: 10, height: 100 };
 const PLAN = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];

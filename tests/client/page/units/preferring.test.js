@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 
-import { Decisions } from '../../../../client/page/decisions.js';
+import { Decisions } from '../../../../client/page/timeline/decisions.js';
 
 // As in tests/server/service/streaming/test_preferred_camera.py: in so many of five frames the preferred camera sees the person.
 const CASES = [

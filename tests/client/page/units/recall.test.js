@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 
-import { Recall } from '../../../../client/page/recall.js';
+import { Recall } from '../../../../client/page/timeline/past_decisions.js';
 
 const FPS = 10;
 

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 
-import { Samples } from '../../../../client/page/samples.js';
+import { Samples } from '../../../../client/page/operator/assist/pointing_samples.js';
 
 /** @param {number} pulse */
 const at = (pulse, x = 10) => ({ pulse, x, y: 20, reach: 5 });

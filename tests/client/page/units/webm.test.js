@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { ClusterSplitter } from '../../../../client/page/webm.js';
+import { ClusterSplitter } from '../../../../client/page/player/media/webm.js';
 
 const size = (/** @type {number} */ bytes) => [0x10, bytes >> 16, (bytes >> 8) & 255, bytes & 255];
 const element = (/** @type {number[]} */ id, /** @type {number[]} */ body) => [...id, ...size(body.length), ...body];

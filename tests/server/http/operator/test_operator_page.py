@@ -170,7 +170,7 @@ async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(b
         shown = people.number(A, 1, 15)
         await page.get_by_label("As whom").select_option(str(shown))
         await page.get_by_label("Which camera").select_option(A)
-        await page.get_by_role("button", name="Is somebody new").click()
+        await page.get_by_role("button", name="Split off as new person").click()
         await expect(page.locator("#known-words")).to_have_text(re.compile(r"They are \d+ from now on\."))
         assert people.number(A, 1, 19) != shown
         await page.goto(f"http://127.0.0.1:{hall.port}/?object={first}")
@@ -241,7 +241,7 @@ async def test_the_picture_is_of_the_camera_that_is_marked_though_anothers_comes
 
         await page.route("**/live.jpg", answer)
         async with page.expect_request(f"**/{A}/live.jpg"):
-            await page.locator("#sections").get_by_role("link", name="Marks").click()
+            await page.locator("#sections").get_by_role("link", name="Zones").click()
         await page.get_by_label("Camera", exact=True).select_option(B)
         image = page.locator("#mark-image")
         await expect(image).to_have_attribute("src", re.compile("^blob:"))
@@ -257,7 +257,7 @@ async def test_areas_of_the_configuration_are_there_whatever_is_pressed_before_t
     browser: Browser,
 ) -> None:
     cameras = [A, {"id": B, "source": "scene:room", "ignore": [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]}]
-    async with operating(browser, "#marks", cameras=cameras) as (hall, page):
+    async with operating(browser, "#zones", cameras=cameras) as (hall, page):
         see(hall)
         pressed = asyncio.Event()
 
@@ -270,7 +270,7 @@ async def test_areas_of_the_configuration_are_there_whatever_is_pressed_before_t
         await page.get_by_label("Camera", exact=True).select_option(B)
         await page.get_by_role("button", name="Next area").click()
         pressed.set()
-        await expect(page.get_by_label("What the marks become")).to_have_value(
+        await expect(page.get_by_label("Zones as YAML")).to_have_value(
             f"cameras:\n  - id: {B}\n    ignore: [[[0, 0], [9, 0], [9, 9]]]\n"
         )
 
@@ -278,10 +278,10 @@ async def test_areas_of_the_configuration_are_there_whatever_is_pressed_before_t
 async def test_areas_to_ignore_become_lines_of_a_configuration(browser: Browser) -> None:
     known = [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]
     cameras = [{"id": A, "source": "scene:room", "ignore": known}, B]
-    async with operating(browser, "#marks", cameras=cameras) as (hall, page):
+    async with operating(browser, "#zones", cameras=cameras) as (hall, page):
         see(hall)
         await page.reload()
-        stage, lines = page.locator("#mark-stage"), page.get_by_label("What the marks become")
+        stage, lines = page.locator("#mark-stage"), page.get_by_label("Zones as YAML")
         await expect(page.locator("#mark-drawing .area")).to_have_count(2)  # the known one, and one begun
         box = await stage.bounding_box()
         assert box is not None
@@ -307,7 +307,7 @@ async def test_areas_to_ignore_become_lines_of_a_configuration(browser: Browser)
 async def test_places_on_the_floor_become_a_file_that_calibrate_takes(
     browser: Browser, tmp_path: Path
 ) -> None:
-    async with operating(browser, "#marks") as (hall, page):
+    async with operating(browser, "#zones") as (hall, page):
         see(hall)
         await page.reload()
         await page.get_by_label("Camera", exact=True).select_option(B)
@@ -335,7 +335,7 @@ async def test_places_on_the_floor_become_a_file_that_calibrate_takes(
 async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes_floor(
     browser: Browser, tmp_path: Path
 ) -> None:
-    async with operating(browser, "#walk", patience=280, **SITE) as (hall, page):
+    async with operating(browser, "#calibration", patience=280, **SITE) as (hall, page):
         walking, state = hall.service.walking, page.locator("#walk-state")
         await expect(state).to_have_text("Nobody walks.")
         await expect(page.get_by_role("button", name="Finish")).to_be_disabled()
@@ -358,7 +358,7 @@ async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes
         await (await download.value).save_as(tmp_path / "ground.json")
         found = yaml.safe_load(await page.get_by_label("What names the ground file").input_value())
         assert found["ground"] == (await download.value).suggested_filename == "ground.json"
-        await page.get_by_role("button", name="Forget it").click()
+        await page.get_by_role("button", name="Discard").click()
         await expect(state).to_have_text("Nobody walks.")
         await expect(page.locator("#walk-result")).to_be_hidden()
     matrices = json.loads((tmp_path / "ground.json").read_text())["homography"]
@@ -366,14 +366,14 @@ async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes
 
 
 async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Browser) -> None:
-    async with operating(browser, "#choosing") as (hall, page):
+    async with operating(browser, "#view-selection") as (hall, page):
         decider, lines = hall.service.decider, page.get_by_label("Lines for the configuration")
         cost = page.get_by_label("Cut cost λ, s")
         await expect(cost).to_have_value("0.04")
         await cost.fill("2")
         await page.get_by_label("Central").fill("0.5")
         await page.keyboard.press("Enter")
-        await expect(page.locator("#choosing-state")).to_have_text("2 tried out, not as the file says.")
+        await expect(page.locator("#selection-state")).to_have_text("2 tried out, not as the file says.")
         assert (decider.view.switch_cost_s, decider.view.quality.centering) == (2.0, 0.5)
         assert "switch_cost_s: 2.0" in await lines.input_value()
         ahead = page.get_by_label("Look-ahead, frames")
@@ -382,7 +382,7 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         assert await ahead.evaluate("(it) => it.validity.rangeOverflow")
         await ahead.fill("15")
         await page.keyboard.press("Enter")
-        await expect(page.locator("#choosing-state")).to_have_text("3 tried out, not as the file says.")
+        await expect(page.locator("#selection-state")).to_have_text("3 tried out, not as the file says.")
         assert decider.view.lookahead == 15
         await page.get_by_label("Size").fill("0")  # the page lets it pass, the site does not: all are 0
         for name in ("Whole", "Unhidden", "Central"):
@@ -390,7 +390,7 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         await page.get_by_role("button", name="Try it").click()
         await expect(page.locator("#trouble")).to_contain_text("all weights are 0")
         await page.get_by_role("button", name="Back to the file").click()
-        await expect(page.locator("#choosing-state")).to_have_text("As the file says.")
+        await expect(page.locator("#selection-state")).to_have_text("As the file says.")
         await expect(page.locator("#trouble")).to_be_empty()
         assert decider.view == hall.service.config.view
 

@@ -1,0 +1,94 @@
+/**
+ * A picture that can be pressed, or have the focus and be marked by keys: arrows move a cross, Enter sets a mark.
+ * Places are in pixels of the site's picture.
+ */
+
+import { svg } from './section.js';
+
+/** @import {Site} from '../shared/contract.js' */
+/** @import {Place} from './drawing.js' */
+
+const STEP = 1; // pixels that an arrow key moves the cross
+const LEAP = 10; // with shift
+const CROSS = 1 / 40; // of the picture's width
+/** @type {Record<string, Place>} */
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
+export class MarkedPicture {
+  /** @type {Place} */
+  #cross;
+  /** @type {Element[]} */
+  #marks = [];
+
+  /**
+   * @param {HTMLElement} stage
+   * @param {HTMLElement} drawing an svg element that lies over the picture
+   * @param {Site} site
+   * @param {(place: Place) => void} mark
+   * @param {() => void} undo
+   */
+  constructor(stage, drawing, site, mark, undo) {
+    this.stage = stage;
+    this.drawing = drawing;
+    this.site = site;
+    this.mark = mark;
+    this.undo = undo;
+    this.#cross = [site.width / 2, site.height / 2];
+    drawing.setAttribute('viewBox', `0 0 ${site.width} ${site.height}`);
+    stage.addEventListener('click', (event) => this.#press(event));
+    stage.addEventListener('keydown', (event) => this.#key(event));
+  }
+
+  /** @param {Place[][]} areas */
+  drawAreas(areas) {
+    this.#marks = areas.map((corners) => svg('polygon', { points: corners.join(' '), class: 'area' }));
+    this.#draw();
+  }
+
+  /** @param {Place[]} points are numbered from 1 */
+  drawPoints(points) {
+    const size = this.site.width * CROSS;
+    this.#marks = points.flatMap(([x, y], at) => {
+      const number = svg('text', { x: x + size / 3, y: y - size / 3, 'font-size': size });
+      number.textContent = String(at + 1);
+      return [svg('circle', { cx: x, cy: y, r: size / 4, class: 'point' }), number];
+    });
+    this.#draw();
+  }
+
+  /** @param {MouseEvent} event */
+  #press({ clientX, clientY }) {
+    const { left, top, width, height } = this.stage.getBoundingClientRect();
+    this.#cross = [((clientX - left) / width) * this.site.width, ((clientY - top) / height) * this.site.height];
+    this.mark(this.#cross);
+  }
+
+  /** @param {KeyboardEvent} event */
+  #key(event) {
+    const arrow = ARROWS[event.key];
+    if (arrow) {
+      const by = event.shiftKey ? LEAP : STEP;
+      const [x, y] = this.#cross;
+      this.#cross = [clamp(x + by * arrow[0], this.site.width), clamp(y + by * arrow[1], this.site.height)];
+      this.#draw();
+    } else if (event.key === 'Enter' || event.key === ' ') this.mark(this.#cross);
+    else if (event.key === 'Backspace') this.undo();
+    else return;
+    event.preventDefault();
+  }
+
+  #draw() {
+    const [x, y] = this.#cross;
+    const size = this.site.width * CROSS;
+    const cross = svg('path', { d: `M${x - size},${y}H${x + size}M${x},${y - size}V${y + size}`, class: 'cross' });
+    this.drawing.replaceChildren(...this.#marks, cross);
+  }
+}
+
+/**
+ * @param {number} value
+ * @param {number} most
+ */
+function clamp(value, most) {
+  return Math.min(most, Math.max(0, value));
+}
