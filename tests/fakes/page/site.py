@@ -253,7 +253,7 @@ class SiteServer:
     async def start(self) -> None:
         app = web.Application()
         app.router.add_get("/", _file)
-        app.router.add_get("/page/{name}", _file)
+        app.router.add_get("/page/{name:.+}", _file)
         app.router.add_get("/api/site", self._site)
         app.router.add_get("/api/session", self._session)
         app.router.add_get("/api/operator/pointing", self._pointing)
