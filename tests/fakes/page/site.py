@@ -10,7 +10,6 @@ import time
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 import av
@@ -403,7 +402,7 @@ def _event(name: str, data: dict[str, Any]) -> bytes:
 
 
 async def _file(request: web.Request) -> web.StreamResponse:
-    path = PAGE / Path(request.match_info.get("name", "index.html")).name
+    path = PAGE / request.match_info.get("name", "index.html")
     return web.FileResponse(path, headers={"Content-Security-Policy": POLICY})
 
 

@@ -107,7 +107,7 @@ async def test_flags_are_of_who_may_be_seen_alone(site: Hall, monkeypatch: pytes
         RiskEvent(reason="alike", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
         RiskEvent(reason="fading", tracks=[2], pulse=19, margin=0.5, risk=0.5),
     ]
-    said = word(A, 3, {1: SMALL, 2: SMALL}, troubles=troubles)
+    said = word(A, 3, {1: SMALL, 2: SMALL}, risk_events=troubles)
     async with site.session.get("/api/events", headers=bearer("family")) as theirs:
         site.service.intake.tracks(tracks(said))
         site.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))

@@ -184,7 +184,7 @@ async def test_flags_are_listed_with_what_has_become_of_them(browser: Browser) -
         see(hall)
         hall.service.decider.people.roll.call(1, "Ann")
         trouble = RiskEvent(reason="alike", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
-        hall.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, troubles=[trouble])))
+        hall.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, risk_events=[trouble])))
         hall.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
         hall.service.pulse = 19
         hall.service.decide()
