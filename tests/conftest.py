@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,13 @@ settings.register_profile(
 )
 settings.register_profile("others", settings.get_profile("the same"), derandomize=False)
 settings.load_profile("the same")
+
+if sys.dont_write_bytecode:
+    # Compiling is half of a command's start, and tests start hundreds. What is kept lies in .venv alone.
+    sys.dont_write_bytecode = False
+    sys.pycache_prefix = str(Path(sys.prefix) / ".bytecode")
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # What a shell starts in the background ignores Ctrl-C, and so would the processes that tests interrupt.
