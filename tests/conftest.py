@@ -25,6 +25,9 @@ settings.register_profile(
 settings.register_profile("others", settings.get_profile("the same"), derandomize=False)
 settings.load_profile("the same")
 
+# As in every process of a site: threads that compute what one does as soon wait by turning round and round.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 if sys.dont_write_bytecode:
     # Compiling is half of a command's start, and tests start hundreds. What is kept lies in .venv alone.
     sys.dont_write_bytecode = False
