@@ -37,15 +37,19 @@ def _config(kind: str, **camera: object) -> Config:
     return build_config({"site": site, "cameras": cameras}, where="site.yaml", folder=Path())
 
 
-def _recall(kind: str) -> float:
+_LEARNED, _SEARCHED = range(0, 80, 8), range(0, 60, 3)
+"""Frames of the room from above: those that the background is learned from, and those that are searched."""
+
+
+def _recall(kind: str, scene: Scene, pictures: dict[int, NDArray[np.uint8]]) -> float:
     """Return the share of people whom the detector surely finds in the room from above."""
-    config, scene = _config(kind), Scene("overhead", 1, 2, 4, *SIZE, 2.0)
+    config = _config(kind)
     detector = make_detector(config, config.cameras[0], Letterbox(SIZE, SIZE))
     assert isinstance(detector, BackgroundDetector)
-    detector.prepare([scene.image(0, frame) for frame in range(0, 80, 8)], 10)
+    detector.prepare([pictures[frame] for frame in _LEARNED], 10)
     found = []
-    for frame in range(0, 60, 3):
-        seen = detector.detect(scene.image(0, frame))
+    for frame in _SEARCHED:
+        seen = detector.detect(pictures[frame])
         sure = seen.boxes[seen.scores > 0.5]
         boxes = scene.truth(frame)[0].boxes
         overlaps = iou(boxes[:, None], sure[None]) if len(sure) else np.zeros((len(boxes), 1))
@@ -54,8 +58,10 @@ def _recall(kind: str) -> float:
 
 
 def test_people_are_found_from_straight_above() -> None:
-    assert _recall("overhead") > 0.5
-    assert _recall("upright") < 0.25
+    scene = Scene("overhead", 1, 2, 4, *SIZE, 2.0)
+    pictures = {frame: scene.image(0, frame) for frame in {*_LEARNED, *_SEARCHED}}
+    assert _recall("overhead", scene, pictures) > 0.5
+    assert _recall("upright", scene, pictures) < 0.25
 
 
 def _turned(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
