@@ -39,19 +39,19 @@ class RecordedWalk:
 
 
 def walk_settings(fps: float, shift: float) -> WalkSettings:
-    """Give the settings for recordings of so many frames a second, out of step by `shift` seconds at most."""
+    """Return the settings for cameras that are out of sync by at most `shift` seconds."""
     return WalkSettings(maximum_offset=round(shift * fps), step=comparison_step(fps))
 
 
 def comparison_step(fps: float) -> int:
-    """Give the frames between the moments at which cameras are compared."""
+    """Return the frames between the moments at which cameras are compared."""
     return max(1, round(_MOMENT_S * fps))
 
 
 def ground_file_text(
     unit: str, homographies: Mapping[str, Floats], more: Mapping[str, Any] | None = None
 ) -> str:
-    """Give its text: the homographies, (3, 3) each, by camera."""
+    """Return the text of the ground file: by camera, the homography, (3, 3)."""
     matrices = {camera: matrix.tolist() for camera, matrix in homographies.items()}
     content = {"unit": unit, "homography": matrices, **(more or {})}
     return json.dumps(content, indent=1) + "\n"
@@ -114,7 +114,7 @@ class CoverageGap:
 
 
 def coverage_gaps(camera: str, thirds: Sequence[float], deep: float) -> Iterator[CoverageGap]:
-    """Say where somebody should walk, too; `thirds` and `deep` are as of a `CameraCalibration`."""
+    """Yield what the walk did not cover; `thirds` and `deep` are as of a `CameraCalibration`."""
     bare = [name for name, share in zip(_THIRDS, thirds, strict=True) if share < _LITTLE]
     if bare:
         where = " and the ".join(bare)
@@ -128,7 +128,7 @@ def coverage_gaps(camera: str, thirds: Sequence[float], deep: float) -> Iterator
 
 
 def report_lines(walked: RecordedWalk, found: WalkCalibration, settings: WalkSettings) -> list[str]:
-    """Give the lines about errors, coverage and offsets."""
+    """Return the report about errors, coverage and offsets, line by line."""
     on_floor, in_pictures = _heights(found.heights), _shares(found.picture)
     lines = [f"feet that two cameras see are {on_floor} apart, in the pictures {in_pictures} of the diagonal"]
     for it in found.cameras:
@@ -151,7 +151,7 @@ def report_lines(walked: RecordedWalk, found: WalkCalibration, settings: WalkSet
 
 
 def details(walked: RecordedWalk, found: WalkCalibration, person: float) -> dict[str, Any]:
-    """Give what the file says beside the homographies."""
+    """Return what the ground file holds beside the homographies."""
     return {
         "person": person,
         "offset": {it.camera: _offset(walked, it) for it in found.cameras},
@@ -174,7 +174,7 @@ def _floors(found: WalkCalibration) -> list[str]:
 
 
 def _offsets(walked: RecordedWalk, found: WalkCalibration) -> list[str]:
-    """Give the offsets as words."""
+    """Return the report about the cameras' time offsets."""
     first, fps = found.cameras[0].camera, walked.fps
     lines = []
     for it in found.cameras:
@@ -191,7 +191,7 @@ def _offsets(walked: RecordedWalk, found: WalkCalibration) -> list[str]:
 
 
 def offset_lines(walked: RecordedWalk, found: WalkCalibration) -> str:
-    """Give the lines of a configuration that bring the cameras into step; empty: they are."""
+    """Return configuration lines that synchronize the cameras; empty if they are synchronized."""
     moved = [it for it in found.cameras if _moved(it) and it.camera not in walked.live]
     lines = [f"  - id: {it.camera}\n    offset: {_use(walked, it)}\n" for it in moved]
     return "".join(["cameras:\n", *lines]) if lines else ""
@@ -206,7 +206,7 @@ def _offset(walked: RecordedWalk, camera: CameraCalibration) -> dict[str, float]
 
 
 def _use(walked: RecordedWalk, camera: CameraCalibration) -> int:
-    """Give the offset to write: what was found comes on top of what the frames have in them already."""
+    """Return the offset to configure: the configured one plus the measured one."""
     return walked.offsets.get(camera.camera, 0) + (round(camera.offset) if _moved(camera) else 0)
 
 

@@ -1,4 +1,4 @@
-"""What a walk has covered so far, as far as it can be told before it is calibrated from."""
+"""The coverage of a calibration walk so far: by camera and pair of cameras, before the calibration itself."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class WalkCoverage:
 
 
 def walk_coverage(trails: Sequence[CameraWalk], seconds: float) -> WalkCoverage:
-    """Say what was covered; the moments that are compared are so many seconds apart."""
+    """Return what a walk has covered; compared moments are ``seconds`` apart."""
     samples = [it.samples for it in trails]
     moments = 1 + max((int(it.moment.max()) for it in samples if it.moment.size), default=-1)
     there = np.zeros((len(samples), moments), dtype=np.bool_)
@@ -67,7 +67,7 @@ def walk_coverage(trails: Sequence[CameraWalk], seconds: float) -> WalkCoverage:
 
 
 def _camera(name: str, samples: WalkSamples, count: NDArray[np.int64]) -> CameraCoverage:
-    """Say what one camera has seen; ``count`` is how many cameras saw anybody at each moment, (M,)."""
+    """Return one camera's coverage; ``count`` (M,) is how many cameras saw a person at each moment."""
     shared = count[samples.moment] > 1
     third, tall = samples.third[shared], samples.tall[shared]
     left, middle, right = (float(it) for it in np.bincount(third, minlength=3) / max(1, len(third)))

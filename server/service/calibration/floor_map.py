@@ -30,7 +30,7 @@ class FloorCoverage:
 
 
 def floor_coverage(own: Floats, size: tuple[int, int], site: tuple[int, int]) -> FloorCoverage:
-    """Give what a camera covers of the floor.
+    """Return what a camera covers of the floor.
 
     Args:
         own: (3, 3) homography from the camera's own picture, pixels -> ground.

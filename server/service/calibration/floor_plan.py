@@ -44,7 +44,7 @@ class FloorPlanCamera:
 
 
 def floor_plan_cameras(found: WalkCalibration) -> list[FloorPlanCamera]:
-    """Give what there is to draw of a calibration from walks."""
+    """Return the cameras of a calibration for the floor plan."""
     return [
         FloorPlanCamera(it.camera, it.homography, it.image, it.position, it.floor) for it in found.cameras
     ]
@@ -79,11 +79,11 @@ def _draw(axis: Axes, view: FloorPlanCamera, colour: str) -> None:
 
 
 def _plain(text: str) -> str:
-    """Give a text as it is to be read: between dollars Matplotlib reads formulas, and may fail to."""
+    """Escape a text for Matplotlib, which reads formulas between dollar signs."""
     return text.replace("$", r"\$")
 
 
 def _area(view: FloorPlanCamera) -> Floats:
-    """Give the outline of the points, (K, 2): convex in the picture, and so on the floor."""
+    """Return the outline of the points, (K, 2): convex in the picture, and so on the floor."""
     outline = cv2.convexHull(view.image.astype(np.float32)).reshape(-1, 2)
     return to_ground(view.homography, outline.astype(np.float64))

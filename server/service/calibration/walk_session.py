@@ -1,4 +1,4 @@
-"""The walk that the operator is on: who was seen where since they said so, and what came of it."""
+"""The operator's calibration walk: collects detections while it lasts, then runs the calibration."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class WalkSession:
         return self._epochs * self._config.track.window.stride / self._fps
 
     def coverage(self) -> WalkCoverage:
-        """Say what was covered of it so far."""
+        """Return the coverage so far."""
         return walk_coverage(list(self._trails.values()), comparison_step(self._fps) / self._fps)
 
     async def _calibrate(self, task: CalibrationTask) -> None:

@@ -1,4 +1,4 @@
-"""Where an operator points at somebody: to the tracker of the camera in whose picture it was."""
+"""An operator's clicks on a person, as corrections for the tracker of the camera."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class PointedPosition:
 def corrections_for_tracker(
     people: PersonTracker, camera: str, number: int, places: Sequence[PointedPosition]
 ) -> OperatorPoints | None:
-    """Say in the camera's own terms where somebody is: by the track that it showed them by.
+    """Return an operator's clicks on a person as corrections of the camera's track of that person.
 
     Frames that are forgotten are left out, and so are those of an earlier run of the camera.
 

@@ -1,4 +1,4 @@
-"""Which of what is foreseen is worth a flag, where only so many may be raised a minute."""
+"""The budget of flags per minute: which risk events are worth a flag."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class FlagBudget:
         known.pulse, known.risk = now, max(known.risk, risk)
 
     def worth(self, now: int, who: frozenset[int], risk: float) -> bool:
-        """Say whether a trouble of these people that is so risky is worth a flag now."""
+        """Return whether a risk event of these persons is worth a flag now."""
         self._go_on(now)
         if any(who & others for _, others in self._raised):
             return False

@@ -1,4 +1,4 @@
-"""What an operator is asked to look at: a flag where cameras foresee trouble, and not too many of them."""
+"""Flags: risk events of the cameras' trackers that an operator is asked to look at."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _ENDED_MOST = 100
 
 
 class Flag(msgspec.Struct, frozen=True, kw_only=True):
-    """One thing that somebody should look at."""
+    """A request to an operator to look at some persons."""
 
     id: int
     """From 1, in the order in which they are raised."""
@@ -52,7 +52,7 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True, slots=True)
 class RiskEvent:
-    """One trouble of one camera, of people."""
+    """A risk event of one camera's tracker, with person numbers."""
 
     camera: str
     objects: tuple[int, ...]
@@ -148,11 +148,11 @@ class FlagQueue:
         self._put(flag)
 
     def _about(self, it: RiskEvent) -> Flag | None:
-        """Give the flag of the same people."""
+        """Return the open flag of the same persons."""
         return next((flag for flag in self.open if set(flag.objects) == set(it.objects)), None)
 
     def _was(self, it: RiskEvent) -> bool:
-        """Say whether a flag that is over was about this."""
+        """Return whether a flag that has ended was about the same event."""
         late = it.pulse - self._settings.answer_s * self._fps
         return any(set(flag.objects) == set(it.objects) and flag.pulse >= late for flag in self._ended)
 
@@ -169,7 +169,7 @@ class FlagQueue:
         self._ended.append(msgspec.structs.replace(flag, state=state))
 
     def _tell(self) -> None:
-        """Tell of what has changed."""
+        """Notify the listeners of changed flags."""
         over = [flag for flag in self._ended if flag.id in self._told]
         for flag in [*over, *self.open]:
             before = self._told.get(flag.id)

@@ -32,7 +32,7 @@ class OperatorAssist:
         self.flags.step(epoch.last, self._foreseen(epoch), people.roll.whose)
 
     def point(self, number: int, camera: str, places: Sequence[PointedPosition]) -> tuple[int, list[int]]:
-        """Tell a camera where somebody is, and that this is who; its tracker goes by that, also in the past.
+        """Send an operator's clicks on a person to a camera; its tracker corrects present and past tracks.
 
         Returns:
             How many of the places the camera is told, and the flags that are followed by that; none: they are
@@ -46,7 +46,7 @@ class OperatorAssist:
         return len(said.points), self.flags.pointed(number, camera, [it.pulse for it in said.points])
 
     def _foreseen(self, epoch: Epoch) -> Iterator[RiskEvent]:
-        """Give the troubles of an epoch whose people all have a number."""
+        """Yield the risk events of an epoch whose persons all have a number."""
         for camera, message in epoch.tracks.items():
             for trouble in message.risk_events:
                 whose = [self._people.whose(camera, message.boot, it, message.last) for it in trouble.tracks]

@@ -1,4 +1,4 @@
-"""The boxes that go with decided frames, for whoever draws."""
+"""The boxes of decided GOPs, to be drawn over their frames."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _TFDT = b"tfdt"
 
 @dataclass(frozen=True, slots=True)
 class GopOverlay:
-    """What is known of the frames of one GOP in one camera."""
+    """The boxes to draw over one GOP of one camera."""
 
     first: int
     boxes: Boxes
@@ -27,7 +27,7 @@ NO_OVERLAY = GopOverlay(0, [])
 
 
 def first_pulse(fragments: bytes, fps: float) -> int:
-    """Give the pulse that fragments, or clusters of WebM, begin with."""
+    """Return the first pulse of MP4 fragments, or of WebM clusters."""
     if fragments.startswith(CLUSTER):
         return pulse_of(fragments, fps)
     at = fragments.index(_TFDT) + len(_TFDT) + 4  # behind version and flags
@@ -52,12 +52,12 @@ class DecidedBoxes:
         return self._kept[-1].first + self._kept[-1].frames - 1 if self._kept else None
 
     def of_camera(self, camera: str, fragments: bytes) -> GopOverlay:
-        """Give everybody's boxes in a camera's GOP."""
+        """Return all boxes in a camera's GOP."""
         choices = self._of(fragments)
         return NO_OVERLAY if choices is None else GopOverlay(choices.first, choices.boxes.get(camera, []))
 
     def of_person(self, number: int, fragments: bytes, *, alone: bool = False) -> GopOverlay:
-        """Give everybody's boxes in a GOP of a person's stream, and the number that the person has there.
+        """Return all boxes in a GOP of a person's stream, and the person's number in it.
 
         ``alone``: give no box but theirs, by any of their numbers.
         """

@@ -18,7 +18,7 @@ class PicturePacer:
         self._zero: float | None = None
 
     def due(self, pulse: int, now: float) -> float:
-        """Give the moment, in the seconds of ``now``, which rises: as long after the last as pulses tell.
+        """Return when to show a picture, in seconds of the clock of ``now``, at the rate of the pulses.
 
         A picture that comes too late is shown now, and what follows is later by as much. What would have to
         wait too long, since what lay between did not come, is shown now, and what follows is earlier.
@@ -36,7 +36,7 @@ PULSE_HEADER = "X-MyView-Pulse"
 
 
 def multipart_part(picture: JpegPicture) -> bytes:
-    """Give one picture with the boundary that ends it: browsers show it only when they have seen that."""
+    """Return one picture with the boundary that ends it: browsers show it only after that."""
     head = [
         "Content-Type: image/jpeg",
         f"Content-Length: {len(picture.data)}",
@@ -101,7 +101,7 @@ class MjpegStreams:
             del self._channels[series]
 
     def rates(self, *, boxed: bool) -> list[float]:
-        """Give the rates that are watched."""
+        """Return the rates that have viewers."""
         return sorted({series.rate for series in self._channels if series.boxed is boxed})
 
     def put(self, drawn: RenderResult, now: float) -> None:

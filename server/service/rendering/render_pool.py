@@ -1,4 +1,4 @@
-"""Everything that is drawn: a source for each person and camera that somebody wants pictures of."""
+"""The pool of render processes: one rendered stream per person or camera that is watched as pictures."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ class RenderPool:
                 running.expiry = loop.call_later(self._linger_s, self._end, subject, running)
 
     def newest(self, subject: Subject) -> int | None:
-        """Give the newest frame that there is of a subject; None: it cannot be shown now.
+        """Return the newest frame of a subject; None: it cannot be shown now.
 
         Raises:
             KeyError: nobody has this number, or no camera this name.

@@ -1,4 +1,4 @@
-"""One stream that is drawn: a viewer of the spliced stream, whose eyes are a process."""
+"""One rendered stream: subscribes to a spliced stream and has a worker process decode and draw it."""
 
 from __future__ import annotations
 
@@ -48,17 +48,17 @@ class StillRequests:
                 return wish.picture  # else it was good enough for who has asked before
 
     def possible(self, newest: int) -> list[Still]:
-        """List what can be given when ``newest`` is the newest frame."""
+        """Return the kinds that can be answered when ``newest`` is the newest frame."""
         return [kind for kind, wish in self._wishes.items() if wish.pulse <= newest]
 
     def give(self, kind: Still, picture: JpegPicture | None) -> None:
-        """Give everybody their picture."""
+        """Answer all requests of a kind."""
         wish = self._wishes.pop(kind)
         wish.picture = picture
         wish.given.set()
 
     def close(self) -> None:
-        """Tell everybody who waits that there will be none."""
+        """Answer all requests: there will be no picture."""
         for kind in list(self._wishes):
             self.give(kind, None)
 
@@ -135,7 +135,7 @@ class RenderedStream:
             self._begin()
 
     async def still(self, kind: Still, pulse: int) -> JpegPicture:
-        """Give a picture of this frame or a newer one.
+        """Return a picture of this frame or a newer one.
 
         Raises:
             NoPictureError: none came in time.
@@ -148,7 +148,7 @@ class RenderedStream:
         raise PictureTimeoutError
 
     async def film_head(self) -> bytes:
-        """Give what the film begins with, when its first frames are there.
+        """Return the init segment of the overlay video, as soon as there is one.
 
         Raises:
             NoPictureError: none came in time.

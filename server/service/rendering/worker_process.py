@@ -1,4 +1,4 @@
-"""The service's end of a drawing process: started on demand, asked one thing at a time, ended for sure."""
+"""The parent side of a render worker process: starts it, sends requests, ends it."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class RenderWorker:
         return self._process.pid
 
     async def ask(self, request: RenderRequest) -> RenderResult:
-        """Give the answer to a request; nothing else is asked meanwhile.
+        """Send a request and return the answer; requests are answered one at a time.
 
         Whoever gives up waiting must end the process: the answer would be taken for another's.
 

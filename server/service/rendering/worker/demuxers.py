@@ -1,4 +1,4 @@
-"""Frames out of MP4 fragments as the service makes them: one frame each, its time in ``tfdt``."""
+"""Demuxers of the service's own MP4 fragments and WebM clusters: one frame each."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class DemuxedFrame:
 
 
 def demux_mp4(fragments: bytes, fps: float) -> Iterator[DemuxedFrame]:
-    """Give the frames of fragments in order."""
+    """Yield the frames of MP4 fragments in order."""
     pulse, lasts = -1, 1
     for kind, start, end in _boxes(fragments, 0, len(fragments)):
         if kind == b"tfdt" and end - start >= _TFDT_TIME + 8:
@@ -48,7 +48,7 @@ def demux_mp4(fragments: bytes, fps: float) -> Iterator[DemuxedFrame]:
 
 
 def _boxes(data: bytes, start: int, end: int) -> Iterator[tuple[bytes, int, int]]:
-    """Give kind, start and end of the boxes' contents, those inside others after them."""
+    """Yield type, start and end of the boxes' contents, those inside others after them."""
     while start + _HEAD <= end:
         size = int.from_bytes(data[start : start + 4], "big")
         kind = data[start + 4 : start + _HEAD]
@@ -61,7 +61,7 @@ def _boxes(data: bytes, start: int, end: int) -> Iterator[tuple[bytes, int, int]
 
 
 def _units(data: bytes, start: int, end: int) -> Iterator[bytes]:
-    """Give the NAL units of a sample, each behind its length (ISO/IEC 14496-15, 5.3.2)."""
+    """Yield the NAL units of a sample, each behind its length (ISO/IEC 14496-15, 5.3.2)."""
     while start + 4 < end:
         size = int.from_bytes(data[start : start + 4], "big")
         unit = data[start + 4 : min(start + 4 + size, end)]
@@ -84,7 +84,7 @@ _KEY = 0x80
 
 
 def demux_webm(clusters: bytes, fps: float) -> Iterator[DemuxedFrame]:
-    """Give the frames of clusters in order."""
+    """Yield the frames of WebM clusters in order."""
     at = 0
     while at + _HEAD + _TIME + _ELEMENT <= len(clusters):
         end = at + _HEAD + _size(clusters, at + 4)
@@ -102,7 +102,7 @@ def demux_webm(clusters: bytes, fps: float) -> Iterator[DemuxedFrame]:
 
 
 def _inside(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Give the elements in some bytes; in the place of a group, those in it."""
+    """Yield the elements in some bytes; those of a group in its place."""
     at = 0
     while at + _ELEMENT <= len(data):
         end = at + _ELEMENT + _size(data, at + 1)
