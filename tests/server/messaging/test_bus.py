@@ -209,10 +209,10 @@ async def test_an_address_that_is_none_is_refused() -> None:
 SCRIPT = """
 import asyncio
 from server.messaging.bus import Bus
-from server.config.sections import Zenoh
+from server.config.sections import ZenohSettings
 async def main():
     address = "tcp/127.0.0.1:{port}"
-    settings = Zenoh(connect=address, listen=address)
+    settings = ZenohSettings(connect=address, listen=address)
     buses = [Bus.router(settings), Bus.client(settings)]
     for bus in buses:
         bus.subscribe("a", print)
