@@ -293,7 +293,7 @@ class CameraProcess:
             self._id, self._boot, self._state, self._backlog.qsize(), self._load
         )
         bad = self._exchange.bad_messages + self._pointed.bad_messages
-        status = msgspec.structs.replace(status, pointed=self._pointed.taken, bad_messages=bad)
+        status = msgspec.structs.replace(status, operator_points=self._pointed.taken, bad_messages=bad)
         self._publish("status", msgspec.json.encode(status))
 
     def _publish(self, what: str, payload: bytes, attachment: bytes | None = None) -> None:

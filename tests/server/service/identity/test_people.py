@@ -86,7 +86,9 @@ def test_a_camera_that_could_not_see_anybody_is_not_asked_who_is_there() -> None
     for epoch in range(8):
         it._registry = registry = Heard([])  # type: ignore[assignment]
         away = range(epoch * STRIDE + (epoch == 6), (epoch + 1) * STRIDE) if 3 <= epoch < 7 else ()
-        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}), word("c1", epoch, {}, unsearched=[*away])))
+        it.update(
+            epoch_of(epoch, word("c0", epoch, {1: SMALL}), word("c1", epoch, {}, without_detection=[*away]))
+        )
         asked.append("c1" in registry.pictures)
     assert asked == [True, True, True, True, False, False, False, True], "a stride later, when it is final"
 

@@ -92,7 +92,7 @@ def test_nothing_is_learned_of_a_camera_that_is_not_there(speaks: bool) -> None:
     decide(it, [FOUND] * 20)
     trust = it._elsewhere._findable._shares.copy()
     for number in range(20, 40):
-        away = word(B, number, {}, unsearched=[*range(number * STRIDE, (number + 1) * STRIDE)])
+        away = word(B, number, {}, without_detection=[*range(number * STRIDE, (number + 1) * STRIDE)])
         it.step(epoch_of(number, word(A, number, FOUND[A]), *([away] if speaks else [])))
     changed = np.abs(it._elsewhere._findable._shares - trust)
     assert changed.max() < 0.05, "but for forgetting"
