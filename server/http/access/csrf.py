@@ -22,7 +22,7 @@ def check_csrf(request: web.Request) -> web.Response | None:
         return None
     if request.method == "OPTIONS":
         return error_response(403, "this address answers no page of another origin")
-    if request.headers.get("Sec-Fetch-SiteSettings", "none") not in {"none", "same-origin"}:
+    if request.headers.get("Sec-Fetch-Site", "none") not in {"none", "same-origin"}:
         return error_response(403, "this is not possible from another site's page")
     if request.method not in {"GET", "HEAD"} and CSRF_HEADER not in request.headers:
         return error_response(
