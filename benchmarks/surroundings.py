@@ -54,7 +54,7 @@ def one_thread_environment() -> dict[str, str]:
 
 
 def machine() -> str:
-    """Say on what, when and with which version this was measured, and how busy the machine was before."""
+    """Describe the machine, the version, the date, and the load before the measurement."""
     load = os.getloadavg()[0]
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     return (

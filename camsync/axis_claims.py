@@ -72,7 +72,7 @@ class AxisClaims:
         return PulseAxis(sorted(epochs)[len(epochs) // 2], self._fps)
 
     def log_minority(self, axis: PulseAxis) -> None:
-        """Tell the log of who claims more than the axis that is gone by."""
+        """Log peers that claim an axis later than the one in use."""
         now = self._clock()
         number = axis.number_at(now)
         further = [

@@ -111,11 +111,11 @@ class PulseClient:
         return self._missed
 
     def now(self) -> float:
-        """Give the clock of ``Pulse.due`` and ``Pulse.received``: unix seconds that never step."""
+        """Return the clock of ``Pulse.due`` and ``Pulse.received``: unix seconds that never step."""
         return self._clock()
 
     def status(self) -> SyncStatus:
-        """Give how the client stands."""
+        """Return the client's connection status."""
         return SyncStatus(
             connected=self._connected,
             pulse=self._follower.last,
@@ -271,7 +271,7 @@ class PulseClient:
         self._wake.set()
 
     def _connecting_ended(self, task: asyncio.Task[None]) -> None:
-        """Tell the consumer of an error that no attempt to reconnect will mend (a malformed host name)."""
+        """Raise in the consumer an error that reconnecting cannot solve (a malformed host name)."""
         error = None if task.cancelled() else task.exception()
         if error is not None:
             self._fail(SyncError(f"cannot connect to {self._host}:{self._port}: {error}"))

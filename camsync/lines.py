@@ -17,7 +17,7 @@ class LineBuffer:
         self._rest = b""
 
     def feed(self, data: bytes) -> Iterator[bytes]:
-        """Give the lines that ``data`` completes.
+        """Yield the lines that ``data`` completes.
 
         Raises:
             OverlongLineError: a line, finished or not, exceeds the limit.

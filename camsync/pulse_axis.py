@@ -18,15 +18,15 @@ class PulseAxis:
 
     @classmethod
     def through(cls, number: int, due: float, fps: float) -> PulseAxis:
-        """Give the axis on which pulse ``number`` is due at ``due``."""
+        """Return the axis on which pulse ``number`` is due at ``due``."""
         return cls(due - number / fps, fps)
 
     def due(self, number: int) -> float:
-        """Give when pulse ``number`` is due."""
+        """Return when pulse ``number`` is due."""
         return self.epoch + number / self.fps
 
     def number_at(self, time: float) -> int:
-        """Give the last pulse due at or before ``time``: negative before the epoch."""
+        """Return the last pulse due at or before ``time``: negative before the epoch."""
         number = math.floor((time - self.epoch) * self.fps)
         # The product rounds otherwise than the quotient of due() does: agree with due() exactly.
         while self.due(number) > time:

@@ -59,19 +59,19 @@ class PulseCounter:
             self._axis = PulseAxis(now, self._fps)
 
     def ahead(self, now: float) -> float:
-        """Give how many seconds the count is ahead of the axis: above 0 after counting alone for long."""
+        """Return how many seconds the count is ahead of the axis: above 0 after counting alone for long."""
         if self._axis is None or self._last is None:
             return 0.0
         return self._axis.due(self._last) - now
 
     def known(self, now: float) -> CountedPulse | None:
-        """Give what to tell a server that has forgotten the axis; None before the first pulse."""
+        """Return the axis to restore on a server that has lost it; None before the first pulse."""
         if self._axis is None or self._last is None:
             return None
         return CountedPulse(self._last, max(0.0, now - self._axis.due(self._last)))
 
     def next_due(self) -> float | None:
-        """Give when the next pulse is due; None while there is no axis."""
+        """Return when the next pulse is due; None while there is no axis."""
         return None if self._axis is None else self._axis.due(self._next)
 
     def own(self, now: float) -> Iterator[tuple[int, float]]:

@@ -31,7 +31,7 @@ class Samples:
     _end: int = -1
 
     def begin(self, at: int, count: int) -> None:
-        """Say that so many samples follow, ``at`` so many bytes in all media."""
+        """Add a chunk of ``count`` samples that starts at byte ``at`` of all media."""
         if at == self._end:
             self.chunks[-1][1] += count
         else:

@@ -60,7 +60,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _OneSiteAtAT
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Give the folder of real multi-view recordings, or skip: it is not part of the project."""
+    """Return the folder of real multi-view recordings; skip without it: it is not in the repository."""
     default = ROOT.parent / "shared" / "data"
     folder = Path(os.environ.get("MYVIEW_TEST_DATA", default))
     if not folder.is_dir():

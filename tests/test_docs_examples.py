@@ -71,7 +71,7 @@ EXAMPLES = list(examples())
 
 @pytest.fixture
 def by_hand() -> Any:
-    """Give the server tests' cameras whose every word is decided by hand."""
+    """Return the module of test cameras whose every frame and track is scripted."""
     return cameras
 
 
@@ -144,7 +144,7 @@ def test_links_to_headings_name_one() -> None:
 
 
 def anchors(text: str) -> list[str]:
-    """Give the names that a document's headings and anchors can be linked to by."""
+    """Return the anchors of a document: its headings and explicit ones."""
     headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     names = [re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings]
     return [*names, *re.findall(r'<a id="([^"]+)">', text)]
@@ -160,7 +160,7 @@ def test_every_command_and_option_is_described() -> None:
 
 
 def option_rows(command: str) -> str:
-    """Give the rows of the table of options that belong to a command."""
+    """Return the rows of the table of a command's options."""
     rows, mine = [], False
     for line in reference("cli").splitlines():
         cells = [cell.strip() for cell in line.split("|")]

@@ -36,7 +36,7 @@ class Losses:
 
 
 def losses(case: Case, truth: SceneTruth, way: Way) -> Losses:
-    """Tell apart what keeps people from being visible in the chosen view.
+    """Classify what keeps people from being visible in the chosen view.
 
     Raises:
         ValueError: the way has no boxes of its own.

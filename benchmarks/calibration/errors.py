@@ -83,7 +83,7 @@ def agreement(ground: Path, truth: Path, size: tuple[int, int]) -> dict[tuple[st
 
 
 def in_common(truth: Path, cameras: Sequence[str], size: tuple[int, int]) -> dict[tuple[str, str], Common]:
-    """Tell of every two cameras whether there is anything by which they could be laid on one floor."""
+    """Return for every pair of cameras whether they have anything in common to be aligned by."""
     people = {name: _people(path, size) for name in cameras if (path := _file(truth, name)) is not None}
     found = {}
     for one, other in combinations(people, 2):

@@ -63,7 +63,7 @@ def _bell(middles: Floats, rng: np.random.Generator) -> Floats:
 
 
 def owners(box: Floats, people: Floats) -> NDArray[np.int64]:
-    """Say whom each point of a box shows, `(_DOWN, _ACROSS)`, or nobody: -1.
+    """Return which person each point of a box shows, `(_DOWN, _ACROSS)`; -1: none.
 
     `people` are boxes `(n, 4)`, NaN who is away; who has their feet lower in the picture is nearer.
     """

@@ -88,7 +88,7 @@ async def apart(
 
 
 def restarted(*processes: str) -> Inject:
-    """Tell processes to end, and start them again as soon as they have."""
+    """Stop processes, and restart each as soon as it has exited."""
 
     async def restart(stand: Stand, name: str) -> None:
         stand.ended.append(await told_to_end(name, stand.control.processes[name]))

@@ -99,7 +99,7 @@ class Crossing:
 
 
 class _Presence:
-    """Says at the best view's router who is there, by a session each."""
+    """Holds liveliness tokens at the best view's router, one session each."""
 
     def __init__(self, settings: ZenohSettings) -> None:
         self._settings = settings
@@ -115,7 +115,7 @@ class _Presence:
 
 
 class _Known:
-    """Says at some routers who is there. That holds for good: nobody of them goes before this process."""
+    """Holds liveliness tokens at some routers, for the life of this process."""
 
     def __init__(self, *routers: Bus) -> None:
         self._routers, self._known = routers, set[str]()

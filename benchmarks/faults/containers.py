@@ -115,7 +115,7 @@ def paused(name: str, seconds: float = _AWAY_S) -> Inject:
 
 
 def restarted(name: str) -> Inject:
-    """Tell a container to end, see how it does, and start it again."""
+    """Stop a container, measure how it stops, and start it again."""
 
     async def inject(stand: Stand) -> None:
         site, service, container = _named(stand, name)

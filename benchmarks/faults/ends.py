@@ -63,7 +63,7 @@ async def _begun(process: asyncio.subprocess.Process) -> None:
 
 
 async def while_watched(views: Views, folder: Path) -> list[Ended]:
-    """Tell a site to end while somebody watches each way there is.
+    """Shut a site down while a client of every kind is connected.
 
     Raises:
         RuntimeError: somebody does not.

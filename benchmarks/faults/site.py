@@ -177,7 +177,7 @@ async def with_up(
 
 
 async def told_to_end(name: str, process: asyncio.subprocess.Process) -> Ended:
-    """Tell a process to end, and see when and how it does."""
+    """Send a process SIGTERM; return when and how it exits."""
     begun = time.monotonic()
     process.terminate()
     try:

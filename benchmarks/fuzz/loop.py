@@ -19,7 +19,7 @@ _AT_ONCE = struct.pack("ii", 1, 0)
 
 
 class _Impatient(selectors.DefaultSelector):
-    """Tells the loop what it did not wait for."""
+    """A selector that skips the waiting: timeouts pass at once, without wall-clock time."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -100,7 +100,7 @@ class ClientSessions(Scripts):
         return _scripted(rng, SERVER_LINES, 1)
 
     def feed(self, data: bytes) -> bool:
-        """Say it; then let a second pass."""
+        """Send one line, then wait a second."""
         return self._loop.run_until_complete(self._session(_script.decode(data)))
 
     async def _session(self, script: Script) -> bool:

@@ -40,7 +40,7 @@ class Sockets(Scripts):
         return (b"C" if lines is CLIENT_LINES else b"S") + said
 
     def feed(self, data: bytes) -> bool:
-        """Say it."""
+        """Send the bytes."""
         said = self._to_server if data[:1] == b"C" else self._to_client
         return self._loop.run_until_complete(said(data[1:]))
 

@@ -130,7 +130,7 @@ class Hall:
 
 
 class Tracker:
-    """Says what one camera's tracker would: whoever comes back into view is somebody new to it."""
+    """Simulates one camera's tracker: whoever comes back into view gets a new track number."""
 
     def __init__(self, hall: Hall, camera: int, boot: int) -> None:
         self._hall, self._camera, self._boot = hall, camera, boot

@@ -71,7 +71,7 @@ def _number(
 
 
 def _alone(blobs: NDArray[np.int64], person: int) -> list[bool | None]:
-    """Say at each stage whether somebody is alone in their blob; None: in none."""
+    """Return for each stage whether a person has a blob of their own; None: no blob."""
     mine = blobs[:, person]
     sharing = (blobs == mine[:, None]).sum(axis=1)
     return [

@@ -24,6 +24,6 @@ class RetainedState:
             self._kept = message.payload
 
     def service(self, there: bool) -> None:
-        """Say what is kept to a service that has come; nothing, too, so that it need not wait."""
+        """Send the retained state to a service that appeared; an empty one too, so that it need not wait."""
         if there:
             self._send(self._kept)

@@ -70,7 +70,7 @@ async def _list(url: str, settings: HttpSettings) -> None:
 
 
 class _Teller:
-    """Says once a second how far it is, on standard error."""
+    """Prints progress to standard error once a second."""
 
     def __init__(self) -> None:
         self._told = 0.0

@@ -73,7 +73,7 @@ class Config(BaseSettings):
         dotenv_settings: PydanticBaseSettingsSource,
         file_secret_settings: PydanticBaseSettingsSource,
     ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """Give environment variables precedence over the file; skip them where there are none."""
+        """Return the settings' sources by precedence: environment variables, where set, override the file."""
         del settings_cls, dotenv_settings, file_secret_settings
         told = any(name.upper().startswith(PREFIX) for name in os.environ)
         return (env_settings, init_settings) if told else (init_settings,)

@@ -24,20 +24,20 @@ _HEADERS = {
 
 
 def page_file(name: str) -> web.FileResponse:
-    """Give one of the page's files, which is there."""
+    """Return a file of the page that is known to exist."""
     return web.FileResponse(_FOLDER / name, headers=_HEADERS)
 
 
 @routes.get("/")
 async def get_index(request: web.Request) -> web.StreamResponse:
-    """Give the page."""
+    """Return the page."""
     del request
     return page_file("index.html")
 
 
 @routes.get("/page/{file:.+}")
 async def get_file(request: web.Request) -> web.StreamResponse:
-    """Give one of the page's files."""
+    """Return a file of the page."""
     path = _file(request.match_info["file"])
     if path is None:
         return error_response(404, f"there is nothing at {request.path}")

@@ -69,7 +69,7 @@ class H264GapFiller:
         return [self._made(self.how.repeat(self.how.frame_num(picture.sample), reference=False), span)]
 
     def is_lost_between(self, newest: EncodedPicture, picture: EncodedPicture, missing: int) -> bool:
-        """Tell it by the numbers, which count what was encoded."""
+        """Return whether pictures were lost between two, by ``frame_num``, which counts encoded pictures."""
         if missing == 0 or missing >= _NUMBERS_TOLD:
             return missing > 0
         return self.how.frame_num(picture.sample) != self.how.next_num(self.how.frame_num(newest.sample))

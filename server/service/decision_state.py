@@ -57,7 +57,7 @@ class Board:
         )
 
     def resolve(self, number: int) -> int:
-        """Give the number that a merged one goes by now."""
+        """Return the number that a merged person goes by now."""
         return self.merged.get(number, number)
 
     def explain(self, number: int, pulse: int | None = None) -> SelectionReason | None:
@@ -93,7 +93,7 @@ def _cut(choice: ObjectChoice, pulse: int) -> ViewCut | None:
 
 
 def reason(choice: ObjectChoice, why: Explanation) -> str:
-    """Say in one plain sentence why this view was chosen."""
+    """Return why this view was selected, as one plain sentence."""
     camera = choice.camera
     if camera is None:
         return "No camera's picture can be shown at the moment."
@@ -103,7 +103,7 @@ def reason(choice: ObjectChoice, why: Explanation) -> str:
 
 
 def _compared(camera: str, why: Explanation) -> str:
-    """Say why this camera, of those that see the person or should."""
+    """Return why this camera was selected among those that see, or should see, the person."""
     shown = why.views.get(camera)
     if shown is not None and not shown.seen and shown.unfound:
         return f"{camera} does not find this person, but others know that they stand before it."

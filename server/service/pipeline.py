@@ -324,12 +324,12 @@ class BestViewPipeline:
             self._bus.publish(self._keys.camera(camera, what), payload)
 
     def _publish(self, decision: GopDecision) -> None:
-        """Say which boxes go with the frames before the frames are sent."""
+        """Send a GOP's boxes, then its frames."""
         with self.stages.sending(lambda: self._late(decision.first)):
             self._send(decision)
 
     def _late(self, pulse: int) -> float | None:
-        """Give the seconds since a pulse was due; None before the first one."""
+        """Return the seconds since a pulse was due; None before the first pulse."""
         return None if self.pulse0 is None else self._clock() - self.pulse0 - pulse / self.config.site.fps
 
     def _send(self, decision: GopDecision) -> None:

@@ -11,7 +11,7 @@ _SLACK_S = 3.0
 
 
 def why_not_ready(service: BestViewPipeline) -> list[str]:
-    """Say what is missing for a best view to be served now; nothing: it can be.
+    """Return what prevents the best view from being served now; empty: ready.
 
     It takes pulses, a camera that delivers, and decisions that keep up with the pulses.
     """
@@ -33,7 +33,7 @@ def why_not_ready(service: BestViewPipeline) -> list[str]:
 
 
 def most_behind(service: BestViewPipeline) -> int:
-    """Give the pulses by which decisions may be behind at most, while all is well."""
+    """Return the largest normal delay of decisions, in pulses."""
     config, fps = service.config, service.config.site.fps
     waits = config.view.late_after_s + config.track.backlog_s + _SLACK_S
     designed = service.decider.view.lookahead + config.encode.gop + config.track.window.stride

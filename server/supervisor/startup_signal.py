@@ -18,7 +18,7 @@ STARTED_FD_VARIABLE = "MYVIEW_STARTED_FD"
 
 
 def signal_started() -> None:
-    """Tell the supervisor, if there is one, that this process has loaded; a second call does nothing."""
+    """Notify the supervisor, if there is one, that this process has started; idempotent."""
     with contextlib.suppress(ValueError, OSError):
         os.close(int(os.environ.pop(STARTED_FD_VARIABLE, "")))
 

@@ -19,7 +19,7 @@ async def _close(writer: asyncio.StreamWriter) -> None:
 
 @pytest.fixture
 async def by_hand() -> AsyncIterator[Connect]:
-    """Give a function that connects to a port.
+    """Yield a function that connects to a port.
 
     It takes ``receive`` bytes of kernel buffer, and ``source``, the address to come from, where given.
     """

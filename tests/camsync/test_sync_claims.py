@@ -35,7 +35,7 @@ class Liar:
         self._connection = connection
 
     async def says(self, line: str) -> None:
-        """Say a line, and wait until it was heard."""
+        """Send a line and wait until it was handled."""
         self._connection.say(f"{line}\nPING 1\n".encode())
         while not isinstance(await self._connection.message(), Pong):
             pass

@@ -54,7 +54,7 @@ def content(name: str) -> dict[str, Any]:
 
 
 def composed(files: tuple[str, ...], tmp_path: Path) -> dict[str, Any]:
-    """Give what compose makes of the files; it checks them by its schema."""
+    """Return the files as compose resolves them; it checks them against its schema."""
     secrets = tmp_path / "secrets"
     (secrets / "public").mkdir(parents=True)
     (secrets / "web").mkdir()

@@ -75,7 +75,7 @@ async def start(*words: str | Path, until: str) -> Process:
 
 
 async def end(*processes: Process) -> list[int]:
-    """Tell processes to end; give their exit codes."""
+    """Send SIGTERM to processes; return their exit codes."""
     for process in processes:
         process.send_signal(signal.SIGTERM)
     told = await asyncio.gather(*(process.communicate() for process in processes))

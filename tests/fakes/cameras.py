@@ -154,7 +154,7 @@ class TrackNumbers:
     next_id = 1
 
     def reserve_below(self, person_id: int) -> None:
-        """Give the tracks' numbers all the same."""
+        """Ignore the reservation: numbers are the tracks' own."""
 
     def update(
         self, tracks: Sequence[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]

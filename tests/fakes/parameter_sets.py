@@ -44,7 +44,7 @@ def alone(camera: str) -> list[NDArray[np.uint8]]:
 
 
 def shown(gop: int) -> tuple[str, int]:
-    """Say whose picture is shown: of which camera, and of which GOP."""
+    """Return the camera and the GOP whose picture is shown in a GOP."""
     camera = (A, B)[gop % 2]
     return (camera, gop) if (camera, gop) not in MISSING else shown(gop - 1)
 

@@ -88,7 +88,7 @@ async def take(client: PulseClient, count: int) -> list[Pulse]:
 
 @asynccontextmanager
 async def pretended_server(answer: Callable[[], bytes]) -> AsyncIterator[tuple[int, asyncio.Semaphore]]:
-    """Say ``answer()`` to every connection and no more; give the port, and a semaphore that counts them."""
+    """Answer every connection with ``answer()`` alone; return the port and a connection-counting semaphore."""
     loop = asyncio.get_running_loop()
     calls = asyncio.Semaphore(0)
     with ExitStack() as stack:

@@ -37,7 +37,7 @@ def paths(people: int, seed: int, seconds: int = 120) -> np.ndarray:
 
 
 def gaps(those: np.ndarray) -> np.ndarray:
-    """Give the distances of all pairs: ``(T, pairs)`` metres."""
+    """Return the distances of all pairs: ``(T, pairs)`` metres."""
     apart = np.linalg.norm(those[:, :, None] - those[:, None], axis=3)
     return apart[:, *np.triu_indices(those.shape[1], 1)]
 

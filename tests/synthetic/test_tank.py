@@ -31,7 +31,7 @@ def tank(cameras: int = 2, objects: int | None = None, seed: int = 1) -> Scene:
 
 @pytest.fixture(scope="module", params=range(3))
 def swum(request: pytest.FixtureRequest) -> list[FishState]:
-    """Give seventy seconds of nine fish: two rounds, and the beginning of a third."""
+    """Return seventy seconds of nine fish: two rounds, and the start of a third."""
     shoal = Shoal(9, request.param)
     return [shoal.at(t / RATE) for t in range(70 * RATE)]
 

@@ -31,7 +31,7 @@ def paths() -> np.ndarray:
 
 @cache
 def four(seed: int) -> VisitingCrowd:
-    """Give four people, whose ways are worked out once for all who ask."""
+    """Return four people, computed once for all tests."""
     return VisitingCrowd(ROOM, 4, seed)
 
 

@@ -49,7 +49,7 @@ def test_any_text_is_read_or_refused_in_one_line(text: str) -> None:
 
 
 def _refusal(lines: list[str]) -> str:
-    """Give why the lines are refused; nothing where they are read."""
+    """Return the error for refused lines; empty where they are read."""
     try:
         list(parse_rows(lines, "f"))
     except ValueError as error:

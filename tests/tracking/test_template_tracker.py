@@ -29,7 +29,7 @@ GROUND, TOYS = texture(0, 210, 140), (texture(1, SIZE, SIZE), texture(2, SIZE, S
 
 
 def places(frame: int) -> npt.NDArray[np.float64]:
-    """Give the boxes of both toys: the first goes right before the second, which goes left."""
+    """Return the boxes of two toys that cross: the first moves right, in front of the second."""
     lefts = np.array([20.0 + 4 * frame, 150.0 - 4 * frame])
     return np.stack([lefts, np.full(2, 50.0), lefts + SIZE, np.full(2, 50.0 + SIZE)], axis=1)
 
@@ -50,7 +50,7 @@ def tracker(stride: int = 5) -> TemplateTracker:
 
 
 def final(results: list[WindowResult | None]) -> dict[int, dict[int, npt.NDArray[np.float64]]]:
-    """Give the final boxes by object and frame."""
+    """Return the final boxes by object and frame."""
     rows: dict[int, dict[int, npt.NDArray[np.float64]]] = {1: {}, 2: {}}
     for result in results:
         for track in result.tracks if result else ():

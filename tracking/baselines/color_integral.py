@@ -40,7 +40,7 @@ class ColorIntegralImage:
 
 
 class ColorIntegralCache:
-    """Gives pictures' colors; those of the picture that was asked for last are summed once."""
+    """Sums pictures' colors; the integral image of the last picture is cached."""
 
     def __init__(self) -> None:
         self._last: tuple[Image, ColorIntegralImage] | None = None

@@ -63,7 +63,7 @@ class AppearanceWeights:
     full_weight_frames: int
 
     def evidence(self, distance: Floats, slope: Floats | float, middle: Floats | float) -> Floats:
-        """Give the evidence of distances between looks that are known well, any shape."""
+        """Return the evidence of distances between well-sampled appearances, any shape."""
         # Not np.clip, which takes longer than all the rest for the few of a group.
         return np.asarray(np.minimum(np.maximum(slope * (middle - distance), -self.maximum), self.maximum))
 

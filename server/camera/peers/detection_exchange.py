@@ -98,7 +98,7 @@ class PeerDetectionExchange:
     async def of(
         self, pulse: int, word: FrameDetections | None, taken: float, *, needed: bool
     ) -> PeerDetections:
-        """Tell the others what was found in a frame; give what they found in it, waited for where needed.
+        """Publish a frame's detections; return the peers' of the same frame, waiting where needed.
 
         ``taken`` is when the frame was taken, by the loop's clock. From then on patience is counted, and not
         from when it was searched: a camera that falls behind takes no other with it.
@@ -132,7 +132,7 @@ class PeerDetectionExchange:
             log.info("camera %s: what %s finds comes in time again", self._camera, camera)
 
     async def end(self, word: FrameDetections | None) -> None:
-        """Tell the others that nothing follows."""
+        """Publish that no more frames follow."""
         if word is not None:
             await self._tell(word)
 

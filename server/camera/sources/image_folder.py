@@ -73,7 +73,7 @@ class ImageFolder:
         return (self._fitted(image, file) for image, file in images if image is not None)
 
     def close(self) -> None:
-        """Say what could not be read, if that was not said; nothing is held open."""
+        """Log how many files could not be read, once."""
         self._say_gaps()
 
     def _fitted(self, image: Image, file: Path) -> Image:

@@ -135,7 +135,7 @@ class LiveStream:
         return "its pictures are {}x{} now, they were {}x{}".format(*size, *self.size)
 
     def _lost(self, why: str, *, mistake: bool = False) -> None:
-        """Say that the camera is away; one that comes and goes, or stays away, is not told of each time."""
+        """Log that the camera is away, throttled for one that comes and goes."""
         if (more := self._away.record(why)) is not None:
             log.warning("%s%s; it is tried again", why, more, exc_info=mistake)
 

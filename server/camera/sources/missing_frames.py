@@ -40,7 +40,7 @@ class MissingFrames:
             self._missing.add(frame)
 
     def say(self, length: int, rate: float) -> None:
-        """Say, once, what was noted up to the end of the recording: its frames, and its pictures a second."""
+        """Log once, at the end of the recording, its missing frames and its true frame rate."""
         if self._said:
             return
         self._said = True

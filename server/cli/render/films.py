@@ -96,7 +96,7 @@ class FilmWriter:
 
 
 def _begun_at(origin: int, heard: AudioChunk, fps: float) -> bytes:
-    """Give sound as it is in a film that has this pulse at time 0; a frame that begins before is left out."""
+    """Return an audio fragment with times relative to the film's first pulse; earlier frames are dropped."""
     form = heard.format
     sample = round(origin * form.rate / fps)
     early = max(0, -((heard.first * form.samples - sample) // form.samples))

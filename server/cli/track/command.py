@@ -67,7 +67,7 @@ def track_one(
 
 
 def _tracker_for(config: Config, name: str | None, video: Path | None) -> str:
-    """Give the tracker of that name, or the configuration's.
+    """Return the tracker of this name, by default the configured one.
 
     Raises:
         UserError: there is none, or it looks at pictures and there are none.
@@ -81,7 +81,7 @@ def _tracker_for(config: Config, name: str | None, video: Path | None) -> str:
 
 
 def _follower(config: Config, name: str, solver: Callable[[], Solver]) -> Tracker:
-    """Give the tracker, which has looked ahead where it goes by pictures."""
+    """Return the tracker, warmed up on the video where it needs pictures."""
     camera = config.cameras[0]
     if not needs_images(name):
         return set_up_tracker(config, name, camera, None, solver)
@@ -90,7 +90,7 @@ def _follower(config: Config, name: str, solver: Callable[[], Solver]) -> Tracke
 
 
 def solver_for(config: Config, name: str | None) -> Solver:
-    """Give the solver of that name, or the configuration's.
+    """Return the solver of this name, by default the configured one.
 
     Raises:
         UserError: there is none.
@@ -101,7 +101,7 @@ def solver_for(config: Config, name: str | None) -> Solver:
 
 
 def config_for_video(video: Path | None, det: Path | None, config: Path | None) -> Config:
-    """Give the configuration, with the video as its only camera."""
+    """Return the configuration with the video as its only camera."""
     base = read_content(config) if config else {}
     base.pop("ground", None)  # one camera needs no floor; the file may be what `myview calibrate` is to make
     where, folder = str(config or "myview track"), config.parent if config else Path()
@@ -114,7 +114,7 @@ def config_for_video(video: Path | None, det: Path | None, config: Path | None) 
 
 
 def detect_frames(config: Config) -> Iterator[DetectedFrame]:
-    """Give every frame of the video, and what is found in it, in its own pixels."""
+    """Yield every frame of the video with its detections, in the video's own pixels."""
     camera = config.cameras[0]
     source = open_source(camera, config.site)
     fit = Letterbox(source.size, (config.site.width, config.site.height))
@@ -127,7 +127,7 @@ def detect_frames(config: Config) -> Iterator[DetectedFrame]:
 
 
 def read_frames(source: PictureSource, first: int = 0) -> Iterator[tuple[int, Image | None]]:
-    """Give the frames of a recording from `first` to its end; `None` where one has no picture."""
+    """Yield the frames of a recording from `first` to its end; `None` where one has no picture."""
     for number in count(first):
         try:
             image = source.take(number)
@@ -148,7 +148,7 @@ def _from_detections(path: Path) -> Iterator[DetectedFrame]:
 
 
 def final_rows(result: WindowResult | None) -> Iterator[MotRow]:
-    """Give the rows of the frames that are final now, moments in hiding included."""
+    """Yield the rows of newly final frames, interpolated gaps included."""
     if result is None:
         return
     for track in result.tracks:

@@ -74,7 +74,7 @@ class AccessControl:
         return ClientIdentity(network_of(request.remote or ""))
 
     def is_operator(self, request: web.Request) -> bool:
-        """Tell whether a request is an operator's, before it is answered."""
+        """Return whether a request is an operator's, before it is answered."""
         if not self.needs_token:
             return is_local_request(request)
         credential = self.authenticator.credential_of(request)
@@ -151,7 +151,7 @@ ACCESS = web.AppKey("access", AccessControl)
 
 
 def is_scoped_to_person(request: web.Request) -> bool:
-    """Tell whether a request may see one person alone: its streams are blanked where nobody saw them."""
+    """Return whether a request is limited to one person, whose unseen frames are blanked."""
     return request.app[ACCESS].grant(request).scope.object is not None
 
 

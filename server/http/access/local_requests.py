@@ -18,7 +18,7 @@ _PROXY_HEADER = re.compile(
 
 
 def is_local_request(request: web.Request) -> bool:
-    """Tell whether a request comes from this machine: from its address, by no proxy, under its name.
+    """Return whether a request comes from this machine: by address, without a proxy, under a local name.
 
     The name is checked since another page's host name can be made to resolve to this machine (DNS rebinding).
     """
@@ -30,7 +30,7 @@ def is_local_request(request: web.Request) -> bool:
 
 
 def _is_proxy_header(name: str) -> bool:
-    """Tell whether proxies add a header; some write _ for -."""
+    """Return whether a proxy added a forwarding header; some write _ for -."""
     return _PROXY_HEADER.fullmatch(name.lower().replace("_", "-")) is not None
 
 

@@ -9,7 +9,7 @@ _IPV6_PREFIX = 64
 
 
 def is_loopback(address: str) -> bool:
-    """Tell whether an address is this machine's own."""
+    """Return whether an address is this machine's own."""
     ip = _parse(address)
     return ip is not None and ip.is_loopback
 

@@ -107,7 +107,7 @@ class Grant:
         return cls(Scope(token.object, token.camera), token.role == "operate", token.name)
 
     def allows(self, permission: Permission, request: web.Request, resolve: Callable[[int], int]) -> bool:
-        """Tell whether this is enough; ``resolve`` returns the number that a merged one goes by now."""
+        """Return whether this permission suffices; ``resolve`` maps merged person numbers to current ones."""
         scope, names = self.scope, request.match_info
         match permission:
             case Permission.PUBLIC | Permission.ANY_TOKEN:

@@ -36,7 +36,7 @@ class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @routes.get(SESSION_PATH)
 async def get_session(request: web.Request) -> web.Response:
-    """Say what whoever asks may."""
+    """Return the permissions of the request."""
     access = request.app[ACCESS]
     return json_response(_session_info(access, access.grant(request)))
 

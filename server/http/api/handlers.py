@@ -13,7 +13,7 @@ routes = web.RouteTableDef()
 
 @routes.get("/api/objects/{object:[0-9]{1,9}}/choice")
 async def get_choice(request: web.Request) -> web.Response:
-    """Say which camera shows this person, or did at a moment of the last minute, since when, and why."""
+    """Return which camera shows this person now, or did within the last minute, since when, and why."""
     service, number = request.app[SERVICE], int(request.match_info["object"])
     if "at" not in request.query:
         selection = service.people.view_selection_of(number)
@@ -34,7 +34,7 @@ async def get_choice(request: web.Request) -> web.Response:
 
 @routes.get("/objects/{object:[0-9]{1,9}}/thumb.jpg")
 async def get_thumbnail(request: web.Request) -> web.Response:
-    """Give a small picture of this person."""
+    """Return a thumbnail of this person."""
     number = int(request.match_info["object"])
     thumbnail = request.app[SERVICE].people.thumbnail_of(number)
     if thumbnail is None:
@@ -46,14 +46,14 @@ async def get_thumbnail(request: web.Request) -> web.Response:
 
 @routes.get("/healthz")
 async def get_health(request: web.Request) -> web.Response:
-    """Say that the process answers."""
+    """Return 200 while the process answers."""
     del request
     return web.Response(text="ok\n")
 
 
 @routes.get("/readyz")
 async def get_ready(request: web.Request) -> web.Response:
-    """Say whether a best view can be served now: pulses and frames come, decisions keep up; or why not."""
+    """Return whether the best view can be served now (pulses, frames, decisions), or the reason why not."""
     service = request.app[SERVICE]
     readiness = service.operations.readiness()
     if readiness.reasons:

@@ -21,7 +21,7 @@ routes = web.RouteTableDef()
 
 @routes.get("/api/objects/{object:[0-9]{1,9}}/past")
 async def get_person_past(request: web.Request) -> web.Response:
-    """Say from when to when a person's best view can be seen again; from= and to= say of which time."""
+    """Return the time ranges in which a person's best view is recorded, within from= and to=."""
     number = int(request.match_info["object"])
     recorded = request.app[SERVICE].recordings.of_person(number, scoped=is_scoped_to_person(request))
     if (unreadable := await refuse_unreadable(recorded, 0)) is not None:
@@ -33,13 +33,13 @@ async def get_person_past(request: web.Request) -> web.Response:
 
 @routes.get("/api/cameras/{camera}/past")
 async def get_camera_past(request: web.Request) -> web.Response:
-    """Say from when to when a camera can be seen again; from= and to= say of which time."""
+    """Return the time ranges in which a camera is recorded, within from= and to=."""
     return await _past(request, request.app[SERVICE].recordings.of_camera(request.match_info["camera"]))
 
 
 @routes.get("/api/past")
 async def get_decisions(request: web.Request) -> web.StreamResponse:
-    """Tell again who was where and which camera showed whom, a line for each GOP; from= and to= say when."""
+    """Stream the recorded decisions, one line per GOP, within from= and to=."""
     service = request.app[SERVICE]
     try:
         playback = parse_time_range(request, service, service.recordings.end)

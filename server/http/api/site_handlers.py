@@ -49,7 +49,7 @@ async def get_flags(request: web.Request) -> web.Response:
 
 @routes.get("/api/events")
 async def get_events(request: web.Request) -> web.StreamResponse:
-    """Tell what happens as it happens: server-sent events."""
+    """Stream events as server-sent events."""
     events, scope = request.app[EVENTS], request.app[ACCESS].grant(request).scope
     refused = refuse_event_listener(request)
     if refused is not None:

@@ -72,7 +72,7 @@ async def get_playlist(request: web.Request, stream: HlsStream) -> web.Response:
 @routes.get(_CAMERA + "/init.mp4")
 @_counted()
 async def get_init(request: web.Request, stream: HlsStream) -> web.Response:
-    """Give what a player needs before the first segment of a stream (HLS)."""
+    """Return the initialization segment of a stream (HLS)."""
     del stream
     head = request.app[SERVICE].streams.init_segment()
     return unavailable("no camera has delivered a picture yet") if head is None else _media(request, head)
@@ -82,7 +82,7 @@ async def get_init(request: web.Request, stream: HlsStream) -> web.Response:
 @routes.get(_CAMERA + f"/{_NUMBER}.m4s")
 @_counted()
 async def get_segment(request: web.Request, stream: HlsStream) -> web.Response:
-    """Give a segment of a stream (HLS), new or past."""
+    """Return a media segment of a stream (HLS), live or recorded."""
     number = int(request.match_info["segment"])
     segment = None if stream.live is None else stream.live.get(number)
     if segment is None:
@@ -96,7 +96,7 @@ async def get_segment(request: web.Request, stream: HlsStream) -> web.Response:
 @routes.get(_CAMERA + f"/{_NUMBER}.{{part:[0-9]{{1,6}}}}.m4s")
 @_counted("part")
 async def get_part(request: web.Request, stream: HlsStream) -> web.Response:
-    """Give a part of a segment of a stream (HLS); one that is yet to come is waited for."""
+    """Return a partial segment of a stream (HLS); blocks until a future one is there."""
     if stream.live is None:
         raise _unknown(request)
     number, index = int(request.match_info["segment"]), int(request.match_info["part"])

@@ -24,7 +24,7 @@ routes = web.RouteTableDef()
 
 @routes.get("/metrics")
 async def get_metrics(request: web.Request) -> web.Response:
-    """Give the metrics in Prometheus' text format."""
+    """Return the metrics in Prometheus' text format."""
     metrics: CollectorRegistry = request.app[METRICS]
     return web.Response(body=generate_latest(metrics), headers={"Content-Type": "text/plain; version=0.0.4"})
 

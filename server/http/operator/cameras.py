@@ -14,7 +14,7 @@ routes = web.RouteTableDef()
 
 @routes.get(f"{OPERATOR_PATH}/cameras")
 async def get_cameras(request: web.Request) -> web.Response:
-    """Say how every camera is: state, rate, how far from the pulse, how late its tracks, what went wrong."""
+    """Return every camera's status: state, frame rate, sync error, tracking delay, last problem."""
     return json_response(OperatorCameras(request.app[SERVICE].cameras.diagnose_cameras()))
 
 
@@ -26,5 +26,5 @@ async def get_pulses(request: web.Request) -> web.Response:
 
 @routes.get(f"{OPERATOR_PATH}/floor")
 async def get_floor(request: web.Request) -> web.Response:
-    """Say what the cameras cover of the floor that they share."""
+    """Return the coverage of the shared floor by the cameras."""
     return json_response(request.app[SERVICE].cameras.map_floor())

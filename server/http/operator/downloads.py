@@ -35,13 +35,13 @@ RowWriter = Callable[[RecordedChoices, range, Callable[[int], str]], Iterator[st
 
 @routes.get(f"{OPERATOR_PATH}/tracks.csv")
 async def get_tracks(request: web.Request) -> web.StreamResponse:
-    """Give who was where from one moment to another, as CSV."""
+    """Return everybody's positions between two moments, as CSV."""
     return await _send(request, "tracks", _TRACKS, _tracks)
 
 
 @routes.get(f"{OPERATOR_PATH}/choices.csv")
 async def get_choices(request: web.Request) -> web.StreamResponse:
-    """Give which camera showed whom from one moment to another, as CSV."""
+    """Return the selected views between two moments, as CSV."""
     return await _send(request, "choices", _CHOICES, _choices)
 
 

@@ -11,6 +11,6 @@ routes = web.RouteTableDef()
 
 @routes.get("/operator")
 async def get_operator_page(request: web.Request) -> web.StreamResponse:
-    """Give the operator's page; what it shows, it has to ask for."""
+    """Return the operator's page; its data is fetched separately."""
     del request
     return page_file("operator.html")

@@ -28,13 +28,13 @@ class PersonEdit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @routes.get(f"{OPERATOR_PATH}/people")
 async def get_people(request: web.Request) -> web.Response:
-    """Tell what was said of people by hand."""
+    """Return the manual overrides of people's identities."""
     return json_response(_people(request.app[SERVICE]))
 
 
 @routes.post(f"{OPERATOR_PATH}/people")
 async def post_people(request: web.Request) -> web.Response:
-    """Say something of people: a name, that two are one, that one is somebody new."""
+    """Apply a manual override: a name, a merge of two people, or a split."""
     service = request.app[SERVICE]
     people = service.people
     edit = await read_json(request, PersonEdit)

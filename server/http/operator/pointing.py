@@ -38,13 +38,13 @@ class PointingBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @routes.get(f"{OPERATOR_PATH}/pointing")
 async def get_pointing(request: web.Request) -> web.Response:
-    """Say whether anybody can be pointed at, and how far back."""
+    """Return whether corrections of position are accepted, and how far back."""
     return json_response(_pointing(request.app[SERVICE], Pointed(0, []), 0))
 
 
 @routes.post(f"{OPERATOR_PATH}/pointing")
 async def post_pointing(request: web.Request) -> web.Response:
-    """Say where somebody is in a camera's picture: its tracker goes by that, also in the past."""
+    """Correct a person's position in a camera's picture, now or in the past; its tracker uses it."""
     service = request.app[SERVICE]
     body = await read_json(request, PointingBody)
     places = [PointedPlace(it.pulse, it.x, it.y, it.reach) for it in body.points]

@@ -32,7 +32,7 @@ _PASSWORD = re.compile(r"cameras[.][^.]+[.]password")
 
 @routes.get(f"{OPERATOR_PATH}/config")
 async def get_config(request: web.Request) -> web.Response:
-    """Give the configuration in force, with what differs from the defaults; passwords are hidden."""
+    """Return the configuration in force and how it differs from the defaults; passwords are hidden."""
     found = request.app[ON_DISK]()
     settings = list(settings_of(request.app[SERVICE].config))
     return json_response(Settings(settings, found.error, list(found.waiting)))
@@ -40,7 +40,7 @@ async def get_config(request: web.Request) -> web.Response:
 
 @routes.get(f"{OPERATOR_PATH}/choosing")
 async def get_choosing(request: web.Request) -> web.Response:
-    """Say what views are chosen by now, and what the configuration says."""
+    """Return the view selection's settings in force, and the configured ones."""
     return json_response(_choosing(request.app[SERVICE]))
 
 
@@ -74,7 +74,7 @@ async def delete_choosing(request: web.Request) -> web.Response:
 
 
 def settings_of(config: Config) -> Iterator[Setting]:
-    """Give every setting in force, in the order of the reference."""
+    """Yield every setting in force, in the reference's order."""
     for name, field in Config.model_fields.items():
         if name == "cameras":
             for camera in config.cameras:
@@ -84,7 +84,7 @@ def settings_of(config: Config) -> Iterator[Setting]:
 
 
 def _settings(place: str, section: Any, default: Any) -> Iterator[Setting]:
-    """Give the settings of a section; ``default`` is one at its defaults, or the class."""
+    """Yield a section's settings; ``default`` is an instance with the defaults, or the class."""
     for name in _names(section):
         if isinstance(default, type) and issubclass(default, BaseModel):
             usual = default.model_fields[name].get_default(call_default_factory=True)
@@ -117,7 +117,7 @@ def _written(key: str, value: Any) -> str:
 
 
 def _shown(value: Any) -> Any:
-    """Give a value as YAML has it: of addresses their hosts, and of options for FFmpeg their names alone."""
+    """Return a value as YAML; of URLs only the host, of FFmpeg options only the names."""
     match value:
         case Mapping():
             return {redact_address(it): HIDDEN for it in value}

@@ -24,7 +24,7 @@ class WalkCommand(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @routes.get(f"{OPERATOR_PATH}/walk")
 async def get_walk(request: web.Request) -> web.Response:
-    """Say what was covered of the walk so far, and what has come of it."""
+    """Return the progress and the result of the calibration walk."""
     return json_response(request.app[SERVICE].calibration.status())
 
 
@@ -53,13 +53,13 @@ async def delete_walk(request: web.Request) -> web.Response:
 
 @routes.get(f"{OPERATOR_PATH}/walk/ground.json")
 async def get_ground(request: web.Request) -> web.Response:
-    """Give the ground file that has come of the walk."""
+    """Return the ground file that the calibration walk yielded."""
     return _file(request.app[SERVICE].calibration.ground_file(), "application/octet-stream", "ground.json")
 
 
 @routes.get(f"{OPERATOR_PATH}/walk/plan.png")
 async def get_plan(request: web.Request) -> web.Response:
-    """Give the floor plan that has come of the walk."""
+    """Return the floor plan that the calibration walk yielded."""
     return _file(request.app[SERVICE].calibration.floor_plan(), "image/png", "ground.png")
 
 

@@ -72,12 +72,12 @@ async def get_mjpeg(request: web.Request) -> web.StreamResponse:
 @routes.get("/cameras/{camera}/live.jpg")
 @_rendering
 async def get_still(request: web.Request) -> web.StreamResponse:
-    """Give the newest picture of a stream."""
+    """Return a stream's newest picture."""
     return await _still(request, _subject(request))
 
 
 def wants_boxes(request: web.Request) -> bool:
-    """Tell whether boxes are to be burnt in."""
+    """Return whether boxes are drawn into the pictures."""
     return request.query.get("overlay") == "1"
 
 

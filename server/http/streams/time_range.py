@@ -13,7 +13,7 @@ from server.service.service import BestViewService
 
 
 def is_time_shifted(request: web.Request) -> bool:
-    """Tell whether a stream is to begin in the past."""
+    """Return whether a stream starts in the past (time shift)."""
     return "from" in request.query or "to" in request.query
 
 

@@ -86,7 +86,7 @@ class HlsSessions:
         return self._by_stream[stream]
 
     def is_new_viewer(self, client: HlsClient, awaits: str | None) -> bool:
-        """Tell whether a request adds a viewer; ``awaits`` is the kind of what it may block on."""
+        """Return whether a request adds a viewer; ``awaits`` is the kind of data it may block on."""
         self._expire()
         known = self._sessions.get(client)
         return known is None or (awaits is not None and known.waiting[awaits] >= known.weight)

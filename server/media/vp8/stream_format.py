@@ -102,7 +102,7 @@ class Vp8GapFiller:
         return [self._made(span)]
 
     def is_lost_between(self, newest: EncodedPicture, picture: EncodedPicture, missing: int) -> bool:
-        """Tell it by what the camera says: VP8 does not number its frames."""
+        """Return whether frames were lost between two, by the camera's report: VP8 frames have no numbers."""
         return missing > 0 and picture.after != newest.pulse
 
     def _made(self, span: Span) -> EncodedPicture:

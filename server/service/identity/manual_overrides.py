@@ -35,7 +35,7 @@ class ManualOverrides:
         return sorted({number, *(raw for raw, said in self._is.items() if said == number)})
 
     def merge(self, kept: int, lost: int, away: Collection[int] = ()) -> None:
-        """Say that two numbers are one person's; of numbers that were never merged, `away` says who is."""
+        """Merge two numbers into one person; `away` names the absent one of numbers never merged."""
         self._gone |= {it for it in (kept, lost) if it in away and it not in self._spoken_of}
         for raw in self.worked_out(lost):
             self._is[raw] = kept

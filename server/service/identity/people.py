@@ -129,7 +129,7 @@ class PersonTracker:
         return self._registry.next_id
 
     def begin_at(self, number: int) -> None:
-        """Give no number below this one any more: an earlier run has given them."""
+        """Assign no number below this one any more: an earlier run has used them."""
         self._registry.reserve_below(number)
 
     def expect(self, tracks: Mapping[TrackName, int], pulse: int) -> None:

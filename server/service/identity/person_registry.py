@@ -53,7 +53,7 @@ class PersonRegistry:
         self.away = (self.away | set(gone)) - set(returned)
 
     def call(self, number: int, name: str) -> None:
-        """Give somebody a name; an empty one takes it back."""
+        """Set a person's name; an empty one removes it."""
         self.names.pop(number, None)
         if name:
             self.names[number] = name

@@ -116,7 +116,7 @@ class StateRecovery:
         return {number for it in self._awaited for number in (it.number, *it.also)}
 
     def begin(self, people: PersonTracker, pulse: int) -> None:
-        """Tell whose the tracks will be, before anybody has heard of them."""
+        """Assign the awaited tracks to their people before any of them is reported."""
         people.begin_at(self.next_number)
         people.expect(self._tracks, pulse - 1)
 

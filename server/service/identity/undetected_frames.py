@@ -21,7 +21,7 @@ class UndetectedFrames:
         self._frames[message.camera].update(message.without_detection)
 
     def over(self, camera: str, first: int, frames: int) -> NDArray[np.bool_]:
-        """Tell it of each of a camera's frames from `first` on, (frames,)."""
+        """Return for each of a camera's frames from `first` on whether it could not detect, (frames,)."""
         known = self._frames.get(camera, set())
         return np.array([it in known for it in range(first, first + frames)], dtype=np.bool_)
 

@@ -100,7 +100,7 @@ class RecordingFolder:
             self._append(record, info, init)
 
     def abandon(self) -> None:
-        """Give up the segment that could not be continued; its files stay."""
+        """Abandon a segment that could not be continued; its files stay."""
         ended, self._open = self._open, None
         session = self.session
         try:

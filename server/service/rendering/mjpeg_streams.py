@@ -11,7 +11,7 @@ from server.service.streaming.subscriber_queue import BytesChunk, Subscriber
 
 
 class PicturePacer:
-    """Gives pictures their moments. ``most`` is how many seconds a picture is kept back at the longest."""
+    """Paces pictures; ``most`` is the longest a picture is held back, in seconds."""
 
     def __init__(self, fps: float, most: float) -> None:
         self._fps, self._most = fps, most

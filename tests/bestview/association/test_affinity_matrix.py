@@ -70,7 +70,7 @@ class Plain:
 
 
 def name(row: int) -> RowKey:
-    """Give an episode for the even rows, somebody's past for the others."""
+    """Return a tracklet for the even rows, a person's past for the others."""
     return TrackletKey("c0", row, 0) if row % 2 == 0 else row
 
 

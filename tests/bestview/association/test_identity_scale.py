@@ -16,7 +16,7 @@ SIDE = 12.0
 
 
 def ground(hall: int) -> NDArray[np.float64]:
-    """Give the homography of a camera over a hall."""
+    """Return the homography of a camera over a hall."""
     return np.array([[PIXEL, 0.0, 100.0 * hall], [0.0, PIXEL, 0.0], [0.0, 0.0, 1.0]])
 
 

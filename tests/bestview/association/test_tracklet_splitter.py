@@ -38,7 +38,7 @@ def taken(*updates: Sequence[TrackUpdate]) -> TrackletSplitter:
 
 
 def looking(local: int, first: int, boxes: Sequence[tuple[float, ...] | None]) -> TrackUpdate:
-    """Give a track of which every sighting shows a look."""
+    """Return a track whose every sighting has an appearance sample."""
     return track(local, first, boxes, *(seen_at(first + i) for i, box in enumerate(boxes) if box))
 
 

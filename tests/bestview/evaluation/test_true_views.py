@@ -17,7 +17,7 @@ SQUARE, WIDE = [100.0, 100.0], [200.0, 200.0]
 
 
 def truth_of(boxes: list[list[float]], shown: list[float], least: float = 0.25) -> ViewGroundTruth:
-    """Give one person's views in one frame of several cameras."""
+    """Return one person's views in one frame of several cameras."""
     laid = np.array(boxes)[None, None]
     sizes = np.array([SQUARE] * len(boxes))
     return view_ground_truth(laid, np.array(shown)[None, None], sizes, least)

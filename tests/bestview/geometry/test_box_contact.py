@@ -13,7 +13,7 @@ CELL = 10.0
 
 
 def cells(box: np.ndarray) -> set[tuple[int, int]]:
-    """Give the cells that a box reaches into, one after the other."""
+    """Return the cells that a box touches, in order."""
     return {
         (row, column)
         for row in range(36)

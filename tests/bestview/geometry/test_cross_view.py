@@ -26,7 +26,7 @@ DEFAULT = CrossViewSettings()
 
 
 def looking(x: float, y: float, yaw: float) -> CameraGeometry:
-    """Give a level camera above (x, y), looking along +Y turned to the left by so many degrees; metres."""
+    """Return a level camera above (x, y), looking along +Y, turned left by some degrees; metres."""
     turn = math.radians(yaw)
     across, along = (math.cos(turn), math.sin(turn)), (-math.sin(turn), math.cos(turn))
     depth = [along[0], along[1], -(along[0] * x + along[1] * y)]
@@ -47,7 +47,7 @@ AWAY = looking(0, -5, 180)
 
 
 def boxes_of(vantage: CameraGeometry, *places: tuple[float, float]) -> NDArray[np.float64]:
-    """Give the boxes of people who stand there."""
+    """Return the boxes of people at these places."""
     foot = from_ground(vantage.homography, np.array(places, dtype=np.float64).reshape(-1, 2))
     pixel = np.concatenate([foot - (0.0, 1.0), foot], axis=-1)
     tall = TALL / person_heights(vantage.homography, pixel)
@@ -63,7 +63,7 @@ def found(vantage: CameraGeometry, *places: tuple[float, float], score: float = 
 def score_of(
     other: CameraDetections | None, vantage: CameraGeometry = SIDE, place: tuple[float, float] = (0, 10)
 ) -> float:
-    """Give the score that the front camera's box of 0.5 has then."""
+    """Return the new score of the front camera's box of score 0.5."""
     others = [] if other is None else [(vantage, other)]
     [score] = rescore_detections(FRONT, found(FRONT, place), others, DEFAULT)
     return float(score)

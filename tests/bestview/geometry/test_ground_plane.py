@@ -26,7 +26,7 @@ from bestview.geometry.ground_plane import feet_cut_off, from_ground, upright_fr
 
 
 def looking_along(height: float = 3.0, focal: float = 400.0) -> NDArray[np.float64]:
-    """Give the homography of a level camera over (0, 0), looking along +Y: 640x480, metres."""
+    """Return the homography of a level camera over (0, 0), looking along +Y: 640x480, metres."""
     ground_to_image = np.array([[focal, 320.0, 0.0], [0.0, 240.0, focal * height], [0.0, 1.0, 0.0]])
     return np.linalg.inv(ground_to_image)
 

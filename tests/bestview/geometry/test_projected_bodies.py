@@ -18,14 +18,14 @@ BOTTOM = np.array([SIZE[1], SIZE[1]], dtype=float)
 
 
 def box_in(camera: Pinhole, place: np.ndarray, slim: float = 0.4) -> np.ndarray:
-    """Give the box of somebody of one person's height at a place, (2,) person heights."""
+    """Return the box of a person one unit tall at a place, (2,) person heights."""
     x, y = camera.picture(place)
     tall = float(camera.heights(np.array([x, y])))
     return np.array([x - slim * tall / 2, y - tall, x + slim * tall / 2, y])
 
 
 def in_all(body: BodyEstimates, grounds: np.ndarray) -> np.ndarray:
-    """Give the boxes of one body in all cameras, (C, 4)."""
+    """Return the boxes of one body in all cameras, (C, 4)."""
     foot, everyone = project_feet(body, grounds)[0], np.zeros(len(grounds), int)
     return project_boxes(body, everyone, foot, grounds)
 

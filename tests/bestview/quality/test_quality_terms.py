@@ -33,7 +33,7 @@ def box(left: float, top: float, width: float = 10.0, height: float = 40.0) -> l
 
 
 def walk(x: float, y: float, frames: int = 15) -> NDArray[np.float64]:
-    """Give one person's boxes (1, N, 4) who goes by (x, y) pixels a frame."""
+    """Return the boxes (1, N, 4) of one person who moves by (x, y) pixels a frame."""
     steps = np.arange(frames)[:, None] * np.array([x, y, x, y])
     return np.array([box(50, 200)]) + steps[None]
 
@@ -44,7 +44,7 @@ def looks(*homographies: NDArray[np.float64] | None) -> CameraLayout:
 
 
 def seen(boxes: NDArray[np.float64], sure: float = 1.0, sharp: float = np.nan) -> TrackWindow:
-    """Give tracks of camera 0."""
+    """Return a window of tracks of camera 0."""
     tracks = len(boxes)
     return TrackWindow(boxes, np.zeros(tracks, dtype=np.int64), np.full(tracks, sure), np.full(tracks, sharp))
 
@@ -82,7 +82,7 @@ def test_who_is_in_the_middle_is_central() -> None:
 
 
 def left_of(*boxes: list[float], cameras: tuple[int, ...] | None = None) -> list[float]:
-    """Give how much of each box is left in one frame, all in one picture unless said otherwise."""
+    """Return the visible share of each box in one frame, by default all in one picture."""
     of = np.array(cameras or [0] * len(boxes), dtype=np.int64)
     return [float(it) for it in unoccluded_share(np.array(boxes)[:, None], of)[:, 0]]
 

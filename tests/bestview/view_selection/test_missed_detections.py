@@ -22,7 +22,7 @@ def views_of(worth: NDArray[np.float64], shown: NDArray[np.bool_]) -> VisibleVie
 def slowly(
     worth: NDArray[np.float64], shown: NDArray[np.bool_], last: LastDetections, lasts: float
 ) -> dict[tuple[int, int, int], float]:
-    """Give every view's worth, frame after frame."""
+    """Return every view's quality, frame by frame."""
     found = {}
     for c, k in np.ndindex(CAMERAS, PEOPLE):
         seen, value = -last.age[c, k], last.quality[c, k]

@@ -43,7 +43,7 @@ class Service(http.server.ThreadingHTTPServer):
             self.socket = context.wrap_socket(self.socket, server_side=True)
 
     def handle_error(self, *_: object) -> None:
-        """Say nothing of who hangs up."""
+        """Suppress the error log for clients that disconnect."""
 
 
 class _Answer(http.server.BaseHTTPRequestHandler):
@@ -56,7 +56,7 @@ class _Answer(http.server.BaseHTTPRequestHandler):
         self.wfile.write(json.dumps({"cameras": self.server.cameras}).encode())
 
     def log_message(self, *_: object) -> None:
-        """Say nothing."""
+        """Suppress the access log."""
 
 
 def serving(service: Service) -> Iterator[Service]:

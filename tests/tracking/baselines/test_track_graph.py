@@ -76,7 +76,7 @@ def _crossing() -> tuple[list[Detections], list[Stroll]]:
 
 
 def _numbers(tracker: Tracker, frames: list[Detections], people: list[Stroll]) -> list[list[int]]:
-    """Give the numbers that each had, in the order in which they had them."""
+    """Return each person's track numbers in order."""
     told = [tracker.push(number, seen) for number, seen in enumerate(frames)]
     results = [it for it in (*told, tracker.flush()) if it is not None]
     had: list[list[int]] = [[] for _ in people]

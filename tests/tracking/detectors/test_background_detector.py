@@ -25,7 +25,7 @@ WALKER = Figure(10, 200, speed=2.0, begin=40)
 
 
 def best_overlap(seen: Detections, figure: Figure, frame: int) -> float:
-    """Give the best overlap with the figure among what the detector is sure of."""
+    """Return the best overlap of the figure with a confident detection."""
     sure = seen.boxes[seen.scores >= SURE]
     return float(iou(sure, figure.box(frame)).max(initial=0.0))
 

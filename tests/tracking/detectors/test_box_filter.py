@@ -28,7 +28,7 @@ def body_of(box: npt.NDArray[np.float64], body: Body = "person") -> npt.NDArray[
 
 
 def scene(seed: int = 0) -> tuple[Plane, Plane, Plane]:
-    """Give foreground, cost and weight: three people, two of them overlapping, among noise."""
+    """Return foreground, cost and weight: three people, two of them overlapping, among noise."""
     rng = np.random.default_rng(seed)
     foreground = (rng.random((ROWS, COLUMNS)) < 0.03).astype(np.float32)
     for box in PEOPLE:

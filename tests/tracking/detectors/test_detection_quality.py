@@ -37,7 +37,7 @@ class Quality:
 def tracked(
     images: Iterable[npt.NDArray[np.uint8]], ignore: tuple[tuple[tuple[float, float], ...], ...] = ()
 ) -> dict[int, Boxes]:
-    """Give the final boxes of every frame, counted from 0."""
+    """Return the final boxes of every frame, counted from 0."""
     detector = BackgroundDetector(BackgroundSettings(ignore=ignore))
     tracker = OnlineTracker(WindowSettings(), CostSettings(), create_solver(DEFAULT_SOLVER))
     found: dict[int, Boxes] = {}

@@ -20,7 +20,7 @@ WHERE_SOMEBODY_IS = 110
 
 @cache
 def room() -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float64]]:
-    """Give a picture of the synthetic room, and the boxes of those who are seen whole."""
+    """Return a picture of the synthetic room and the boxes of fully visible people."""
     scene = Scene("room", 3, 4, 1, 640, 360, 25)
     seen = scene.truth(WHERE_SOMEBODY_IS)[0]
     return scene.image(0, WHERE_SOMEBODY_IS), seen.boxes[seen.visibility >= 0.8]

@@ -29,7 +29,7 @@ def random_rows(rng: np.random.Generator, objects: int) -> list[MotRow]:
 
 
 def matchings(frame: FrameSimilarity) -> Iterator[Pairs]:
-    """Give all ways to match as many as there are."""
+    """Yield all maximal matchings."""
     people, tracks = frame.similarity.shape
     if people <= tracks:
         for columns in permutations(range(tracks), people):
@@ -56,7 +56,7 @@ def boxes_of(frames: list[FrameSimilarity]) -> tuple[dict[int, int], dict[int, i
 
 
 def clear(frames: list[FrameSimilarity]) -> tuple[int, int]:
-    """Give matches and switches: pairs stay where they can, then the overlap is largest."""
+    """Return matches and switches: pairs are kept where possible, then the overlap is maximal."""
     matches = switches = 0
     before: dict[int, int] = {}
     last: dict[int, int] = {}
@@ -79,7 +79,7 @@ def clear(frames: list[FrameSimilarity]) -> tuple[int, int]:
 
 
 def identity_f1(frames: list[FrameSimilarity]) -> float:
-    """Give IDF1: the best way to say which track stands for which person."""
+    """Return IDF1 by the best assignment of tracks to people."""
     people, tracks = boxes_of(frames)
     together = {
         (person, track): sum(
@@ -100,7 +100,7 @@ def identity_f1(frames: list[FrameSimilarity]) -> float:
 
 
 def hota(frames: list[FrameSimilarity]) -> float:
-    """Give HOTA as its paper defines it: matched for the best alignment over the whole recording."""
+    """Return HOTA by its paper's definition: matched by the best alignment over the recording."""
     people, tracks = boxes_of(frames)
     shared = dict.fromkeys(((person, track) for person in people for track in tracks), 0.0)
     for frame in frames:

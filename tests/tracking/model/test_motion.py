@@ -29,7 +29,7 @@ def walked(frames: int = 12) -> MotionModel:
 def window(
     motion: MotionModel | None, settings: CostSettings, *boxes: np.ndarray, look: np.ndarray = LOOK
 ) -> Network:
-    """Give a window of one hidden object and one box a frame."""
+    """Return a window of one hidden object and one box a frame."""
     frames = [Detections(box[None], np.ones(1), look[None]) for box in boxes]
     return build_network([Template(1, LOOK, None, motion)], frames, settings)
 

@@ -317,7 +317,7 @@ class NetworkCamera:
 
 @lru_cache
 def numbers() -> Mapping[tuple[bytes, ...], int]:
-    """Say of what the cameras send which access unit it is."""
+    """Return the number of an access unit among those that the camera sends."""
     return {tuple(nals(unit.data)): unit.pulse for unit in encoded(0, 1000)}
 
 

@@ -57,7 +57,7 @@ class Site:
         return it
 
     def tell(self, epochs: Iterable[int], seen: Seen = ALL, boot: int = 1) -> None:
-        """Tell of who is seen; pictures are of no matter here."""
+        """Push an epoch with these tracks; pictures do not matter here."""
         for epoch in epochs:
             for camera in CAMERAS:
                 self.service.intake.tracks(tracks(word(camera, epoch, seen[camera], boot=boot)))

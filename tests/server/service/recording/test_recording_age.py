@@ -44,7 +44,7 @@ def records(store: RecordingFolder, clocks: ClocksByHand, gops: range) -> None:
 
 
 def kept(folder: Path) -> list[int]:
-    """Say of which GOPs there are pictures on the disk."""
+    """Return the GOPs whose pictures are on the disk."""
     return sorted(int(it.stem) // GOP for it in folder.glob("*/cameras/c0/*.mp4"))
 
 

@@ -50,7 +50,7 @@ def refused(store: RecordingFolder, clock: ClocksByHand, gop: int) -> None:
 
 
 def on_disk(folder: Path) -> list[int]:
-    """Say of which segments there are pictures, by their first pulse."""
+    """Return the first pulses of the segments whose pictures are on the disk."""
     return sorted({int(it.stem) for it in folder.glob("*/cameras/*/*.mp4")})
 
 

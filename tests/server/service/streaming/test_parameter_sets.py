@@ -28,7 +28,7 @@ from server.service.streaming.subscriber_queue import Chunk
 
 
 async def spliced(config: Config) -> tuple[bytes, bytes]:
-    """Give a stream that changes camera at every GOP, as MP4 and as a transport stream."""
+    """Return a stream that changes camera at every GOP, as MP4 and as MPEG-TS."""
     agreement = stream_format_for(
         config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
     )

@@ -28,7 +28,7 @@ def decider(has: Callable[[str, int], bool] = EVERY_FRAME, **changes: Any) -> Vi
 
 
 def decide(it: ViewDecider, story: Sequence[Seen], *, end: int | None = None) -> list[GopDecision]:
-    """Tell a story epoch by epoch; ``end`` is the last frame when the recordings are over."""
+    """Feed a scripted scene epoch by epoch; ``end`` is the last frame of ended recordings."""
     decisions = []
     for number, seen in enumerate(story):
         decisions += it.step(
