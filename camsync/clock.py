@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 Clock = Callable[[], float]
-"""Gives the time now in unix seconds."""
+"""Returns the current time in unix seconds."""
 
 
 def steady_unix_clock() -> Clock:

@@ -45,7 +45,7 @@ try:
 except zenoh.ZError as error:
     print("refused", error)
 """
-"""Says nonsense under a key of the bus; whoever hears it counts it as a bad message."""
+"""Publishes malformed messages under a key of the bus; receivers count them as bad messages."""
 STATUS = "myview/demo/camera/c1/status"
 BUS = "tls/bestview:7447"
 

@@ -88,7 +88,7 @@ async def take(client: PulseClient, count: int) -> list[Pulse]:
 
 @asynccontextmanager
 async def pretended_server(answer: Callable[[], bytes]) -> AsyncIterator[tuple[int, asyncio.Semaphore]]:
-    """Answer every connection with ``answer()`` alone; return the port and a connection-counting semaphore."""
+    """Answer every connection with ``answer()`` alone; return the port and a semaphore of connections."""
     loop = asyncio.get_running_loop()
     calls = asyncio.Semaphore(0)
     with ExitStack() as stack:
