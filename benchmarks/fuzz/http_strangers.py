@@ -80,7 +80,7 @@ class Strangers(Target):
             {"access": {"tokens": str(tokens)}, "http": {"hls_segment_s": 0.2}}, one_each, before=self._watch
         )
         for number, name in _NAMES.items():
-            self._served.service.decider.people.roll.call(number, name)
+            self._served.service.decider.people.registry.set_name(number, name)
         self._authenticator = self._served.app[ACCESS].authenticator
         ends = time.monotonic() + 1e9
         self._sessions = {

@@ -194,7 +194,7 @@ class Fed(BestViewPipeline):
     def come(self, *cameras: str) -> None:
         """Let cameras be there."""
         for camera in cameras:
-            self.intake.alive(KEYS.camera(camera, "alive"), there=True)
+            self.intake.alive(KEYS.camera(camera, "alive"), is_present=True)
 
     def handle(self, message: Message) -> None:
         """Take a message in as the bus hands it on, by what its key ends with."""
@@ -203,7 +203,7 @@ class Fed(BestViewPipeline):
         parts = message.key.split("/")
         what = parts[4] if len(parts) > 4 else ""
         if what == "alive":
-            self.intake.alive(message.key, there=message.payload == b"1")
+            self.intake.alive(message.key, is_present=message.payload == b"1")
         elif what in self._handlers:
             self._handlers[what](message)
 

@@ -66,12 +66,12 @@ class Memories(Scripts):
         )
         it = StateReplication(people, CAMERAS, FPS, lambda _, payload: told.append(payload))
         for camera in CAMERAS:
-            it.alive(KEYS.camera(camera, "alive"), there=True)
+            it.alive(KEYS.camera(camera, "alive"), is_present=True)
         wrong = 0
         for key, payload in script:
             self.messages += 1
             try:
-                it.heard(Message(key, payload, b""))
+                it.snapshot_received(Message(key, payload, b""))
             except DECODE_ERRORS:
                 wrong += 1
         rng = Random(seed)
@@ -81,7 +81,7 @@ class Memories(Scripts):
             words = [word(rng, camera, last // STRIDE) for camera in CAMERAS]
             people.update(Epoch(last // STRIDE, last, {said.camera: said for said in words}))
             it.take(last)
-            assert not set(people.roll.merged) & set(people.roll.everybody), (
+            assert not set(people.registry.merged) & set(people.registry.everybody), (
                 "a number that is another's is somebody's"
             )
         for payload in told:

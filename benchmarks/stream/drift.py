@@ -54,7 +54,7 @@ class Source:
         self._keys = ZenohKeys(service.config.site.name)
         self._trackers = [Tracker(hall, camera, _BOOT) for camera in range(CAMERAS)]
         for name in hall.ids:
-            service.intake.alive(self._keys.camera(name, "alive"), there=True)
+            service.intake.alive(self._keys.camera(name, "alive"), is_present=True)
 
     def pulse(self, number: int) -> None:
         """Send what comes with a pulse, and let the service decide."""

@@ -94,12 +94,12 @@ class BestViewPipeline:
         self.assist = OperatorAssist(
             config, self.decider.people, partial(self._tell_camera, "operator_points")
         )
-        self.remembering = StateReplication(
+        self.state_replication = StateReplication(
             self.decider.people,
             cameras,
             fps,
             partial(self._tell_camera, "identities"),
-            tells=config.view.share.index == 0,
+            sends=config.view.share.index == 0,
         )
         self.walking = WalkSession(config)
         self.past = Recorder(config, self.frame_buffers, self.agreement, frames, self.sound)
@@ -111,7 +111,7 @@ class BestViewPipeline:
         self._pulsed_at: float | None = None
         self._clock: Callable[[], float] = time.time
         """The pulses', which does not step when the system's is set."""
-        self.lacking = LossRecorder(self.frame_buffers, self.intake.states, stride)
+        self.losses = LossRecorder(self.frame_buffers, self.intake.states, stride)
         self.stages = StageTimers()
         self.inboxes: list[Inbox[Message]] = []
         """Where the bus's messages wait for the event loop."""
@@ -160,7 +160,7 @@ class BestViewPipeline:
             UserError: the output folder cannot be written.
         """
         if self._out is not None:  # not before all ports are listened on: a failed start leaves no files
-            self._recorder = self.lacking.recorder = self._record(self._out)
+            self._recorder = self.losses.recorder = self._record(self._out)
         self.past.open()
         patience = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._go_without_pulses)
         follow = asyncio.create_task(self._follow_pulses(), name="pulses")
@@ -171,7 +171,7 @@ class BestViewPipeline:
                 self._changed.clear()
                 if follow.done():
                     await follow  # raises what ended it
-                if (self.pulse >= 0 or self._without_pulses) and not self.remembering.waits:
+                if (self.pulse >= 0 or self._without_pulses) and not self.state_replication.is_waiting:
                     await self.decide_by_turns()
             for decision in self.what_is_left():
                 self._publish(decision)
@@ -298,23 +298,23 @@ class BestViewPipeline:
 
     def _alive(self, key: str, there: bool) -> None:
         self.intake.alive(key, there)
-        self.remembering.alive(key, there)
+        self.state_replication.alive(key, there)
         self._changed.set()
-        if self.remembering.waits:
+        if self.state_replication.is_waiting:
             asyncio.get_running_loop().call_later(PATIENCE_S, self._changed.set)
 
     def _remembered(self, message: Message) -> None:
-        self.intake.remembered(message, self.remembering.heard)
+        self.intake.remembered(message, self.state_replication.snapshot_received)
         self._changed.set()
 
     def _step(self, epoch: Epoch) -> None:
         self._decided_to = epoch.last
-        self.lacking.epoch(epoch)
+        self.losses.epoch(epoch)
         self.walking.take(epoch)
-        self.remembering.begin(epoch.last)
+        self.state_replication.begin(epoch.last)
         with self.stages.deciding():
             decisions = self.decider.step(epoch)
-        self.remembering.take(epoch.last)  # names are there with the first decision
+        self.state_replication.take(epoch.last)  # names are there with the first decision
         for decision in decisions:
             self._publish(decision)
         self.assist.step(epoch, self.config)
@@ -334,7 +334,7 @@ class BestViewPipeline:
 
     def _send(self, decision: GopDecision) -> None:
         choices = self.board.put(decision)
-        self.past.put(choices, self.pulse0, self.remembering.numbers_since)
+        self.past.put(choices, self.pulse0, self.state_replication.numbers_since)
         for tell in self.on_decision:
             tell(choices)
         self.splicer.publish_decision(decision)
@@ -344,5 +344,5 @@ class BestViewPipeline:
             self._bus.publish(key, msgspec.json.encode(choices))
         if self._recorder is not None:
             self._recorder.write(decision)
-        self.lacking.gop(decision)
+        self.losses.gop(decision)
         self.intake.forget_thumbnails_before(decision.first - self.config.view.identity.forget_after)

@@ -173,9 +173,11 @@ class FedService(BestViewPipeline):
     def come(self, *cameras: str) -> None:
         """Let cameras be there, which remember nobody."""
         for camera in cameras:
-            for part in (self.intake, self.remembering):
-                part.alive(ZenohKeys("hall").camera(camera, "alive"), there=True)
-            self.remembering.heard(Message(ZenohKeys("hall").camera(camera, "retained_identities"), b"", b""))
+            for part in (self.intake, self.state_replication):
+                part.alive(ZenohKeys("hall").camera(camera, "alive"), is_present=True)
+            self.state_replication.snapshot_received(
+                Message(ZenohKeys("hall").camera(camera, "retained_identities"), b"", b"")
+            )
 
     def feed(self, epoch: int, seen: Mapping[str, Mapping[int, Box | None]]) -> None:
         """Send an epoch's frames and words of the cameras in ``seen``, and decide."""

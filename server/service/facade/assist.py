@@ -109,9 +109,9 @@ class AssistService:
             raise ConflictError(self.blocked)
         if camera not in pipeline.frame_buffers:
             raise UnknownCameraError(camera, pipeline.frame_buffers)
-        number = pipeline.decider.people.roll.whose(command.number)
+        number = pipeline.decider.people.registry.current(command.number)
         if number not in pipeline.decider.people.known:
-            is_recovering = pipeline.remembering.awaits(command.number)
+            is_recovering = pipeline.state_replication.may_recover(command.number)
             raise UnknownObjectError(command.number, is_recovering=is_recovering)
         for place in command.places:
             self._check(place)

@@ -163,10 +163,10 @@ class PeopleService:
             summaries.append(
                 PersonSummary(
                     number=number,
-                    name=people.roll.names.get(number),
-                    former_numbers=people.roll.also(number),
-                    first_seen=people.roll.first_seen.get(number, standing.first),
-                    last_seen=people.roll.last_seen.get(number, standing.first),
+                    name=people.registry.names.get(number),
+                    former_numbers=people.registry.aliases(number),
+                    first_seen=people.registry.first_seen.get(number, standing.first),
+                    last_seen=people.registry.last_seen.get(number, standing.first),
                     camera=standing.choice.camera,
                     cameras=list(standing.cameras),
                     thumbnail_pulse=None if thumbnail is None else thumbnail.pulse,
@@ -177,7 +177,7 @@ class PeopleService:
     def list_remote_people(self) -> list[RemotePerson]:
         """Return the people whom other services of the site decide for, by number."""
         share = self._pipeline.config.view.share
-        return [RemotePerson(it, shard_address(it, share)) for it in self._pipeline.decider.people.elsewhere]
+        return [RemotePerson(it, shard_address(it, share)) for it in self._pipeline.decider.people.remote]
 
     def shard_of(self, number: int) -> Shard:
         """Return the service that decides for a number, which need not be anybody's."""
@@ -191,12 +191,12 @@ class PeopleService:
 
     def unknown(self, number: int) -> UnknownObjectError:
         """Return the error to raise where nobody has this number."""
-        return UnknownObjectError(number, is_recovering=self._pipeline.remembering.awaits(number))
+        return UnknownObjectError(number, is_recovering=self._pipeline.state_replication.may_recover(number))
 
     @property
     def numbered_since(self) -> float:
         """Unix seconds since when numbers mean the same people."""
-        return self._pipeline.remembering.numbers_since
+        return self._pipeline.state_replication.numbers_since
 
     def view_selection_of(self, number: int, pulse: int | None = None) -> ViewSelection | None:
         """Return why a person's newest view was selected, or that at a pulse of the last minute.
@@ -249,7 +249,7 @@ class PeopleService:
     def manual_overrides(self) -> ManualOverrides:
         """Return the names and merges that the operator has given."""
         people = self._pipeline.decider.people
-        return ManualOverrides(dict(sorted(people.roll.names.items())), people.merged_by_hand)
+        return ManualOverrides(dict(sorted(people.registry.names.items())), people.merged_by_hand)
 
     def check_editable(self, number: int) -> None:
         """Check that a person can be edited.
@@ -271,7 +271,7 @@ class PeopleService:
         number, name = self._editable(command.number), " ".join(command.name.split())
         if len(name) > NAME_LENGTH_MAX or not name.isprintable():
             raise InvalidCommandError(f"name: at most {NAME_LENGTH_MAX} letters that can be read")
-        self._pipeline.decider.people.roll.call(number, name)
+        self._pipeline.decider.people.registry.set_name(number, name)
 
     def merge_people(self, command: MergePeople) -> None:
         """Merge one person's number into another's, whatever the evidence says from now on.
@@ -298,7 +298,7 @@ class PeopleService:
         for camera in command.cameras:
             if camera not in cameras:
                 raise UnknownCameraError(camera, cameras)
-        new = self._pipeline.decider.people.part(number, command.cameras or cameras)
+        new = self._pipeline.decider.people.split_off(number, command.cameras or cameras)
         if new is None:
             raise ConflictError(f"no such camera shows object {number} now")
         return new
@@ -308,7 +308,7 @@ class PeopleService:
         if self.editing_blocked:
             raise ConflictError(self.editing_blocked)
         people = self._pipeline.decider.people
-        current = people.roll.whose(number)
+        current = people.registry.current(number)
         if current not in people.known:
             raise self.unknown(number)
         return current
@@ -317,7 +317,7 @@ class PeopleService:
         """Return every person's thumbnails by number, each with its camera."""
         thumbnails: dict[int, list[tuple[str, Thumbnail]]] = {}
         for (camera, boot, track), thumbnail in self._pipeline.intake.thumbnails.items():
-            number = self._pipeline.decider.people.whose(camera, boot, track, thumbnail.pulse)
+            number = self._pipeline.decider.people.person_of(camera, boot, track, thumbnail.pulse)
             if number is not None:
                 thumbnails.setdefault(number, []).append((camera, thumbnail))
         return thumbnails

@@ -56,14 +56,14 @@ class CameraWindow:
                 local_id=key.local_id,
                 first_frame=self.fresh,
                 boxes=boxes,
-                appearance=_glimpses(track.appearance, self.fresh),
+                appearance=_appearance_samples(track.appearance, self.fresh),
                 picture_height=float(height),
             )
             for key, track, boxes, gone in zip(self.keys, self.message.tracks, own, hidden, strict=True)
             if not gone.all()
         ]
 
-    def seen(self) -> list[tuple[int, int]]:
+    def seen_spans(self) -> list[tuple[int, int]]:
         """Return each track's first and last frame with a box; the last is lower: none."""
         there = ~np.isnan(self.boxes[:, :, 0])
         if not there.size:
@@ -74,7 +74,9 @@ class CameraWindow:
         return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
-def _glimpses(looks: Sequence[messages.AppearanceHistogram], first: int) -> tuple[AppearanceSample, ...]:
+def _appearance_samples(
+    looks: Sequence[messages.AppearanceHistogram], first: int
+) -> tuple[AppearanceSample, ...]:
     """Return the looks in the frames from `first` on."""
     return tuple(
         AppearanceSample(max(it.first, first), it.last, np.array(it.histogram, dtype=np.float64))
@@ -121,7 +123,7 @@ class WindowReader:
             fresh = max(fresh, min(self._final.get(message.camera, -1), message.final_to) + 1)
         return CameraWindow(message, keys, locals_, fit, boxes.reshape(len(keys), frames, 4), fresh)
 
-    def read_again(self, window: CameraWindow) -> CameraWindow:
+    def with_current_keys(self, window: CameraWindow) -> CameraWindow:
         """Return a window by what its tracks are called now."""
         keys = self.locals.of(window.message)
         return replace(window, keys=keys, locals=np.array([key.local_id for key in keys], dtype=np.int64))

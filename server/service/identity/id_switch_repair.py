@@ -22,7 +22,7 @@ class IdSwitchRepair:
 
     def __init__(self, registry: IdentityRegistry, reader: WindowReader) -> None:
         self._registry, self._reader = registry, reader
-        self._said: dict[TrackKey, TrackPart] = {}
+        self._switches: dict[TrackKey, TrackPart] = {}
         """Since when a track is whose, until the evidence speaks of that time no more."""
 
     def read(
@@ -30,7 +30,7 @@ class IdSwitchRepair:
         window: CameraWindow,
         before: Sequence[HistorySpan[CameraWindow]],
         parts: Parts,
-        asked_from: int,
+        needed_from: int,
     ) -> tuple[CameraWindow, list[Split]]:
         """Return a window by what its tracks are called now, and what has turned out about numbers.
 
@@ -39,17 +39,17 @@ class IdSwitchRepair:
         """
         splits: list[Split] = []
         for one, two, frame in find_id_switches(window, before):
-            first, second = (_whose(parts.get(it, UNKNOWN), frame - 1, asked_from) for it in (one, two))
+            first, second = (_person_at(parts.get(it, UNKNOWN), frame - 1, needed_from) for it in (one, two))
             self._reader.locals.exchange(one, two)
             splits += self._registry.swap_tracks(one, two, frame, (first, second))
             if first and second and first != second:
-                self._said |= {one: TrackPart(frame, second), two: TrackPart(frame, first)}
+                self._switches |= {one: TrackPart(frame, second), two: TrackPart(frame, first)}
                 self.overlay(parts)
-        return self._reader.read_again(window), splits
+        return self._reader.with_current_keys(window), splits
 
     def overlay(self, parts: Parts) -> None:
         """Put what was said of tracks over what is worked out."""
-        for key, since in self._said.items():
+        for key, since in self._switches.items():
             if key not in parts:
                 continue
             later = [it for it in parts[key] if it.first > since.first]
@@ -57,22 +57,22 @@ class IdSwitchRepair:
 
     def merge(self, merged: Mapping[int, int]) -> None:
         """Take over that numbers are another's now."""
-        self._said = {
-            key: TrackPart(it.first, merged.get(it.number, it.number)) for key, it in self._said.items()
+        self._switches = {
+            key: TrackPart(it.first, merged.get(it.number, it.number)) for key, it in self._switches.items()
         }
 
-    def keep_only(self, parts: Parts, asked_from: int) -> None:
+    def keep_only(self, parts: Parts, needed_from: int) -> None:
         """Forget what nobody asks for any more."""
-        self._said = {
+        self._switches = {
             key: it
-            for key, it in self._said.items()
-            if key in parts and not any(it.first < part.first <= asked_from for part in parts[key])
+            for key, it in self._switches.items()
+            if key in parts and not any(it.first < part.first <= needed_from for part in parts[key])
         }
 
 
-def _whose(parts: Sequence[TrackPart], frame: int, asked_from: int) -> int:
+def _person_at(parts: Sequence[TrackPart], frame: int, needed_from: int) -> int:
     """Return whose a track was in a frame, 0: nobody's; where that is forgotten, in the first that is not."""
-    if frame < parts[0].first <= asked_from:
+    if frame < parts[0].first <= needed_from:
         frame = parts[0].first
     number = int(person_numbers([parts], frame, 1)[0, 0])
     return 0 if number == NOBODY_YET else number

@@ -15,9 +15,9 @@ from server.service.ingest.window_history import HistorySpan
 
 Floats = NDArray[np.float64]
 
-_SAME = 0.5
+_SAME_IOU = 0.5
 """Overlap (IoU) from which two boxes are one: what is mended are the same detections in other hands."""
-_TOLD_BY = 2
+_MIN_FRAMES = 2
 """Frames in which each must be in the other's place at least."""
 
 
@@ -44,14 +44,14 @@ def find_id_switches(mended: CameraWindow, before: Sequence[HistorySpan[CameraWi
     # What is forgotten before them was exchanged, too, or they would not be from the first of them on.
     first, last = max(mended.first, before[0].first), before[-1].last
     new = mended.boxes[:, first - mended.first : last - mended.first + 1]
-    old = _laid_out(mended.keys, before, first, last)
-    same = _overlap(new[:, None], old[None]) > _SAME  # (T, T, F): track now, track before
+    old = _published_boxes(mended.keys, before, first, last)
+    same = _overlap(new[:, None], old[None]) > _SAME_IOU  # (T, T, F): track now, track before
     found = []
     for one, two in combinations(range(len(mended.keys)), 2):
         kept = np.flatnonzero(same[one, one] | same[two, two])
         since = int(kept[-1]) + 1 if kept.size else 0
         count = int(min(same[one, two, since:].sum(), same[two, one, since:].sum()))
-        if count >= _TOLD_BY:
+        if count >= _MIN_FRAMES:
             frame = first + since if kept.size else mended.first
             found.append((-count, IdSwitch(mended.keys[one], mended.keys[two], frame)))
     # In a crowd a box is in more than one other's place: the clearest pairs, and nobody in two of them.
@@ -64,7 +64,7 @@ def find_id_switches(mended: CameraWindow, before: Sequence[HistorySpan[CameraWi
     return exchanges
 
 
-def _laid_out(
+def _published_boxes(
     keys: Sequence[TrackKey], said: Sequence[HistorySpan[CameraWindow]], first: int, last: int
 ) -> Floats:
     """Return where tracks were said to be in the frames from `first` to `last`: (T, F, 4), NaN: nowhere."""

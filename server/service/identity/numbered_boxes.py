@@ -18,18 +18,18 @@ Numbers = Callable[[Sequence[TrackKey], int, int], NDArray[np.int64]]
 
 
 def numbered_boxes(
-    stretches: Sequence[HistorySpan[CameraWindow]], numbers: Numbers, first: int, frames: int
+    spans: Sequence[HistorySpan[CameraWindow]], numbers: Numbers, first: int, frames: int
 ) -> list[list[NumberedBox]]:
     """Return the boxes of each of the frames from `first` on, by rising number.
 
     Of two tracks of one person in one frame the first counts. Negative numbers are nobody's.
     """
-    told: list[list[NumberedBox]] = [[] for _ in range(frames)]
-    for stretch in stretches:
-        window, count = stretch.window, stretch.last - stretch.first + 1
-        place = stretch.first - window.first
+    boxes_per_frame: list[list[NumberedBox]] = [[] for _ in range(frames)]
+    for span in spans:
+        window, count = span.window, span.last - span.first + 1
+        place = span.first - window.first
         boxes = window.boxes[:, place : place + count]
-        whose = numbers(window.keys, stretch.first, count)
+        whose = numbers(window.keys, span.first, count)
         # Frame by frame, and in a frame in the tracks' order.
         frame, track = np.nonzero((~np.isnan(boxes[..., 0]) & (whose >= 0)).T)
         number = whose[track, frame]
@@ -40,6 +40,6 @@ def numbered_boxes(
         frame, track, number = frame[new], track[new], number[new]
         rows = list(zip(number.tolist(), *boxes[track, frame].T.tolist(), strict=True))
         ends = np.searchsorted(frame, np.arange(count + 1)).tolist()
-        for at, (begin, end) in enumerate(pairwise(ends), start=stretch.first - first):
-            told[at] = rows[begin:end]
-    return told
+        for at, (begin, end) in enumerate(pairwise(ends), start=span.first - first):
+            boxes_per_frame[at] = rows[begin:end]
+    return boxes_per_frame

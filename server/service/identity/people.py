@@ -34,7 +34,7 @@ from server.service.ingest.window_history import WindowHistory
 
 ALL = ShareSettings()
 """One service for everybody."""
-_LATELY = 100
+_RECENT_FRAMES = 100
 """Frames that tell whether a camera looks; at least those of an epoch."""
 
 
@@ -59,48 +59,48 @@ class PersonTracker:
         fps: float = 25.0,
     ) -> None:
         self._registry = IdentityRegistry(settings, homographies, overhead, fps)
-        self._remembered = settings.forget_after
-        self.roll = PersonRegistry(settings.maximum_departed_people)
+        self._forget_after = settings.forget_after
+        self.registry = PersonRegistry(settings.maximum_departed_people)
         """Everybody, also those whom another service decides for."""
         self._share = share
         self._histories = {camera: WindowHistory[CameraWindow]() for camera in cameras}
         self._reader = WindowReader(site_size)
         self._lag = lag
-        self._mending = IdSwitchRepair(self._registry, self._reader)
-        self.unsearched = UndetectedFrames()
+        self._id_switch_repair = IdSwitchRepair(self._registry, self._reader)
+        self.undetected = UndetectedFrames()
         """Frames in which cameras could not have found anybody."""
-        self.told = PublishedTracks()
+        self.published = PublishedTracks()
         """By which tracks people were shown in GOPs that are told."""
         self._parts: dict[TrackKey, Sequence[TrackPart]] = {}
-        self._heard: dict[TrackKey, int] = {}
-        self._asked_from = 0
+        self._last_reported: dict[TrackKey, int] = {}
+        self._needed_from = 0
         """Nobody asks for frames before this one any more."""
         self._corrections: list[Merge | Split] = []
-        self._by_hand = ManualOverrides()
+        self._overrides = ManualOverrides()
         self._expected: dict[TrackName, tuple[int, int]] = {}
         """Tracks that are not heard of yet: whose they were in an earlier run, and when that ended."""
-        self._now = -1
+        self._newest = -1
         """The last frame that was spoken of."""
 
     def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
         """Take over what all cameras said about an epoch; give it as it was read."""
-        late = [self._taken(window) for window in self._reader.read_late(epoch)]
-        windows = [self._taken(window) for window in self._reader.read(epoch)]
+        late = [self._stored(window) for window in self._reader.read_late(epoch)]
+        windows = [self._stored(window) for window in self._reader.read(epoch)]
         self._recall(windows)
         tracks = [track for window in windows for track in window.local_tracks()]
-        since = max(self._now + 1, epoch.last + 1 - _LATELY)  # there may be a long time in between
+        since = max(self._newest + 1, epoch.last + 1 - _RECENT_FRAMES)  # there may be a long time in between
         pictures = self._pictures(windows, since - self._lag, epoch.last - self._lag)
-        self._now = epoch.last
-        update = self._by_hand.read(self._registry.update(tracks, epoch.last - self._lag, pictures))
+        self._newest = epoch.last
+        update = self._overrides.apply(self._registry.update(tracks, epoch.last - self._lag, pictures))
         for key, parts in track_parts(update.person_ids).items():
-            self._parts[key] = merge_settled_parts(self._parts.get(key, ()), parts, self._asked_from)
-        self._mending.overlay(self._parts)
+            self._parts[key] = merge_settled_parts(self._parts.get(key, ()), parts, self._needed_from)
+        self._id_switch_repair.overlay(self._parts)
         keys = chain.from_iterable(window.keys for window in windows)
-        seen = chain.from_iterable(window.seen() for window in windows)
+        seen = chain.from_iterable(window.seen_spans() for window in windows)
         for key, (first, last) in zip(keys, seen, strict=True):
-            self._heard[key] = epoch.last
-            self.roll.note(self._parts.get(key, ()), first, last)
-        self.roll.left(update.departed, update.returned)
+            self._last_reported[key] = epoch.last
+            self.registry.note(self._parts.get(key, ()), first, last)
+        self.registry.update_presence(update.departed, update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)
         self._corrections += [*update.merged, *update.split]
@@ -115,13 +115,13 @@ class PersonTracker:
     @property
     def known(self) -> list[int]:
         """Everybody's number whom this service decides for, in order; those who are away too."""
-        return own_numbers(self.roll.everybody, self.roll.merged, self._share)
+        return own_numbers(self.registry.everybody, self.registry.merged, self._share)
 
     @property
-    def elsewhere(self) -> list[int]:
+    def remote(self) -> list[int]:
         """The other people's numbers, in order: another service decides for them."""
         mine = set(self.known)
-        return [number for number in self.roll.everybody if number not in mine]
+        return [number for number in self.registry.everybody if number not in mine]
 
     @property
     def next_number(self) -> int:
@@ -135,10 +135,10 @@ class PersonTracker:
     def expect(self, tracks: Mapping[TrackName, int], pulse: int) -> None:
         """Take over whose tracks are that are not heard of yet, from a run that ended with a pulse."""
         self._expected |= {
-            track: (number, pulse) for track, number in tracks.items() if not self.heard_of(track)
+            track: (number, pulse) for track, number in tracks.items() if not self.is_known(track)
         }
 
-    def expect_no_more(self, tracks: Iterable[TrackName]) -> None:
+    def cancel_expected(self, tracks: Iterable[TrackName]) -> None:
         """Take these tracks, should they be heard of, for somebody's of whom nothing is known."""
         for track in tracks:
             self._expected.pop(track, None)
@@ -146,18 +146,18 @@ class PersonTracker:
     @property
     def merged_by_hand(self) -> dict[int, int]:
         """Return by number that was said to be another's whose it is."""
-        return self._by_hand.said
+        return self._overrides.merged
 
     def merge(self, kept: int, lost: int) -> None:
         """Take somebody's word that two numbers are one person's, whatever the evidence says from now on."""
-        here = not {kept, lost} <= self.roll.away
-        self._by_hand.merge(kept, lost, self.roll.away)
+        here = not {kept, lost} <= self.registry.away
+        self._overrides.merge(kept, lost, self.registry.away)
         self._merge(kept, lost)
         if here:
-            self.roll.away.discard(kept)
+            self.registry.away.discard(kept)
         self._corrections.append(Merge(kept, lost))
 
-    def part(self, number: int, cameras: Collection[str]) -> int | None:
+    def split_off(self, number: int, cameras: Collection[str]) -> int | None:
         """Take somebody's word that whom these cameras show as this person now is somebody new.
 
         Returns:
@@ -166,15 +166,17 @@ class PersonTracker:
         tracks = [
             key
             for key, parts in self._parts.items()
-            if key.camera in cameras and parts[-1].number == number and self._heard.get(key) == self._now
+            if key.camera in cameras
+            and parts[-1].number == number
+            and self._last_reported.get(key) == self._newest
         ]
-        new = self._registry.split_off(tracks, self._by_hand.worked_out(number))
+        new = self._registry.split_off(tracks, self._overrides.automatic_numbers(number))
         if new is None:
             return None
         for key in tracks:  # those that the registry has settled it does not speak of again
-            since = max(self._asked_from, self._parts[key][-1].first)
+            since = max(self._needed_from, self._parts[key][-1].first)
             self._parts[key] = [*self._parts[key], TrackPart(since, new)]
-            self.roll.note([TrackPart(since, new)], since, max(since, self._now))
+            self.registry.note([TrackPart(since, new)], since, max(since, self._newest))
         self._corrections += [Split(number, new, camera) for camera in sorted({it.camera for it in tracks})]
         return new
 
@@ -188,12 +190,12 @@ class PersonTracker:
         told = self._histories[camera].over(first, first + frames - 1)
         return numbered_boxes(told, self.numbers, first, frames)
 
-    def whose(self, camera: str, boot: int, track: int, pulse: int) -> int | None:
+    def person_of(self, camera: str, boot: int, track: int, pulse: int) -> int | None:
         """Return the person's number behind a tracker's number in a frame."""
         key = self._reader.locals.known(camera, boot, track)
         return None if key is None else self.number(key.camera, key.local_id, pulse)
 
-    def heard_of(self, track: TrackName) -> bool:
+    def is_known(self, track: TrackName) -> bool:
         """Return whether a camera has spoken of this track, lately."""
         return self._reader.locals.known(track.camera, track.boot, track.track) is not None
 
@@ -202,7 +204,7 @@ class PersonTracker:
         found: dict[int, list[TrackName]] = {}
         wanted = set(numbers)
         for key, parts in self._parts.items():
-            if parts[-1].number in wanted and self._heard.get(key, -1) >= since:
+            if parts[-1].number in wanted and self._last_reported.get(key, -1) >= since:
                 found.setdefault(parts[-1].number, []).append(self._reader.locals.origin(key))
         return dict(sorted(found.items()))
 
@@ -217,13 +219,13 @@ class PersonTracker:
 
     def forget_boxes_before(self, pulse: int) -> None:
         """Let go of the boxes before a pulse, and of who they were."""
-        if self.told.frames:
+        if self.published.frames:
             said = [it for history in self._histories.values() for it in history.over(0, pulse - 1)]
             for it in sorted(said, key=lambda it: it.last):
-                self.told.note(it, self.numbers(it.window.keys, it.last, 1)[:, 0])
-        self._asked_from = max(self._asked_from, pulse)
-        self.unsearched.forget_before(pulse)
-        self._mending.keep_only(self._parts, self._asked_from)
+                self.published.note(it, self.numbers(it.window.keys, it.last, 1)[:, 0])
+        self._needed_from = max(self._needed_from, pulse)
+        self.undetected.forget_before(pulse)
+        self._id_switch_repair.keep_only(self._parts, self._needed_from)
         for history in self._histories.values():
             history.forget_before(pulse)
 
@@ -232,17 +234,17 @@ class PersonTracker:
         return {
             it.message.camera: it.message.size
             for it in windows
-            if not self.unsearched.over(it.message.camera, first, last + 1 - first).all()
+            if not self.undetected.over(it.message.camera, first, last + 1 - first).all()
         }
 
-    def _taken(self, window: CameraWindow) -> CameraWindow:
+    def _stored(self, window: CameraWindow) -> CameraWindow:
         """Take a window over, by what its tracks are called if its past was mended."""
-        self.unsearched.note(window.message)
+        self.undetected.note(window.message)
         history = self._histories[window.message.camera]
         if window.message.revised_from is not None:
             before = history.over(window.first, window.fresh - 1)
-            window, splits = self._mending.read(window, before, self._parts, self._asked_from)
-            self._corrections += self._by_hand.read_splits(splits)
+            window, splits = self._id_switch_repair.read(window, before, self._parts, self._needed_from)
+            self._corrections += self._overrides.apply_splits(splits)
         history.put(window, window.first, window.message.last)
         return window
 
@@ -251,11 +253,11 @@ class PersonTracker:
         for key in chain.from_iterable(it.keys for it in windows) if self._expected else ():
             number, pulse = self._expected.pop(self._reader.locals.origin(key), (0, 0))
             if number:
-                self._registry.recall(key, self.roll.whose(number), pulse)
+                self._registry.recall(key, self.registry.current(number), pulse)
 
     def _merge(self, kept: int, lost: int) -> None:
-        self.roll.merge(kept, lost)
-        self._mending.merge({lost: kept})
+        self.registry.merge(kept, lost)
+        self._id_switch_repair.merge({lost: kept})
         self._parts = {
             key: [TrackPart(part.first, kept) if part.number == lost else part for part in parts]
             for key, parts in self._parts.items()
@@ -263,8 +265,8 @@ class PersonTracker:
 
     def _forget(self, now: int) -> None:
         """Let go of tracks and people that were not heard of for as long as the registry remembers."""
-        for key in [key for key, heard in self._heard.items() if heard < now - self._remembered]:
-            del self._heard[key]
+        for key in [key for key, heard in self._last_reported.items() if heard < now - self._forget_after]:
+            del self._last_reported[key]
             self._parts.pop(key, None)
             self._reader.locals.forget(key)
-        self.roll.forget_unseen_since(now - self._remembered)
+        self.registry.forget_unseen_since(now - self._forget_after)

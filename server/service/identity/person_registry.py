@@ -31,11 +31,11 @@ class PersonRegistry:
         """Everybody's number, in order."""
         return sorted(self.first_seen)
 
-    def whose(self, number: int) -> int:
+    def current(self, number: int) -> int:
         """Return whose number this is: what it turned out to be, or itself."""
         return self.merged.get(number, number)
 
-    def also(self, number: int) -> list[int]:
+    def aliases(self, number: int) -> list[int]:
         """Return the other numbers that somebody once had, in order."""
         return sorted(old for old, new in self.merged.items() if new == number)
 
@@ -48,17 +48,17 @@ class PersonRegistry:
                 self.first_seen[part.number] = min(part.first, self.first_seen.get(part.number, part.first))
                 self.last_seen[part.number] = max(ends, self.last_seen.get(part.number, ends))
 
-    def left(self, gone: Iterable[int], returned: Iterable[int]) -> None:
+    def update_presence(self, gone: Iterable[int], returned: Iterable[int]) -> None:
         """Note who has gone away, and who is back."""
         self.away = (self.away | set(gone)) - set(returned)
 
-    def call(self, number: int, name: str) -> None:
+    def set_name(self, number: int, name: str) -> None:
         """Set a person's name; an empty one removes it."""
         self.names.pop(number, None)
         if name:
             self.names[number] = name
 
-    def known_as(self, number: int, also: Iterable[int]) -> None:
+    def add_aliases(self, number: int, also: Iterable[int]) -> None:
         """Take over from an earlier run that somebody had these numbers, too."""
         self.merged |= {old: number for old in also if old != number and old not in self.first_seen}
 

@@ -18,25 +18,25 @@ class PublishedTracks:
 
     def __init__(self) -> None:
         self.frames = 0
-        self._said: deque[tuple[int, int, Mapping[tuple[str, int], TrackName]]] = deque()
+        self._published: deque[tuple[int, int, Mapping[tuple[str, int], TrackName]]] = deque()
         self._oldest: int | None = None
 
-    def note(self, said: HistorySpan[CameraWindow], whose: NDArray[np.int64]) -> None:
+    def note(self, span: HistorySpan[CameraWindow], numbers: NDArray[np.int64]) -> None:
         """Take over by which tracks a camera shows people, (T,) their numbers; those below 0 are nobody's.
 
         Frames come in their order, of one camera as of another.
         """
         if self._oldest is None:
-            self._oldest = said.first
-        message = said.window.message
+            self._oldest = span.first
+        message = span.window.message
         tracks = {
             (message.camera, number): TrackName(message.camera, message.boot, track.id)
-            for track, number in zip(message.tracks, whose.tolist(), strict=True)
+            for track, number in zip(message.tracks, numbers.tolist(), strict=True)
             if number >= 0
         }
-        self._said.append((said.first, said.last, tracks))
-        while self._said[0][1] < said.last - self.frames:
-            self._oldest = self._said.popleft()[1] + 1
+        self._published.append((span.first, span.last, tracks))
+        while self._published[0][1] < span.last - self.frames:
+            self._oldest = self._published.popleft()[1] + 1
 
     def remembers(self, pulse: int) -> bool:
         """Return whether a frame is one of those that are remembered."""
@@ -47,7 +47,7 @@ class PublishedTracks:
 
         ``numbers`` are all that the person has had.
         """
-        for first, _, tracks in reversed(self._said):
+        for first, _, tracks in reversed(self._published):
             if first <= pulse:
                 found = [tracks[camera, it] for it in numbers if (camera, it) in tracks]
                 if found:

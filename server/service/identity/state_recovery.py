@@ -16,24 +16,24 @@ from server.messaging.identity_snapshot import (
 from server.service.identity.local_numbers import TrackName
 from server.service.identity.people import PersonTracker
 
-ALONE_MOST = 1_000_000
+SINGLE_CAMERA_NUMBER_MAX = 1_000_000
 """The first free number that is believed of one camera alone: larger ones another must say, too."""
-_SLACK = 10_000
+_NUMBER_SLACK = 10_000
 """Numbers by which the newest word may be ahead of the one before: nobody gives so many in a second."""
-LONGEST_S = 30.0
+MAX_DOWNTIME_S = 30.0
 """Seconds that the service may be away: in a longer time a track may have gone over to somebody else."""
 
 
 def state_for_cameras(
-    people: PersonTracker, cameras: Iterable[str], pulse: int, lately: int, since: float
+    people: PersonTracker, cameras: Iterable[str], pulse: int, recent: int, since: float
 ) -> dict[str, IdentitySnapshot]:
     """Build the state that each camera retains: whom it followed lately, and the first free number."""
-    followed = people.followed(people.roll.everybody, pulse - lately)
+    followed = people.followed(people.registry.everybody, pulse - recent)
     boots: dict[str, int] = {}
     for it in chain.from_iterable(followed.values()):
         boots[it.camera] = max(it.boot, boots.get(it.camera, 0))
     also: dict[int, list[int]] = {}
-    for old, number in people.roll.merged.items():
+    for old, number in people.registry.merged.items():
         if old <= PERSON_NUMBER_MAX:
             also.setdefault(number, []).append(old)
     by_hand = set(people.merged_by_hand.values())
@@ -51,7 +51,7 @@ def state_for_cameras(
                     number=number,
                     tracks=theirs,
                     aliases=also.get(number, [])[-ALIASES_MAX:],
-                    name=people.roll.names.get(number, ""),
+                    name=people.registry.names.get(number, ""),
                     manual=number in by_hand,
                 )
             )
@@ -93,16 +93,16 @@ class StateRecovery:
         """The pulse at which each track was first heard of again."""
         self.next_number = max((first_free_number(it) for it in said.values()), default=1)
         """No number below it is given any more, however long ago that was."""
-        lately = {camera: it for camera, it in said.items() if it.pulse < pulse <= it.pulse + longest}
+        recent = {camera: it for camera, it in said.items() if it.pulse < pulse <= it.pulse + longest}
         # All that were told of lately were told the same: one that says otherwise does not decide.
-        since = sorted(it.numbered_since for it in lately.values())
+        since = sorted(it.numbered_since for it in recent.values())
         self.numbered_since = (
             since[len(since) // 2] if since else max((it.numbered_since for it in said.values()), default=inf)
         )
         """When numbers began, unix seconds; infinite: nobody remembers."""
-        if lately:
-            self._until = max(it.pulse for it in lately.values()) + longest
-            self._awaited = _awaited(lately)
+        if recent:
+            self._until = max(it.pulse for it in recent.values()) + longest
+            self._awaited = _awaited(recent)
             self._tracks = {track: it.number for it in self._awaited for track in it.tracks}
 
     @property
@@ -124,19 +124,19 @@ class StateRecovery:
         """Look for them after an epoch that ends with a pulse was taken in."""
         if pulse > self._until:
             self._awaited, self._over = [], True
-            people.expect_no_more(self._tracks)
-        self._awaited = [it for it in self._awaited if not self._give_back(it, people, pulse)]
+            people.cancel_expected(self._tracks)
+        self._awaited = [it for it in self._awaited if not self._restore(it, people, pulse)]
 
-    def _give_back(self, awaited: _Awaited, people: PersonTracker, pulse: int) -> bool:
+    def _restore(self, awaited: _Awaited, people: PersonTracker, pulse: int) -> bool:
         """Return whether somebody is here again, with all that is to be said of them said."""
         found = [self._number(it, people, pulse) for it in awaited.tracks]
         numbers = sorted({it for it in found if it is not None})
         if not numbers:
             return False
         kept = awaited.number if awaited.number in numbers else numbers[0]
-        if awaited.name and kept not in people.roll.names:
-            people.roll.call(kept, awaited.name)
-        people.roll.known_as(kept, awaited.also)
+        if awaited.name and kept not in people.registry.names:
+            people.registry.set_name(kept, awaited.name)
+        people.registry.add_aliases(kept, awaited.also)
         for other in numbers if awaited.by_hand else ():
             if other != kept:
                 people.merge(kept, other)
@@ -144,10 +144,10 @@ class StateRecovery:
 
     def _number(self, track: TrackName, people: PersonTracker, pulse: int) -> int | None:
         """Return whose a track was when it was first heard of again; None: nobody knows."""
-        if people.heard_of(track):
+        if people.is_known(track):
             self._found.setdefault(track, pulse)
         first = self._found.get(track)
-        return None if first is None else people.whose(track.camera, track.boot, track.track, first)
+        return None if first is None else people.person_of(track.camera, track.boot, track.track, first)
 
 
 def first_free_number(said: IdentitySnapshot) -> int:
@@ -162,7 +162,7 @@ def trusted_first_free(firsts: Iterable[int]) -> int:
     (1000000, 1000000, 2010005)
     """
     _, other, *_ = [*sorted(firsts, reverse=True), 1, 1]
-    return max(other + _SLACK, ALONE_MOST)
+    return max(other + _NUMBER_SLACK, SINGLE_CAMERA_NUMBER_MAX)
 
 
 def _awaited(said: dict[str, IdentitySnapshot]) -> list[_Awaited]:

@@ -14,7 +14,7 @@ from server.messaging.inbox import Message
 from server.messaging.messages import camera_of_key
 from server.service.identity.people import PersonTracker
 from server.service.identity.state_recovery import (
-    LONGEST_S,
+    MAX_DOWNTIME_S,
     StateRecovery,
     first_free_number,
     state_for_cameras,
@@ -25,11 +25,11 @@ log = logging.getLogger(__name__)
 
 PATIENCE_S = 1.0
 """How long a camera that has come is waited for until it says what it remembers."""
-_LATELY_S = 10.0
+_RECENT_S = 10.0
 """A camera whose words come late, on a machine with too much to do, goes on following all the same."""
-_COMES_S = 10.0
+_JOIN_S = 10.0
 """How long after the beginning a camera may still come that remembers more people: its way may be slow."""
-_EVERY_S = 1.0
+_INTERVAL_S = 1.0
 """Seconds between two words of the same to a camera: each says when it was true."""
 
 
@@ -52,40 +52,40 @@ class StateReplication:
         fps: float,
         send: Callable[[str, bytes], None],
         *,
-        tells: bool = True,
+        sends: bool = True,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._people, self._cameras, self._fps = people, cameras, fps
-        self._send, self._tells, self._clock = send, tells, clock
-        self._came: dict[str, float] = {}
+        self._send, self._sends, self._clock = send, sends, clock
+        self._came_at: dict[str, float] = {}
         """When each camera came first that has not said yet what it remembers; it may come again."""
-        self._there: set[str] = set()
-        self._said: dict[str, IdentitySnapshot] = {}
-        self._firsts: dict[str, int] = {}
+        self._present: set[str] = set()
+        self._snapshots: dict[str, IdentitySnapshot] = {}
+        self._first_free: dict[str, int] = {}
         """The first free number by what each camera said last."""
-        self._returning: list[StateRecovery] = []
+        self._recoveries: list[StateRecovery] = []
         """First of all who had come when this began, then a camera each that came later."""
-        self._anybody = False
+        self._any_camera = False
         self._began_at: float | None = None
         self._free = math.inf
         """From this number on this run gives them anew, by what it began with; before that it gives none."""
-        self._heard: set[str] = set()
+        self._reported: set[str] = set()
         """Cameras that have said what they remember: told sooner, they would have forgotten it."""
         self._sent: dict[str, IdentitySnapshot] = {}
         self._since = time.time()
 
-    def alive(self, key: str, there: bool) -> None:
+    def alive(self, key: str, is_present: bool) -> None:
         """A camera's liveliness token came or went."""
         camera = camera_of_key(key)
-        if camera in self._cameras and there:
-            self._anybody = True
-            self._there.add(camera)
-            if camera not in self._heard:  # its token may come after its word
-                self._came.setdefault(camera, self._clock())
+        if camera in self._cameras and is_present:
+            self._any_camera = True
+            self._present.add(camera)
+            if camera not in self._reported:  # its token may come after its word
+                self._came_at.setdefault(camera, self._clock())
         else:
-            self._there.discard(camera)
+            self._present.discard(camera)
 
-    def heard(self, message: Message) -> None:
+    def snapshot_received(self, message: Message) -> None:
         """A camera says what it remembers.
 
         One that reached the service only after the beginning is heard, too; of what a camera says again only
@@ -97,75 +97,80 @@ class StateReplication:
         camera = camera_of_key(message.key)
         if camera not in self._cameras:
             return
-        again = self._began_at is not None and camera in self._heard
-        self._came.pop(camera, None)
-        self._heard.add(camera)
+        again = self._began_at is not None and camera in self._reported
+        self._came_at.pop(camera, None)
+        self._reported.add(camera)
         if not message.payload:
             return
-        said = msgspec.json.decode(message.payload, type=IdentitySnapshot)
-        self._firsts[camera] = first_free_number(said)
+        snapshot = msgspec.json.decode(message.payload, type=IdentitySnapshot)
+        self._first_free[camera] = first_free_number(snapshot)
         if again:
-            self._people.begin_at(min(said.next_number, trusted_first_free(self._firsts.values())))
+            self._people.begin_at(min(snapshot.next_number, trusted_first_free(self._first_free.values())))
         else:
-            self._said[camera] = said
+            self._snapshots[camera] = snapshot
 
     @property
-    def waits(self) -> bool:
+    def is_waiting(self) -> bool:
         """Whether a camera may still say what it remembers, so that nothing should be decided yet."""
         if self._began_at is not None:
             return False
         now = self._clock()
-        return any(now < came + PATIENCE_S for camera, came in self._came.items() if camera in self._there)
+        return any(
+            now < came + PATIENCE_S for camera, came in self._came_at.items() if camera in self._present
+        )
 
-    def awaits(self, number: int) -> bool:
+    def may_recover(self, number: int) -> bool:
         """Return whether a person of this number may be re-identified, or is so in a decision to come."""
-        if self._began_at is None or self._people.roll.whose(number) in self._people.roll.first_seen:
+        if (
+            self._began_at is None
+            or self._people.registry.current(number) in self._people.registry.first_seen
+        ):
             return True
-        comes = self._heard < set(self._cameras) and self._clock() < self._began_at + _COMES_S
-        return (comes and number < self._free) or any(number in it.numbers for it in self._returning)
+        comes = self._reported < set(self._cameras) and self._clock() < self._began_at + _JOIN_S
+        return (comes and number < self._free) or any(number in it.numbers for it in self._recoveries)
 
     @property
     def numbers_since(self) -> float:
         """When numbers began, unix seconds: since then none was given twice. 0: nobody has one yet."""
-        return self._since if self._began_at is not None or self._people.roll.first_seen else 0.0
+        return self._since if self._began_at is not None or self._people.registry.first_seen else 0.0
 
     def begin(self, pulse: int) -> None:
         """Begin with what is remembered, before an epoch that ends with a pulse is taken in.
 
         As long as no camera has come there is nothing to begin with. What is said later adds to it.
         """
-        if not self._anybody or (self._began_at is not None and not self._said):
+        if not self._any_camera or (self._began_at is not None and not self._snapshots):
             return
-        most = trusted_first_free(self._firsts.values())
-        for camera in [camera for camera, it in self._said.items() if first_free_number(it) > most]:
+        most = trusted_first_free(self._first_free.values())
+        for camera in [camera for camera, it in self._snapshots.items() if first_free_number(it) > most]:
             log.warning("camera %s alone remembers numbers beyond %d: it is not believed", camera, most)
-            del self._said[camera]
-        said = {camera: _below(self._free, it) for camera, it in self._said.items()}
-        self._said = {}
-        returning = StateRecovery(said, pulse, round(LONGEST_S * self._fps))
-        returning.begin(self._people, pulse)
-        self._returning.append(returning)
+            del self._snapshots[camera]
+        snapshot = {camera: _below(self._free, it) for camera, it in self._snapshots.items()}
+        self._snapshots = {}
+        recovery = StateRecovery(snapshot, pulse, round(MAX_DOWNTIME_S * self._fps))
+        recovery.begin(self._people, pulse)
+        self._recoveries.append(recovery)
         if self._began_at is None:
             self._began_at, self._free = self._clock(), self._people.next_number
-            self._since = min(self._since, returning.numbered_since)
-        if said:
-            log.info("%s: remembered %d people", ", ".join(sorted(said)), len(returning.numbers))
+            self._since = min(self._since, recovery.numbered_since)
+        if snapshot:
+            log.info("%s: remembered %d people", ", ".join(sorted(snapshot)), len(recovery.numbers))
 
     def take(self, pulse: int) -> None:
         """Look at people after an epoch that ends with a pulse was taken in."""
-        for returning in self._returning:
-            returning.look(self._people, pulse)
-        self._returning = [it for it in self._returning if not it.over]
-        if self._began_at is not None and self._tells:
-            self._tell(pulse)
+        for recovery in self._recoveries:
+            recovery.look(self._people, pulse)
+        self._recoveries = [it for it in self._recoveries if not it.over]
+        if self._began_at is not None and self._sends:
+            self._send_state(pulse)
 
-    def _tell(self, pulse: int) -> None:
-        lately = round(_LATELY_S * self._fps)
-        for camera, now in state_for_cameras(self._people, self._cameras, pulse, lately, self._since).items():
-            if camera not in self._heard:
+    def _send_state(self, pulse: int) -> None:
+        recent = round(_RECENT_S * self._fps)
+        for camera, now in state_for_cameras(self._people, self._cameras, pulse, recent, self._since).items():
+            if camera not in self._reported:
                 continue
             before = self._sent.get(camera)
-            if before is not None and pulse - before.pulse < _EVERY_S * self._fps and _same(before, now):
+            if before is not None and pulse - before.pulse < _INTERVAL_S * self._fps and _same(before, now):
                 continue
             payload = msgspec.json.encode(now)
             if len(payload) <= SNAPSHOT_BYTES_MAX:
@@ -173,10 +178,10 @@ class StateReplication:
                 self._send(camera, payload)
 
 
-def _below(free: float, said: IdentitySnapshot) -> IdentitySnapshot:
+def _below(free: float, snapshot: IdentitySnapshot) -> IdentitySnapshot:
     """Leave out whom this run does not know by the number, since it may have given it to somebody else."""
-    known = [it for it in said.people if max([it.number, *it.aliases]) < free]
-    return msgspec.structs.replace(said, people=known)
+    known = [it for it in snapshot.people if max([it.number, *it.aliases]) < free]
+    return msgspec.structs.replace(snapshot, people=known)
 
 
 def _same(one: IdentitySnapshot, other: IdentitySnapshot) -> bool:

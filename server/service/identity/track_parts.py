@@ -37,7 +37,7 @@ def track_parts(numbers: Mapping[TrackletKey, int]) -> dict[TrackKey, list[Track
 
 
 def merge_settled_parts(
-    before: Sequence[TrackPart], parts: list[TrackPart], asked_from: int
+    before: Sequence[TrackPart], parts: list[TrackPart], needed_from: int
 ) -> list[TrackPart]:
     """Put parts that the registry has settled before those that may still change.
 
@@ -48,7 +48,7 @@ def merge_settled_parts(
     if not settled:
         return parts
     ends = [*(part.first for part in settled[1:]), parts[0].first]
-    asked = [part for part, end in zip(settled, ends, strict=True) if end > asked_from]
+    asked = [part for part, end in zip(settled, ends, strict=True) if end > needed_from]
     return asked + parts
 
 

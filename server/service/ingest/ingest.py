@@ -130,7 +130,7 @@ class Ingest:
         self._sound_head = msgspec.json.Decoder(AudioHeader)
         self._thumb_head = msgspec.json.Decoder(ThumbnailHeader)
 
-    def alive(self, key: str, there: bool) -> None:
+    def alive(self, key: str, is_present: bool) -> None:
         """A camera's liveliness token came or went."""
         camera = camera_of_key(key)
         state = self.states.get(camera)
@@ -138,10 +138,10 @@ class Ingest:
             if (more := self._unknown.record(camera)) is not None:
                 log.warning("camera %s is not in the configuration%s; it is ignored", camera, more)
             return
-        state.alive = there
+        state.alive = is_present
         state.status = None  # what was said before is of another time
         state.gauge.begin()
-        if there:
+        if is_present:
             state.refused, state.ended = "", False
             self._aligner.come(camera)
         else:
@@ -149,7 +149,7 @@ class Ingest:
             self._aligner.gone(camera)
             self._thumbnails[camera].clear()
         if self._told[camera].take(time.monotonic()):
-            log.info("camera %s %s", camera, "is there" if there else "is gone")
+            log.info("camera %s %s", camera, "is there" if is_present else "is gone")
 
     def video(self, message: Message) -> None:
         """Shelve a frame."""

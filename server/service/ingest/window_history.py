@@ -21,7 +21,7 @@ class WindowHistory(Generic[Window]):
     """Keeps for every frame of one camera the newest window that has it."""
 
     def __init__(self) -> None:
-        self._stretches: list[HistorySpan[Window]] = []
+        self._spans: list[HistorySpan[Window]] = []
         """In order; no frame is in two of them."""
 
     def put(self, window: Window, first: int, last: int) -> None:
@@ -29,24 +29,24 @@ class WindowHistory(Generic[Window]):
         if last < first:
             return
         before, after = self.over(self._earliest, first - 1), self.over(last + 1, self._latest)
-        self._stretches = [*before, HistorySpan(window, first, last), *after]
+        self._spans = [*before, HistorySpan(window, first, last), *after]
 
     def over(self, first: int, last: int) -> list[HistorySpan[Window]]:
         """Return what is known of the frames from `first` to `last`, in order; frames may be missing."""
         return [
             HistorySpan(it.window, max(it.first, first), min(it.last, last))
-            for it in self._stretches
+            for it in self._spans
             if it.first <= last and it.last >= first
         ]
 
     def forget_before(self, pulse: int) -> None:
         """Let go of the frames before a pulse."""
-        self._stretches = self.over(pulse, self._latest)
+        self._spans = self.over(pulse, self._latest)
 
     @property
     def _earliest(self) -> int:
-        return self._stretches[0].first if self._stretches else 0
+        return self._spans[0].first if self._spans else 0
 
     @property
     def _latest(self) -> int:
-        return self._stretches[-1].last if self._stretches else -1
+        return self._spans[-1].last if self._spans else -1

@@ -43,7 +43,7 @@ class CameraCollector(Collector):
         )
         for what, words, spread in _SPREADS:
             yield self._spread(what, words, spread)
-        late, lost = self._pipeline.aligner.late_messages, self._pipeline.lacking.lost_pictures
+        late, lost = self._pipeline.aligner.late_messages, self._pipeline.losses.lost_pictures
         yield self._counter("late_windows", "Windows that came too late to count.", lambda it, _: late[it])
         yield self._counter(
             "lost_pictures", "Pictures not there when their GOP was decided.", lambda it, _: lost[it]

@@ -32,7 +32,7 @@ class ServiceCollector(Collector):
         yield CounterMetricFamily(
             "myview_late_epochs",
             "Windows decided without a camera that was there.",
-            value=pipeline.lacking.late_epochs,
+            value=pipeline.losses.late_epochs,
         )
         yield CounterMetricFamily(
             "myview_left_out_epochs",

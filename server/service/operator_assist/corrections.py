@@ -36,7 +36,7 @@ def corrections_for_tracker(
     Returns:
         None: nothing is left, or the camera has not shown this person.
     """
-    told, numbers = people.told, [number, *people.roll.also(number)]
+    told, numbers = people.published, [number, *people.registry.aliases(number)]
     known = [it for it in places if told.remembers(it.pulse)]
     tracks = [(it, told.of(camera, numbers, it.pulse)) for it in known]
     boots = [track.boot for _, track in tracks if track is not None]

@@ -28,8 +28,8 @@ class OperatorAssist:
     def step(self, epoch: Epoch, config: Config) -> None:
         """Take in what the cameras said of an epoch."""
         people, assist = self._people, config.track.assist
-        people.told.frames = assist.memory_frames if assist.enabled else 0
-        self.flags.step(epoch.last, self._foreseen(epoch), people.roll.whose)
+        people.published.frames = assist.memory_frames if assist.enabled else 0
+        self.flags.step(epoch.last, self._foreseen(epoch), people.registry.current)
 
     def point(self, number: int, camera: str, places: Sequence[PointedPosition]) -> tuple[int, list[int]]:
         """Send an operator's clicks on a person to a camera; its tracker corrects present and past tracks.
@@ -49,7 +49,9 @@ class OperatorAssist:
         """Yield the risk events of an epoch whose persons all have a number."""
         for camera, message in epoch.tracks.items():
             for trouble in message.risk_events:
-                whose = [self._people.whose(camera, message.boot, it, message.last) for it in trouble.tracks]
+                whose = [
+                    self._people.person_of(camera, message.boot, it, message.last) for it in trouble.tracks
+                ]
                 known = tuple(dict.fromkeys(number for number in whose if number is not None))
                 if known and len(known) == len(whose):
                     yield RiskEvent(

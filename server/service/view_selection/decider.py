@@ -188,7 +188,7 @@ class ViewDecider:
 
     def _decide(self, outlook: LookaheadWindow, first: int, frames: int, weight: Floats) -> GopDecision:
         people, lookahead = self.people, len(weight)
-        everybody, seen = outlook.numbers, people.roll.first_seen
+        everybody, seen = outlook.numbers, people.registry.first_seen
         known = np.fromiter((seen[it] for it in everybody.tolist()), np.int64, len(everybody))
         part = outlook.part(first, lookahead, known < first + frames)
         before = self._shots.of(part.numbers)
@@ -205,12 +205,12 @@ class ViewDecider:
         names = [*self._cameras, None]  # NO_CAMERA is the last of them
         assert NO_CAMERA == -1  # noqa: S101 — as the line above says
         choices = tuple(
-            ObjectChoice(number, names[view], names[last], number in people.roll.away)
+            ObjectChoice(number, names[view], names[last], number in people.registry.away)
             for number, view, last in zip(
                 part.numbers.tolist(), views.tolist(), before.cameras.tolist(), strict=True
             )
         )
         why = SelectionReasons(part, before.cameras, weight, self.switch_cost, self._config.view.quality)
         return GopDecision(
-            first, frames, choices, boxes, dict(people.roll.merged), people.take_corrections(), why
+            first, frames, choices, boxes, dict(people.registry.merged), people.take_corrections(), why
         )

@@ -51,10 +51,10 @@ class LookaheadWindow:
         self.numbers: Ints = np.array(people.known, dtype=np.int64)
         """(K,) everybody's, rising."""
         pulses, everybody = range(first, last + 1), len(self.numbers)
-        unsearched = np.array([people.unsearched.over(camera, first, len(pulses)) for camera in cameras])
-        line = WindowTracks([sight.over(camera, first, last) for camera in cameras], first, unsearched)
+        undetected = np.array([people.undetected.over(camera, first, len(pulses)) for camera in cameras])
+        line = WindowTracks([sight.over(camera, first, last) for camera in cameras], first, undetected)
         shown = np.array([[has(camera, it) for camera in cameras] for it in pulses], dtype=np.bool_)
-        numbers: Ints = np.array(people.roll.everybody, dtype=np.int64)
+        numbers: Ints = np.array(people.registry.everybody, dtype=np.int64)
         anybody, mine = line.persons(people, numbers, len(pulses)), find_indices(numbers, self.numbers)
         self.looked = (
             UndetectedViews.nobody() if elsewhere is None else elsewhere.look(line, anybody, len(pulses))

@@ -31,19 +31,19 @@ class WindowTracks:
     """
 
     def __init__(
-        self, said: Sequence[Sequence[HistorySpan[WindowQuality]]], first: int, unsearched: NDArray[np.bool_]
+        self, said: Sequence[Sequence[HistorySpan[WindowQuality]]], first: int, undetected: NDArray[np.bool_]
     ) -> None:
-        self._stretches = list(chain.from_iterable(said))
+        self._spans = list(chain.from_iterable(said))
         self._first = first
         camera = np.repeat(np.arange(len(said)), [len(own) for own in said])
-        lengths = np.array([it.last - it.first + 1 for it in self._stretches], dtype=np.int64)
-        self._tracks = np.array([len(it.window.window.keys) for it in self._stretches], dtype=np.int64)
+        lengths = np.array([it.last - it.first + 1 for it in self._spans], dtype=np.int64)
+        self._tracks = np.array([len(it.window.window.keys) for it in self._spans], dtype=np.int64)
         self._camera = camera
         self.camera: Ints = np.repeat(camera, lengths)
-        self.frame = _joined([np.arange(it.first - first, it.last - first + 1) for it in self._stretches])
-        self.searched = ~unsearched[self.camera, self.frame]
+        self.frame = _joined([np.arange(it.first - first, it.last - first + 1) for it in self._spans])
+        self.searched = ~undetected[self.camera, self.frame]
         self.row: Ints = np.repeat(np.arange(len(self.frame)), np.repeat(self._tracks, lengths))
-        self.quality: Floats = np.concatenate([np.zeros(0), *(_quality(it) for it in self._stretches)])
+        self.quality: Floats = np.concatenate([np.zeros(0), *(_quality(it) for it in self._spans)])
         self._begins = np.cumsum(np.concatenate([[0], lengths * self._tracks]))
 
     def persons(self, people: PersonTracker, everybody: Ints, frames: int) -> Ints:
@@ -53,7 +53,7 @@ class WindowTracks:
         """
         if not len(self.quality) or not len(everybody):
             return np.full(len(self.quality), -1)
-        windows = [it.window.window for it in self._stretches]
+        windows = [it.window.window for it in self._spans]
         locals_ = np.concatenate([it.locals for it in windows])
         tracks = np.repeat(self._camera, self._tracks) * (locals_.max() + 1) + locals_
         _, once, back = np.unique(tracks, return_index=True, return_inverse=True)
@@ -64,7 +64,7 @@ class WindowTracks:
         return _joined(
             [
                 persons[it.first - self._first : it.last - self._first + 1, own].reshape(-1)
-                for it, own in zip(self._stretches, each, strict=True)
+                for it, own in zip(self._spans, each, strict=True)
             ]
         )
 
@@ -72,31 +72,31 @@ class WindowTracks:
         """Return the boxes at places in line, (P,) rising: (P, 4) pixels of the site's picture."""
         boxes = np.empty((len(places), 4))
         ends = np.searchsorted(places, self._begins)
-        for stretch, begin, start, end in zip(
-            self._stretches, self._begins.tolist(), ends.tolist(), ends[1:].tolist(), strict=False
+        for span, begin, start, end in zip(
+            self._spans, self._begins.tolist(), ends.tolist(), ends[1:].tolist(), strict=False
         ):
-            own = stretch.window.window
+            own = span.window.window
             frame, track = np.divmod(places[start:end] - begin, max(len(own.keys), 1))
-            boxes[start:end] = own.boxes[track, frame + stretch.first - own.first]
+            boxes[start:end] = own.boxes[track, frame + span.first - own.first]
         return boxes
 
     def terms(self, place: int) -> Floats:
         """Return what the quality at a place in line is made of, (terms,)."""
         number = int(np.searchsorted(self._begins, place, side="right")) - 1
-        stretch = self._stretches[number]
-        seen = stretch.window
+        span = self._spans[number]
+        seen = span.window
         frame, track = divmod(place - int(self._begins[number]), seen.quality.shape[1])
-        return np.asarray(seen.terms[:, frame + stretch.first - seen.window.first, track])
+        return np.asarray(seen.terms[:, frame + span.first - seen.window.first, track])
 
 
 def _joined(parts: Sequence[Ints]) -> Ints:
     return np.concatenate([np.zeros(0, dtype=np.int64), *parts])
 
 
-def _quality(stretch: HistorySpan[WindowQuality]) -> Floats:
+def _quality(span: HistorySpan[WindowQuality]) -> Floats:
     """Return the quality of a stretch's views in line."""
-    seen, first = stretch.window, stretch.window.window.first
-    return seen.quality[stretch.first - first : stretch.last - first + 1].reshape(-1)
+    seen, first = span.window, span.window.window.first
+    return seen.quality[span.first - first : span.last - first + 1].reshape(-1)
 
 
 def find_indices(numbers: Ints, everybody: Ints) -> Ints:

@@ -46,7 +46,7 @@ async def test_a_site_is_shown_as_it_is(busy: Hall) -> None:
     solve = SolverReport(objective=-4.0, bound=-4.0, gap=0.0, integral=True, rounds=1)
     busy.service.intake.status(status(A, fps=24.5, missed=3, shed=2, waiting=7, in_step=False))
     busy.service.intake.tracks(tracks(word(A, 2, {}, solve=solve, solved_at=0.25)))
-    busy.service.decider.people.roll.names[1] = "Ann"
+    busy.service.decider.people.registry.names[1] = "Ann"
     now = await client.status(url(busy))
     assert (now.name, now.ready, now.why, now.pulse) == ("hall", True, "2 of 2 cameras", 14)
     one, two = now.cameras

@@ -181,7 +181,7 @@ async def test_a_person_s_token_is_void_when_people_were_numbered_anew_since(
         if remembered is not None:
             said = IdentitySnapshot(pulse=0, boot=1, next_number=9, numbered_since=remembered, people=[])
             key = ZenohKeys("hall").camera("c0", "retained_identities")
-            hall.service.remembering.heard(Message(key, msgspec.json.encode(said), b""))
+            hall.service.state_replication.snapshot_received(Message(key, msgspec.json.encode(said), b""))
         while True:  # the file of tokens is looked at now and then
             await asyncio.sleep(0.1)
             async with hall.session.get("/api/site", headers=bearer("guest")) as answer:

@@ -33,7 +33,7 @@ async def hall(tmp_path: Path) -> AsyncIterator[Hall]:
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 1.0}, http=HTTP):
         hall.service.past.open()
         hall.service.come(*CAMERAS)
-        hall.service.remembering.begin(0)
+        hall.service.state_replication.begin(0)
         yield hall
 
 

@@ -190,5 +190,5 @@ async def test_a_site_without_pulses_or_live_cameras_is_not_ready(busy: Hall) ->
     assert await ready(busy) == (503, "no pulse has come for 60 s")
     busy.service._pulsed_at = time.monotonic()
     for camera in CAMERAS:
-        busy.service.intake.alive(ZenohKeys("hall").camera(camera, "alive"), there=False)
+        busy.service.intake.alive(ZenohKeys("hall").camera(camera, "alive"), is_present=False)
     assert await ready(busy) == (503, "no camera delivers frames")

@@ -39,7 +39,7 @@ async def test_what_went_wrong_last_is_told_until_something_else_does(busy: Hall
     assert await trouble() == "its source gives no pictures; it is tried again"
     intake.status(status(A, state="live"))
     assert await trouble() == "its source gives no pictures; it is tried again"
-    intake.alive(ZenohKeys("hall").camera(A, "alive"), there=False)
+    intake.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
     assert await trouble() == "its process was gone"
 
 

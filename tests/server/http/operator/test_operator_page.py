@@ -121,7 +121,7 @@ async def test_every_camera_has_a_tile_that_says_how_it_is(browser: Browser) -> 
         )
         hall.service.intake.status(status(A, missed=3, clock_offset=-0.25))
         await expect(tile.get_by_text("-250 ms")).to_be_visible()
-        hall.service.intake.alive(ZenohKeys("hall").camera(A, "alive"), there=False)
+        hall.service.intake.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
         await expect(tile.locator(".state")).to_have_text("Gone")
         await expect(tile.locator(".last-trouble")).to_contain_text("its process was gone")
         await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
@@ -164,7 +164,7 @@ async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(b
         await page.get_by_label("who is also").select_option(str(second))
         await page.get_by_role("button", name="Merge").click()
         await expect(page.locator("#known-words")).to_have_text(f"{second} is {first} from now on.")
-        assert people.roll.merged == {second: first}
+        assert people.registry.merged == {second: first}
         hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
         await expect(page.locator(f'#known-people [data-object="{second}"]')).to_have_count(0)
         shown = people.number(A, 1, 15)
@@ -182,7 +182,7 @@ async def test_flags_are_listed_with_what_has_become_of_them(browser: Browser) -
     async with operating(browser, "#flagged") as (hall, page):
         await expect(page.locator("#flag-none")).to_have_text("None so far.")
         see(hall)
-        hall.service.decider.people.roll.call(1, "Ann")
+        hall.service.decider.people.registry.set_name(1, "Ann")
         trouble = RiskEvent(reason="alike", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
         hall.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, risk_events=[trouble])))
         hall.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))

@@ -101,8 +101,8 @@ async def test_what_the_walk_lacks_is_said_while_it_goes_on(wide: Hall) -> None:
     await do(wide, do="start")
     assert len((await wide.get_json(WALK))["lacking"]) == 2  # nothing of either camera
     walk(wide, 100, wide=0.01)
-    lacking = (await wide.get_json(WALK))["lacking"]
-    assert f"walk also nearer to camera {A}, and farther from it" in lacking
+    losses = (await wide.get_json(WALK))["lacking"]
+    assert f"walk also nearer to camera {A}, and farther from it" in losses
 
 
 @pytest.mark.parametrize(

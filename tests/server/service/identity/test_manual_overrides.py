@@ -21,26 +21,26 @@ def test_whoever_is_said_to_be_one_stays_one(steps: list[tuple[bool, int, int]])
     it = ManualOverrides()
     one: list[set[int]] = [{number} for number in range(1, 7)]
     for by_hand, first, second in steps:
-        kept, lost = it.now(first), it.now(second)
+        kept, lost = it.current(first), it.current(second)
         if kept == lost:
             continue
         if by_hand:
             it.merge(kept, lost)
         else:
-            read = it.read(said({}, Merge(first, second)))
+            read = it.apply(said({}, Merge(first, second)))
             gone = {merge.lost for merge in read.merged}
-            assert not gone & {it.now(number) for number in range(1, 7) if number not in gone}
-            if it.now(first) != it.now(second):
+            assert not gone & {it.current(number) for number in range(1, 7) if number not in gone}
+            if it.current(first) != it.current(second):
                 continue  # nobody's word was about the lost one: it is never heard of again
         together = next(group for group in one if kept in group) | next(
             group for group in one if lost in group
         )
         one = [group for group in one if not group & together] + [together]
     for group in one:
-        assert len({it.now(number) for number in group}) == 1
+        assert len({it.current(number) for number in group}) == 1
     for number in range(1, 7):
-        assert it.now(it.now(number)) == it.now(number)
-        assert number in it.worked_out(it.now(number))
+        assert it.current(it.current(number)) == it.current(number)
+        assert number in it.automatic_numbers(it.current(number))
 
 
 def dictated(*updates: IdentityUpdate) -> PersonTracker:
@@ -59,16 +59,16 @@ TWO = said({("c0", 1): 1, ("c1", 1): 2})
 def test_a_merge_by_hand_holds_while_the_evidence_goes_on_saying_two() -> None:
     it = dictated(TWO, TWO, replace(TWO, split=(Split(1, 2, "c1"),)), replace(TWO, merged=(Merge(2, 1),)))
     seen(it, 0)
-    it.roll.call(2, "Ann")
+    it.registry.set_name(2, "Ann")
     it.merge(1, 2)
     assert it.known == [1]
-    assert it.roll.names == {1: "Ann"}
-    assert (it.roll.first_seen, it.roll.last_seen) == ({1: 0}, {1: STRIDE - 1})
+    assert it.registry.names == {1: "Ann"}
+    assert (it.registry.first_seen, it.registry.last_seen) == ({1: 0}, {1: STRIDE - 1})
     assert it.take_corrections() == (Merge(1, 2),)
     for epoch in (1, 2, 3):
         seen(it, epoch)
         assert it.known == [1]
-        assert it.roll.merged == {2: 1}
+        assert it.registry.merged == {2: 1}
         assert boxes(it, "c0", epoch * STRIDE) == {1: SMALL}
         assert boxes(it, "c1", epoch * STRIDE) == {1: LARGE}
     assert it.take_corrections() == ()
@@ -81,8 +81,8 @@ def test_who_is_said_to_be_somebody_is_whoever_that_turns_out_to_be() -> None:
     it.merge(1, 2)
     seen(it, 1)
     it.update(epoch_of(2, word("c0", 2, {2: SMALL})))
-    assert it.roll.everybody == [3]
-    assert it.roll.merged == {1: 3, 2: 3}
+    assert it.registry.everybody == [3]
+    assert it.registry.merged == {1: 3, 2: 3}
     assert boxes(it, "c0", 2 * STRIDE) == {3: SMALL}
 
 
@@ -92,18 +92,18 @@ def test_who_is_two_to_the_evidence_is_away_when_both_are() -> None:
     it.merge(1, 2)
     for epoch, away in ((1, set()), (2, {1}), (3, set())):
         seen(it, epoch)
-        assert it.roll.away == away
+        assert it.registry.away == away
 
 
 def test_a_name_that_both_have_is_the_one_that_is_kept() -> None:
     it = dictated(TWO)
     seen(it, 0)
-    it.roll.call(1, "Ann")
-    it.roll.call(2, "Bob")
+    it.registry.set_name(1, "Ann")
+    it.registry.set_name(2, "Bob")
     it.merge(1, 2)
-    assert it.roll.names == {1: "Ann"}
-    it.roll.call(1, "")
-    assert it.roll.names == {}
+    assert it.registry.names == {1: "Ann"}
+    it.registry.set_name(1, "")
+    assert it.registry.names == {}
 
 
 def test_whom_a_camera_shows_is_somebody_new_at_once_and_stays_it() -> None:
@@ -117,7 +117,7 @@ def test_whom_a_camera_shows_is_somebody_new_at_once_and_stays_it() -> None:
     if other != one:
         it.merge(one, other)
         it.take_corrections()
-    assert it.part(one, ["c1"]) is not None
+    assert it.split_off(one, ["c1"]) is not None
     [split] = it.take_corrections()
     assert isinstance(split, Split)
     new = split.split_off
@@ -127,5 +127,5 @@ def test_whom_a_camera_shows_is_somebody_new_at_once_and_stays_it() -> None:
         assert it.number("c1", 1, epoch * STRIDE - 1) == new
         assert it.number("c0", 1, epoch * STRIDE - 1) == one
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: LARGE}), word("c1", epoch, {1: SMALL})))
-    assert it.part(one, ["c1"]) is None
-    assert it.part(99, CAMERAS) is None
+    assert it.split_off(one, ["c1"]) is None
+    assert it.split_off(99, CAMERAS) is None

@@ -109,8 +109,8 @@ def test_people_are_where_their_tracks_are() -> None:
     first, second = it.known
     assert boxes(it, "c0", 4) == {first: SMALL, second: LARGE}
     assert boxes(it, "c1", 4) == {}
-    assert it.whose("c0", 1, 2, 0) == second
-    assert it.whose("c0", 9, 2, 0) is None
+    assert it.person_of("c0", 1, 2, 0) == second
+    assert it.person_of("c0", 9, 2, 0) is None
 
 
 def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
@@ -118,7 +118,7 @@ def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
     for epoch in range(3):
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL if epoch < 2 else None})))
     [number] = it.known
-    assert (it.roll.first_seen[number], it.roll.last_seen[number]) == (0, 2 * STRIDE - 1)
+    assert (it.registry.first_seen[number], it.registry.last_seen[number]) == (0, 2 * STRIDE - 1)
 
 
 def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
@@ -137,8 +137,8 @@ def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
     )
     for epoch in range(5):
         it.update(epoch_of(epoch, word("c0", epoch, {1: None if epoch == 0 else SMALL})))
-    assert it.roll.first_seen == {1: STRIDE, 2: later}
-    assert it.roll.last_seen == {1: later - 1, 2: 5 * STRIDE - 1}
+    assert it.registry.first_seen == {1: STRIDE, 2: later}
+    assert it.registry.last_seen == {1: later - 1, 2: 5 * STRIDE - 1}
     numbers = it.numbers([TrackKey("c0", 1)], 0, 5 * STRIDE)[0].tolist()
     assert numbers == [-1] * STRIDE + [1] * (later - STRIDE) + [2] * (2 * STRIDE)
 
@@ -177,8 +177,8 @@ def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
     it.update(epoch_of(1, word("c0", 1, {1: LARGE}, boot=2)))
     [before], [after] = boxes(it, "c0", 0), boxes(it, "c0", STRIDE)
-    assert it.whose("c0", 1, 1, 0) == before
-    assert it.whose("c0", 2, 1, STRIDE) == after
+    assert it.person_of("c0", 1, 1, 0) == before
+    assert it.person_of("c0", 2, 1, STRIDE) == after
 
 
 def test_of_merged_numbers_the_newest_are_remembered() -> None:
@@ -186,8 +186,8 @@ def test_of_merged_numbers_the_newest_are_remembered() -> None:
     it = people(maximum_departed_people=5)
     for lost in range(2, 40):
         it.merge(1, lost)
-    assert it.roll.merged == dict.fromkeys(range(35, 40), 1)
-    assert it.roll.also(1) == [*range(35, 40)]
+    assert it.registry.merged == dict.fromkeys(range(35, 40), 1)
+    assert it.registry.aliases(1) == [*range(35, 40)]
 
 
 def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> None:
@@ -199,9 +199,9 @@ def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> Non
     for epoch in range(3):
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: None}), word("c1", epoch, {1: LARGE})))
     assert it.known == [1]
-    assert it.roll.merged == {3: 1, 2: 1}
+    assert it.registry.merged == {3: 1, 2: 1}
     assert boxes(it, "c1", 0) == {1: LARGE}, "in frames past, too"
-    assert it.roll.also(1) == [2, 3]
+    assert it.registry.aliases(1) == [2, 3]
 
 
 def test_what_turned_out_is_taken_once_and_in_order() -> None:
@@ -235,13 +235,13 @@ def test_people_who_were_gone_for_long_are_forgotten_with_all_that_is_known_of_t
     for epoch in range(1, 4):
         it.update(epoch_of(epoch, word("c0", epoch, {})))
     assert it.known == [number]
-    assert it.roll.away == {number}
+    assert it.registry.away == {number}
     it.update(epoch_of(9, word("c0", 9, {})))
     assert it.known == []
-    assert it.roll.away == set()
-    assert it.whose("c0", 1, 1, 0) is None
+    assert it.registry.away == set()
+    assert it.person_of("c0", 1, 1, 0) is None
     assert not it._parts
-    assert not it._heard
+    assert not it._last_reported
 
 
 @pytest.mark.parametrize("pulse", [-1, 0, 4, 1000])

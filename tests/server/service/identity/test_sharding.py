@@ -106,7 +106,7 @@ def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
             service.splicer.persons[2].subscribe()
     assert service.board.resolve(2) == 1
     assert list(service.board.standings) == [1]
-    assert service.decider.people.elsewhere == []
+    assert service.decider.people.remote == []
     assert set(service.splicer.persons) == {1, 2}
     service.close()
 

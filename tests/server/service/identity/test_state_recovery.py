@@ -24,7 +24,12 @@ from server.messaging.identity_snapshot import (
 )
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
-from server.service.identity.state_recovery import ALONE_MOST, LONGEST_S, StateRecovery, trusted_first_free
+from server.service.identity.state_recovery import (
+    MAX_DOWNTIME_S,
+    SINGLE_CAMERA_NUMBER_MAX,
+    StateRecovery,
+    trusted_first_free,
+)
 from server.service.identity.state_replication import PATIENCE_S, StateReplication
 from server.service.service import BestViewService
 
@@ -48,10 +53,10 @@ class Site:
     def start(self, *, deaf: str | None = None) -> FedService:
         """Start the service anew: the cameras hear of it, but for one."""
         self.service = it = FedService(small_config(**self._changes))
-        it.remembering._send = self._tell
+        it.state_replication._send = self._tell
         for camera in CAMERAS:
-            for part in (it.intake, it.remembering):
-                part.alive(KEYS.camera(camera, "alive"), there=True)
+            for part in (it.intake, it.state_replication):
+                part.alive(KEYS.camera(camera, "alive"), is_present=True)
             if camera != deaf:
                 self.cameras[camera].service(there=True)
         return it
@@ -64,9 +69,9 @@ class Site:
             self.service.pulse = end_of_epoch(epoch, STRIDE)
             self.service.decide()
 
-    def whose(self, camera: str, track: int, epoch: int, boot: int = 1) -> int:
+    def person_of(self, camera: str, track: int, epoch: int, boot: int = 1) -> int:
         """Return who is behind a track."""
-        number = self.service.decider.people.whose(camera, boot, track, end_of_epoch(epoch, STRIDE))
+        number = self.service.decider.people.person_of(camera, boot, track, end_of_epoch(epoch, STRIDE))
         assert number is not None
         return number
 
@@ -83,9 +88,9 @@ def told(*, merge: bool = False, **changes: object) -> Site:
     site.start()
     site.tell(range(4))
     people = site.service.decider.people
-    people.roll.call(site.whose(A, 2, 3), "Ann")
+    people.registry.set_name(site.person_of(A, 2, 3), "Ann")
     if merge:
-        people.merge(site.whose(A, 2, 3), site.whose(A, 1, 3))
+        people.merge(site.person_of(A, 2, 3), site.person_of(A, 1, 3))
     site.tell(range(4, 6))
     return site
 
@@ -96,88 +101,90 @@ ONLY_LATE: Seen = {A: {9: SMALL, 2: LARGE}, B: {3: LARGE}}
 
 def test_who_is_followed_all_along_keeps_their_number_and_name_and_nobody_else_gets_it() -> None:
     site = told()
-    before = [site.whose(A, 1, 5), site.whose(A, 2, 5), site.whose(B, 3, 5)]
+    before = [site.person_of(A, 1, 5), site.person_of(A, 2, 5), site.person_of(B, 3, 5)]
     site.start()
     site.tell(range(7, 9), ONLY_LATE)
-    assert [site.whose(A, 2, 8), site.whose(B, 3, 8)] == before[1:]
-    assert site.whose(A, 9, 8) > max(before), "numbers are not used twice, not of those who have left either"
-    assert site.service.decider.people.roll.names == {before[1]: "Ann"}
+    assert [site.person_of(A, 2, 8), site.person_of(B, 3, 8)] == before[1:]
+    assert site.person_of(A, 9, 8) > max(before), (
+        "numbers are not used twice, not of those who have left either"
+    )
+    assert site.service.decider.people.registry.names == {before[1]: "Ann"}
     assert site.service.decider.people.merged_by_hand == {}
 
 
 def test_the_same_goes_for_any_number_of_runs() -> None:
     site = told()
-    before = [site.whose(A, 1, 5), site.whose(A, 2, 5), site.whose(B, 3, 5)]
+    before = [site.person_of(A, 1, 5), site.person_of(A, 2, 5), site.person_of(B, 3, 5)]
     for run in range(1, 4):
         site.start()
         site.tell(range(6 * run, 6 * run + 5))
         last = 6 * run + 4
-        assert [site.whose(A, 1, last), site.whose(A, 2, last), site.whose(B, 3, last)] == before
+        assert [site.person_of(A, 1, last), site.person_of(A, 2, last), site.person_of(B, 3, last)] == before
 
 
 def test_who_was_said_to_be_one_is_one_again_under_the_same_number() -> None:
     site = told(merge=True)
-    kept, (old,) = site.whose(A, 2, 5), site.service.decider.people.roll.merged
+    kept, (old,) = site.person_of(A, 2, 5), site.service.decider.people.registry.merged
     site.start()
     site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
     site.tell(range(8, 12))  # the other track comes later
     people = site.service.decider.people
-    assert site.whose(A, 1, 11) == site.whose(A, 2, 11) == kept
-    assert people.roll.merged[old] == kept, "an address with the old number goes on"
-    assert people.roll.names == {kept: "Ann"}
+    assert site.person_of(A, 1, 11) == site.person_of(A, 2, 11) == kept
+    assert people.registry.merged[old] == kept, "an address with the old number goes on"
+    assert people.registry.names == {kept: "Ann"}
 
 
 def test_a_camera_whose_last_word_was_late_is_remembered_all_the_same() -> None:
     site = told()
-    before = site.whose(B, 3, 5)
+    before = site.person_of(B, 3, 5)
     site.tell(range(6, 7), {A: {1: SMALL, 2: LARGE}, B: {}})
     site.start()
     site.tell(range(7, 9))
-    assert site.whose(B, 3, 8) == before
+    assert site.person_of(B, 3, 8) == before
 
 
 def test_tracks_of_a_camera_that_was_started_anew_are_not_taken_for_those_of_before() -> None:
     site = told()
     site.tell(range(6, 7), {A: {2: SMALL}, B: {}}, boot=2)
-    before, used = site.whose(A, 2, 6, boot=2), site.service.decider.people.next_number
+    before, used = site.person_of(A, 2, 6, boot=2), site.service.decider.people.next_number
     site.start()
     site.tell(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}}, boot=2)
-    assert site.whose(A, 2, 8, boot=2) == before
-    assert site.whose(A, 1, 8, boot=2) >= used
+    assert site.person_of(A, 2, 8, boot=2) == before
+    assert site.person_of(A, 1, 8, boot=2) >= used
 
 
 def test_a_number_too_large_to_remember_keeps_nobody_else_from_being_remembered() -> None:
     site = told()
-    ann = site.whose(A, 2, 5)
-    site.service.decider.people.roll.known_as(ann, [PERSON_NUMBER_MAX + 1])
+    ann = site.person_of(A, 2, 5)
+    site.service.decider.people.registry.add_aliases(ann, [PERSON_NUMBER_MAX + 1])
     site.tell(range(6, 7))
     site.start()
     site.tell(range(7, 9))
-    assert site.whose(A, 2, 8) == ann
-    assert site.service.decider.people.roll.names == {ann: "Ann"}
+    assert site.person_of(A, 2, 8) == ann
+    assert site.service.decider.people.registry.names == {ann: "Ann"}
 
 
 def test_numbers_have_begun_with_the_first_that_is_given_however_late_a_camera_says_it_is_there() -> None:
     site = Site()
     service = site.service = FedService(small_config())  # no camera's token has come
-    assert service.remembering.numbers_since == 0, "nobody has a number"
+    assert service.state_replication.numbers_since == 0, "nobody has a number"
     before = time.time() - 60
     site.tell(range(4))
-    assert site.whose(A, 1, 3)
-    assert service.remembering.numbers_since > before, "a token of before is for somebody else, maybe"
+    assert site.person_of(A, 1, 3)
+    assert service.state_replication.numbers_since > before, "a token of before is for somebody else, maybe"
 
 
 def test_a_camera_that_remembers_nothing_learns_from_what_the_others_do() -> None:
     site = told()
-    ann, other = site.whose(A, 2, 5), site.whose(B, 3, 5)
+    ann, other = site.person_of(A, 2, 5), site.person_of(B, 3, 5)
     site.cameras[B] = RetainedState(lambda said: site._hear(B, said))  # it was started anew, too
     site.start()
     site.tell(range(7, 9))
-    assert site.whose(A, 2, 8) == ann
-    assert site.whose(B, 3, 8) not in {ann, other}, "nobody knows who that is: it is a new number"
+    assert site.person_of(A, 2, 8) == ann
+    assert site.person_of(B, 3, 8) not in {ann, other}, "nobody knows who that is: it is a new number"
 
 
-LONG_AGO = 6 + int(LONGEST_S * FPS / STRIDE)
+LONG_AGO = 6 + int(MAX_DOWNTIME_S * FPS / STRIDE)
 
 
 @pytest.mark.parametrize(
@@ -190,18 +197,18 @@ LONG_AGO = 6 + int(LONGEST_S * FPS / STRIDE)
 )
 def test_nobody_is_given_a_number_or_name_that_may_be_anothers(epochs: range, boot: int) -> None:
     site = told()
-    used = max(site.service.decider.people.roll.everybody)
+    used = max(site.service.decider.people.registry.everybody)
     site.start()
     site.tell(epochs, boot=boot)
     people = site.service.decider.people
     assert people.known
     assert min(people.known) > used
-    assert people.roll.names == {}
+    assert people.registry.names == {}
 
 
 def test_a_camera_that_says_late_what_it_remembers_keeps_numbers_from_being_used_twice() -> None:
     site = told()
-    used = max(site.service.decider.people.roll.everybody)
+    used = max(site.service.decider.people.registry.everybody)
     site.cameras[A] = RetainedState(lambda said: site._hear(A, said))
     site.start(deaf=B)
     site.tell(range(7, 8), {A: {}, B: {}})
@@ -212,41 +219,41 @@ def test_a_camera_that_says_late_what_it_remembers_keeps_numbers_from_being_used
 
 def test_a_camera_that_says_late_what_it_remembers_is_heard_all_the_same() -> None:
     site = told()
-    ann, b = site.whose(A, 2, 5), site.whose(B, 3, 5)
+    ann, b = site.person_of(A, 2, 5), site.person_of(B, 3, 5)
     site.start(deaf=B)
     site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
-    assert site.service.remembering.awaits(b), "camera B may still come"
+    assert site.service.state_replication.may_recover(b), "camera B may still come"
     site.cameras[B].service(there=True)
     site.tell(range(8, 12), {A: {2: LARGE, 9: SMALL}, B: {3: LARGE}})
-    assert [site.whose(A, 2, 11), site.whose(B, 3, 11)] == [ann, b]
+    assert [site.person_of(A, 2, 11), site.person_of(B, 3, 11)] == [ann, b]
 
 
 def test_of_what_is_said_late_nothing_counts_that_may_be_anothers_by_now() -> None:
     site = told()
-    before = [site.whose(A, 1, 5), site.whose(A, 2, 5), site.whose(B, 3, 5)]
+    before = [site.person_of(A, 1, 5), site.person_of(A, 2, 5), site.person_of(B, 3, 5)]
     site.cameras[A] = RetainedState(lambda said: site._hear(A, said))
     site.start(deaf=B)
     site.tell(range(7, 8), {A: {1: SMALL, 2: LARGE}, B: {}})
-    assert site.whose(A, 1, 7) in before, "nobody had said that it was taken"
+    assert site.person_of(A, 1, 7) in before, "nobody had said that it was taken"
     site.cameras[B].service(there=True)
     site.tell(range(8, 12))
-    assert site.whose(B, 3, 11) > max(before)
-    assert site.service.decider.people.roll.names == {}
+    assert site.person_of(B, 3, 11) > max(before)
+    assert site.service.decider.people.registry.names == {}
 
 
 def test_a_track_that_comes_late_is_whose_number_its_own_has_become_meanwhile() -> None:
     site = Site()
     site.start()
     site.tell(range(4))
-    site.service.decider.people.merge(site.whose(A, 1, 3), site.whose(B, 3, 3))
+    site.service.decider.people.merge(site.person_of(A, 1, 3), site.person_of(B, 3, 3))
     site.tell(range(4, 6))
-    one, ann = site.whose(A, 1, 5), site.whose(A, 2, 5)
+    one, ann = site.person_of(A, 1, 5), site.person_of(A, 2, 5)
     site.start()
     site.tell(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}})
     site.tell(range(9, 11), {A: {2: LARGE}, B: {}})
     site.service.decider.people.merge(ann, one)
     site.tell(range(11, 14), {A: {2: LARGE}, B: {3: LARGE}})
-    assert site.whose(B, 3, 13) == ann
+    assert site.person_of(B, 3, 13) == ann
 
 
 def test_a_name_that_was_given_meanwhile_stays_and_one_that_was_taken_back_is_not_given_again() -> None:
@@ -254,12 +261,12 @@ def test_a_name_that_was_given_meanwhile_stays_and_one_that_was_taken_back_is_no
     site.start()
     site.tell(range(7, 9))
     people = site.service.decider.people
-    people.roll.call(site.whose(A, 2, 8), "")
-    people.roll.call(site.whose(A, 1, 8), "Bob")
+    people.registry.set_name(site.person_of(A, 2, 8), "")
+    people.registry.set_name(site.person_of(A, 1, 8), "Bob")
     site.tell(range(9, 10))
     site.start()
     site.tell(range(10, 12))
-    assert site.service.decider.people.roll.names == {site.whose(A, 1, 11): "Bob"}
+    assert site.service.decider.people.registry.names == {site.person_of(A, 1, 11): "Bob"}
 
 
 def test_of_several_services_the_first_one_tells_and_all_begin_with_it() -> None:
@@ -267,13 +274,13 @@ def test_of_several_services_the_first_one_tells_and_all_begin_with_it() -> None
     assert site.service.decider.people.known
     site.start()
     site.tell(range(7, 9))
-    assert site.service.decider.people.roll.names == {}, "the second one told nobody"
+    assert site.service.decider.people.registry.names == {}, "the second one told nobody"
     first = told()
     first._changes = {"view": {"share": {"of": 2, "index": 1}}}
-    ann = first.whose(A, 2, 5)
+    ann = first.person_of(A, 2, 5)
     first.start()
     first.tell(range(7, 9))
-    assert first.whose(A, 2, 8) == ann
+    assert first.person_of(A, 2, 8) == ann
 
 
 class Clock:
@@ -290,27 +297,27 @@ def test_nothing_is_decided_before_every_camera_that_is_there_has_had_time_to_sa
     clock, service = Clock(), FedService(small_config())
     it = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
     it.begin(4)
-    assert not it.waits, "nobody is there"
-    it.alive(KEYS.camera(A, "alive"), there=True)
-    it.alive(KEYS.camera("cellar", "alive"), there=True)
-    it.alive(KEYS.camera(B, "alive"), there=True)
-    assert it.waits
-    it.heard(Message(KEYS.camera(A, "retained_identities"), b"", b""))
-    assert it.waits
-    it.alive(KEYS.camera(A, "alive"), there=True)
-    it.alive(KEYS.camera(B, "alive"), there=False)
-    assert not it.waits, "a camera's token may come after its word"
-    it.alive(KEYS.camera(B, "alive"), there=True)
+    assert not it.is_waiting, "nobody is there"
+    it.alive(KEYS.camera(A, "alive"), is_present=True)
+    it.alive(KEYS.camera("cellar", "alive"), is_present=True)
+    it.alive(KEYS.camera(B, "alive"), is_present=True)
+    assert it.is_waiting
+    it.snapshot_received(Message(KEYS.camera(A, "retained_identities"), b"", b""))
+    assert it.is_waiting
+    it.alive(KEYS.camera(A, "alive"), is_present=True)
+    it.alive(KEYS.camera(B, "alive"), is_present=False)
+    assert not it.is_waiting, "a camera's token may come after its word"
+    it.alive(KEYS.camera(B, "alive"), is_present=True)
     clock.now += PATIENCE_S
-    assert not it.waits, "one that is frozen keeps nobody waiting for longer"
+    assert not it.is_waiting, "one that is frozen keeps nobody waiting for longer"
     it.begin(9)
-    it.alive(KEYS.camera(A, "alive"), there=True)
-    assert not it.waits, "only at the beginning"
+    it.alive(KEYS.camera(A, "alive"), is_present=True)
+    assert not it.is_waiting, "only at the beginning"
 
 
 async def test_who_may_be_found_again_is_not_said_to_be_nobody() -> None:
     site = told()
-    number = site.whose(A, 1, 5)
+    number = site.person_of(A, 1, 5)
     service = site.start()
     async with TestClient(TestServer(make_app(BestViewService(service)))) as client:
         path = f"/objects/{number}/best.mp4"
@@ -337,7 +344,7 @@ def test_what_a_camera_says_that_is_none_is_counted(damage: bytes, caplog: pytes
     assert service.intake.states[B].bad_messages == 1
     assert caplog.messages == []
     site.tell(range(7, 9))
-    assert site.service.decider.people.roll.names == {site.whose(A, 2, 8): "Ann"}
+    assert site.service.decider.people.registry.names == {site.person_of(A, 2, 8): "Ann"}
 
 
 def test_a_camera_keeps_no_more_than_it_can() -> None:
@@ -381,7 +388,7 @@ def test_whatever_cameras_remember_two_tracks_seen_at_once_in_a_camera_are_two(
         site.cameras[camera].put(Message("", said, b""))
     site.start()
     site.tell(range(7, 12), {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}})
-    assert site.whose(A, 1, 11) != site.whose(A, 2, 11)
+    assert site.person_of(A, 1, 11) != site.person_of(A, 2, 11)
 
 
 @settings(max_examples=40)
@@ -396,7 +403,7 @@ def test_whatever_cameras_remember_the_service_goes_on(
     site.tell(range(7, 10))
     people = site.service.decider.people
     assert people.known
-    assert set(people.roll.merged).isdisjoint(people.roll.everybody)
+    assert set(people.registry.merged).isdisjoint(people.registry.everybody)
 
 
 def lying(site: Site, camera: str, **changes: object) -> None:
@@ -416,7 +423,7 @@ def lying(site: Site, camera: str, **changes: object) -> None:
 @pytest.mark.parametrize("again", [False, True])
 def test_no_camera_alone_moves_everybodys_numbers_far_ahead(lie: dict[str, object], again: bool) -> None:
     site = told()
-    ann = site.whose(A, 2, 5)
+    ann = site.person_of(A, 2, 5)
     if not again:
         lying(site, B, **lie)
     site.start()
@@ -426,9 +433,9 @@ def test_no_camera_alone_moves_everybodys_numbers_far_ahead(lie: dict[str, objec
         site.cameras[B].service(there=True)
     site.tell(range(9, 12), {A: {1: SMALL, 2: LARGE, 9: SMALL}, B: {3: LARGE}})
     people = site.service.decider.people
-    assert people.next_number <= ALONE_MOST + 10
-    assert site.whose(A, 2, 11) == ann
-    assert people.roll.names == {ann: "Ann"}
+    assert people.next_number <= SINGLE_CAMERA_NUMBER_MAX + 10
+    assert site.person_of(A, 2, 11) == ann
+    assert people.registry.names == {ann: "Ann"}
 
 
 def test_large_numbers_that_two_cameras_remember_go_on() -> None:
@@ -442,7 +449,7 @@ def test_large_numbers_that_two_cameras_remember_go_on() -> None:
 
 @given(st.lists(st.integers(1, PERSON_NUMBER_MAX), max_size=6), st.integers(1, PERSON_NUMBER_MAX))
 def test_whatever_one_camera_says_the_others_say_how_far_it_is_believed(others: list[int], lie: int) -> None:
-    most = max([trusted_first_free(others), ALONE_MOST])
+    most = max([trusted_first_free(others), SINGLE_CAMERA_NUMBER_MAX])
     assert trusted_first_free([*others, lie]) <= max(most, max(others, default=0) + 10_000)
 
 
@@ -468,7 +475,7 @@ def test_a_camera_that_comes_and_goes_and_never_says_what_it_remembers_is_waited
     clock, service = Clock(), FedService(small_config())
     it = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
     for _ in range(4):
-        it.alive(KEYS.camera(B, "alive"), there=False)
-        it.alive(KEYS.camera(B, "alive"), there=True)
+        it.alive(KEYS.camera(B, "alive"), is_present=False)
+        it.alive(KEYS.camera(B, "alive"), is_present=True)
         clock.now += PATIENCE_S / 2
-    assert not it.waits
+    assert not it.is_waiting

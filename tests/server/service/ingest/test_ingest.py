@@ -48,7 +48,7 @@ class Hall:
         self.frames: list[tuple[str]] = []
         self.intake = Ingest(self.frame_buffers, self.aligner, lambda *frame: self.frames.append(frame))
         for camera in CAMERAS:
-            self.intake.alive(KEYS.camera(camera, "alive"), there=True)
+            self.intake.alive(KEYS.camera(camera, "alive"), is_present=True)
 
     def handle(self, what: str, message: Message) -> None:
         handlers = {
@@ -99,7 +99,7 @@ def test_a_camera_that_leaves_frames_out_says_so_while_it_is_there() -> None:
     hall.handle("status", status("c0"))
     assert state.message == ""
     hall.handle("status", status("c0", load_level=2, load=words))
-    hall.intake.alive(KEYS.camera("c0", "alive"), there=False)
+    hall.intake.alive(KEYS.camera("c0", "alive"), is_present=False)
     assert state.message == ""
 
 
@@ -125,7 +125,7 @@ def test_any_bytes_are_counted_and_dropped(what: str, payload: bytes, attachment
 def test_any_key_is_ignored(what: str, key: str) -> None:
     hall = Hall()
     hall.handle(what, Message(key, b"", b""))
-    hall.intake.alive(key, there=True)
+    hall.intake.alive(key, is_present=True)
     assert hall.bad() == 0
 
 
@@ -182,7 +182,7 @@ def test_cameras_that_nobody_configured_are_ignored(caplog: pytest.LogCaptureFix
     hall.intake.video(video("cellar", encoded(0)[0]))
     hall.intake.tracks(tracks(word("cellar", 0, {})))
     for there in (True, False) * 5:
-        hall.intake.alive(KEYS.camera("cellar", "alive"), there=there)
+        hall.intake.alive(KEYS.camera("cellar", "alive"), is_present=there)
     assert len(caplog.messages) == 1
     assert list(hall.intake.states) == list(CAMERAS)
     assert not hall.frames
@@ -206,8 +206,8 @@ def test_a_refused_camera_that_is_started_again_with_the_right_settings_is_welco
     hall = Hall()
     hall.intake.video(video("c0", encoded(0)[0]))
     hall.intake.video(video("c1", encoded(1, crf=40)[0]))
-    hall.intake.alive(KEYS.camera("c1", "alive"), there=False)
-    hall.intake.alive(KEYS.camera("c1", "alive"), there=True)
+    hall.intake.alive(KEYS.camera("c1", "alive"), is_present=False)
+    hall.intake.alive(KEYS.camera("c1", "alive"), is_present=True)
     hall.intake.video(video("c1", encoded(1)[5], boot=2))
     assert hall.intake.states["c1"].word == "live"
     assert hall.frame_buffers["c1"].has(5)
@@ -219,14 +219,14 @@ def test_a_cameras_state_follows_what_it_does() -> None:
     words = [state.word]
     hall.intake.video(video("c0", encoded(0)[0]))
     words.append(state.word)
-    hall.intake.alive(KEYS.camera("c0", "alive"), there=False)
+    hall.intake.alive(KEYS.camera("c0", "alive"), is_present=False)
     words.append(state.word)
-    hall.intake.alive(KEYS.camera("c0", "alive"), there=True)
+    hall.intake.alive(KEYS.camera("c0", "alive"), is_present=True)
     hall.intake.tracks(tracks(word("c0", 0, {}, ended=True)))
     words.append(state.word)
-    hall.intake.alive(KEYS.camera("c0", "alive"), there=False)
+    hall.intake.alive(KEYS.camera("c0", "alive"), is_present=False)
     words.append(state.word)
-    hall.intake.alive(KEYS.camera("c0", "alive"), there=True)
+    hall.intake.alive(KEYS.camera("c0", "alive"), is_present=True)
     words.append(state.word)
     assert words == ["starting", "live", "gone", "ended", "ended", "live"]
 
@@ -238,7 +238,7 @@ def test_small_pictures_are_kept_by_run_and_track_until_they_are_old_or_the_came
     hall.intake.thumbnail(thumbnail("c1", 1, b"other", pulse=50))
     hall.intake.forget_thumbnails_before(20)
     assert [kept.jpeg for kept in hall.intake.thumbnails.values()] == [b"new", b"other"]
-    hall.intake.alive(KEYS.camera("c1", "alive"), there=False)
+    hall.intake.alive(KEYS.camera("c1", "alive"), is_present=False)
     assert list(hall.intake.thumbnails) == [("c0", 1, 2)]
 
 
@@ -282,7 +282,7 @@ def test_a_camera_that_comes_and_goes_without_end_is_few_lines_of_the_log(
     hall = Hall()
     caplog.clear()
     for there in (False, True) * 50:
-        hall.intake.alive(KEYS.camera("c0", "alive"), there=there)
+        hall.intake.alive(KEYS.camera("c0", "alive"), is_present=there)
     assert caplog.messages == ["camera c0 is gone", "camera c0 is there"] * 4 + ["camera c0 is gone"]
 
 

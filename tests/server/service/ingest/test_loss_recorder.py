@@ -21,7 +21,7 @@ class Told:
         self.now = 0.0
         frame_buffers = {camera: FrameBuffer(FPS, 50, StreamFormat()) for camera in CAMERAS}
         states = {camera: CameraState() for camera in CAMERAS}
-        self.lacking = LossRecorder(frame_buffers, states, STRIDE, lambda: self.now)
+        self.losses = LossRecorder(frame_buffers, states, STRIDE, lambda: self.now)
 
     def epochs(self, numbers: range, late: str | None = None) -> None:
         """Decide epochs, to which all have spoken but one."""
@@ -30,7 +30,7 @@ class Told:
             words = [word(camera, number, {}) for camera in CAMERAS if camera != late]
             epoch = epoch_of(number, *words)
             late_ones = () if late is None else (late,)
-            self.lacking.epoch(Epoch(epoch.number, epoch.last, epoch.tracks, late_ones))
+            self.losses.epoch(Epoch(epoch.number, epoch.last, epoch.tracks, late_ones))
 
 
 def test_a_spell_of_late_tracks_is_told_when_it_begins_and_when_it_is_over(
@@ -49,7 +49,7 @@ def test_a_spell_of_late_tracks_is_told_when_it_begins_and_when_it_is_over(
     assert over.getMessage() == (
         f"camera {B}: its tracks come in time again; those of 40 windows in {seconds:.0f} s did not"
     )
-    assert told.lacking.late_epochs == 40
+    assert told.losses.late_epochs == 40
 
 
 def test_cameras_are_told_of_each_for_itself(caplog: pytest.LogCaptureFixture) -> None:
@@ -64,5 +64,5 @@ def test_a_camera_that_has_gone_meanwhile_is_not_said_to_be_in_time(caplog: pyte
     told = Told()
     told.epochs(range(3), late=B)
     told.now += 1000.0
-    told.lacking.epoch(epoch_of(9, word(A, 9, {})))
+    told.losses.epoch(epoch_of(9, word(A, 9, {})))
     assert len(caplog.messages) == 1

@@ -197,7 +197,7 @@ async def test_whatever_a_camera_says_the_other_one_goes_on(name: str) -> None:
     lie = (REFUSED | TAKEN)[name]
     lived = Lived(lie)
     service, people = lived.service, lived.service.decider.people
-    number = people.whose(OTHER, 1, 7, lived.last)
+    number = people.person_of(OTHER, 1, 7, lived.last)
     assert number is not None, "its person is somebody"
     assert number < 20
     told_of = [it for it in lived.decided if STRIDE <= it.first <= lived.last]
@@ -211,7 +211,7 @@ async def test_whatever_a_camera_says_the_other_one_goes_on(name: str) -> None:
     states = service.intake.states
     assert states[OTHER].bad_messages == 0
     assert (states[LIAR].bad_messages > 0) == (name in REFUSED)
-    assert sum(map(len, people.unsearched._frames.values())) < 1000
+    assert sum(map(len, people.undetected._frames.values())) < 1000
     told(service)
 
 

@@ -61,7 +61,7 @@ def lived(service: FedService, epochs: range) -> None:
 def service(tmp_path: Path) -> FedService:
     """A service that records and writes decisions, and has lived for some epochs."""
     it = FedService(small_config(record={"folder": str(tmp_path / "kept")}), out=tmp_path)
-    it._recorder = it.lacking.recorder = it._record(tmp_path)
+    it._recorder = it.losses.recorder = it._record(tmp_path)
     it.past.open()
     it.come(*CAMERAS)
     return it

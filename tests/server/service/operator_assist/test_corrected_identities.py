@@ -71,7 +71,7 @@ def played(
         Who is who, and by pulse who was shown where when that frame was told, 20 frames later.
     """
     people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), WINDOW.lag)
-    people.told.frames = ASSIST.memory_frames
+    people.published.frames = ASSIST.memory_frames
     camera, told, first = Camera(), {}, 0
     held: list[CameraTracks] = []
     for frame in range(frames):
@@ -138,7 +138,7 @@ def test_numbers_follow_where_the_meeting_was_long_ago(said_at: int) -> None:
 def test_who_points_again_after_it_was_mended_still_means_the_same() -> None:
     people, told = played(99, range(MET + 8, MET + 14))
     left, right = sides(told, 30)
-    before, after = (people.told.of("c0", [left], it) for it in (40, 120))
+    before, after = (people.published.of("c0", [left], it) for it in (40, 120))
     assert before is not None
     assert after is not None
     assert before.track == after.track, "the tracker's own number stays with the person"

@@ -313,7 +313,7 @@ async def shows(hall: Hall) -> None:
     hall.service.past.recent._frames = GOP
     hall.service.past.open()
     hall.service.come(*CAMERAS)
-    hall.service.remembering.begin(0)
+    hall.service.state_replication.begin(0)
     for epoch in range(7):
         hall.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
     await until(lambda: written(hall) == 6)
@@ -376,7 +376,7 @@ async def test_who_is_nowhere_else_is_gone_with_what_was_recorded(
     hall.service.past.recent._choices.clear()
     hall.service.splicer.forget([], [])
     hall.service.splicer._persons._ended.clear()
-    hall.service.decider.people.roll.first_seen.clear()
+    hall.service.decider.people.registry.first_seen.clear()
     assert len((await hall.get_json("/api/objects/1/past"))["spans"]) == 1
     shutil.rmtree(store.folder)
     assert await hall.get(path) == (status, {"error": error})

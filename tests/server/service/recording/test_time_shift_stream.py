@@ -439,7 +439,7 @@ async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tm
         hall.service.come(*CAMERAS)
         said = IdentitySnapshot(pulse=19, boot=1, next_number=9, numbered_since=since, people=[])
         key = ZenohKeys("hall").camera(A, "retained_identities")
-        hall.service.remembering.heard(Message(key, msgspec.json.encode(said), b""))
+        hall.service.state_replication.snapshot_received(Message(key, msgspec.json.encode(said), b""))
         for epoch in range(5, 8):
             hall.service.feed(epoch, IN_A)
         await until_written(hall, 1)
