@@ -14,9 +14,9 @@ from dataclasses import asdict, dataclass, field
 from multiprocessing import get_context
 from pathlib import Path
 
-from benchmarks.recordings import Recording, TrackSettings, find_recordings, track
-from benchmarks.report import Report
-from benchmarks.surroundings import CannotRunError, finish, parser
+from benchmarks.common.environment import CannotRunError, finish, parser
+from benchmarks.common.public_detections import Recording, TrackSettings, find_recordings, track
+from benchmarks.common.report import Report
 from tracking import PAPER_COSTS
 from tracking.evaluation import Scores, average_scores
 

@@ -21,8 +21,8 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.report import Report
-from benchmarks.surroundings import parser
+from benchmarks.common.environment import parser
+from benchmarks.common.report import Report
 from server.camera.encoding.encoder import Encoder
 from server.camera.pipeline import CameraPipeline
 from server.config.loader import build_config

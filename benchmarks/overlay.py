@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.report import Report
-from benchmarks.surroundings import parser
+from benchmarks.common.environment import parser
+from benchmarks.common.report import Report
 from server.camera.encoding.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import FragmentSample, fragment

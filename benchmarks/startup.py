@@ -22,8 +22,8 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from benchmarks.report import Report
-from benchmarks.surroundings import ROOT, parser
+from benchmarks.common.environment import ROOT, parser
+from benchmarks.common.report import Report
 
 _GIVE_UP_S = 600.0
 _ANSI = re.compile(r"\x1b\[[0-9;]*m")

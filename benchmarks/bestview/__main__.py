@@ -35,18 +35,23 @@ from pathlib import Path
 
 import cv2
 
-from benchmarks.bestview.calibrate import CannotCalibrateError, calibrated
-from benchmarks.bestview.cases import Case, auditorium, gallery, room, terrace
-from benchmarks.bestview.join import own_tracks
-from benchmarks.bestview.plot import plot_sweeps, plot_ways
-from benchmarks.bestview.sweep import Swept, sweep, sweep_tables
-from benchmarks.bestview.watch import Watched, followed
-from benchmarks.bestview.ways import LEAST_IOU, Outcome, Seen, Way, outcome, ways
-from benchmarks.bestview.who import Met
-from benchmarks.bestview.why import Losses, losses
-from benchmarks.peers.environment import PeerEnvironment, PeersAwayError, default_folder, peer_environment
-from benchmarks.report import Report
-from benchmarks.surroundings import CannotRunError, parser
+from benchmarks.bestview.association_baselines import own_tracks
+from benchmarks.bestview.camera_tracks import Watched, followed
+from benchmarks.bestview.identity_errors import Met
+from benchmarks.bestview.methods import LEAST_IOU, Outcome, Seen, Way, outcome, ways
+from benchmarks.bestview.parameter_sweep import Swept, sweep, sweep_tables
+from benchmarks.bestview.plots import plot_sweeps, plot_ways
+from benchmarks.bestview.scenes import Case, auditorium, gallery, room, terrace
+from benchmarks.bestview.track_calibration import CannotCalibrateError, calibrated
+from benchmarks.bestview.visibility_losses import Losses, losses
+from benchmarks.common.environment import CannotRunError, parser
+from benchmarks.common.report import Report
+from benchmarks.other_trackers.virtual_environment import (
+    PeerEnvironment,
+    PeersAwayError,
+    default_folder,
+    peer_environment,
+)
 
 ROOMS = ((2, 3, 40.0), (4, 8, 40.0), (8, 20, 30.0))
 """Cameras, people, seconds."""

@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from benchmarks.calibration.errors import Agreement, agreement, error_of_known, in_common
-from benchmarks.recordings import Recording, track
-from benchmarks.report import Report
-from benchmarks.surroundings import CannotRunError, parser
-from benchmarks.views import Views, find_views
+from benchmarks.calibration.calibration_errors import Agreement, agreement, error_of_known, in_common
+from benchmarks.common.environment import CannotRunError, parser
+from benchmarks.common.public_detections import Recording, track
+from benchmarks.common.recorded_views import Views, find_views
+from benchmarks.common.report import Report
 from bestview.calibration import CalibrationError, Walk, WalkCalibration, WalkTrack, calibrate_from_walks
 from server.cli.calibrate.walk_input import VideoFormat, walks_from_tracks
 from server.cli.evaluate.track_scores import evaluate_recordings, read_recordings

@@ -15,11 +15,11 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from benchmarks.endurance.crowd import crowd
-from benchmarks.endurance.memory import SPAN, Samples
-from benchmarks.experiments.scene import HEIGHT, WIDTH
-from benchmarks.report import Report
-from benchmarks.surroundings import parser
+from benchmarks.common.environment import parser
+from benchmarks.common.report import Report
+from benchmarks.endurance.endless_crowd import crowd
+from benchmarks.endurance.memory_samples import SPAN, Samples
+from benchmarks.paper_experiments.scene import HEIGHT, WIDTH
 from tracking import CostSettings, OnlineTracker, WindowSettings, create_solver
 from tracking.solvers.base import DEFAULT_SOLVER
 

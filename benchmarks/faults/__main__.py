@@ -38,24 +38,34 @@ import asyncio
 import tempfile
 from pathlib import Path
 
-from benchmarks.faults import apart, clock, disk, ends, messages, page, processes, reload, sources
-from benchmarks.faults.measure import measure
-from benchmarks.faults.plot import draw
-from benchmarks.faults.site import Fault
-from benchmarks.faults.table import describe
-from benchmarks.report import Report
-from benchmarks.surroundings import CannotRunError, finish, parser
+from benchmarks.common.environment import CannotRunError, finish, parser
+from benchmarks.common.report import Report
+from benchmarks.faults.injection import (
+    clock_steps,
+    config_reload,
+    full_disk,
+    messages,
+    page_server,
+    processes,
+    separate_processes,
+    shutdown,
+    sources,
+)
+from benchmarks.faults.outcomes.measurement import measure
+from benchmarks.faults.outcomes.plots import draw
+from benchmarks.faults.outcomes.promise_table import describe
+from benchmarks.faults.site.fault_site import Fault
 
 FAULTS: tuple[Fault, ...] = (
     *processes.FAULTS,
-    *reload.FAULTS,
-    *page.FAULTS,
-    *apart.FAULTS,
+    *config_reload.FAULTS,
+    *page_server.FAULTS,
+    *separate_processes.FAULTS,
     *sources.FAULTS,
     *messages.FAULTS,
-    *disk.FAULTS,
-    *clock.FAULTS,
-    *ends.FAULTS,
+    *full_disk.FAULTS,
+    *clock_steps.FAULTS,
+    *shutdown.FAULTS,
 )
 
 

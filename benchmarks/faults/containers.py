@@ -21,14 +21,14 @@ from typing import Any
 
 import yaml
 
-from benchmarks.faults.compose import PLAIN, ComposeError, ComposeSite, composed, missing
-from benchmarks.faults.film import CAMERAS, Views
-from benchmarks.faults.measure import measure
-from benchmarks.faults.pairs import SHOWN
-from benchmarks.faults.site import LEASE_S, SETTINGS, Ended, Fault, Inject, Stand, listening
-from benchmarks.faults.table import describe
-from benchmarks.report import Report
-from benchmarks.surroundings import CannotRunError, finish, parser
+from benchmarks.common.environment import CannotRunError, finish, parser
+from benchmarks.common.report import Report
+from benchmarks.faults.injection.process_pairs import SHOWN
+from benchmarks.faults.outcomes.measurement import measure
+from benchmarks.faults.outcomes.promise_table import describe
+from benchmarks.faults.site.compose_site import PLAIN, ComposeError, ComposeSite, composed, missing
+from benchmarks.faults.site.fault_site import LEASE_S, SETTINGS, Ended, Fault, Inject, Stand, listening
+from benchmarks.faults.video.stamped_views import CAMERAS, Views
 
 _FILMS, _KEPT = "/site/films", "/site/kept"
 _AWAY_S = 4.0

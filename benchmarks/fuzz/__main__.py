@@ -1,7 +1,7 @@
 """Everything that reads bytes from outside is given bytes that nobody meant: what comes of them.
 
     python -m benchmarks.fuzz --part mot
-    python -m benchmarks.fuzz --target zenoh-sessions --first 5000 --inputs 5000
+    python -m benchmarks.fuzz --target bus-sessions --first 5000 --inputs 5000
     python -m benchmarks.fuzz --replay out/fuzz/mot-text.ValueError-read_rows.1.bin
 
 An input that is wrong is refused in one clear line, or counted and dropped. A crash is anything else: another
@@ -21,19 +21,29 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-from benchmarks.fuzz.run import Attempt, Crash, Plan, Runner, Tally
-from benchmarks.fuzz.target import Target
-from benchmarks.report import Report
-from benchmarks.surroundings import ROOT
+from benchmarks.common.environment import ROOT
+from benchmarks.common.report import Report
+from benchmarks.fuzz.engine.runner import Attempt, Crash, Plan, Runner, Tally
+from benchmarks.fuzz.engine.target import Target
 
-PARTS = ("pulse", "zenoh", "http", "config", "mot", "calibration", "media", "kept")
+PARTS = {
+    "pulse": "pulses.targets",
+    "bus": "bus.messages",
+    "http": "http.targets",
+    "config": "files.config",
+    "mot": "files.motchallenge",
+    "calibration": "files.calibration",
+    "media": "media.targets",
+    "recordings": "files.recordings",
+}
+"""The module that lists the targets of each part."""
 MESSAGES = 1_000_000
 _COLUMNS = ("target", "inputs", "messages", "a second", "refused", "accepted", "crashes", "kinds of crash")
 
 
 def targets_of(part: str) -> tuple[type[Target], ...]:
     """Return the targets of a part, whose libraries are loaded only now."""
-    found: tuple[type[Target], ...] = importlib.import_module(f"benchmarks.fuzz.{part}").TARGETS
+    found: tuple[type[Target], ...] = importlib.import_module(f"benchmarks.fuzz.{PARTS[part]}").TARGETS
     return found
 
 

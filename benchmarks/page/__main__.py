@@ -19,11 +19,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from playwright.async_api import CDPSession, Page
 
-from benchmarks.browser import check_chromium, chromium
-from benchmarks.demo_site import demo_at, open_when_there
-from benchmarks.page import hours as page_hours
-from benchmarks.report import Report
-from benchmarks.surroundings import CannotRunError, finish, parser
+from benchmarks.common.browser import check_chromium, chromium
+from benchmarks.common.demo_site import demo_at, open_when_there
+from benchmarks.common.environment import CannotRunError, finish, parser
+from benchmarks.common.report import Report
+from benchmarks.page import long_playback as page_hours
 
 _PLAYING_MS = 60_000
 _SETTLE_S = 15.0

@@ -21,10 +21,10 @@ from pathlib import Path
 
 import yaml
 
-from benchmarks.render.stages import STAGES, StageTimes, time_stages
-from benchmarks.report import Report
-from benchmarks.surroundings import CannotRunError, finish, one_thread_environment, parser
-from benchmarks.views import Views, find_views
+from benchmarks.common.environment import CannotRunError, finish, one_thread_environment, parser
+from benchmarks.common.recorded_views import Views, find_views
+from benchmarks.common.report import Report
+from benchmarks.render.stage_times import STAGES, StageTimes, time_stages
 
 
 @dataclass(frozen=True, slots=True)

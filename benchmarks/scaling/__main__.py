@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.report import Report
-from benchmarks.scaling.hall import Hall
-from benchmarks.scaling.service import REST, STAGES
-from benchmarks.scaling.site import Load, carry
-from benchmarks.surroundings import parser
+from benchmarks.common.environment import parser
+from benchmarks.common.report import Report
+from benchmarks.scaling.simulated_hall import Hall
+from benchmarks.scaling.simulated_site import Load, carry
+from benchmarks.scaling.timed_service import REST, STAGES
 
 _FPS = 25.0
 _CAMERAS = (4, 16, 36, 64, 100)

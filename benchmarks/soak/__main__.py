@@ -24,22 +24,22 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import aiohttp
 import numpy as np
 
-from benchmarks.delay.site import LOG, running_site
-from benchmarks.live.counts import Counts, read_counts
-from benchmarks.processes import running_pids
-from benchmarks.report import Report
-from benchmarks.soak.report import describe, plot
+from benchmarks.common.environment import parser
+from benchmarks.common.process_load import running_pids
+from benchmarks.common.report import Report
+from benchmarks.latency.running_site import LOG, running_site
+from benchmarks.live_cameras.frame_counters import read_counts
+from benchmarks.soak.accelerated_site import Tempo, film
+from benchmarks.soak.measurements import PROCESSES, LatencyMedians, SoakMeasurements
 from benchmarks.soak.samples import Sample, descriptors_of, resident_of, threads_of
-from benchmarks.soak.site import CAMERAS, Tempo, film
-from benchmarks.soak.tasks import hooked_environment, read_held
+from benchmarks.soak.soak_report import describe, plot
+from benchmarks.soak.task_counts import hooked_environment, read_held
 from benchmarks.soak.visitors import Visitors
-from benchmarks.surroundings import parser
 
 _SEED = 1
 _SAMPLES = 480
@@ -50,38 +50,13 @@ _LATEST = 2.0
 """Of the time that it should take: after that it is given up."""
 _KEPT = 0.125
 """Of the whole time: how long the recording is kept, so that it is full before the second quarter."""
-_PROCESSES = ("bestview", "sync", "up", *(f"camera {it}" for it in CAMERAS))
 
 
 class BrokenError(Exception):
     """The site did not last; the text says why."""
 
 
-@dataclass(frozen=True, slots=True)
-class Delay:
-    """How long pictures took to viewers lately, milliseconds: medians."""
-
-    hours: float
-    camera: float
-    person: float
-
-
-@dataclass(slots=True)
-class Soaked:
-    """What was found."""
-
-    tempo: Tempo
-    visitors: Visitors
-    samples: dict[str, list[Sample]] = field(default_factory=lambda: {it: [] for it in _PROCESSES})
-    delays: list[Delay] = field(default_factory=list)
-    recorded: list[float] = field(default_factory=list)
-    """Megabytes on the disk."""
-    counts: Counts = field(default_factory=lambda: Counts({}, 0))
-    seconds: float = 0.0
-    broken: str = ""
-
-
-async def soak(hours: float, tempo: Tempo, folder: Path, out: Path) -> Soaked:
+async def soak(hours: float, tempo: Tempo, folder: Path, out: Path) -> SoakMeasurements:
     """Run the site for so many hours of its time."""
     filmed = await asyncio.to_thread(film, folder / "films", tempo)
     notes, recorded = folder / "notes", folder / "recorded"
@@ -90,7 +65,7 @@ async def soak(hours: float, tempo: Tempo, folder: Path, out: Path) -> Soaked:
     async with running_site(filmed, folder, hooked_environment(notes), settings) as site:
         await asyncio.sleep(_SETTLE_S)
         visitors = Visitors(site.url, tempo.fps, _SEED)
-        soaked = Soaked(tempo, visitors)
+        soaked = SoakMeasurements(tempo, visitors)
         watching = asyncio.create_task(visitors.watch())
         began = time.monotonic()
         try:
@@ -109,7 +84,7 @@ async def soak(hours: float, tempo: Tempo, folder: Path, out: Path) -> Soaked:
 
 
 async def _sample(
-    soaked: Soaked,
+    soaked: SoakMeasurements,
     hours: float,
     folder: Path,
     write: Callable[[list[object]], object],
@@ -118,7 +93,7 @@ async def _sample(
     tempo, visitors = soaked.tempo, soaked.visitors
     expected = tempo.seconds(3600.0 * hours)
     every, give_up = max(_LEAST_S, expected / _SAMPLES), time.monotonic() + _LATEST * expected + 60.0
-    pids = {name: running_pids(name) for name in _PROCESSES}
+    pids = {name: running_pids(name) for name in PROCESSES}
     missing = [name for name, found in pids.items() if len(found) != 1]
     if missing:
         raise BrokenError(f"not running: {', '.join(missing)}")
@@ -150,9 +125,11 @@ async def _sample(
         soaked.recorded.append(await asyncio.to_thread(_megabytes, folder / "recorded"))
 
 
-def _note_delay(soaked: Soaked, now: float) -> None:
+def _note_delay(soaked: SoakMeasurements, now: float) -> None:
     camera, person = (seen.delays for seen in (soaked.visitors.camera, soaked.visitors.person))
-    soaked.delays.append(Delay(now, *(float(np.median(it)) if it else np.nan for it in (camera, person))))
+    soaked.delays.append(
+        LatencyMedians(now, *(float(np.median(it)) if it else np.nan for it in (camera, person)))
+    )
     camera.clear()
     person.clear()
 

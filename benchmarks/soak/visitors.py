@@ -13,7 +13,7 @@ from typing import Any
 
 import aiohttp
 
-from benchmarks.soak.site import CAMERAS
+from benchmarks.soak.accelerated_site import CAMERAS
 
 _TIMESCALE = 90_000
 _PATIENCE_S = 20.0

@@ -12,8 +12,11 @@ import argparse
 
 import numpy as np
 
-from benchmarks.report import Report
-from benchmarks.solvers.growth import (
+from benchmarks.common.environment import parser
+from benchmarks.common.report import Report
+from benchmarks.solvers.random_windows import Size
+from benchmarks.solvers.solver_times import CASES, EXACT_CASES, GATE, Case, against_arcs, live, timed, warm_up
+from benchmarks.solvers.time_growth import (
     SOLVERS,
     SWEEPS,
     exponent_of_all,
@@ -22,9 +25,6 @@ from benchmarks.solvers.growth import (
     plot_table1,
     table1,
 )
-from benchmarks.solvers.times import CASES, EXACT_CASES, GATE, Case, against_arcs, live, timed, warm_up
-from benchmarks.solvers.windows import Size
-from benchmarks.surroundings import parser
 
 LIVE = (Size(8, 16, 15), Size(10, 40, 15), Size(20, 40, 15))
 

@@ -9,11 +9,11 @@ import pytest
 
 from benchmarks import ablation
 from benchmarks.ablation import DEFAULT, TERMS, Term, cell
-from benchmarks.peers import __main__ as peers
-from benchmarks.peers import environment as peer_environment
-from benchmarks.peers.environment import PeersAwayError
-from benchmarks.recordings import Recording, find_recordings, track
-from benchmarks.surroundings import SKIPPED
+from benchmarks.common.environment import SKIPPED
+from benchmarks.common.public_detections import Recording, find_recordings, track
+from benchmarks.other_trackers import __main__ as peers
+from benchmarks.other_trackers import virtual_environment as peer_environment
+from benchmarks.other_trackers.virtual_environment import PeersAwayError
 from server.cli.track.command import track_one
 from server.system.errors import UserError
 from tracking.evaluation import Scores

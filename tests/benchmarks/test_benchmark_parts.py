@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks.delay.bus import Marks
-from benchmarks.delay.page import Shown
-from benchmarks.delay.stages import STAGES, split
-from benchmarks.picture.__main__ import small_png
-from benchmarks.processes import OTHER, busy_now
+from benchmarks.common.environment import SKIPPED, CannotRunError
+from benchmarks.common.process_load import OTHER, busy_now
+from benchmarks.common.recorded_views import find_views
+from benchmarks.common.stopwatch import Stopwatch
+from benchmarks.latency.bus_subscriber import Marks
+from benchmarks.latency.shown_frames import Shown
+from benchmarks.latency.stage_delays import STAGES, split
 from benchmarks.render import __main__ as render
-from benchmarks.stopwatch import Stopwatch
-from benchmarks.surroundings import SKIPPED, CannotRunError
-from benchmarks.views import find_views
+from benchmarks.screenshots.__main__ import small_png
 from server.messaging.messages import CameraTracks, FrameHeader, GopChoices
 
 FPS, GOP, LOOKAHEAD, STRIDE = 25.0, 10, 20, 5
@@ -153,7 +153,7 @@ class Work:
 
 
 def test_a_stage_inside_a_stage_counts_only_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("benchmarks.stopwatch.time", CLOCK)
+    monkeypatch.setattr("benchmarks.common.stopwatch.time", CLOCK)
     watch = Stopwatch()
     with watch.watching((Work, "outer", "outside"), (Work, "inner", "inside")):
         assert Work().outer() == "done"

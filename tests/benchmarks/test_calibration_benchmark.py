@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.calibration.errors import in_common
+from benchmarks.calibration.calibration_errors import in_common
 from tracking.motchallenge import MotRow, write_rows
 
 TALL = 60.0

@@ -8,10 +8,10 @@ import tracemalloc
 
 import pytest
 
+from benchmarks.common.report import Report
 from benchmarks.endurance.__main__ import describe, run_tracker, spans
-from benchmarks.endurance.crowd import crowd
-from benchmarks.endurance.memory import Samples, resident_megabytes
-from benchmarks.report import Report
+from benchmarks.endurance.endless_crowd import crowd
+from benchmarks.endurance.memory_samples import Samples, resident_megabytes
 from tracking import CostSettings, OnlineTracker, WindowSettings, create_solver
 
 WARM_UP, FRAMES = 400, 900

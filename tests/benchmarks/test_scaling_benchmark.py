@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks.scaling.__main__ import exponent
-from benchmarks.scaling.hall import STRIDE, WINDOW, Hall, Tracker
-from benchmarks.scaling.service import REST, STAGES, Times
-from benchmarks.scaling.site import carry
+from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, Hall, Tracker
+from benchmarks.scaling.simulated_site import carry
+from benchmarks.scaling.timed_service import REST, STAGES, Times
 from bestview import foot_points, to_ground
 from server.messaging.messages import CameraTracks
 from server.service.ingest.validation import is_plausible

@@ -11,6 +11,7 @@ import pytest
 from aiohttp import web
 from aiohttp.test_utils import TestServer
 
+from benchmarks.soak.accelerated_site import CAMERAS, HEIGHT, WIDTH, Filmed, Tempo
 from benchmarks.soak.samples import (
     DELAY,
     DESCRIPTORS,
@@ -21,8 +22,7 @@ from benchmarks.soak.samples import (
     resident_of,
     threads_of,
 )
-from benchmarks.soak.site import CAMERAS, HEIGHT, WIDTH, Filmed, Tempo
-from benchmarks.soak.tasks import FOLDER_VARIABLE, hooked_environment, note_tasks, read_held
+from benchmarks.soak.task_counts import FOLDER_VARIABLE, hooked_environment, note_tasks, read_held
 from benchmarks.soak.visitors import Seen, Visitors, shown_by
 from fakes.timeouts import PATIENCE
 from server.config.loader import build_config
@@ -70,7 +70,7 @@ def test_a_process_is_read_as_it_is() -> None:
 
 
 def test_a_process_counts_its_own_tasks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("benchmarks.soak.tasks._EVERY_S", 0.01)
+    monkeypatch.setattr("benchmarks.soak.task_counts._EVERY_S", 0.01)
     monkeypatch.setattr(asyncio.BaseEventLoop, "run_forever", asyncio.BaseEventLoop.run_forever)
     note_tasks(str(tmp_path))
 

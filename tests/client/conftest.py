@@ -10,7 +10,7 @@ import pytest_asyncio
 from aiohttp.test_utils import TestServer
 from playwright.async_api import Browser
 
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from fakes.http_server import HandMadeSite
 
 

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 import client
-from benchmarks.faults.compose import PLAIN, ComposeSite, composed, missing
+from benchmarks.faults.site.compose_site import PLAIN, ComposeSite, composed, missing
 
 pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(1200)]
 

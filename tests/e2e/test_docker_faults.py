@@ -7,11 +7,11 @@ import gc
 
 import pytest
 
-from benchmarks.faults.compose import missing
+from benchmarks.common.report import Report
 from benchmarks.faults.containers import FAULTS
-from benchmarks.faults.measure import measure
-from benchmarks.faults.run import Outcome
-from benchmarks.report import Report
+from benchmarks.faults.outcomes.fault_run import Outcome
+from benchmarks.faults.outcomes.measurement import measure
+from benchmarks.faults.site.compose_site import missing
 
 pytestmark = [
     pytest.mark.live,

@@ -18,8 +18,8 @@ import aiohttp
 import av
 import pytest
 
-from benchmarks.faults.compose import PLAIN, ComposeSite, composed, missing
-from benchmarks.surroundings import ROOT
+from benchmarks.common.environment import ROOT
+from benchmarks.faults.site.compose_site import PLAIN, ComposeSite, composed, missing
 
 pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(1200)]
 

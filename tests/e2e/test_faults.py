@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.faults import processes as faults_processes
-from benchmarks.faults.measure import measure
-from benchmarks.report import Report
+from benchmarks.common.report import Report
+from benchmarks.faults.injection import processes as faults_processes
+from benchmarks.faults.outcomes.measurement import measure
 
 pytestmark = [pytest.mark.live, pytest.mark.slow]
 

@@ -19,7 +19,7 @@ import pytest_asyncio
 import zenoh
 from playwright.async_api import Browser, Page
 
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from fakes.programs import needs_chromium
 from fakes.prometheus.monitoring_files import ASKED, OF_PROMETHEUS
 from fakes.prometheus.promql_series import Printed, given, selectors

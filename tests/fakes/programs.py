@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from benchmarks.browser import chromium_path
+from benchmarks.common.browser import chromium_path
 
 
 def _needs(program: str, what: str | None = None) -> pytest.MarkDecorator:

@@ -11,9 +11,9 @@ from random import Random
 import pytest
 
 from benchmarks.fuzz.__main__ import PARTS, side_by_side, targets_of
-from benchmarks.fuzz.http_strangers import SECRETS, Strangers
-from benchmarks.fuzz.run import Attempt, Crash, Plan, Runner, numbered
-from benchmarks.fuzz.target import Scripts, Target, UnclearError, refused
+from benchmarks.fuzz.engine.runner import Attempt, Crash, Plan, Runner, numbered
+from benchmarks.fuzz.engine.target import Scripts, Target, UnclearError, refused
+from benchmarks.fuzz.http.unauthenticated import SECRETS, Strangers
 from server.http.access import authorization
 from server.http.access.permissions import Permission
 from server.service.calibration import floor_plan

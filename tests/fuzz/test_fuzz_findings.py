@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.fuzz.site import KEYS, STRIDE, Fed, pictures, site, video
+from benchmarks.fuzz.engine.fed_site import KEYS, STRIDE, Fed, pictures, site, video
 from bestview import validate_homography
 from client.fmp4 import Mp4Error
 from client.mp4_writer import write_plain

@@ -19,7 +19,7 @@ from hypothesis.errors import Unsatisfiable
 from schemathesis import GenerationMode
 from schemathesis.checks import content_type_conformance, response_schema_conformance, status_code_conformance
 
-from benchmarks.fuzz.http_site import Served
+from benchmarks.fuzz.http.served_site import Served
 from fakes.timeouts import PATIENCE
 
 CASES = 4

@@ -42,9 +42,9 @@ WEIGHTS: Mapping[RiskReason, tuple[float, float, float, float, float]] = {
     "fading": (-4.71, -0.02, -0.05, -0.12, 1.23),
     "gap": (-3.00, -1.00, 0.00, 0.00, 0.00),
 }
-"""By reason; `python -m benchmarks.assist.risk` learns them, but for `gap`: the default solver proves its
-answers, so that no school ever has such a trouble. What stands there is a guess, no likelier than one in
-twenty, and less the surer the two are told apart."""
+"""By reason; learned by `python -m benchmarks.operator_assist.risk_weights`, except for `gap`: the default
+solver proves its answers, so that no school ever has such a trouble. What stands there is a guess, no
+likelier than one in twenty, and less the surer the two are told apart."""
 
 
 def failure_probability(reason: RiskReason, signs: RiskFeatures) -> float:

@@ -4,6 +4,6 @@ import os
 import sys
 
 if "server.cli.main" in sys.orig_argv:
-    from benchmarks.soak.tasks import FOLDER_VARIABLE, note_tasks
+    from benchmarks.soak.task_counts import FOLDER_VARIABLE, note_tasks
 
     note_tasks(os.environ[FOLDER_VARIABLE])

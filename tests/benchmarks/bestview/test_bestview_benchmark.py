@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.bestview import __main__ as bestview
-from benchmarks.bestview.cases import Case
-from benchmarks.bestview.decide import Rendering, decide_given, largest
-from benchmarks.bestview.join import (
+from benchmarks.bestview.association_baselines import (
     boxes_by_truth,
     bridged,
     by_nearest_feet,
@@ -21,10 +19,12 @@ from benchmarks.bestview.join import (
     own_tracks,
     tracks_by_truth,
 )
-from benchmarks.bestview.sweep import DEFAULT_SWITCH_COST_S, STRIDE, Setting, sweep
-from benchmarks.bestview.watch import Rows
-from benchmarks.bestview.ways import Way, outcome, visible_rows
-from benchmarks.bestview.why import Losses, losses
+from benchmarks.bestview.camera_tracks import Rows
+from benchmarks.bestview.methods import Way, outcome, visible_rows
+from benchmarks.bestview.parameter_sweep import DEFAULT_SWITCH_COST_S, STRIDE, Setting, sweep
+from benchmarks.bestview.scenes import Case
+from benchmarks.bestview.service_decisions import Rendering, decide_given, largest
+from benchmarks.bestview.visibility_losses import Losses, losses
 from server.cli.evaluate.choices_file import Choice
 from server.messaging.messages import CameraTracks, TrackMessage
 from tracking.motchallenge import MotRow

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.bestview.parts import own_parts
-from benchmarks.bestview.who import Agreement, Met
+from benchmarks.bestview.identity_errors import Agreement, Met
+from benchmarks.bestview.tracklet_cuts import own_parts
 from server.config.loader import build_config
 from server.messaging.messages import Box, CameraTracks, TrackMessage
 from tracking.motchallenge import MotRow

@@ -11,18 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.faults.film import FRAMES, HEIGHT, WIDTH, Stamp, Views, read_stamp, stamped
-from benchmarks.faults.judge import judge
-from benchmarks.faults.live import MOST_AHEAD, MOST_BEHIND
-from benchmarks.faults.measure import _group
-from benchmarks.faults.processes import FAULTS
-from benchmarks.faults.reader import write_reader
-from benchmarks.faults.recorded import File, note
-from benchmarks.faults.run import Outcome, _injected
-from benchmarks.faults.site import Stand
-from benchmarks.faults.table import kept
-from benchmarks.faults.viewer import Picture, Told
-from benchmarks.report import Report
+from benchmarks.common.report import Report
+from benchmarks.faults.injection.processes import FAULTS
+from benchmarks.faults.outcomes.fault_run import Outcome, _injected
+from benchmarks.faults.outcomes.measurement import _group
+from benchmarks.faults.outcomes.promise_table import kept
+from benchmarks.faults.outcomes.recording_check import File, note
+from benchmarks.faults.site.fault_site import Stand
+from benchmarks.faults.video.stamp_detector import write_reader
+from benchmarks.faults.video.stamped_views import FRAMES, HEIGHT, WIDTH, Stamp, Views, read_stamp, stamped
+from benchmarks.faults.viewing.live_pictures import MOST_AHEAD, MOST_BEHIND
+from benchmarks.faults.viewing.picture_check import judge
+from benchmarks.faults.viewing.viewers import Picture, Told
 from client import Box, Gop
 from tracking.detectors.neural.onnx import OnnxDetector, OnnxSettings
 

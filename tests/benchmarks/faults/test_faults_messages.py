@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import pytest
 
-from benchmarks.faults.bus import Crossing, Way
-from benchmarks.faults.messages import _pointing
+from benchmarks.faults.injection.messages import _pointing
+from benchmarks.faults.site.lossy_bus import Crossing, Way
 from client import Box, Gop
 from server.messaging.inbox import Message
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks.faults.__main__ import FAULTS
-from benchmarks.faults.pairs import BESTVIEW, DRAWING, OTHER, SHOWN, names, title, turns
-from benchmarks.faults.site import Stand
-from benchmarks.faults.viewer import Viewer
+from benchmarks.faults.injection.process_pairs import BESTVIEW, DRAWING, OTHER, SHOWN, names, title, turns
+from benchmarks.faults.site.fault_site import Stand
+from benchmarks.faults.viewing.viewers import Viewer
 from client import Gop
 
 

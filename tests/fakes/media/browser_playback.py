@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from fakes.timeouts import PATIENCE
 from server.service.streaming.splicer import Splicer
 

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 from playwright.async_api import Page
 
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from fakes.running.site import PATIENT_CAMERAS, RunningSite, running
 from fakes.running.stream_frames import FPS
 from fakes.timeouts import PATIENCE_MS

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.faults.film import write_film
+from benchmarks.faults.video.stamped_views import write_film
 from fakes.running.stream_frames import FPS
 
 MET = 80

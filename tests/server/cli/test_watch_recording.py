@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 import client
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from client.model import Box, Site
 from client.sidecar import write_sidecars
 from client.stream_events import Frame

@@ -8,7 +8,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from benchmarks.assist.risk import fitted
+from benchmarks.operator_assist.risk_weights import fitted
 from tracking.interactive import RiskFeatures, RiskReason
 from tracking.interactive.risk import WEIGHTS, failure_probability
 

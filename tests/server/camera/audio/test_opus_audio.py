@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import client
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, video
 from fakes.media.audio import (
     BEEPS,

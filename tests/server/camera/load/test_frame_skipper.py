@@ -7,7 +7,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from benchmarks.endurance.crowd import crowd
+from benchmarks.endurance.endless_crowd import crowd
 from server.camera.load.frame_skipper import FrameSkipper
 from server.camera.load.load_shedder import ShedLevel, shed_levels
 from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, create_solver

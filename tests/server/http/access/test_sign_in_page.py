@@ -10,7 +10,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from fakes.paths import AXE
 from fakes.programs import needs_chromium
 from fakes.site import Hall, see

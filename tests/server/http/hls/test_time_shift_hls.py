@@ -13,7 +13,7 @@ import av
 import numpy as np
 import pytest
 
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from fakes.cameras import CAMERAS, FPS, GOP
 from fakes.hls_recording import FRAMES, GOPS, HTTP, LENGTH, fetch, forget, numbers, shows, text, until_written
 from fakes.media.audio import FRAMES as SOUNDING

@@ -18,7 +18,7 @@ import pytest_asyncio
 import yaml
 from playwright.async_api import Browser, Page, Route, expect
 
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from bestview import IdentityRegistry
 from fakes.calibration_walk import SITE, curved, errors_on_floor, words
 from fakes.cameras import CAMERAS, FPS, LARGE, SMALL, small_config, status, tracks, word

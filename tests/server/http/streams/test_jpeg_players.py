@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from fakes.cameras import FPS, GOP
 from fakes.drawn_site import Drawn, drawn_room
 from fakes.programs import needs_chromium, needs_ffmpeg

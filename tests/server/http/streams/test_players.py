@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from fakes.cameras import CAMERAS, FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, encoded, tracks, video, word
 from fakes.media.browser_playback import HLS_BY_ITSELF
 from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv, needs_vlc

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.browser import chromium
+from benchmarks.common.browser import chromium
 from fakes.cameras import (
     CAMERAS,
     FPS,

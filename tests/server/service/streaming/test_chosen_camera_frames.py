@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from benchmarks.stream.right import Right, judge, schedule
+from benchmarks.streaming.frame_correctness import Right, judge, schedule
 from server.config.sections import EncodeSettings
 from server.service.streaming.media_chunk import MediaChunk
 from server.service.streaming.spliced_stream import GopAssembler

@@ -1,0 +1,206 @@
+"""The ways to a best view: MyView's, simpler ones, and MyView's with the truth in place of its stages."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.bestview.association_baselines import (
+    boxes_by_truth,
+    bridged,
+    by_nearest_feet,
+    not_joined,
+    own_tracks,
+    tracks_by_truth,
+)
+from benchmarks.bestview.camera_tracks import Rows, Watched, followed
+from benchmarks.bestview.occupancy.foreground_masks import CannotMapError
+from benchmarks.bestview.occupancy.reference_tracker import occupancy_rows
+from benchmarks.bestview.scenes import Case
+from benchmarks.bestview.service_decisions import Rendering, decide, decide_given, largest
+from benchmarks.bestview.tracklet_cuts import own_parts
+from benchmarks.other_trackers.virtual_environment import PEERS, PeerEnvironment
+from bestview import ViewScore
+from server.cli.evaluate.choices_file import Choice
+from server.cli.evaluate.ground_truth import SceneTruth, people_of_objects
+from server.cli.evaluate.view_scores import evaluate_views
+from server.cli.render.site_file import SiteInfo
+from server.service.view_selection.decider import camera_homographies
+from tracking.evaluation import MultiCameraScores, TruthAndTracks, evaluate_cameras
+from tracking.motchallenge import MotRow, format_rows
+
+LEAST_IOU = 0.5
+BRIDGE = 20
+"""Frames that somebody may be hidden for and still count as shown."""
+FOUND_ONLY = {"unfound": 0.0}
+LOOKS_ALONE = {"identity": {"maximum_travel_evidence": 0.0}}
+TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
+OURS, CALIBRATED, WITHOUT = "MyView", "MyView, calibrated", "no homographies"
+PEER = "ByteTrack"
+MAP = "occupancy map"
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """One way's boxes by the person's number, and its choices."""
+
+    name: str
+    rendering: Rendering
+    given: bool = False
+    """Its boxes are the truth's: there is nothing to score in them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How good it is."""
+
+    name: str
+    tracks: MultiCameraScores | None
+    views: ViewScore
+
+
+def visible_rows(case: Case, truth: SceneTruth) -> dict[str, list[MotRow]]:
+    """Return the true boxes of those who are visible: what a camera that misses nothing would find."""
+    place = {person: index for index, person in enumerate(truth.people)}
+    return {
+        camera: [
+            row
+            for row in case.gt[camera]
+            if row.confidence != 0.0 and truth.views.visible[place[row.id], row.frame - 1, column]
+        ]
+        for column, camera in enumerate(truth.cameras)
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A scene as its cameras see it, whose search for people knows the ground.
+
+    Attributes:
+        case: the scene.
+        watched: what they find.
+    """
+
+    case: Case
+    watched: Watched
+
+
+def ways(
+    case: Case,
+    truth: SceneTruth,
+    seen: Watched,
+    blind: Watched,
+    peers: PeerEnvironment | None,
+    walked: Seen | None,
+) -> Iterator[Way]:
+    """Yield them, truth first.
+
+    Args:
+        case: the scene.
+        truth: who could be seen in it.
+        seen: what its cameras find.
+        blind: the same where no homographies are known.
+        peers: where the other tracker is installed.
+        walked: the scene with the homographies of its own tracks.
+    """
+    frames = truth.boxes.shape[1]
+    config = case.config()
+
+    def chosen(rows: Rows) -> Rendering:
+        return Rendering(_lists(rows), decide_given(config, rows, frames).choices)
+
+    def simple(rows: Rows) -> Rendering:
+        return Rendering(_lists(rows), largest(rows, case.sizes, frames))
+
+    there = visible_rows(case, truth)
+    yield Way(TRUE, chosen(there), given=True)
+    yield Way(TRUE_LARGEST, simple(there), given=True)
+    said = followed(config, seen.frames)
+    own = own_tracks(said)
+    named = boxes_by_truth(own, case.gt)
+    yield Way("own boxes, true ids", chosen(named))
+    yield Way("  and gaps bridged", chosen(bridged(named, BRIDGE)))
+    yield Way("own parts, true joins", chosen(tracks_by_truth(own_parts(config, said), case.gt)))
+    yield Way("own tracks, true joins", chosen(tracks_by_truth(own, case.gt)))
+    yield Way("own tracks, not joined", simple(not_joined(own)))
+    uncalibrated = case.config(ground=False)
+    bare_said = followed(uncalibrated, blind.frames)
+    bare = decide(uncalibrated, bare_said)
+    yield Way(WITHOUT, bare)
+    if case.apart:
+        yield Way("  looks alone", decide(case.config(ground=False, view=LOOKS_ALONE), bare_said))
+    if not case.calibrated:
+        yield Way(f"{WITHOUT}, largest", simple(bare.tracks))
+    for name, sight in ((OURS, Seen(case, seen) if case.calibrated else None), (CALIBRATED, walked)):
+        if sight is None:
+            continue
+        scene, found = sight.case, sight.watched
+        said = said if scene is case else followed(scene.config(), found.frames)
+        apart = followed(uncalibrated, found.frames)
+        ours = decide(scene.config(), said)
+        yield Way(name, ours)
+        yield Way(f"{name}, found only", decide(scene.config(view=FOUND_ONLY), said))
+        yield Way(f"{name}, no evidence", decide(scene.config(), apart))
+        if case.apart:
+            yield Way(f"{name}, looks alone", decide(scene.config(view=LOOKS_ALONE), said))
+        yield Way(f"{name}, again", chosen(ours.tracks))
+        yield Way(f"{name}, largest", simple(ours.tracks))
+        ground = {camera: it for camera, it in camera_homographies(scene.config()).items() if it is not None}
+        short = "nearest feet" if scene is case else "nearest feet, calibr."
+        yield Way(short, simple(by_nearest_feet(own_tracks(apart), ground)))
+        if case.detections is None and not case.apart:
+            title = MAP if scene is case else f"{MAP}, calibr."
+            yield from (Way(title, chosen(rows)) for rows in _mapped(scene, found))
+        if peers is not None:
+            theirs = by_nearest_feet(_peer_tracks(peers, found.boxes), ground)
+            yield Way(f"{PEER}, {short}", simple(theirs))
+
+
+def _mapped(scene: Case, found: Watched) -> Iterator[Rows]:
+    """Yield what the occupancy map finds; where there can be none, say why."""
+    try:
+        yield occupancy_rows(scene, found.boxes)
+    except CannotMapError as problem:
+        print(f"{scene.name}: no occupancy map: {problem}")
+
+
+def _lists(rows: Rows) -> dict[str, list[MotRow]]:
+    return {camera: list(found) for camera, found in rows.items()}
+
+
+def outcome(case: Case, truth: SceneTruth, way: Way) -> Outcome:
+    """Score a way."""
+    recordings = {camera: TruthAndTracks(case.gt[camera], way.rendering.tracks[camera]) for camera in case.gt}
+    if way.given:
+        scores, person_of = None, {person: person for person in truth.people}
+    else:
+        scores = evaluate_cameras(recordings, LEAST_IOU)
+        person_of = people_of_objects(truth.people, recordings, LEAST_IOU)
+    return Outcome(way.name, scores, score_choices(case, truth, way.rendering.choices, person_of))
+
+
+def score_choices(
+    case: Case, truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int]
+) -> ViewScore:
+    """Score choices against the truth, as `myview evaluate --views` does."""
+    config = case.config()
+    facts = SiteInfo(config.site.fps, config.view.switch_cost_s, case.sizes)
+    return evaluate_views(truth, choices, person_of, facts).total
+
+
+def _peer_tracks(peers: PeerEnvironment, boxes: Rows) -> dict[str, list[MotRow]]:
+    """Return the peer's tracks of every camera's detections.
+
+    Raises:
+        PeersAwayError: it failed.
+    """
+    peer = next(it for it in PEERS if it.name == PEER)
+    tracks = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for camera, rows in boxes.items():
+            path = Path(folder) / f"{camera}.txt"
+            path.write_text(format_rows(rows), encoding="ascii")
+            tracks[camera] = peers.track(peer, path)
+    return tracks

@@ -1,0 +1,85 @@
+"""Homographies that are a little off beside each other, moved until the cameras' feet agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+
+import numpy as np
+
+from benchmarks.bestview.camera_tracks import Rows
+from bestview import foot_points, to_ground
+from bestview.geometry.ground_plane import feet_cut_off
+from tracking.boxes import Floats
+from tracking.motchallenge import MotRow
+
+_GATE = 0.5
+"""How far apart, in person heights, feet of two cameras may be one person's."""
+_ROUNDS = 5
+_LEAST_PAIRS = 20
+
+
+def levelled(
+    boxes: Rows, ground: Mapping[str, Floats], heights: Mapping[str, int], person: float
+) -> dict[str, Floats]:
+    """Return the homographies, each with its ground shifted, the shifts adding up to nothing.
+
+    The feet of two cameras that are each other's nearest in a frame are taken for one person's. The median of
+    their distances, pair of cameras by pair of cameras, is what the shifts explain, by least squares.
+
+    Args:
+        boxes: each camera's detections.
+        ground: each camera's homography (3, 3) from its picture to the ground.
+        heights: of each camera's picture, pixels.
+        person: how long a person's height is in units of the ground.
+    """
+    cameras = list(ground)
+    there = {camera: _standing(boxes[camera], ground[camera], heights[camera]) for camera in cameras}
+    shifts: Floats = np.zeros((len(cameras), 2))
+    for _ in range(_ROUNDS):
+        rows, wanted = [], []
+        for one, other in combinations(range(len(cameras)), 2):
+            pairs = _pairs(
+                there[cameras[one]], there[cameras[other]], shifts[one] - shifts[other], _GATE * person
+            )
+            if len(pairs) < _LEAST_PAIRS:
+                continue
+            root = np.sqrt(len(pairs))
+            row = np.zeros(len(cameras))
+            row[one], row[other] = root, -root
+            rows.append(row)
+            wanted.append(-root * np.median(pairs, axis=0))
+        if rows:
+            # The shortest of all answers: of cameras that share ground the shifts add up to nothing.
+            shifts = np.linalg.lstsq(np.array(rows), np.array(wanted), rcond=None)[0]
+    moved = {}
+    for camera, (x, y) in zip(cameras, shifts, strict=True):
+        moved[camera] = np.array([[1.0, 0.0, x], [0.0, 1.0, y], [0.0, 0.0, 1.0]]) @ ground[camera]
+    return moved
+
+
+def _standing(rows: list[MotRow], homography: Floats, height: int) -> dict[int, Floats]:
+    """Return the feet (K, 2) on the ground that are seen in each frame."""
+    if not rows:
+        return {}
+    boxes = np.array([row.box for row in rows])
+    places = to_ground(homography, foot_points(boxes))
+    places[feet_cut_off(boxes, height)] = np.nan
+    frames = np.array([row.frame for row in rows])
+    known = np.isfinite(places).all(axis=1)
+    return {int(frame): places[known & (frames == frame)] for frame in np.unique(frames)}
+
+
+def _pairs(one: Mapping[int, Floats], other: Mapping[int, Floats], shift: Floats, gate: float) -> Floats:
+    """Return the differences (P, 2) of feet that are each other's nearest, and near, after a shift."""
+    found = [np.empty((0, 2))]
+    for frame in sorted(one.keys() & other.keys()):
+        apart = one[frame][:, None] - other[frame][None]
+        if not apart.size:
+            continue
+        distance = np.linalg.norm(apart + shift, axis=2)
+        first, second = distance.argmin(axis=1), distance.argmin(axis=0)
+        mutual = [row for row, column in enumerate(first) if second[column] == row]
+        near = [row for row in mutual if distance[row, first[row]] <= gate]
+        found.append(apart[near, first[near]])
+    return np.concatenate(found)

@@ -1,0 +1,125 @@
+"""What look-ahead, the cost of a cut and the length of a GOP do to the choice, on true boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.bestview.methods import visible_rows
+from benchmarks.bestview.scenes import Case
+from benchmarks.bestview.service_decisions import decide_given
+from benchmarks.common.report import Report
+from bestview import NO_CAMERA, ViewScore, score_views, select_views
+from server.cli.evaluate.choices_file import views_of
+from server.cli.evaluate.ground_truth import SceneTruth
+from server.config.sections import EncodeSettings, ViewSettings
+
+STRIDE = 5
+"""Frames between two windows of the tracker, as by default; its delay is that of the true site."""
+LOOKAHEADS = (10, 15, 25, 50, 100)
+GOPS = (1, 5, 10, 25)
+SWITCH_COSTS_S = (0.0, 0.1, 0.2, 0.3, 0.5, 1.0)
+GOES_ON_S = (0.0, 0.25, 0.5, 1.0, 2.0)
+QUICK_LOOKAHEADS, QUICK_GOPS, QUICK_SWITCH_COSTS_S, QUICK_GOES_ON_S = (10, 25), (1, 10), (0.1, 0.3), (0.0,)
+DEFAULT_LOOKAHEAD, DEFAULT_GOP = ViewSettings().lookahead, EncodeSettings().gop
+DEFAULT_SWITCH_COST_S, DEFAULT_GOES_ON_S = ViewSettings().switch_cost_s, ViewSettings().goes_on_s
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What is varied; a look-ahead of None: the whole recording is known."""
+
+    lookahead: int | None
+    gop: int
+    switch_cost_s: float
+    goes_on_s: float = DEFAULT_GOES_ON_S
+
+    def delay_s(self, fps: float) -> float:
+        """Return the longest that the first frame of a GOP waits for its decision, seconds."""
+        return 0.0 if self.lookahead is None else (self.lookahead + STRIDE - 2) / fps
+
+
+@dataclass(frozen=True, slots=True)
+class Swept:
+    """A setting and how good its choices are, beside the frame-exact optimum at the same cost of a cut."""
+
+    setting: Setting
+    delay_s: float
+    score: ViewScore
+
+
+def settings_of(*, quick: bool) -> Iterator[Setting]:
+    """Yield the settings: look-ahead by GOP; at their defaults, the cost of a cut and what goes on."""
+    gops = QUICK_GOPS if quick else GOPS
+    for gop in gops:
+        for lookahead in QUICK_LOOKAHEADS if quick else LOOKAHEADS:
+            if lookahead >= gop:
+                yield Setting(lookahead, gop, DEFAULT_SWITCH_COST_S)
+        yield Setting(None, gop, DEFAULT_SWITCH_COST_S)
+    for cost in QUICK_SWITCH_COSTS_S if quick else SWITCH_COSTS_S:
+        if cost != DEFAULT_SWITCH_COST_S:
+            yield Setting(DEFAULT_LOOKAHEAD, DEFAULT_GOP, cost)
+    for goes_on in QUICK_GOES_ON_S if quick else GOES_ON_S:
+        if goes_on != DEFAULT_GOES_ON_S:
+            yield Setting(DEFAULT_LOOKAHEAD, DEFAULT_GOP, DEFAULT_SWITCH_COST_S, goes_on)
+
+
+def sweep(case: Case, truth: SceneTruth, *, quick: bool) -> list[Swept]:
+    """Try them all."""
+    fps = case.config().site.fps
+    rows = visible_rows(case, truth)
+    frames = truth.boxes.shape[1]
+    results = []
+    for setting in settings_of(quick=quick):
+        switch_cost = setting.switch_cost_s * fps
+        if setting.lookahead is None:
+            views = _known_whole(truth, setting.gop, switch_cost)
+        else:
+            config = case.config(
+                encode={"gop": setting.gop},
+                track={"window": {"window": STRIDE, "stride": STRIDE, "birth_window": STRIDE}},
+                view={
+                    "lookahead": setting.lookahead,
+                    "switch_cost_s": setting.switch_cost_s,
+                    "goes_on_s": setting.goes_on_s,
+                },
+            )
+            choices = decide_given(config, rows, frames).choices
+            same = {person: person for person in truth.people}
+            views = views_of(choices, same, truth.people, truth.cameras, frames)
+        score = score_views(truth.views.cost, truth.views.visible, views, switch_cost, fps)
+        results.append(Swept(setting, setting.delay_s(fps), score))
+    return results
+
+
+def _known_whole(
+    truth: SceneTruth, gop: int, switch_cost: float
+) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
+    """Return the optimum whose cuts are where a GOP begins."""
+    people, frames = truth.views.cost.shape[:2]
+    starts = np.arange(frames) % gop == 0
+    return select_views(truth.views.cost, np.full(people, NO_CAMERA), switch_cost, starts).views
+
+
+def sweep_tables(report: Report, swept: Mapping[str, Sequence[Swept]]) -> None:
+    """Print a table for each scene."""
+    for name, found in swept.items():
+        report.table(
+            f"{name}, true boxes: look-ahead, GOP and the cost of a cut",
+            ["look-ahead", "GOP", "cut, s", "goes on, s", "delay, s", "Regret", "Visible", "Cuts", "Best"],
+            [
+                [
+                    "all" if it.setting.lookahead is None else str(it.setting.lookahead),
+                    str(it.setting.gop),
+                    f"{it.setting.switch_cost_s:g}",
+                    f"{it.setting.goes_on_s:g}",
+                    "-" if it.setting.lookahead is None else f"{it.delay_s:.2f}",
+                    *(f"{100 * share:.2f}" for share in (it.score.regret, it.score.visible)),
+                    f"{it.score.cuts_per_minute:.1f}",
+                    f"{it.score.optimum_cuts_per_minute:.1f}",
+                ]
+                for it in found
+            ],
+        )

@@ -1,0 +1,78 @@
+"""The plots of the benchmark of best views."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.bestview.methods import Outcome
+from benchmarks.bestview.parameter_sweep import (
+    DEFAULT_GOES_ON_S,
+    DEFAULT_GOP,
+    DEFAULT_LOOKAHEAD,
+    DEFAULT_SWITCH_COST_S,
+    Swept,
+)
+from server.cli.render.plots import new_figure, save_figure
+
+
+def plot_ways(found: Mapping[str, Sequence[Outcome]], out: Path) -> None:
+    """Draw joint IDF1, agreement and visibility of every way, a row for each scene."""
+    most = max(len(outcomes) for outcomes in found.values())
+    figure = new_figure((12.0, 0.8 + (0.8 + 0.2 * most) * len(found)))
+    axes = figure.subplots(len(found), 3, squeeze=False)
+    for line, (name, outcomes) in zip(axes, found.items(), strict=True):
+        names = [it.name for it in outcomes]
+        places = np.arange(len(names))[::-1]
+        joint = [np.nan if it.tracks is None else 100 * it.tracks.joint.idf1 for it in outcomes]
+        columns = {
+            "joint IDF1": joint,
+            "agreement with the optimum": [100 * it.views.agreement for it in outcomes],
+            "visible in the chosen view": [100 * it.views.visible for it in outcomes],
+        }
+        for axis, (title, values) in zip(line, columns.items(), strict=True):
+            axis.barh(places, values, color="#2a7f3f")
+            axis.set_xlim(0, 100)
+            axis.set_ylim(-0.6, len(names) - 0.4)  # where bars are missing, too
+            axis.set_title(f"{name}: {title}, %", fontsize="small")
+            axis.set_yticks(places, names if title == "joint IDF1" else [], fontsize="x-small")
+    save_figure(figure, out)
+
+
+def plot_sweeps(swept: Mapping[str, Sequence[Swept]], out: Path) -> None:
+    """Draw regret over delay for each GOP, over the GOP, and cuts over the cost of a cut."""
+    figure = new_figure((12.0, 0.8 + 3.0 * len(swept)))
+    axes = figure.subplots(len(swept), 3, squeeze=False)
+    for line, (name, found) in zip(axes, swept.items(), strict=True):
+        plain = [it for it in found if it.setting.goes_on_s == DEFAULT_GOES_ON_S]
+        usual = [it for it in plain if it.setting.switch_cost_s == DEFAULT_SWITCH_COST_S]
+        for gop in sorted({it.setting.gop for it in usual}):
+            mine = [it for it in usual if it.setting.gop == gop and it.setting.lookahead is not None]
+            line[0].plot(
+                [it.delay_s for it in mine], [100 * it.score.regret for it in mine], "o-", label=f"GOP {gop}"
+            )
+        line[0].set_xlabel("delay declared, s")
+        line[0].legend(fontsize="x-small")
+        whole = [it for it in usual if it.setting.lookahead is None]
+        line[1].plot([it.setting.gop for it in whole], [100 * it.score.regret for it in whole], "o-")
+        line[1].set_xlabel("GOP, frames; everything known beforehand")
+        for axis in line[:2]:
+            axis.set_ylabel("regret, %")
+        costs = sorted(
+            (
+                it
+                for it in plain
+                if it.setting.gop == DEFAULT_GOP and it.setting.lookahead == DEFAULT_LOOKAHEAD
+            ),
+            key=lambda it: it.setting.switch_cost_s,
+        )
+        values = [it.setting.switch_cost_s for it in costs]
+        line[2].plot(values, [it.score.cuts_per_minute for it in costs], "o-", label="MyView's choice")
+        line[2].plot(values, [it.score.optimum_cuts_per_minute for it in costs], "s--", label="optimum")
+        line[2].set_xlabel("what a cut costs, seconds of not seeing somebody")
+        line[2].set_ylabel("cuts a minute")
+        line[2].legend(fontsize="x-small")
+        line[0].set_title(f"{name}, true boxes", fontsize="small")
+    save_figure(figure, out)

@@ -1,0 +1,141 @@
+"""The scenes that best views are measured on: recordings, what is really there, and where the floor is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from benchmarks.bestview.camera_tracks import Rows, Watched, in_file, in_pictures, sure_rows
+from benchmarks.common.environment import CannotRunError
+from benchmarks.common.recorded_views import Views, find_views
+from server.cli.evaluate.ground_truth import SceneTruth, build_truth
+from server.cli.render.video_info import Size
+from server.config.loader import build_config
+from server.config.site_config import Config
+from synthetic import Scene, write_recording
+from tracking.motchallenge import read_rows
+
+_AUDITORIUM = ("HC3", "HC4", "IP2", "IP5")
+_AUDITORIUM_SIZE, _AUDITORIUM_FPS = (1920, 1080), 30.0
+_ROOM_SIZE, _ROOM_FPS, _ROOM_SEED = (640, 360), 25.0, 1
+_GALLERY_SIZE = (384, 216)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """One scene.
+
+    Attributes:
+        name: what the table calls it.
+        about: what it is, for the title.
+        content: the configuration, with the homographies that are known, if any.
+        gt: the ground truth of each camera.
+        least_shown: the share of a person that has to show for a view to show them.
+        detections: files to track by; None: the pictures are searched.
+        apart: its cameras have no floor in common.
+    """
+
+    name: str
+    about: str
+    content: Mapping[str, Any]
+    gt: Rows
+    least_shown: float
+    detections: Mapping[str, Path] | None = None
+    apart: bool = False
+
+    def config(self, *, ground: bool = True, **changes: Mapping[str, Any]) -> Config:
+        """Return the configuration, with some settings changed, and with or without homographies."""
+        content = {**self.content, **changes}
+        if not ground:
+            content.pop("ground", None)
+        return build_config(content, where=self.name, folder=Path())
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether there are homographies."""
+        return "ground" in self.content
+
+    @property
+    def sizes(self) -> dict[str, Size]:
+        """Return the size of each camera's picture, which is the site's."""
+        site = self.content["site"]
+        return dict.fromkeys(self.gt, (site["width"], site["height"]))
+
+    def truth(self) -> SceneTruth:
+        """Return how well everybody could be seen."""
+        return build_truth(self.gt, self.sizes, self.least_shown)
+
+    def watch(self, *, ground: bool = True) -> Watched:
+        """Let every camera look for people by itself; how tall they are where it may know from the ground."""
+        config = self.config(ground=ground)
+        if self.detections is not None:
+            files = self.detections
+            return Watched(
+                {camera: in_file(config, files[camera]) for camera in self.gt},
+                {camera: read_rows(files[camera]) for camera in self.gt},
+            )
+        frames = {camera: in_pictures(config, camera) for camera in self.gt}
+        return Watched(frames, {camera: sure_rows(it) for camera, it in frames.items()})
+
+
+def terrace(data: Path) -> Case:
+    """Two views, searched by background subtraction, the watermark masked.
+
+    Raises:
+        CannotRunError: it is not there.
+    """
+    views = find_views(data, "terrace")
+    folder = data / "terrace"
+    gt = {video.stem: read_rows(folder / "gt" / f"{video.stem}.txt") for video in views.videos}
+    return Case("terrace", "two views, background subtraction", _content(views), gt, 0.25)
+
+
+def auditorium(data: Path) -> Case:
+    """Four views without pictures or calibration, by public detections.
+
+    Its flag of who is hidden is set for nearly everybody in two cameras, so that it says nothing: whoever
+    has a box counts as visible.
+
+    Raises:
+        CannotRunError: it is not there.
+    """
+    folder = data / "auditorium"
+    if not folder.is_dir():
+        raise CannotRunError(f"needs {folder}; --data or MYVIEW_TEST_DATA say where")
+    width, height = _AUDITORIUM_SIZE
+    content = {
+        "site": {"name": "bench", "fps": _AUDITORIUM_FPS, "width": width, "height": height},
+        "cameras": [{"id": camera, "source": "scene:none"} for camera in _AUDITORIUM],
+    }
+    gt = {camera: read_rows(folder / "gt" / f"{camera}.txt.gz") for camera in _AUDITORIUM}
+    detections = {camera: folder / "det" / f"{camera}.txt.gz" for camera in _AUDITORIUM}
+    return Case("auditorium", "four views, public detections, no calibration", content, gt, 0.0, detections)
+
+
+def room(folder: Path, cameras: int, people: int, seconds: float) -> Case:
+    """Draw the synthetic room into a new folder."""
+    return _drawn(folder, Scene("room", cameras, people, _ROOM_SEED, *_ROOM_SIZE, _ROOM_FPS), seconds)
+
+
+def gallery(folder: Path, people: int, seconds: float) -> Case:
+    """Draw the synthetic gallery, whose three cameras have no floor in common, into a new folder."""
+    scene = Scene("gallery", 3, people, _ROOM_SEED, *_GALLERY_SIZE, _ROOM_FPS)
+    return replace(_drawn(folder, scene, seconds), apart=True)
+
+
+def _drawn(folder: Path, scene: Scene, seconds: float) -> Case:
+    name = f"{scene.name}-{scene.cameras}-{scene.objects}"
+    write_recording(scene, folder / name, seconds)
+    views = find_views(folder, name)
+    gt = {video.stem: read_rows(folder / name / "gt" / f"{video.stem}.txt") for video in views.videos}
+    about = f"synthetic, {scene.cameras} cameras, {scene.objects} people, {seconds:g} s"
+    return Case(name, about, _content(views), gt, 0.25)
+
+
+def _content(views: Views) -> dict[str, Any]:
+    content = {"site": views.site, "cameras": views.cameras}
+    if views.ground is not None:
+        content["ground"] = str(views.ground.absolute())
+    return content

@@ -1,0 +1,139 @@
+"""The best-view service's own classes on what cameras said, or on boxes whose people are given."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from itertools import chain, zip_longest
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.bestview.camera_tracks import Messages, Rows
+from bestview import NO_CAMERA, IdentityUpdate, TrackletKey, TrackUpdate, size_quality
+from server.cli.evaluate.choices_file import Choice, read_choices
+from server.config.site_config import Config
+from server.messaging.epochs import closing_epoch
+from server.messaging.messages import Box, CameraTracks, TrackMessage
+from server.service.decision_files.decision_writer import DecisionWriter
+from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.view_selection.decider import ViewDecider, camera_homographies
+from tracking.boxes import Floats
+from tracking.motchallenge import MotRow, read_rows
+
+
+@dataclass(frozen=True, slots=True)
+class Rendering:
+    """What `myview render` would write: boxes by the person's number, and the chosen cameras."""
+
+    tracks: dict[str, list[MotRow]]
+    choices: list[Choice]
+
+
+_NOTHING_NEW: dict[str, Any] = {it.name: () for it in fields(IdentityUpdate) if it.name != "numbers"}
+"""Nobody is born, gone, back or merged."""
+
+
+class GivenNumbers:
+    """A registry that knows who everybody is: a track's place is its person's, in every camera."""
+
+    def __init__(self, people: Sequence[int]) -> None:
+        self._people = people
+
+    def update(
+        self, tracks: Sequence[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+    ) -> IdentityUpdate:
+        """Return everybody their number."""
+        del last_frame, pictures
+        numbers = {TrackletKey(*it.key, 0): self._people[it.key.local_id - 1] for it in tracks}
+        return IdentityUpdate(numbers, **_NOTHING_NEW)
+
+
+def decide(config: Config, messages: Messages, people: Sequence[int] | None = None) -> Rendering:
+    """Line up what the cameras said, join it, choose views; with `people`, they are not joined but known."""
+    aligner = EpochAligner(config.camera_ids, config.track.window.stride, grace=0)
+    last = {camera: said[-1].last for camera, said in messages.items()}
+    decider = ViewDecider(
+        config, camera_homographies(config), lambda camera, pulse: 0 <= pulse <= last[camera]
+    )
+    if people is not None:
+        decider.people._registry = GivenNumbers(people)  # type: ignore[assignment]  # noqa: SLF001 — truth in its place
+    for camera in config.camera_ids:
+        aligner.come(camera)
+        aligner.frame(camera, messages[camera][0].boot, 0)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        recorder = DecisionWriter(folder, config.camera_ids, decider.people.fits)
+        for message in chain.from_iterable(zip_longest(*messages.values())):
+            if message is not None:
+                aligner.tracks(message)
+            for epoch in aligner.ready(now=-1):
+                for decision in decider.step(epoch):
+                    recorder.write(decision)
+        for decision in decider.finish(max(last.values())):
+            recorder.write(decision)
+        recorder.close()
+        tracks = {camera: read_rows(folder / "tracks" / f"{camera}.txt") for camera in config.camera_ids}
+        return Rendering(tracks, read_choices(folder / "choices.csv"))
+
+
+def decide_given(config: Config, rows: Rows, frames: int) -> Rendering:
+    """Choose views by boxes that are final, and whose numbers are their people's, at once."""
+    people = sorted({row.id for found in rows.values() for row in found})
+    messages = {camera: _said(config, camera, found, people, frames) for camera, found in rows.items()}
+    return decide(config, messages, people)
+
+
+def _said(
+    config: Config, camera: str, rows: Sequence[MotRow], people: Sequence[int], frames: int
+) -> list[CameraTracks]:
+    """Put boxes into messages; everybody is in each of them, so that local numbers are places in `people`."""
+    stride = config.track.window.stride
+    boxes: dict[tuple[int, int], Box] = {(row.id, row.frame - 1): row.box for row in rows}
+    spans = [(end - stride + 1, end) for end in range(stride - 1, frames, stride)]
+    spans.append((frames - frames % stride, frames - 1))
+    return [
+        CameraTracks(
+            camera=camera,
+            boot=1,
+            size=(config.site.width, config.site.height),
+            epoch=closing_epoch(last, stride) if place == len(spans) - 1 else place,
+            first=first,
+            last=last,
+            final_to=last,
+            ended=place == len(spans) - 1,
+            shed=[],
+            tracks=[
+                TrackMessage(
+                    id=number + 1,
+                    boxes=[boxes.get((person, frame)) for frame in range(first, last + 1)],
+                    confidence=1.0,
+                )
+                for number, person in enumerate(people)
+            ],
+            solve=None,
+        )
+        for place, (first, last) in enumerate(spans)
+    ]
+
+
+def largest(rows: Rows, sizes: Mapping[str, tuple[int, int]], frames: int) -> list[Choice]:
+    """Choose frame by frame the camera in which somebody's box is largest; of equals the first."""
+    cameras = list(rows)
+    people = sorted({row.id for found in rows.values() for row in found})
+    place = {person: index for index, person in enumerate(people)}
+    quality: Floats = np.zeros((len(people), frames, len(cameras)))
+    for column, (camera, found) in enumerate(rows.items()):
+        for row in found:
+            if row.frame <= frames:
+                size = float(size_quality(np.array(row.box), *sizes[camera]))
+                quality[place[row.id], row.frame - 1, column] = size
+    views = np.where(quality.max(axis=2) > 0.0, quality.argmax(axis=2), NO_CAMERA)
+    return [
+        Choice(frame + 1, person, cameras[view])
+        for person, line in zip(people, views.tolist(), strict=True)
+        for frame, view in enumerate(line)
+        if view != NO_CAMERA
+    ]

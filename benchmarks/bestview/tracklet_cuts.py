@@ -1,0 +1,44 @@
+"""The parts of tracks that identity joins: cut where a camera's tracker may have confused people."""
+
+from __future__ import annotations
+
+from itertools import chain, zip_longest
+
+import numpy as np
+
+from benchmarks.bestview.camera_tracks import Messages
+from bestview.association.sightings import FootPointError, align_tracks
+from bestview.association.tracklet_splitter import TrackletSplitter
+from server.config.site_config import Config
+from server.service.identity.camera_window import WindowReader
+from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.view_selection.decider import camera_homographies
+from tracking.motchallenge import MotRow
+
+
+def own_parts(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
+    """Return each camera's final boxes, numbered by part of track as the service cuts them."""
+    settings = config.view.identity
+    tracklets, reader = TrackletSplitter(settings), WindowReader((config.site.width, config.site.height))
+    ground, error = camera_homographies(config), FootPointError(settings.foot_sideways, settings.foot_upwards)
+    aligner = EpochAligner(config.camera_ids, config.track.window.stride, grace=0)
+    for camera in config.camera_ids:
+        aligner.come(camera)
+        aligner.frame(camera, messages[camera][0].boot, 0)
+    parts: dict[str, list[MotRow]] = {camera: [] for camera in config.camera_ids}
+    for message in chain.from_iterable(zip_longest(*messages.values())):
+        if message is not None:
+            aligner.tracks(message)
+        for epoch in aligner.ready(now=-1):
+            tracks = [it for window in reader.read(epoch) for it in window.local_tracks()]
+            seen = align_tracks(tracks, ground, error, config.overhead)
+            # None is ever settled here, so that a row is one part for good.
+            rows, _ = tracklets.update(seen, {it.key: it.appearance for it in tracks})
+            for track, column in zip(*np.nonzero(rows >= 0), strict=True):
+                camera = seen.keys[track].camera
+                left, top, right, bottom = (
+                    reader.fits[camera].boxes_to_site(seen.boxes[track, column]).tolist()
+                )
+                frame, number = seen.first_frame + int(column) + 1, int(rows[track, column]) + 1
+                parts[camera].append(MotRow(frame, number, left, top, right - left, bottom - top))
+    return parts

@@ -1,0 +1,92 @@
+"""What every benchmark shares: its options, where recordings are, one thread a process, the machine."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NoReturn
+
+ROOT = Path(__file__).resolve().parents[2]
+SKIPPED = 77
+"""The exit code of a benchmark that cannot run here (as in automake); what it lacks, it has said."""
+
+ONE_THREAD = {
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+}
+"""The matrices here are small: more threads only spin, and the cores belong to the other processes."""
+
+
+class CannotRunError(Exception):
+    """A benchmark lacks something on this machine; the text says what."""
+
+
+def parser(about: str, name: str) -> argparse.ArgumentParser:
+    """Return a command line with the options that all benchmarks have."""
+    found = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=about.splitlines()[0])
+    found.add_argument("--out", type=Path, default=ROOT / "out" / "bench", help="folder for plots and tables")
+    found.add_argument(
+        "--data",
+        type=Path,
+        default=Path(os.environ.get("MYVIEW_TEST_DATA", ROOT.parent / "shared" / "data")),
+        help="folder of recordings, one folder per scene",
+    )
+    return found
+
+
+def command_line() -> str:
+    """Return the command that runs this process's benchmark as it was run."""
+    module = Path(sys.argv[0]).resolve().relative_to(ROOT).with_suffix("")
+    name = ".".join(module.parts).removesuffix(".__main__")
+    words = ["python", "-m", name, *sys.argv[1:]]
+    return " ".join(words)
+
+
+def one_thread_environment() -> dict[str, str]:
+    """Return the environment for child processes."""
+    return {**os.environ, **ONE_THREAD}
+
+
+def machine() -> str:
+    """Describe the machine, the version, the date, and the load before the measurement."""
+    load = os.getloadavg()[0]
+    when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return (
+        f"{_processor()}, {os.cpu_count()} cores, load {load:.1f} before; "
+        f"Python {platform.python_version()}; commit {_commit()}; {when}"
+    )
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.machine()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+def _commit() -> str:
+    done = _git("rev-parse", "--short", "HEAD")
+    changed = _git("status", "--porcelain", "--untracked-files=no")
+    return (done or "unknown") + ("+changes" if changed else "")
+
+
+def _git(*words: str) -> str:
+    try:
+        done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False)
+    except OSError:
+        return ""
+    return done.stdout.strip()
+
+
+def finish(problem: CannotRunError, name: str) -> NoReturn:
+    """Return why a benchmark is left out, and end."""
+    print(f"{name}: left out: {problem}")
+    sys.exit(SKIPPED)

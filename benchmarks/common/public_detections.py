@@ -1,0 +1,75 @@
+"""Public detections with ground truth, and MyView's tracks of them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from benchmarks.common.environment import CannotRunError
+from server.cli.track.command import track_one
+from tracking.evaluation import Scores, evaluate
+from tracking.motchallenge import MotRow, read_rows
+
+TrackSettings = Mapping[str, Mapping[str, Any]]
+"""The section `track` of a configuration, or what of it differs from the defaults."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """One camera's detections and what is really there."""
+
+    name: str
+    detections: Path
+    truth: Path
+    video: Path | None = None
+
+    def score(self, tracks: list[MotRow]) -> Scores:
+        """Score tracks of this sequence."""
+        return evaluate(read_rows(self.truth), tracks)
+
+
+def find_recordings(data: Path, names: list[str] | None = None) -> list[Recording]:
+    """Return the sequences that are in the folder of recordings, or those of them that are named.
+
+    Raises:
+        CannotRunError: there are none.
+    """
+    campus, pets, auditorium = data / "mot15" / "TUD-Campus", data / "pets09", data / "auditorium"
+    known = [
+        Recording("TUD-Campus", campus / "det.txt", campus / "gt.txt"),
+        Recording("pets09", pets / "det" / "view1.txt", pets / "gt" / "view1.txt", pets / "view1.mp4"),
+        *(
+            Recording(camera, auditorium / "det" / f"{camera}.txt.gz", auditorium / "gt" / f"{camera}.txt.gz")
+            for camera in ("HC3", "HC4", "IP2", "IP5")
+        ),
+    ]
+    found = [it for it in known if it.detections.is_file() and it.truth.is_file()]
+    if names:
+        found = [it for it in found if it.name in names]
+    if not found:
+        which = ", ".join(names or [it.name for it in known])
+        raise CannotRunError(f"needs detections and ground truth ({which}) in {data}")
+    return found
+
+
+def track(
+    sequence: Recording, settings: TrackSettings | None = None, *, pictures: bool = False
+) -> list[MotRow]:
+    """Return MyView's tracks: what `myview track --det` writes, by default with its defaults.
+
+    With `pictures` people's looks come from the video; without, only boxes and confidences are known.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        out, config = Path(folder) / "tracks.txt", Path(folder) / "settings.yaml"
+        config.write_text(
+            yaml.safe_dump({"track": {key: dict(it) for key, it in (settings or {}).items()}}),
+            encoding="utf-8",
+        )
+        video = sequence.video if pictures else None
+        track_one(video, sequence.detections, out, config, None, lambda _: None)
+        return read_rows(out)

@@ -1,0 +1,131 @@
+"""What is compared: detectors, and what the tracker makes of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from benchmarks.detectors.scored_views import View
+from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
+from tracking.detectors import (
+    BackgroundDetector,
+    BackgroundSettings,
+    Detector,
+    HogDetector,
+    HogSettings,
+    Image,
+    paper_settings,
+)
+from tracking.detectors.ignore_mask import visible_mask
+from tracking.motchallenge import MotRow
+
+SURE = 0.4
+"""Score from which a hypothesis of the background detector is a person by itself."""
+
+
+class BlobDetector:
+    """The usual: MOG2, its shadows left out, opened and closed, and its connected components."""
+
+    LEAST_HEIGHT = 0.1  # of the picture's
+
+    def __init__(self, view: View) -> None:
+        self._view = view
+        self._model = cv2.createBackgroundSubtractorMOG2(500, 16.0, True)  # noqa: FBT003 — detectShadows
+        self._visible: Image | None = None
+
+    def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
+        """Return a box for every component that is large enough."""
+        rows, columns = image.shape[:2]
+        if self._visible is None:
+            self._visible = visible_mask(rows, columns, self._view.ignore)
+        mask = (self._model.apply(image) == 255).astype(np.uint8) & self._visible
+        mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8))
+        mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((9, 5), dtype=np.uint8))
+        _, _, stats, _ = cv2.connectedComponentsWithStats(mask)
+        least = self.LEAST_HEIGHT * rows
+        tall = stats[1:][stats[1:, cv2.CC_STAT_HEIGHT] >= least].astype(np.float64)
+        boxes = np.concatenate([tall[:, :2], tall[:, :2] + tall[:, 2:4]], axis=1)
+        return Detections(boxes, np.ones(len(boxes)), np.empty((len(boxes), 0)))
+
+
+@dataclass(frozen=True, slots=True)
+class Observer:
+    """A detector of the comparison."""
+
+    name: str
+    make: Callable[[View], Detector]
+    with_peers: bool = True
+    """Other trackers get its boxes, too."""
+
+
+def _background(view: View) -> BackgroundSettings:
+    return BackgroundSettings(ignore=view.ignore)
+
+
+OBSERVERS = (
+    Observer("MyView", lambda view: BackgroundDetector(_background(view))),
+    Observer(
+        "the paper's box filters",
+        lambda view: BackgroundDetector(paper_settings(_background(view))),
+        with_peers=False,
+    ),
+    Observer("MOG2 + connected components", BlobDetector),
+    Observer(
+        "OpenCV's HOG", lambda view: HogDetector(HogSettings(min_height=view.smallest), ignore=view.ignore)
+    ),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What an observer found in a view."""
+
+    hypotheses: list[MotRow]
+    tracks: list[MotRow]
+    frames: int
+    detect_s: float
+    """Processor time, all frames."""
+    track_s: float
+
+
+def watch(observer: Observer, view: View, frames: int | None) -> Seen:
+    """Show a view to an observer, and its boxes to the tracker."""
+    detector = observer.make(view)
+    tracker = OnlineTracker(WindowSettings(), CostSettings(), create_solver("columns"))
+    boxes: list[MotRow] = []
+    tracks: list[MotRow] = []
+    count, detecting, following = 0, 0.0, 0.0
+    for number, image in enumerate(view.images(frames)):
+        start = time.process_time()
+        found = detector.detect(image, number)
+        middle = time.process_time()
+        result = tracker.push(number, found)
+        detecting, following = detecting + middle - start, following + time.process_time() - middle
+        boxes += rows_of(number, found)
+        tracks += final_rows(result)
+        count += 1
+    tracks += final_rows(tracker.flush())
+    return Seen(boxes, tracks, count, detecting, following)
+
+
+def rows_of(number: int, found: Detections) -> list[MotRow]:
+    """Return a frame's detections as rows of a file."""
+    return [
+        MotRow(number + 1, -1, left, top, right - left, bottom - top, score)
+        for (left, top, right, bottom), score in zip(found.boxes.tolist(), found.scores.tolist(), strict=True)
+    ]
+
+
+def final_rows(result: WindowResult | None) -> Iterable[MotRow]:
+    """Yield the rows of the frames that are final now."""
+    if result is None:
+        return
+    for track in result.tracks:
+        for number in range(result.first, result.final_to + 1):
+            left, top, right, bottom = track.boxes[number - result.first].tolist()
+            if not np.isnan(left):
+                yield MotRow(number + 1, track.id, left, top, right - left, bottom - top)

@@ -1,0 +1,99 @@
+"""The scenes that observations are measured on, and what was found in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import av
+import numpy as np
+
+from benchmarks.common.environment import CannotRunError
+from tracking.detectors import Image
+from tracking.evaluation import TruthAndTracks, evaluate, evaluate_cameras, oracle_association
+from tracking.motchallenge import MotRow, read_rows
+
+WATERMARK = ((130.0, 232.0), (354.0, 232.0), (354.0, 282.0), (130.0, 282.0))
+"""Half-transparent and in every frame: where it lies nobody can be told from the background."""
+
+_SMALLEST = {"pets09": 0.12}
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """One camera's recording."""
+
+    name: str
+    video: Path
+    truth: Path | None
+    watermark: bool
+    smallest: float
+    """Height of the smallest people, in picture heights, which HOG has to be told: its time hangs on it."""
+
+    @property
+    def ignore(self) -> tuple[tuple[tuple[float, float], ...], ...]:
+        """The polygons that nobody is looked for in."""
+        return (WATERMARK,) if self.watermark else ()
+
+    def images(self, most: int | None = None) -> Iterator[Image]:
+        """Yield the frames, at most so many."""
+        with av.open(str(self.video)) as film:
+            for frame in islice(film.decode(video=0), most):
+                yield np.asarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8)
+
+    def people(self, frames: int | None) -> list[MotRow]:
+        """Return the ground truth of the first frames."""
+        if self.truth is None:
+            return []
+        return [row for row in read_rows(self.truth) if frames is None or row.frame <= frames]
+
+
+def views_of(data: Path, scene: str) -> list[View]:
+    """Return the views of a scene.
+
+    Raises:
+        CannotRunError: there is none.
+    """
+    folder = data / scene
+    views = []
+    for video in sorted(folder.glob("*.mp4")):
+        truth = folder / "gt" / f"{video.stem}.txt"
+        marked, smallest = scene in {"terrace", "campus4"}, _SMALLEST.get(scene, 0.25)
+        views.append(View(video.stem, video, truth if truth.exists() else None, marked, smallest))
+    if not views:
+        raise CannotRunError(f"needs the recordings {folder}/*.mp4; --data or MYVIEW_TEST_DATA say where")
+    return views
+
+
+@dataclass(frozen=True, slots=True)
+class ViewScores:
+    """What boxes are worth, at an overlap (IoU) of one half; shares."""
+
+    recall: float
+    precision: float
+    idf1: float
+
+
+def scores_of_boxes(truth: list[MotRow], boxes: list[MotRow]) -> ViewScores:
+    """Score detections: recall as much as any association can reach, precision of all of them."""
+    best = oracle_association(boxes, truth)
+    people = sum(row.confidence != 0.0 for row in truth)
+    recall = len(best) / max(people, 1)
+    precision = len(best) / max(len(boxes), 1)
+    return ViewScores(recall, precision, 2.0 * len(best) / max(people + len(best), 1))
+
+
+def scores_of_tracks(truth: list[MotRow], tracks: list[MotRow]) -> ViewScores:
+    """Score tracks."""
+    found = evaluate(truth, tracks)
+    return ViewScores(found.recall, found.precision, found.idf1)
+
+
+def oracle(truths: dict[str, list[MotRow]], boxes: dict[str, list[MotRow]]) -> float:
+    """Return the joint IDF1 over all cameras of boxes that are given the true identity."""
+    cameras = {
+        name: TruthAndTracks(truth, oracle_association(boxes[name], truth)) for name, truth in truths.items()
+    }
+    return evaluate_cameras(cameras).joint.idf1

@@ -1,0 +1,1 @@
+"""The faults, by what fails: processes, sources, messages, disk, clock, configuration."""

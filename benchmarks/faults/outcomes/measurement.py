@@ -1,0 +1,59 @@
+"""Injects faults one after the other, each into the site that it asks for."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import sys
+from pathlib import Path
+
+from benchmarks.common.environment import CannotRunError
+from benchmarks.common.report import Report
+from benchmarks.faults.outcomes import recording_check
+from benchmarks.faults.outcomes.fault_run import Outcome, run
+from benchmarks.faults.site.fault_site import Fault
+from benchmarks.faults.video.stamped_views import Views, make
+from client import ClientError
+
+_LINES = 20
+_PULSES = 15_000
+"""Detections for so many: ten minutes."""
+
+
+async def measure(faults: list[Fault], folder: Path, report: Report) -> list[Outcome]:
+    """Inject these faults one after the other."""
+    views = await asyncio.to_thread(make, folder, _PULSES)
+    outcomes: list[Outcome] = []
+    groups = itertools.groupby(faults, key=lambda fault: fault.alone or fault.setup)
+    for number, (_, some) in enumerate(groups):
+        outcomes += await _group(list(some), views, folder / f"site-{number}", report)
+    return outcomes
+
+
+async def _group(faults: list[Fault], views: Views, folder: Path, report: Report) -> list[Outcome]:
+    await asyncio.to_thread(folder.mkdir)
+    outcomes: list[Outcome] = []
+    try:
+        if faults[0].alone is not None:
+            return [Outcome(faults[0], ended=await faults[0].alone(views, folder))]
+        async with faults[0].setup(views, folder) as stand:
+            for fault in faults:
+                outcomes.append(await run(fault, stand, views))
+                print(f"{fault.name}: done", file=sys.stderr, flush=True)
+            ended = len(stand.ended)
+        outcomes[-1].ended += stand.ended[ended:]  # with the site
+        files = await asyncio.to_thread(recording_check.read, stand.recorded, stand.live)
+        recording_check.note(outcomes, stand.told, files)
+    except CannotRunError as error:
+        report.say(f"{faults[0].name}: left out: {error}")
+    except (ClientError, RuntimeError) as error:
+        report.say(f"{faults[0].name} and what follows it: {error}")
+        report.say(await asyncio.to_thread(_log_of, folder))
+        outcomes += [Outcome(it, failed="there was no site to try it on") for it in faults[len(outcomes) :]]
+    return outcomes
+
+
+def _log_of(folder: Path) -> str:
+    """Return the end of what a site's processes said."""
+    said = [path.read_text(encoding="utf-8", errors="replace") for path in sorted(folder.glob("*.log"))]
+    return "\n".join("".join(said).splitlines()[-_LINES:])

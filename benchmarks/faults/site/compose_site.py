@@ -1,0 +1,151 @@
+"""A site in containers, as docker-compose.yml runs it: built, started, looked at, and taken away."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.common.environment import ROOT, CannotRunError
+from server.cli.generated_config import free_port
+
+PLAIN = (ROOT / "docker-compose.yml",)
+_BUILD_S = 900.0
+"""An image without any cache downloads some 250 MB."""
+_UP_S = 300.0
+_COMMAND_S = 120.0
+
+
+class ComposeError(RuntimeError):
+    """What Docker said instead of doing it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ComposeSite:
+    """One compose project."""
+
+    project: str
+    files: tuple[Path, ...]
+    environment: Mapping[str, str]
+
+    def run(self, *words: str, seconds: float = _COMMAND_S, check: bool = True) -> str:
+        """Run a command of Docker; give what it says.
+
+        Raises:
+            ComposeError: it fails, or does not end.
+        """
+        try:
+            done = subprocess.run(
+                words,
+                cwd=ROOT,
+                env=dict(self.environment),
+                capture_output=True,
+                text=True,
+                timeout=seconds,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise ComposeError(f"{' '.join(words)}: has not ended after {seconds:g} s") from None
+        if check and done.returncode:
+            raise ComposeError(
+                f"{' '.join(words)}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
+            )
+        return done.stdout.strip()
+
+    def compose(self, *words: str, seconds: float = _COMMAND_S, check: bool = True) -> str:
+        """Run ``docker compose`` for this project."""
+        named = [word for file in self.files for word in ("--file", str(file))]
+        return self.run("docker", "compose", *named, *words, seconds=seconds, check=check)
+
+    async def docker(self, *words: str) -> str:
+        """Run ``docker`` beside whatever else goes on."""
+        return await asyncio.to_thread(self.run, "docker", *words)
+
+    def up(self) -> None:
+        """Start all, and wait for their health.
+
+        Raises:
+            ComposeError: they do not become healthy; with what they said.
+        """
+        words = ("up", "--detach", "--no-build", "--wait", "--wait-timeout", f"{_UP_S:.0f}")
+        try:
+            self.compose(*words, seconds=_UP_S + _COMMAND_S)
+        except ComposeError as error:
+            raise ComposeError(f"{error}\n{self.compose('logs', check=False)}") from None
+
+    def containers(self) -> dict[str, dict[str, Any]]:
+        """Inspect every container by its service, those included that have ended."""
+        ids = self.compose("ps", "--all", "--quiet").split()
+        found = json.loads(self.run("docker", "inspect", *ids)) if ids else []
+        return {it["Config"]["Labels"]["com.docker.compose.service"]: it for it in found}
+
+    def state(self, service: str) -> dict[str, Any]:
+        """Return one container's state as the engine knows it: when it started, how it ended."""
+        found: dict[str, Any] = json.loads(
+            self.run("docker", "inspect", "--format", "{{json .State}}", self.container(service))
+        )
+        return found
+
+    def container(self, service: str) -> str:
+        """Return the name that compose gives to a service's container."""
+        return f"{self.project}-{service}-1"
+
+    @property
+    def network(self) -> str:
+        """The network of pulses, frames and tracks."""
+        return f"{self.project}_site"
+
+    def address(self) -> str:
+        """Return where the best view is published, as host:port."""
+        return self.compose("port", "bestview", "8080")
+
+
+def missing() -> str | None:
+    """Return what is missing to run containers here; None: nothing."""
+    if shutil.which("docker") is None:
+        return "needs Docker: there is no `docker` here"
+    for words in (["docker", "info"], ["docker", "compose", "version"]):
+        try:
+            answer = subprocess.run(words, capture_output=True, timeout=30, check=False).returncode
+        except subprocess.TimeoutExpired:
+            answer = 1
+        if answer:
+            return f"needs a Docker Engine with Compose: `{' '.join(words)}` fails"
+    return None
+
+
+@contextlib.contextmanager
+def composed(files: Sequence[Path] = PLAIN, **variables: str) -> Iterator[ComposeSite]:
+    """Build, start and await a whole site; nothing of it is left in the end.
+
+    Raises:
+        CannotRunError: there is no engine here.
+        ComposeError: it does not come up.
+    """
+    lacking = missing()
+    if lacking is not None:
+        raise CannotRunError(lacking)
+    project = f"myview-test-{uuid.uuid4().hex[:8]}"
+    plain = {name: it for name, it in os.environ.items() if not name.startswith(("MYVIEW_", "COMPOSE_"))}
+    environment = {
+        **plain,
+        "COMPOSE_PROJECT_NAME": project,
+        "MYVIEW_IMAGE": project,
+        "MYVIEW_PUBLISH": f"127.0.0.1:{free_port()}",  # Docker's own choice would change with a restart
+        **variables,
+    }
+    site = ComposeSite(project, tuple(files), environment)
+    try:
+        site.compose("build", seconds=_BUILD_S)
+        site.up()
+        yield site
+    finally:
+        site.compose("down", "--volumes", "--rmi", "all", "--timeout", "5", check=False)

@@ -1,0 +1,195 @@
+"""Views of the synthetic room that say on every picture, and in every box, whose they are and of which frame.
+
+A strip at the bottom of each picture has its camera and its number in black and white blocks, which survive
+encoding. Detections are the scene's truth, and the thousandths of a box's left, top and width tell the frame
+it was found in. So a viewer can tell a picture of the wrong camera or moment from the right one, and a
+box that belongs to another picture from one that belongs to this.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from av.video.frame import VideoFrame
+from numpy.typing import NDArray
+
+from client import Box
+from synthetic import Scene
+
+FPS = 25
+WIDTH, HEIGHT = 256, 144
+CAMERAS = ("c0", "c1", "c2")
+FRAMES = 1000
+"""Of a film, which then begins again; numbers of frames have three digits."""
+_PEOPLE, _SEED = 3, 1
+_START, _DRAWN = 300, 50
+"""All are in sight. What is drawn is played forwards and backwards, so that nobody jumps."""
+BLOCK, EDGE = 8, 2
+"""Pixels of one bit, and how many at its sides are not read."""
+BITS, NUMBER_BITS = 16, 12
+"""Of a strip, which has them twice, then inverted; of the number in it: the others are the camera's."""
+_TOPS, _WIDTHS = np.random.default_rng(1).permuted(np.tile(np.arange(FRAMES), (2, 1)), axis=1).tolist()
+"""The thousandths of a box's top and width, by its frame; means of boxes, which trackers make, fit none."""
+_DARK, _BRIGHT, _MIDDLE = 40, 215, 128
+_SHOWS = 0.3
+"""Share of a person that must show to be found."""
+_TIME_BASE = Fraction(1, 90_000)
+
+
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """What a picture says of itself."""
+
+    camera: str
+    frame: int
+    """Below :data:`FRAMES`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Views:
+    """What is played: `benchmarks.latency.running_site.Played`."""
+
+    cameras: list[dict[str, Any]]
+    site: dict[str, Any]
+    ground: Path | None
+    found: Mapping[tuple[str, int, int, int, int], int]
+    """In which frame of a camera a box was found: left, top, right, bottom in thousandths."""
+
+    def frame_of(self, camera: str, box: Box) -> int | None:
+        """Return in which frame a box was found; None where it is a mean of several and says nothing."""
+        sides = (round(1000 * side) for side in (box.left, box.top, box.right, box.bottom))
+        return self.found.get((camera, *sides))  # type: ignore[arg-type]
+
+
+def stamped(image: NDArray[np.uint8], camera: int, frame: int) -> NDArray[np.uint8]:
+    """Return a picture ``(H, W, 3)`` with its strip: a copy."""
+    value = camera << NUMBER_BITS | frame
+    bits = [value >> place & 1 for place in range(BITS)]
+    bits += [1 - bit for bit in bits]
+    strip = np.repeat(np.where(np.array(bits) > 0, _BRIGHT, _DARK).astype(np.uint8), BLOCK)
+    marked = image.copy()
+    marked[-BLOCK:, : len(strip)] = strip[None, :, None]
+    return marked
+
+
+def read_stamp(grey: NDArray[np.uint8]) -> Stamp | None:
+    """Read the strip of a picture ``(H, W)``; None where it cannot be read."""
+    rows = grey[-BLOCK + EDGE : grey.shape[0] - EDGE, : 2 * BITS * BLOCK].astype(np.float64)
+    blocks = rows.reshape(len(rows), 2 * BITS, BLOCK)[:, :, EDGE:-EDGE].mean(axis=(0, 2)) > _MIDDLE
+    bits, inverse = blocks[:BITS], blocks[BITS:]
+    if (bits == inverse).any():
+        return None
+    value = sum(1 << place for place in np.flatnonzero(bits).tolist())
+    camera, frame = divmod(value, 1 << NUMBER_BITS)
+    return Stamp(f"c{camera}", frame)
+
+
+def make(folder: Path, pulses: int) -> Views:
+    """Write films, detections for so many pulses, and the homographies into a folder."""
+    scene = Scene("room", len(CAMERAS), _PEOPLE, _SEED, WIDTH, HEIGHT, FPS)
+    places = _places()
+    truths = {place: scene.truth(place) for place in sorted(set(places))}
+    cameras, found = [], {}
+    for number, name in enumerate(CAMERAS):
+        drawn = {place: scene.image(number, place) for place in truths}
+        pictures = [stamped(drawn[place], number, frame) for frame, place in enumerate(places)]
+        write_film(pictures, folder / f"{name}.mp4")
+        boxes = [_boxes(truths[place][number]) for place in places]
+        _write_detections(boxes, pulses, folder / f"{name}.txt")
+        for frame, some in enumerate(boxes):
+            found.update(dict.fromkeys(((name, *sides) for sides in _sides(some, frame)), frame))
+        source, detected = str(folder / f"{name}.mp4"), str(folder / f"{name}.txt")
+        cameras.append({"id": name, "source": source, "at_end": "loop", "detections": detected})
+    floors = {name: scene.homography(number) for number, name in enumerate(CAMERAS)}
+    ground = {name: floor.tolist() for name, floor in floors.items() if floor is not None}
+    (folder / "ground.json").write_text(json.dumps({"unit": "m", "homography": ground}), encoding="ascii")
+    site = {"name": "faults", "fps": FPS, "width": WIDTH, "height": HEIGHT}
+    return Views(cameras, site, folder / "ground.json", found)
+
+
+def make_unattractive(views: Views, folder: Path, best: str, pulses: int) -> Views:
+    """Let people be smaller in all cameras but one, so that this one is shown: by other detections."""
+    cameras, found = [], dict(views.found)
+    for camera in views.cameras:
+        name = camera["id"]
+        if name == best:
+            cameras.append(camera)
+            continue
+        boxes: list[list[tuple[int, int, int, int]]] = [[] for _ in range(FRAMES)]
+        for (of, left, top, right, bottom), frame in views.found.items():
+            if of == name:
+                width, height = (right - left) // 2000, (bottom - top) // 2000
+                x, y = (left + right) // 2000 - width // 2, bottom // 1000 - height
+                boxes[frame].append((x, y, width, height))
+        smaller = [np.array(some).reshape(-1, 4) for some in boxes]
+        for frame, some in enumerate(smaller):
+            found.update(dict.fromkeys(((name, *sides) for sides in _sides(some, frame)), frame))
+        path = folder / f"{name}-small.txt"
+        _write_detections(smaller, pulses, path)
+        cameras.append({**camera, "detections": str(path)})
+    return replace(views, cameras=cameras, found=found)
+
+
+def make_smaller(path: Path, out: Path) -> Path:
+    """Write a film again, in three quarters of its size."""
+    with av.open(str(path)) as container:
+        pictures = [
+            np.asarray(
+                frame.reformat(WIDTH * 3 // 4, HEIGHT * 3 // 4).to_ndarray(format="bgr24"), dtype=np.uint8
+            )
+            for frame in container.decode(video=0)
+        ]
+    write_film(pictures, out)
+    return out
+
+
+def write_film(pictures: Sequence[NDArray[np.uint8]], path: Path, fps: int = FPS) -> None:
+    """Encode pictures, so many a second, with a key picture every ten."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=fps, options={"crf": "18", "preset": "ultrafast"})
+        stream.height, stream.width = pictures[0].shape[:2]
+        stream.pix_fmt, stream.gop_size, stream.codec_context.max_b_frames = "yuv420p", 10, 0
+        stream.codec_context.thread_count = 1
+        for number, picture in enumerate(pictures):
+            frame = VideoFrame.from_ndarray(picture, format="bgr24")
+            frame.pts, frame.time_base = round(number / fps / _TIME_BASE), _TIME_BASE
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+
+
+def _places() -> list[int]:
+    """Return the scene's frame that each frame of a film shows."""
+    there = list(range(_START, _START + _DRAWN))
+    both = [*there, *reversed(there)]
+    return [both[frame % len(both)] for frame in range(FRAMES)]
+
+
+def _boxes(truth: Any) -> NDArray[np.float64]:
+    """Return the boxes ``(N, 4)`` that are whole and to be seen, left, top, width, height in whole pixels."""
+    boxes = np.floor(truth.boxes[truth.visibility >= _SHOWS]).reshape(-1, 4)
+    inside = (boxes[:, :2] >= 1).all(axis=1) & (boxes[:, 2] < WIDTH - 1) & (boxes[:, 3] < HEIGHT - 1)
+    kept = boxes[inside]
+    return np.hstack([kept[:, :2], kept[:, 2:] - kept[:, :2]])
+
+
+def _write_detections(boxes: Sequence[NDArray[np.float64]], pulses: int, path: Path) -> None:
+    with path.open("w", encoding="ascii") as file:
+        for pulse in range(pulses):
+            frame = pulse % FRAMES
+            x, y, wide = (f".{code:03d}" for code in (frame, _TOPS[frame], _WIDTHS[frame]))
+            for left, top, width, height in boxes[frame].astype(int).tolist():
+                file.write(f"{pulse + 1},-1,{left}{x},{top}{y},{width}{wide},{height},1,-1,-1,-1\n")
+
+
+def _sides(boxes: NDArray[Any], frame: int) -> Iterator[tuple[int, int, int, int]]:
+    """Yield left, top, right and bottom in thousandths of the boxes ``(N, 4)`` of a frame."""
+    for left, top, width, height in (1000 * boxes.astype(int)).tolist():
+        x, y = left + frame, top + _TOPS[frame]
+        yield x, y, x + width + _WIDTHS[frame], y + height

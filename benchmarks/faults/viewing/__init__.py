@@ -1,0 +1,1 @@
+"""Viewers of a site under fault, and the check of every picture that they received."""

@@ -1,0 +1,148 @@
+"""Viewers of a site under fault: the Python client's own player, and when every picture came."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import time
+from dataclasses import dataclass, field
+from typing import cast
+
+import av
+import numpy as np
+
+from benchmarks.faults.video.stamped_views import FPS, Stamp, read_stamp
+from client import Cameras, ClientError, Event, Gop, HttpSettings, events
+from client.fmp4 import BoxReader, decode_time
+from client.http import server_url
+from client.recording import Recording
+from client.session import Session
+from client.stream_events import Commentary
+
+_TICKS = 90_000
+_AGAIN_S = 0.2
+_SETTINGS = HttpSettings()
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One picture as a viewer got it."""
+
+    pulse: int
+    at: float
+    """When it came, seconds of the monotonic clock."""
+    stamp: Stamp | None
+    """What it says of itself; None where it cannot be read."""
+
+
+@dataclass(slots=True)
+class Tape:
+    """Takes what the player would write into a file, and notes when."""
+
+    data: bytearray = field(default_factory=bytearray)
+    came: list[tuple[float, int]] = field(default_factory=list)
+    """When what ends at an offset had come."""
+
+    def write(self, data: bytes) -> int:
+        """Take a header or a fragment."""
+        self.data += data
+        self.came.append((time.monotonic(), len(self.data)))
+        return len(data)
+
+    def pictures(self) -> list[Picture]:
+        """Decode everything."""
+        moments: dict[int, float] = {}
+        at = 0
+        for moment, end in self.came:
+            for box in BoxReader().feed(bytes(self.data[at:end])):
+                if box.kind == b"moof":
+                    moments[round(decode_time(box) * FPS / _TICKS)] = moment
+            at = end
+        if not moments:
+            return []
+        shown = []
+        with av.open(io.BytesIO(bytes(self.data)), "r", format="mp4") as container:
+            for frame in container.decode(video=0):
+                pulse = round(float(frame.time or 0.0) * FPS)
+                stamp = read_stamp(np.asarray(frame.to_ndarray(format="gray"), dtype=np.uint8))
+                shown.append(Picture(pulse, moments.get(pulse, 0.0), stamp))
+        return shown
+
+
+class Viewer:
+    """Watches the best view of one object for as long as it is let."""
+
+    def __init__(self, url: str, number: int) -> None:
+        self.number = number
+        self.tapes: list[Tape] = []
+        self.given_up = 0
+        """How often the player took the server for gone for good; it is then started again."""
+        self._sessions: list[Session] = []
+        self._address = server_url(url) / f"objects/{number}/best.mp4"
+
+    @property
+    def reconnections(self) -> int:
+        """How often the stream had to be opened again."""
+        return self.given_up + sum(session.reconnections for session in self._sessions)
+
+    async def run(self) -> None:
+        """Watch until cancelled."""
+        while True:
+            self.tapes.append(Tape())
+            record = Recording(cast("io.BufferedWriter", self.tapes[-1]), None)
+            self._sessions.append(Session(record, Commentary(self.number), None, None, None))
+            with contextlib.suppress(ClientError):
+                await self._sessions[-1].run(self._address, _SETTINGS)
+            self.given_up += 1
+            await asyncio.sleep(_AGAIN_S)
+
+    @property
+    def last_came(self) -> float:
+        """When something came last; 0 before."""
+        return max((tape.came[-1][0] for tape in self.tapes if tape.came), default=0.0)
+
+    def pictures(self) -> list[Picture]:
+        """Decode what came, in the order in which it came."""
+        return [picture for tape in self.tapes for picture in tape.pictures()]
+
+
+@dataclass(slots=True)
+class Told:
+    """What the server's events said, and when."""
+
+    gops: list[tuple[float, Gop]] = field(default_factory=list)
+    cameras: Cameras | None = None
+    merged: dict[int, int] = field(default_factory=dict)
+
+    def take(self, event: Event) -> None:
+        """Take an event; what the server says anew after a reconnection is passed over."""
+        match event:
+            case Gop() if not self.gops or event.first > self.gops[-1][1].first:
+                self.gops.append((time.monotonic(), event))
+                self.merged.update({it.lost: it.kept for it in event.merged})
+            case Cameras():
+                self.cameras = event
+
+    async def listen(self, url: str) -> None:
+        """Listen until cancelled."""
+        while True:
+            with contextlib.suppress(ClientError):
+                async for event in events(url, _SETTINGS):
+                    self.take(event)
+            await asyncio.sleep(_AGAIN_S)
+
+    def state(self, camera: str) -> str | None:
+        """Return a camera's state as it was told last."""
+        known = self.cameras.cameras if self.cameras else ()
+        return next((it.state for it in known if it.camera == camera), None)
+
+    def shown(self, number: int) -> str | None:
+        """Return the camera that an object is shown by."""
+        return self.choice(self.gops[-1][1], number) if self.gops else None
+
+    def choice(self, gop: Gop, number: int) -> str | None:
+        """Return the camera of an object in a GOP, by whichever number it has now."""
+        while number not in gop.choices and number in self.merged:
+            number = self.merged[number]
+        return gop.choices.get(number)

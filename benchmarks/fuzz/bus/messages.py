@@ -1,0 +1,261 @@
+"""Messages from the bus: one by one, and whole sessions of a site up to what its viewers are given."""
+
+from __future__ import annotations
+
+import asyncio
+from random import Random
+from typing import Any
+
+import msgspec
+from prometheus_client import generate_latest
+
+from benchmarks.fuzz.bus.damaged_messages import wrong
+from benchmarks.fuzz.bus.retained_state import Memories
+from benchmarks.fuzz.engine.fed_site import (
+    CAMERAS,
+    FPS,
+    HEIGHT,
+    KEYS,
+    STRIDE,
+    WIDTH,
+    Fed,
+    pictures,
+    site,
+    sound,
+    status,
+    thumbnail,
+    tracks,
+    video,
+    word,
+)
+from benchmarks.fuzz.engine.target import Scripts, Target
+from server.camera.operator_corrections import CorrectionInbox as PointedAt
+from server.camera.peers.detection_buffer import PeerDetectionBuffer
+from server.camera.peers.detection_exchange import PeerDetectionExchange
+from server.http.api.responses import cameras_info, objects_info, site_info
+from server.http.app import make_app
+from server.http.metrics.http_collector import METRICS
+from server.media.audio.audio_format import AudioFormat
+from server.media.stream_format import StreamFormat
+from server.messaging.epochs import end_of_epoch
+from server.messaging.inbox import Message
+from server.messaging.messages import FrameDetections
+from server.messaging.operator_messages import OPERATOR_POINTS_MAX, OperatorPoint, OperatorPoints
+from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.ingest.ingest import Ingest
+from server.service.service import BestViewService
+from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.media_chunk import MediaChunk
+
+_EPOCHS = 3
+"""Two GOPs are decided, and one is looked ahead to."""
+_ASKED_EVERY = 8
+Script = list[tuple[str, bytes, bytes]]
+"""Messages: key, payload, attachment. An empty key is the end of an epoch."""
+_script = msgspec.msgpack.Decoder(Script)
+_packed = msgspec.msgpack.encode
+
+
+class Messages(Target):
+    """One message to an intake that has just begun."""
+
+    name = "bus-messages"
+
+    def __init__(self) -> None:
+        self._pictures = pictures(0, 10)
+        self._form = AudioFormat(48_000, 2)
+
+    def make(self, rng: Random) -> bytes:
+        """Return a message."""
+        pulse = rng.randrange(10)
+        right = rng.choice(
+            (
+                lambda: video("c0", self._pictures[pulse]),
+                lambda: tracks(word(rng, "c0", pulse)),
+                lambda: status("c0", pulse),
+                lambda: thumbnail("c0", pulse),
+                lambda: sound(pulse),
+            )
+        )()
+        it = wrong(rng, right) if rng.random() < 0.95 else right
+        return _packed([(it.key.encode("utf-8", "replace").decode(), it.payload, it.attachment)])
+
+    def feed(self, data: bytes) -> bool:
+        """Take it in, and the epoch out that it may have made."""
+        agreement = StreamFormat()
+        frame_buffers = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
+        aligner = EpochAligner(CAMERAS, STRIDE, grace=5)
+        frame_buffer = AudioBuffer(self._form, FPS, 10.0)
+        intake = Ingest(frame_buffers, aligner, lambda *_: None, frame_buffer, sounding=CAMERAS[0])
+        handlers = (intake.video, intake.tracks, intake.status, intake.thumbnail)
+        for key, payload, head in _script.decode(data):
+            message = Message(key, payload, head)
+            if key == KEYS.sound:
+                intake.sound(message)
+            for what, handle in zip(("video", "tracks", "status", "thumbs"), handlers, strict=True):
+                if f"/{what}" in key:
+                    handle(message)
+        aligner.ready(now=100)
+        intake.forget_thumbnails_before(1)
+        return not any(it.bad_messages for it in intake.states.values())
+
+
+class Words(Scripts):
+    """What cameras tell each other of a frame."""
+
+    name = "bus-detections"
+
+    def __init__(self) -> None:
+        self._exchange = PeerDetectionExchange(site(), "c0", None, 50)
+
+    def make(self, rng: Random) -> bytes:
+        """Return some words of the other camera."""
+        script: Script = []
+        for pulse in range(3):
+            boxes = [(1.0, 2.0, 9.0, 30.0, 0.9)] * rng.randrange(3)
+            told = FrameDetections(camera="c1", boot=1, size=(WIDTH, HEIGHT), pulse=pulse, boxes=boxes)
+            message = Message(KEYS.camera("c1", "detections"), msgspec.json.encode(told), b"")
+            it = wrong(rng, message) if rng.random() < 0.7 else message
+            script.append((it.key, it.payload, b""))
+        return _packed(script)
+
+    def feed(self, data: bytes) -> bool:
+        """Hear them."""
+        earshot, bad = PeerDetectionBuffer(("c1",), 50, lambda _: True), self._exchange.bad_messages
+        for pulse, (_, payload, _) in enumerate(_script.decode(data)):
+            self.messages += 1
+            # The key is what was asked for: the bus hands nothing else on.
+            heard = self._exchange._read(Message(KEYS.camera("c1", "detections"), payload, b""))
+            if heard is not None and heard.camera == "c1":
+                earshot.put(heard, 0.0)
+            earshot.ask(pulse, 1.0)
+            earshot.misses(pulse)
+            earshot.give_up(pulse)
+            earshot.heard(pulse)
+        return self._exchange.bad_messages == bad
+
+
+class Places(Scripts):
+    """Where an operator points, as a camera hears it."""
+
+    name = "bus-operator-points"
+
+    def make(self, rng: Random) -> bytes:
+        """Return some words of the best view."""
+        script: Script = []
+        for pulse in range(3):
+            place = OperatorPoint(pulse=pulse, track=1, x=9.0, y=9.0, tolerance=rng.random() + 0.1)
+            points = [place] * rng.randrange(3)
+            payload = msgspec.json.encode(OperatorPoints(boot=1, points=points))
+            message = Message(KEYS.camera("c0", "operator_points"), payload, b"")
+            it = wrong(rng, message) if rng.random() < 0.7 else message
+            script.append((it.key, it.payload, b""))
+        return _packed(script)
+
+    def feed(self, data: bytes) -> bool:
+        """Hear them."""
+        heard = PointedAt("c0", 1)
+        for key, payload, _ in _script.decode(data):
+            self.messages += 1
+            heard.put(Message(key, payload, b""))
+            assert len(heard.take()) <= OPERATOR_POINTS_MAX
+        return not heard.bad_messages
+
+
+class Sessions(Scripts):
+    """A site over some epochs: messages wrong, lost, doubled and out of order; then all is asked of it."""
+
+    name = "bus-sessions"
+
+    def __init__(self) -> None:
+        self._pictures = [pictures(seed, _EPOCHS * STRIDE) for seed in range(len(CAMERAS))]
+        self._config = site()
+        self._loop = asyncio.new_event_loop()
+
+    def make(self, rng: Random) -> bytes:
+        """Return some hundred messages, of which some are wrong."""
+        script: Script = []
+        share = rng.choice((0.0, 0.02, 0.02, 0.1, 0.5))
+        only_one = rng.random() < 0.5
+        for epoch in range(_EPOCHS):
+            messages = [sound(epoch)]
+            for seed, camera in enumerate(CAMERAS):
+                messages += [video(camera, it) for it in self._pictures[seed][epoch * STRIDE :][:STRIDE]]
+                messages += [
+                    tracks(word(rng, camera, epoch)),
+                    status(camera, epoch),
+                    thumbnail(camera, epoch),
+                ]
+            for message in messages:
+                if rng.random() >= share or (only_one and "c1" not in message.key):
+                    sent = [message]
+                else:
+                    sent = rng.choice(([], [message] * 2, [wrong(rng, message)], [wrong(rng, message)]))
+                script += [(_plain(it.key), it.payload, it.attachment) for it in sent]
+            if rng.random() < share:
+                at = rng.randrange(len(script) + 1)
+                alive = (KEYS.camera(rng.choice(CAMERAS), "alive"), rng.choice((b"0", b"1")), b"")
+                script.insert(at, alive)
+                rng.shuffle(script[-20:])
+            script.append(("", b"", b""))
+        return _packed(script)
+
+    def feed(self, data: bytes) -> bool:
+        """Play it."""
+        return self._loop.run_until_complete(self._session(_script.decode(data)))
+
+    async def _session(self, script: Script) -> bool:
+        service = Fed(self._config)
+        service.agreement.accept(self._pictures[0][0].data)
+        viewers = [
+            it.subscribe()
+            for it in (*service.splicer.cameras.values(), *service.splicer.decided_cameras.values())
+        ]
+        epoch = 0
+        for key, payload, head in script:
+            if key:
+                self.messages += 1
+                service.handle(Message(key, payload, head))
+                continue
+            service.pulse = end_of_epoch(epoch, STRIDE)
+            epoch += 1
+            service.decide()
+        service.pulse += 2 * STRIDE
+        service.decide()
+        if len(script) % _ASKED_EVERY == 0:
+            ask(service)
+        for viewer in viewers:
+            drink(viewer)
+        return service.dropped == 0
+
+    def close(self) -> None:
+        """Close the loop."""
+        self._loop.close()
+
+
+def ask(service: Fed) -> None:
+    """Ask a service everything that its API tells."""
+    facade = BestViewService(service)
+    for content in (site_info(facade), objects_info(facade), cameras_info(facade)):
+        msgspec.json.encode(content)
+    for number in [*service.board.standings, 99]:
+        msgspec.json.encode(facade.people.view_selection_of(number))
+    generate_latest(make_app(facade)[METRICS])
+
+
+def drink(viewer: Any) -> None:
+    """Take what waits for a viewer, in every form."""
+    for piece in list(viewer._queue):
+        if isinstance(piece, MediaChunk):
+            assert piece.data
+            assert piece.mpegts
+            assert piece.data_with_audio
+    viewer._queue.clear()
+
+
+def _plain(key: str) -> str:
+    return key.encode("utf-8", "replace").decode()
+
+
+TARGETS = (Messages, Words, Places, Memories, Sessions)

@@ -1,0 +1,262 @@
+"""Running a target over many inputs, in a process of its own, which may hang, grow or die."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import multiprocessing
+import multiprocessing.queues
+import re
+import resource
+import signal
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from types import FrameType
+
+from benchmarks.fuzz.engine.shared_counts import ROOM, Counts, Shared
+from benchmarks.fuzz.engine.target import Target
+
+HANG_S = 2.0
+"""Processor time that one input may take."""
+STUCK_S = 60.0
+"""The same by the clock, however busy the machine: then the process is killed."""
+GROWTH_MB = 200
+"""Megabytes that the process may grow by within one input."""
+DEAD, MOST_MB = "died", 4096
+_KEPT = 3
+"""Inputs that are saved of each kind of crash."""
+
+
+class HangError(BaseException):
+    """An input took too long. No Exception: the code under test may not swallow it."""
+
+
+class GrowthError(Exception):
+    """An input took too much memory."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """What came of a target's inputs, in which time."""
+
+    counts: Counts
+    seconds: float
+    kinds: int
+    """Of crashes, by the place in the code."""
+
+
+@dataclass(frozen=True, slots=True)
+class Crash:
+    """What happened, and where."""
+
+    kind: str
+    text: str
+
+
+class _Tracebacks(logging.Handler):
+    """Keeps the last traceback that was logged."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.last: str | None = None
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.exc_info and record.exc_info[0] is not None:
+            self.last = record.getMessage() + "\n" + logging.Formatter().formatException(record.exc_info)
+
+
+class Attempt:
+    """Feeds inputs one by one, and tells what is wrong: what is raised, logged, too slow or too large."""
+
+    def __init__(self, target: Target, hang_s: float = HANG_S) -> None:
+        self.target, self._hang_s = target, hang_s
+        self._log = _Tracebacks()
+        self._most = _most_mb()
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Watch the log and the time meanwhile."""
+        root = logging.getLogger()
+        level, handlers, before = root.level, root.handlers[:], signal.signal(signal.SIGPROF, _hung)
+        root.handlers[:] = [self._log]
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)  # numbers that are too large, and told so
+                yield
+        finally:
+            root.handlers[:] = handlers
+            root.setLevel(level)
+            signal.signal(signal.SIGPROF, before)
+
+    def feed(self, data: bytes) -> bool | Crash:
+        """Return whether an input was taken; a crash where there was one."""
+        self._log.last = None
+        signal.setitimer(signal.ITIMER_PROF, self._hang_s)
+        try:
+            taken = self.target.hand_over(data)
+            signal.setitimer(signal.ITIMER_PROF, 0)
+            if self._log.last is not None:
+                return Crash(_logged(self._log.last), self._log.last)
+            self._weigh()
+        except (Exception, HangError) as error:  # noqa: BLE001 — whatever it is, it is a crash
+            signal.setitimer(signal.ITIMER_PROF, 0)
+            self._most = _most_mb()
+            return Crash(_kind(error), "".join(traceback.format_exception(error)))
+        return taken
+
+    def _weigh(self) -> None:
+        most = _most_mb()
+        grown, self._most = most - self._most, most
+        if grown > GROWTH_MB:
+            raise GrowthError(f"{grown} MB more")
+
+
+def _most_mb() -> int:
+    """Return the most megabytes that the process has had."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+
+
+def _hung(_: int, __: FrameType | None) -> None:
+    raise HangError("took too long")
+
+
+def _kind(error: BaseException) -> str:
+    """Name a crash by what was raised and where: crashes of one kind are one mistake."""
+    frames = traceback.extract_tb(error.__traceback__)
+    ours = [it for it in frames if "site-packages" not in it.filename and "fuzz_" not in it.filename]
+    place = ours[-1] if ours else frames[-1] if frames else None
+    where = "" if place is None else f"{Path(place.filename).stem}-{place.name.strip('<>')}"
+    return f"{type(error).__name__}-{where}"
+
+
+def _logged(text: str) -> str:
+    """Name a crash whose traceback was not raised, but logged."""
+    places = re.findall(r'File ".*/([^/"]+)\.py", line \d+, in (\w+)', text)
+    where = "-".join(places[-1]) if places else ""
+    return f"logged-{where}"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How many inputs and which; whichever bound is reached first is the end."""
+
+    inputs: int | None = None
+    seconds: float | None = None
+    seed: int = 1
+    out: Path | None = None
+    """Where crashes are saved; None: nowhere."""
+    hang_s: float = HANG_S
+    messages: int | None = None
+    first: int = 0
+    """The number of the first input."""
+
+    def done(self, counts: Counts) -> bool:
+        """Return whether these are as many as there were to be."""
+        return any(
+            most is not None and so_far >= most
+            for so_far, most in ((counts.inputs, self.inputs), (counts.messages, self.messages))
+        )
+
+
+def numbered(target: Target, seed: int, index: int) -> bytes:
+    """Return the input of this number: the same in every run."""
+    return target.make(Random(seed << 48 | index))
+
+
+class Runner:
+    """Counts and saves what comes of a target's inputs."""
+
+    def __init__(self, make: Callable[[], Target], name: str, plan: Plan) -> None:
+        self._make, self._name, self._plan = make, name, plan
+        self._kinds: dict[str, int] = {}
+
+    def run(self) -> Tally:
+        """Run it in processes of its own; one that dies or grows is followed by another."""
+        began = time.monotonic()
+        shared, fork, counts = Shared(), multiprocessing.get_context("fork"), Counts()
+        until = None if self._plan.seconds is None else began + self._plan.seconds
+        while not self._plan.done(counts) and (
+            not counts.inputs or until is None or time.monotonic() < until
+        ):
+            kinds = fork.SimpleQueue()
+            child = fork.Process(target=self._child, args=(shared, until, kinds))
+            child.start()
+            died = self._wait(child, shared)
+            while not kinds.empty():
+                self._count(kinds.get())
+            counts = shared.counts
+            if died is not None:
+                self._save(Crash(f"{DEAD}-{died}", f"the process {died}"), counts.inputs, shared.data)
+                counts.inputs, counts.messages, counts.crashes = (
+                    it + 1 for it in (counts.inputs, counts.messages, counts.crashes)
+                )
+                shared.keep(counts)
+        return Tally(counts, time.monotonic() - began, len(self._kinds))
+
+    def _wait(self, child: multiprocessing.process.BaseProcess, shared: Shared) -> str | None:
+        """Wait for a process; say how it died, None where it did not."""
+        last, since = -1, time.monotonic()
+        while child.is_alive():
+            child.join(1.0)
+            inputs = shared.counts.inputs
+            if inputs != last:
+                last, since = inputs, time.monotonic()
+            elif time.monotonic() - since > STUCK_S:
+                child.kill()
+                child.join()
+                return "stuck"
+        if child.exitcode is not None and child.exitcode < 0:
+            return f"signal-{-child.exitcode}"
+        if child.exitcode:
+            raise RuntimeError(f"{self._name}: the fuzzing itself failed; see above")
+        return None
+
+    def _child(
+        self, shared: Shared, until: float | None, kinds: multiprocessing.queues.SimpleQueue[str]
+    ) -> None:
+        counts = shared.counts
+        resource.setrlimit(resource.RLIMIT_AS, (MOST_MB << 20, MOST_MB << 20))
+        target = self._make()
+        attempt, begun, grown = Attempt(target, self._plan.hang_s), counts.inputs, False
+        before = counts.messages - target.messages
+        gc.freeze()
+        with attempt.watching():
+            while not grown and not self._plan.done(counts):
+                if until is not None and time.monotonic() > until and counts.inputs > begun:
+                    break
+                data = numbered(target, self._plan.seed, self._plan.first + counts.inputs)[:ROOM]
+                shared.keep(counts, data)
+                match attempt.feed(data):
+                    case Crash() as crash:
+                        counts.crashes += 1
+                        self._save(crash, counts.inputs, data)
+                        if self._kinds[crash.kind] <= _KEPT:
+                            kinds.put(crash.kind)
+                        grown = crash.kind.startswith(GrowthError.__name__)  # what it had it keeps
+                    case True:
+                        counts.accepted += 1
+                    case _:
+                        counts.refused += 1
+                counts.inputs += 1
+                counts.messages = before + target.messages
+        shared.keep(counts)
+        target.close()
+
+    def _count(self, kind: str) -> int:
+        count = self._kinds[kind] = self._kinds.get(kind, 0) + 1
+        return count
+
+    def _save(self, crash: Crash, place: int, data: bytes) -> None:
+        """Save what crashed, some of each kind, by the input's number."""
+        count = self._count(crash.kind)
+        if self._plan.out is not None and count <= _KEPT:
+            self._plan.out.mkdir(parents=True, exist_ok=True)
+            stem = f"{self._name}.{crash.kind}.{self._plan.first + place}"
+            (self._plan.out / f"{stem}.bin").write_bytes(data)
+            (self._plan.out / f"{stem}.txt").write_text(crash.text, encoding="utf-8", errors="replace")

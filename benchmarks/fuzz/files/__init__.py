@@ -1,0 +1,1 @@
+"""Files: configurations, calibrations, MOTChallenge files, recordings."""

@@ -1,0 +1,54 @@
+"""What an operator sends: bodies that are nearly right, to every address that takes one."""
+
+from __future__ import annotations
+
+from random import Random
+from typing import Any
+
+from benchmarks.fuzz.engine.mutations import as_json, damaged, otherwise
+from benchmarks.fuzz.http.served_site import Asked
+from server.http.access.csrf import CSRF_HEADER
+
+_ASKED: tuple[tuple[str, str, Any], ...] = (
+    ("POST", "/api/operator/people", {"object": 1, "name": "Ada"}),
+    ("POST", "/api/operator/people", {"object": 1, "merge": 2}),
+    ("POST", "/api/operator/people", {"object": 1, "part": ["c0", "c1"]}),
+    (
+        "POST",
+        "/api/operator/pointing",
+        {"object": 1, "camera": "c0", "points": [{"pulse": 12, "x": 9.5, "y": 20.0, "reach": 3.0}]},
+    ),
+    ("PUT", "/api/operator/choosing", {"switch_cost_s": 0.2, "goes_on_s": 0.5, "lookahead": 10}),
+    (
+        "PUT",
+        "/api/operator/choosing",
+        {"missed_s": 1.0, "unfound": 0.5, "quality": {"relative": 1.0}},
+    ),
+    ("DELETE", "/api/operator/choosing", None),
+    ("POST", "/api/operator/walk", {"do": "start"}),
+    ("POST", "/api/operator/walk", {"do": "go_on", "person": 1.75}),
+    ("DELETE", "/api/operator/walk", None),
+    ("POST", "/api/session", {"token": "secret"}),
+    ("GET", "/api/operator/people", None),
+    ("GET", "/api/operator/walk", None),
+    ("GET", "/api/operator/choosing", None),
+)
+"""To finish a walk starts a process: that is for other tests."""
+
+
+class Operator(Asked):
+    """One thing that is asked by somebody who may; what the one before did holds."""
+
+    name = "http-operator"
+
+    def make(self, rng: Random) -> bytes:
+        """Return the bytes of a request."""
+        method, path, right = rng.choice(_ASKED)
+        body = b"" if right is None else as_json(otherwise(rng, right) if rng.random() < 0.85 else right)
+        if rng.random() < 0.15:
+            body = damaged(rng, body)
+        head = (
+            f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n{CSRF_HEADER}: 1\r\nConnection: close\r\n"
+            f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
+        )
+        return head.encode() + body

@@ -1,0 +1,134 @@
+"""A small site that is served, and somebody who sends it bytes."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from asyncio import AbstractEventLoop
+from collections.abc import Callable, Mapping
+from contextlib import AsyncExitStack
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from aiohttp import web
+
+from benchmarks.fuzz.engine.event_loops import HurryingLoop, leaves_no_trace
+from benchmarks.fuzz.engine.fed_site import Fed, Word, feed_epoch, site, word
+from benchmarks.fuzz.engine.target import Target
+from server.http.api.openapi import describe
+from server.http.app import make_app, serving
+from server.service.service import BestViewService
+
+_WELL_EVERY = 100
+EPOCHS = 6
+_WAIT_S = 10.0
+"""Then an answer is not waited for; by a clock that hurries."""
+_MOST = 65_536
+_HEALTH = b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+
+
+class Served:
+    """A site that has run for some epochs, and stands still. ``sections`` are its configuration's.
+
+    ``before`` is given the application before it is served.
+    """
+
+    def __init__(
+        self,
+        sections: Mapping[str, Any] | None = None,
+        word: Word = word,
+        loop: AbstractEventLoop | None = None,
+        before: Callable[[web.Application], None] = lambda _: None,
+    ) -> None:
+        self.loop = loop or HurryingLoop()
+        self._folder = TemporaryDirectory()
+        self._stack = AsyncExitStack()
+        self._before = before
+        self.loop.run_until_complete(self._serve(dict(sections or {}), word))
+
+    async def _serve(self, sections: dict[str, Any], word: Word) -> None:
+        config = site(record={"folder": str(Path(self._folder.name) / "kept")}, **sections)
+        self.service, rng = Fed(config), Random(1)
+        self.service.past.open()
+        self._stack.callback(self.service.close)
+        self.service.pulse0 = 1_700_000_000.0
+        for epoch in range(EPOCHS):
+            feed_epoch(self.service, rng, epoch, EPOCHS, word)
+        self.app = make_app(BestViewService(self.service))
+        self._before(self.app)
+        self.port = await self._stack.enter_async_context(
+            serving(self.app, config.http.model_copy(update={"port": 0}))
+        )
+
+    @property
+    def described(self) -> list[tuple[str, tuple[str, ...]]]:
+        """Return the addresses that the application tells of, each with what can be asked for."""
+        found = [("/", ("object",)), ("/operator", ()), ("/api", ()), ("/api/openapi.json", ())]
+        for path, item in describe(self.app)["paths"].items():
+            for operation in item.values():
+                named = tuple(it["name"] for it in operation["parameters"] if it["in"] == "query")
+                found.append((path, named))
+        return found
+
+    def ask(self, data: bytes, address: str = "127.0.0.1") -> bytes:
+        """Send bytes on a connection of their own; give what is answered, of streams the beginning."""
+        return self.loop.run_until_complete(self._ask(data, address))
+
+    async def _ask(self, data: bytes, address: str) -> bytes:
+        answer = b""
+        with socket.socket() as asking:
+            leaves_no_trace(asking)
+            asking.bind((address, 0))
+            asking.connect(("127.0.0.1", self.port))  # whoever listens need not take it up yet
+            asking.settimeout(0)
+            with contextlib.suppress(TimeoutError, ConnectionError):
+                async with asyncio.timeout(_WAIT_S):
+                    await self.loop.sock_sendall(asking, data)
+                    while len(answer) < _MOST and (more := await self.loop.sock_recv(asking, _MOST)):
+                        answer += more
+        return answer
+
+    def is_well(self) -> bool:
+        """Return whether it still answers others."""
+        return self.ask(_HEALTH).startswith(b"HTTP/1.1 200")
+
+    def close(self) -> None:
+        """End the server."""
+        self.loop.run_until_complete(self._stack.aclose())
+        self.loop.close()
+        self._folder.cleanup()
+
+
+def judged(data: bytes, answer: bytes) -> bool:
+    """Return whether a request was granted; an answer is one line of JSON where it was not."""
+    assert b"Traceback" not in answer, answer[:2000].decode("utf-8", "replace")
+    code = answer[9:12]
+    assert code != b"500", answer[:2000].decode("utf-8", "replace")
+    if code.startswith(b"4") and answer.startswith(b"HTTP/1.1"):
+        head, _, body = answer.partition(b"\r\n\r\n")
+        if b"application/json" in head and not data.startswith(b"HEAD"):
+            assert body.startswith(b'{"error":'), body[:300]
+    return code.startswith((b"2", b"3"))
+
+
+class Asked(Target):
+    """Requests to a site that is open to all: what the one before has chosen goes on."""
+
+    def __init__(self) -> None:
+        self._served = Served()
+        self._fed = 0
+
+    def feed(self, data: bytes) -> bool:
+        """Ask, and read what is answered."""
+        granted = judged(data, self._served.ask(data))
+        self._fed += 1
+        if self._fed % _WELL_EVERY == 0:
+            assert self._served.is_well()
+        return granted
+
+    def close(self) -> None:
+        """End the server."""
+        self._served.close()

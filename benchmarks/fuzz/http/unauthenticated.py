@@ -1,0 +1,209 @@
+"""A site with tokens: nobody gets anything but by a whole one, and by it nothing that it is not for.
+
+What is right is read off an input's bytes, not asked of the server: whose secret is in it, and which address
+the application took it for. Object 1 is seen by camera c0 alone, object 2 by c1.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from http import HTTPStatus
+from pathlib import Path
+from random import Random
+from urllib.parse import unquote_to_bytes
+
+import yaml
+from aiohttp import web
+
+from benchmarks.fuzz.engine.fed_site import STRIDE, one_each, pictures
+from benchmarks.fuzz.engine.mutations import as_json, damaged
+from benchmarks.fuzz.engine.target import Target, folder
+from benchmarks.fuzz.http.addresses import WORDS, address, some_range
+from benchmarks.fuzz.http.served_site import EPOCHS, Served, judged
+from server.config.tokens_file import token_digest
+from server.http.access.authorization import ACCESS
+from server.http.access.sessions import _Session
+from server.http.app_keys import SERVICE
+
+_WHO = ("hall", "family", "door", "night", "void")
+SECRETS = {who: f"{who}-{Random(who).randbytes(24).hex()}" for who in _WHO}
+_COOKIES = {who: f"{who}+{Random(who + who).randbytes(24).hex()}" for who in _WHO}
+_RIGHTS: dict[str, dict[str, object]] = {
+    "hall": {"role": "watch"},
+    "family": {"role": "watch", "object": 1, "made": "2999-01-01T00:00:00Z"},
+    "door": {"role": "watch", "camera": "c0"},
+    "night": {"role": "operate"},
+    "void": {"role": "watch", "object": 1, "made": "2001-01-01T00:00:00Z"},
+}
+_NAMES = {1: "Ada Lovelace", 2: "Charles Babbage"}
+_OPEN = {"/", "/operator", "/page/{file}", "/api", "/api/openapi.json", "/healthz", "/readyz", "/api/session"}
+_NARROW = {"/api/site", "/api/objects", "/api/cameras", "/api/events", "/api/flags", "/api/past"}
+"""What answers everybody who has a token, each with what that is for."""
+_ADDRESSES = ("127.0.0.1", "127.0.0.1", "127.0.0.1", "127.0.0.1", "127.0.0.2", "127.0.0.9")
+"""From the last too many wrong tokens have come."""
+_WINDOW = 24
+_MADE = (".mjpeg", "best.jpg", "live.jpg")
+"""What starts a process that decodes."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Answered:
+    """What an answer was one to."""
+
+    status: int
+    method: str
+    path: str
+    """The address's pattern."""
+    object: int | None
+    """Whoever is asked for, by the number that they have now."""
+    camera: str | None
+    held: bool
+    """The view was to be of a camera."""
+
+
+class Strangers(Target):
+    """One request, of somebody or nobody."""
+
+    name = "http-unauthenticated"
+
+    def __init__(self) -> None:
+        self._folder = folder()
+        tokens = Path(self._folder.name) / "tokens.yaml"
+        listed: list[dict[str, object]] = [
+            {"name": f"token {who}", "sha256": token_digest(SECRETS[who]), **rights}
+            for who, rights in _RIGHTS.items()
+        ]
+        tokens.write_text(yaml.safe_dump({"tokens": listed}))
+        self._answered: list[_Answered] = []
+        self._served = Served(
+            {"access": {"tokens": str(tokens)}, "http": {"hls_segment_s": 0.2}}, one_each, before=self._watch
+        )
+        for number, name in _NAMES.items():
+            self._served.service.decider.people.registry.set_name(number, name)
+        self._authenticator = self._served.app[ACCESS].authenticator
+        ends = time.monotonic() + 1e9
+        self._sessions = {
+            token_digest(_COOKIES[who]): _Session(token_digest(SECRETS[who]), ends) for who in _WHO
+        }
+        self._paths = [it for it in self._served.described if not it[0].endswith(_MADE)]
+        self._pictures = {
+            "c0": _windows(0, 0.5) - _windows(1, 0.0),
+            "c1": _windows(1, 0.5) - _windows(0, 0.0),
+        }
+
+    def _watch(self, app: web.Application) -> None:
+        """Note what every answer is one to."""
+        app.on_response_prepare.append(self._note)
+
+    async def _note(self, request: web.Request, response: web.StreamResponse) -> None:
+        resource, names = request.match_info.route.resource, request.match_info
+        number = (
+            request.app[SERVICE].people.current_number(int(names["object"])) if "object" in names else None
+        )
+        self._answered.append(
+            _Answered(
+                status=response.status,
+                method=request.method,
+                path="" if resource is None else resource.canonical,
+                object=number,
+                camera=names.get("camera"),
+                held="camera" in request.query,
+            )
+        )
+
+    def make(self, rng: Random) -> bytes:
+        """Return the bytes of a request, and first from which address."""
+        path, queries = rng.choice(self._paths)
+        asked = address(rng, path, queries)
+        lines = ["Host: 127.0.0.1"]
+        for _ in range(rng.choice((0, 1, 1, 1, 1, 2))):
+            who = rng.choice(_WHO)
+            way = rng.random()
+            if way < 0.35:
+                kind = rng.choice(("Bearer", "Bearer", "bearer", "BEARER ", "Basic", ""))
+                lines.append(f"Authorization: {kind} {_nearly(rng, SECRETS[who])}")
+            elif way < 0.7:
+                asked += f"{'&' if '?' in asked else '?'}token={_nearly(rng, SECRETS[who])}"
+            else:
+                name = rng.choice(("myview_hall_0",) * 4 + ("myview", "MYVIEW_HALL_0"))
+                others = rng.choice(("", "a=b; ", "=; "))
+                lines.append(f"Cookie: {others}{name}={_nearly(rng, _COOKIES[who])}")
+        if rng.random() < 0.05:
+            lines.append(rng.choice(("X-Forwarded-For: 127.0.0.1", "Origin: http://x", some_range(rng))))
+        method, body = rng.choice(("GET",) * 12 + ("HEAD", "OPTIONS", "POST", "DELETE")), b""
+        if method == "POST":
+            asked, body = (
+                "/api/session",
+                as_json({"token": _nearly(rng, SECRETS[rng.choice(_WHO)])}),
+            )
+            lines += ["X-MyView-Changes: 1", f"Content-Length: {len(body)}"]
+        elif method == "DELETE":
+            asked = "/api/session"
+            lines.append("X-MyView-Changes: 1")
+        head = "\r\n".join([f"{method} {asked} HTTP/1.1", *lines, "Connection: close", "", ""])
+        request = head.encode("utf-8", "surrogateescape") + body
+        request = damaged(rng, request, WORDS) if rng.random() < 0.25 else request
+        return bytes([rng.randrange(len(_ADDRESSES))]) + request
+
+    def feed(self, data: bytes) -> bool:
+        """Ask, and look at what was answered to whom."""
+        came_from = _ADDRESSES[data[0] % len(_ADDRESSES)] if data else _ADDRESSES[0]
+        self._authenticator.sessions._sessions = dict(self._sessions)
+        self._authenticator._rate_limit._until = {_ADDRESSES[-1]: time.monotonic() + 1e9}
+        self._authenticator._valid.clear()
+        self._answered.clear()
+        answer = self._served.ask(data[1:], came_from)
+        granted = judged(data[1:], answer)
+        said = data + unquote_to_bytes(data)
+        who = {it for it in _WHO if SECRETS[it].encode() in said or _COOKIES[it].encode() in said}
+        for one in self._answered:
+            assert one.status >= HTTPStatus.BAD_REQUEST or _may(who, one), f"{sorted(who)}: {one}"
+        if not who & {"hall", "night"}:
+            self._nothing_else_of(who, answer)
+        return granted
+
+    def _nothing_else_of(self, who: set[str], answer: bytes) -> None:
+        pieces = {answer[at : at + _WINDOW] for at in range(0, len(answer) - _WINDOW, _WINDOW)}
+        for camera, theirs in self._pictures.items():
+            may = camera == "c0" and who & {"family", "door"}
+            assert may or theirs.isdisjoint(pieces), f"{sorted(who)}: a picture of {camera}"
+        for number, name in _NAMES.items():
+            assert name.encode() not in answer or (number == 1 and "family" in who), f"{sorted(who)}: {name}"
+
+    def close(self) -> None:
+        """End the server."""
+        self._served.close()
+        self._folder.cleanup()
+
+
+def _may(who: set[str], one: _Answered) -> bool:
+    """Return whether somebody who knows these secrets may have been given this answer."""
+    if one.path in _OPEN or one.method == "OPTIONS" or "night" in who:
+        return True
+    if "hall" in who:
+        return not one.path.startswith("/api/operator")
+    if one.path in _NARROW:
+        return bool(who & {"family", "door"})
+    if one.object is not None:
+        return "family" in who and one.object == 1 and not one.held
+    return one.camera == "c0" and "door" in who
+
+
+def _nearly(rng: Random, secret: str) -> str:
+    """Return a secret, mostly whole."""
+    if rng.random() < 0.5:
+        return secret
+    if rng.random() < 0.2:
+        return token_digest(secret)
+    hurt = damaged(rng, secret.encode()).decode("utf-8", "surrogateescape")
+    return hurt.replace("\r", "").replace("\n", "") if rng.random() < 0.8 else hurt
+
+
+def _windows(seed: int, begin: float) -> frozenset[bytes]:
+    """Return all pieces of a camera's pictures, in each from such a share of it on."""
+    found: set[bytes] = set()
+    for unit in pictures(seed, EPOCHS * STRIDE):
+        begins = range(round(begin * len(unit.data)), len(unit.data) - _WINDOW)
+        found.update(unit.data[at : at + _WINDOW] for at in begins)
+    return frozenset(found)

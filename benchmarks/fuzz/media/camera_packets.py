@@ -1,0 +1,109 @@
+"""What cameras and their recordings give: packets, and files."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+
+import av
+import msgspec
+import numpy as np
+
+from benchmarks.fuzz.engine.fed_site import FPS, HEIGHT, STRIDE, WIDTH, pictures
+from benchmarks.fuzz.engine.target import Target, folder, refused
+from benchmarks.fuzz.media.damaged_media import wrong
+from server.camera.passthrough.access_units import parse_packing
+from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
+from server.camera.passthrough.recording_source import PassthroughRecording
+from server.camera.sources.base import PictureSource, SourceEndedError
+from server.camera.sources.recording import Recording
+from server.system.errors import UserError
+
+
+def _take(source: PictureSource) -> None:
+    """Take the first frames of a recording, and close it."""
+    try:
+        for pulse in range(12):
+            source.take(pulse)
+    except SourceEndedError:
+        pass
+    finally:
+        source.close()
+
+
+class OwnPackets(Target):
+    """What a camera's own H.264 is packed in."""
+
+    name = "media-packets"
+
+    def __init__(self) -> None:
+        units = pictures(0, 2)
+        sps = b"\x67\x42\xc0\x1e\xd9"
+        avcc = b"\x01\x42\xc0\x1e\xff\xe1" + struct.pack(">H", len(sps)) + sps + b"\x01\x00\x02\x68\xce"
+        lengths = b"".join(struct.pack(">I", len(it)) + it for it in (b"\x65\x88\x84", b"\x41\x9a"))
+        self._right = ((avcc, lengths), (units[0].data[:40], units[1].data), (b"", units[0].data))
+
+    def make(self, rng: Random) -> bytes:
+        """Return what stands beside a stream, and a packet of it."""
+        beside, packet = rng.choice(self._right)
+        beside = wrong(rng, beside) if rng.random() < 0.6 else beside
+        packet = wrong(rng, packet) if rng.random() < 0.6 else packet
+        return msgspec.msgpack.encode((beside, packet))
+
+    def feed(self, data: bytes) -> bool:
+        """Unpack it."""
+        beside, packet = msgspec.msgpack.decode(data, type=tuple[bytes, bytes])
+        try:
+            parse_packing(beside).annex_b(packet)
+        except ValueError as error:
+            return refused(error)
+        return True
+
+
+class Files(Target):
+    """A recording, opened as a camera's source: each frame in its place however damaged the file is."""
+
+    name = "media-files"
+
+    def __init__(self) -> None:
+        self._folder, self._memory = TemporaryDirectory(), folder()
+        self._path = Path(self._folder.name) / "kept" / "c0.mp4"  # below /dev it would be taken for a camera
+        self._path.parent.symlink_to(self._memory.name)
+        with av.open(str(self._path), "w") as out:
+            stream = out.add_stream(
+                "libx264", rate=FPS, options={"preset": "ultrafast", "g": "5", "bf": "0", "sc_threshold": "0"}
+            )
+            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+            rng = np.random.default_rng(1)
+            for _ in range(10):
+                image = np.repeat(rng.integers(0, 255, (HEIGHT, WIDTH // 8, 3), dtype=np.uint8), 8, axis=1)
+                out.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))
+            out.mux(stream.encode())
+        self._file = self._path.read_bytes()
+
+    def make(self, rng: Random) -> bytes:
+        """Return a file."""
+        return wrong(rng, self._file)
+
+    def feed(self, data: bytes) -> bool:
+        """Take its frames; then those that are passed on as they are."""
+        self._path.write_bytes(data)
+        wanted = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
+        try:
+            recording = Recording(str(self._path), 0, "stop")
+        except UserError as error:
+            return refused(error)
+        _take(recording)
+        try:
+            own = PassthroughRecording(str(self._path), 0, "stop", wanted)
+        except (UserError, IncompatibleStreamError) as error:
+            return refused(error)
+        _take(own)
+        return True
+
+    def close(self) -> None:
+        """Take the folders away."""
+        self._folder.cleanup()
+        self._memory.cleanup()

@@ -1,0 +1,128 @@
+"""What a camera sends that is watched live: any of three forms, with sound or without."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+
+import av
+import numpy as np
+from av.video.stream import VideoStream
+
+from benchmarks.fuzz.engine.fed_site import FPS, HEIGHT, STRIDE, WIDTH
+from benchmarks.fuzz.engine.target import Scripts, folder, refused
+from benchmarks.fuzz.media.damaged_media import wrong
+from server.camera.audio.live_source import LiveAudioSource
+from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
+from server.camera.passthrough.stream_source import PassthroughStream
+from server.camera.sources.live_stream import LiveStream
+from server.camera.sources.opening import OpenedVideo
+from server.config.sections import SoundSettings
+from server.system.errors import UserError
+
+_FRAMES = 2 * STRIDE + 3
+"""What is looked at before it is passed on, and what waits meanwhile."""
+_FORMS = {"mpegts": "libx264", "h264": "libx264", "mpjpeg": "mjpeg"}
+
+
+class _Once(LiveStream):
+    """Reads until what the camera sends ends; what its thread raises is kept."""
+
+    failure: BaseException | None = None
+    units = 0
+    """That came out of what the camera sends."""
+
+    def _run(self, opened: OpenedVideo | None) -> None:
+        try:
+            if opened is not None:
+                self._read(opened)
+        except BaseException as error:  # noqa: BLE001 — in a thread nobody would see it
+            self.failure = error
+
+    def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+        self.units += bool(packet.size)
+        return super()._decode(packet)
+
+
+class _OwnOnce(PassthroughStream, _Once):
+    """The same where its access units are passed on."""
+
+    def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+        self.units += bool(packet.size)
+        return super()._decode(packet)
+
+
+class Live(Scripts):
+    """A camera that sends whatever it likes. How it is reached is FFmpeg's: here it is in a file."""
+
+    name = "media-live"
+    _wanted = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
+
+    def __init__(self) -> None:
+        self._folder, self._memory = TemporaryDirectory(), folder()
+        self._path = Path(self._folder.name) / "sent" / "camera"  # below /dev it would be taken for a device
+        self._path.parent.symlink_to(self._memory.name)
+        self._sent = [_sent(form, codec) for form, codec in _FORMS.items()]
+
+    def make(self, rng: Random) -> bytes:
+        """Return what is to be done with it, and what is sent."""
+        return rng.choice((b"D", b"P")) + wrong(rng, rng.choice(self._sent))
+
+    def feed(self, data: bytes) -> bool:
+        """Decode it, or pass its access units on."""
+        self._path.write_bytes(data[1:])
+        sound = LiveAudioSource(SoundSettings(source="c0"), FPS)
+        try:
+            if data[:1] == b"P":
+                self._watch(_OwnOnce(str(self._path), {}, sound, self._wanted), range(_FRAMES))
+            else:
+                self._watch(_Once(str(self._path), {}, sound), range(1))
+        except (UserError, IncompatibleStreamError) as error:
+            self.messages += 1
+            return refused(error)
+        sound.at(0)
+        return True
+
+    def _watch(self, stream: _Once, pulses: Iterable[int]) -> None:
+        stream._thread.join()
+        self.messages += stream.units
+        for pulse in pulses:
+            stream.take(pulse)
+        stream.close()
+        if stream.failure is not None:
+            raise stream.failure
+
+    def close(self) -> None:
+        """Take the folders away."""
+        self._folder.cleanup()
+        self._memory.cleanup()
+
+
+def _sent(form: str, codec: str) -> bytes:
+    """Return some GOPs as a camera sends them, with sound where the form has any."""
+    sent = io.BytesIO()
+    with av.open(sent, "w", format=form) as out:
+        stream = out.add_stream(codec, rate=FPS)
+        assert isinstance(stream, av.VideoStream)
+        if codec == "libx264":
+            stream.options = {"preset": "ultrafast", "g": str(STRIDE), "bf": "0", "sc_threshold": "0"}
+        stream.width, stream.height = WIDTH, HEIGHT
+        stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
+        heard = out.add_stream("aac", 48_000) if form == "mpegts" else None
+        rng = np.random.default_rng(1)
+        for frame in range(_FRAMES):
+            image = np.repeat(rng.integers(0, 255, (HEIGHT, WIDTH // 8, 3), dtype=np.uint8), 8, axis=1)
+            picture = av.VideoFrame.from_ndarray(image, format="bgr24").reformat(format=stream.pix_fmt)
+            picture.pts = frame
+            out.mux(stream.encode(picture))
+            if heard is not None:
+                tone = av.AudioFrame.from_ndarray(np.zeros((2, 1920), dtype=np.float32), "fltp", "stereo")
+                tone.sample_rate, tone.pts = 48_000, frame * 1920
+                out.mux(heard.encode(tone))
+        out.mux(stream.encode())
+        if heard is not None:
+            out.mux(heard.encode())
+    return sent.getvalue()

@@ -1,0 +1,156 @@
+"""Access units of two cameras, some damaged, through a site's streams in every form."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from random import Random
+from typing import Any, Literal
+
+import msgspec
+
+from benchmarks.fuzz.bus.messages import ask, drink
+from benchmarks.fuzz.engine.fed_site import CAMERAS, STRIDE, Fed, pictures, site, tracks, video, word
+from benchmarks.fuzz.engine.target import Scripts
+from benchmarks.fuzz.media.damaged_media import wrong
+from server.camera.encoding.encoder import AccessUnit
+from server.config.site_config import Config
+from server.messaging.epochs import end_of_epoch
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+
+_EPOCHS = 4
+_FRAMES = _EPOCHS * STRIDE
+_PEOPLE = (1, 2)
+_WHOLE = 1 / 64
+"""Of the inputs, so many are decided on by the service itself, which takes ten times as long."""
+_Cuts = list[tuple[int | None, int | None]]
+"""For each GOP: the camera that shows each of two people. Of none the service decides itself."""
+_Units = list[tuple[int, int, bytes]]
+"""Camera, pulse, access unit."""
+_script = msgspec.msgpack.Decoder(tuple[_Cuts, _Units])
+
+
+class _Splice(Scripts):
+    """Two cameras' frames, and where the streams of people are cut from one to the other."""
+
+    codec: Literal["h264", "vp8"] = "h264"
+    parameters = "equal"
+
+    def __init__(self) -> None:
+        self._pictures = [pictures(seed, _FRAMES, self.codec) for seed in range(len(CAMERAS))]
+        self._config = self._site()
+        self._loop = asyncio.new_event_loop()
+        self._decided: list[GopDecision] = []
+        right = [
+            (camera, pulse, units[pulse].data)
+            for pulse in range(_FRAMES)
+            for camera, units in enumerate(self._pictures)
+        ]
+        self._loop.run_until_complete(self._whole(right))
+
+    def _site(self) -> Config:
+        encode = {"gop": STRIDE, "codec": self.codec, "parameters": self.parameters}
+        return site(codec=self.codec, encode=encode)
+
+    def make(self, rng: Random) -> bytes:
+        """Return two cameras' frames in the order of their pulses."""
+        share = rng.choice((0.05, 0.1, 0.3))
+        whole = rng.random() < _WHOLE
+        gops = _EPOCHS if whole else rng.choice((2, 2, 3))
+        views = (0, 0, 1, 1, None)
+        cuts: _Cuts = [] if whole else [(rng.choice(views), rng.choice(views)) for _ in range(gops)]
+        script: _Units = []
+        for pulse in range(gops * STRIDE):
+            for camera, units in enumerate(self._pictures):
+                data = units[pulse].data
+                if rng.random() < share:
+                    data = wrong(rng, data) if rng.random() < 0.9 else b""
+                if rng.random() > share / 4:
+                    script.append((camera, pulse, data))
+        return msgspec.msgpack.encode((cuts, script))
+
+    def feed(self, data: bytes) -> bool:
+        """Splice them."""
+        cuts, units = _script.decode(data)
+        return self._loop.run_until_complete(self._cut(cuts, units) if cuts else self._whole(units))
+
+    async def _whole(self, units: _Units) -> bool:
+        """Decide by what cameras say of people, and ask everything that the API tells."""
+        service, rng = Fed(self._config), Random(1)
+        published, self._decided = service._publish, []
+
+        def publish(decision: GopDecision) -> None:
+            self._decided.append(decision)
+            published(decision)
+
+        service._publish = publish  # type: ignore[method-assign]  # what a cut is made like
+        viewers = [it.join() for it in _channels(service)]
+        for epoch in range(_EPOCHS):
+            self._show(service, units, epoch)
+            for name in CAMERAS:
+                service.handle(tracks(word(rng, name, epoch)))
+            service.pulse = end_of_epoch(epoch, STRIDE)
+            service.decide()
+        ask(service)
+        for viewer in viewers:
+            drink(viewer)
+        return not any(it.refused for it in service.intake.states.values())
+
+    async def _cut(self, cuts: _Cuts, units: _Units) -> bool:
+        """Cut where the input says, as it may come to anybody's mind: to pictures that never came, too."""
+        service = Fed(self._config)
+        viewers = [it.join() for it in _channels(service)]
+        before: dict[int, str | None] = dict.fromkeys(_PEOPLE)
+        for gop, chosen in enumerate(cuts):
+            self._show(service, units, gop)
+            now = {
+                number: None if it is None else CAMERAS[it]
+                for number, it in zip(_PEOPLE, chosen, strict=True)
+            }
+            choices = tuple(ObjectChoice(it, now[it], before[it], now[it] is None) for it in _PEOPLE)
+            decision = replace(
+                self._decided[0], first=gop * STRIDE, choices=choices, merged={}, corrections=()
+            )
+            service.past.put(service.board.put(decision), None)
+            service.splicer.publish_decision(decision)
+            if gop == 0:
+                viewers += [it.subscribe() for it in service.splicer.persons.values()]
+            before = now
+        for viewer in viewers:
+            drink(viewer)
+        return not any(it.refused for it in service.intake.states.values())
+
+    def _show(self, service: Fed, units: _Units, gop: int) -> None:
+        for camera, pulse, data in units:
+            if pulse // STRIDE == gop:
+                self.messages += 1
+                unit = AccessUnit(pulse=pulse, key=pulse % STRIDE == 0, data=data)
+                service.handle(video(CAMERAS[camera], unit))
+
+    def close(self) -> None:
+        """Close the loop."""
+        self._loop.close()
+
+
+def _channels(service: Fed) -> list[Any]:
+    return [*service.splicer.cameras.values(), *service.splicer.decided_cameras.values()]
+
+
+class Splice(_Splice):
+    """H.264 of one set of parameters."""
+
+    name = "media-splice"
+
+
+class SpliceOwn(_Splice):
+    """H.264 whose parameter sets are each camera's own."""
+
+    name = "media-splice-own"
+    parameters = "own"
+
+
+class SpliceVp8(_Splice):
+    """VP8."""
+
+    name = "media-splice-vp8"
+    codec = "vp8"

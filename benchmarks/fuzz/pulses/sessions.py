@@ -1,0 +1,133 @@
+"""Whole sessions of the pulse server and client, without sockets."""
+
+from __future__ import annotations
+
+import asyncio
+from random import Random
+
+import msgspec
+
+from benchmarks.fuzz.engine.target import Scripts
+from benchmarks.fuzz.pulses.fake_connection import Clock, Wire
+from benchmarks.fuzz.pulses.protocol_lines import CLIENT_LINES, SERVER_LINES, some_line
+from camsync import ClientSettings, PulseClient, PulseServer
+from camsync.protocol import parse_client_line, parse_server_line
+from camsync.server_connection import ServerConnection
+from server.messaging.number_types import Pulse
+
+_pulse = msgspec.json.Decoder(Pulse)
+Script = list[tuple[int, bytes]]
+"""Who says what: the number of a connection, and bytes in one piece."""
+_script = msgspec.msgpack.Decoder(Script)
+
+
+def _scripted(rng: Random, lines: tuple[bytes, ...], connections: int) -> bytes:
+    script: Script = []
+    for _ in range(rng.randrange(1, 10)):
+        line = some_line(rng, lines)
+        at = rng.randrange(len(line) + 1) if rng.random() < 0.2 else len(line)
+        who = rng.randrange(connections)
+        script += [(who, part) for part in (line[:at], line[at:]) if part]
+    return msgspec.msgpack.encode(script)
+
+
+class ServerSessions(Scripts):
+    """Three connections to a server, which must go on to speak its own protocol to them all."""
+
+    name = "pulse-server"
+
+    def __init__(self) -> None:
+        self._loop = asyncio.new_event_loop()
+
+    def make(self, rng: Random) -> bytes:
+        """Return who says what."""
+        return _scripted(rng, CLIENT_LINES, 3)
+
+    def feed(self, data: bytes) -> bool:
+        """Let them say it; then let a second pass."""
+        return self._loop.run_until_complete(self._session(_script.decode(data)))
+
+    async def _session(self, script: Script) -> bool:
+        clock = Clock()
+        server = PulseServer(25.0, expect=("c0",), clock=clock)
+        hub = server._registry
+        wires = [Wire() for _ in range(3)]
+        peers = [hub.new_connection() for _ in wires]
+        for peer, wire in zip(peers, wires, strict=True):
+            peer.connection_made(wire)
+        for who, said in script:
+            if not wires[who].closed:
+                self.messages += said.count(b"\n")
+                peers[who].data_received(said)
+            clock.now += 0.01
+        server._begin_without() if server.epoch is None else None
+        for _ in range(3):
+            clock.now += 0.04
+            server._tick()
+        errors = sum(it.errors for it in server.clients())
+        for wire in wires:
+            self._spoken(wire)
+        if server.pulse is not None:
+            _pulse.decode(str(server.pulse).encode())  # a number that cameras can say in turn
+        await server.stop()
+        for peer in peers:
+            peer.connection_lost(None)
+        return errors == 0 and not any(wire.closed for wire in wires)
+
+    @staticmethod
+    def _spoken(wire: Wire) -> None:
+        for line in wire.lines:
+            assert parse_server_line(line) is not None, line
+
+    def close(self) -> None:
+        """Close the loop."""
+        self._loop.close()
+
+
+class ClientSessions(Scripts):
+    """A client that is told anything by its server: numbers rise, and it ends in words or goes on."""
+
+    name = "pulse-client"
+
+    def __init__(self) -> None:
+        self._loop = asyncio.new_event_loop()
+
+    def make(self, rng: Random) -> bytes:
+        """Return what the server says, mostly after a greeting that is right."""
+        if rng.random() < 0.8:
+            first: Script = [(0, rng.choice(SERVER_LINES[:2]))]
+            return msgspec.msgpack.encode([*first, *_script.decode(_scripted(rng, SERVER_LINES, 1))])
+        return _scripted(rng, SERVER_LINES, 1)
+
+    def feed(self, data: bytes) -> bool:
+        """Send one line, then wait a second."""
+        return self._loop.run_until_complete(self._session(_script.decode(data)))
+
+    async def _session(self, script: Script) -> bool:
+        clock = Clock()
+        client = PulseClient("nowhere", 1, "c0", settings=ClientSettings(queue=10_000), clock=clock)
+        link = ServerConnection(client._receive, client._hello, clock, 1.0, 5.0)
+        client._link = link
+        wire = Wire()
+        link.connection_made(wire)
+        for _, said in script:
+            if not wire.closed:
+                self.messages += said.count(b"\n")
+                link.data_received(said)
+            clock.now += 0.01
+        for _ in range(3):
+            clock.now += 0.2
+            client._count_alone(clock.now)
+        for line in wire.written.splitlines():
+            parse_client_line(line)
+        client.status()
+        client._hello()
+        numbers = [it.number for it in client._queue]
+        assert numbers == sorted(set(numbers)), "pulses go back"
+        link.end("over")
+        client._cancel_timer()
+        return "protocol" not in link.lost.result()
+
+    def close(self) -> None:
+        """Close the loop."""
+        self._loop.close()

@@ -1,0 +1,103 @@
+"""The pulse protocol over TCP: a real server, which answers others meanwhile, and a real client."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from random import Random
+
+from benchmarks.fuzz.engine.event_loops import HurryingLoop, leaves_no_trace
+from benchmarks.fuzz.engine.target import Scripts, refused
+from benchmarks.fuzz.pulses.protocol_lines import CLIENT_LINES, SERVER_LINES, some_line
+from camsync import PulseClient, PulseServer, SyncError, query_clients
+from camsync.messages import ClientList, ErrorMessage
+from camsync.protocol import parse_server_line
+
+_OTHERS_EVERY = 20
+_LISTENS_S = 0.25
+"""So long a client hears what it was told, and comes again for more."""
+_SELDOM = 8
+"""Who says that nothing more will come leaves a port that is taken for a minute."""
+
+
+class Sockets(Scripts):
+    """What somebody says to the server, or to a client."""
+
+    name = "pulse-sockets"
+
+    def __init__(self) -> None:
+        self._loop = HurryingLoop()
+        self._server = PulseServer(25.0, clock=self._loop.time)
+        self._loop.run_until_complete(self._server.start())
+        self._said = b""
+        self._stranger = self._loop.run_until_complete(asyncio.start_server(self._say, "127.0.0.1", 0))
+        self._fed = 0
+
+    def make(self, rng: Random) -> bytes:
+        """Return what a connection says, to the server or to a client."""
+        lines = rng.choice((CLIENT_LINES, SERVER_LINES))
+        said = b"".join(some_line(rng, lines) for _ in range(rng.randrange(1, 6)))
+        return (b"C" if lines is CLIENT_LINES else b"S") + said
+
+    def feed(self, data: bytes) -> bool:
+        """Send the bytes."""
+        said = self._to_server if data[:1] == b"C" else self._to_client
+        return self._loop.run_until_complete(said(data[1:]))
+
+    async def _to_server(self, data: bytes) -> bool:
+        reader, writer = await asyncio.open_connection("127.0.0.1", self._server.port)
+        leaves_no_trace(writer.get_extra_info("socket"))
+        said = data + b"\n"
+        self.messages += said.count(b"\n")
+        writer.write(said + b"WHO\n")
+        heard = []
+        with contextlib.suppress(ConnectionError, TimeoutError):
+            # Who has left too much unread is not told who is there.
+            async with asyncio.timeout(0.3):
+                while line := await reader.readline():
+                    heard.append(parse_server_line(line.rstrip(b"\n")))
+                    if isinstance(heard[-1], ClientList) or _ended(heard[-1]):
+                        break
+        writer.transport.abort()
+        self._fed += 1
+        if self._fed % _OTHERS_EVERY == 0 or not heard:
+            await query_clients("127.0.0.1", self._server.port)
+        return not any(isinstance(it, ErrorMessage) for it in heard)
+
+    async def _say(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        leaves_no_trace(writer.get_extra_info("socket"))
+        with contextlib.suppress(OSError):
+            writer.write(self._said)
+            await writer.drain()
+            if len(self._said) % _SELDOM == 0:
+                writer.write_eof()
+            else:
+                writer.close()
+
+    async def _to_client(self, data: bytes) -> bool:
+        self._said = data
+        self.messages += data.count(b"\n")  # once, however often the client comes again for more
+        port = self._stranger.sockets[0].getsockname()[1]
+        client = PulseClient("127.0.0.1", port, "c0", clock=self._loop.time)
+        client.start()
+        try:
+            async with asyncio.timeout(_LISTENS_S):
+                async for _ in client:
+                    pass
+        except TimeoutError:
+            return client.status().connections > 0
+        except SyncError as error:
+            return refused(error)
+        finally:
+            await client.close()
+        return True
+
+    def close(self) -> None:
+        """Stop the server."""
+        self._stranger.close()
+        self._loop.run_until_complete(self._server.stop())
+        self._loop.close()
+
+
+def _ended(message: object) -> bool:
+    return isinstance(message, ErrorMessage) and message.code in {"flood", "overlong", "stopped", "full"}

@@ -1,0 +1,118 @@
+"""`myview up` on replayed views, on ports that are free."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import sys
+from collections.abc import AsyncIterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import aiohttp
+import yaml
+
+from benchmarks.common.environment import one_thread_environment
+from server.cli.generated_config import free_port
+
+CONFIG = "site.yaml"
+LOG = "up.log"
+_POLL_S = 0.2
+_START_S = 150.0
+_END_S = 15.0
+
+
+class Played(Protocol):
+    """What the configuration of a site needs to know of the views that it plays."""
+
+    @property
+    def cameras(self) -> list[dict[str, Any]]:
+        """The configuration's cameras."""
+
+    @property
+    def site(self) -> dict[str, Any]:
+        """The configuration's site."""
+
+    @property
+    def ground(self) -> Path | None:
+        """Homographies to the ground plane."""
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A site that is running."""
+
+    url: str
+    bus: str
+    """Where its zenoh router listens."""
+    process: asyncio.subprocess.Process
+
+
+@contextlib.asynccontextmanager
+async def running_site(
+    views: Played,
+    folder: Path,
+    environment: Mapping[str, str] | None = None,
+    settings: Mapping[str, Mapping[str, Any]] | None = None,
+) -> AsyncIterator[Site]:
+    """Run `myview up` on the views; its log goes into the folder.
+
+    `environment` and `settings`, by section, are set besides.
+
+    Raises:
+        RuntimeError: it did not start; why stands in the log.
+    """
+    sync, bus, http = (free_port() for _ in range(3))
+    address = f"tcp/127.0.0.1:{bus}"
+    content: dict[str, Any] = {
+        "site": views.site,
+        "cameras": views.cameras,
+        "sync": {"port": sync},
+        "zenoh": {"connect": address, "listen": address},
+        "http": {"port": http},
+    }
+    if views.ground is not None:
+        content["ground"] = str(views.ground.absolute())
+    for section, values in (settings or {}).items():
+        content[section] = {**content.get(section, {}), **values}
+    config = folder / CONFIG
+    config.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    with (folder / LOG).open("w", encoding="utf-8") as log:
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "server.cli.main", "up", str(config)),
+            env={**one_thread_environment(), **(environment or {})},
+            stdout=log,
+            stderr=log,
+        )
+    site = Site(f"http://127.0.0.1:{http}/", address, process)
+    try:
+        await _until_up(site)
+        yield site
+    finally:
+        await _end(process)
+
+
+async def _until_up(site: Site) -> None:
+    """Wait until the best-view service answers: before the first pulse, which it is waited for."""
+    loop = asyncio.get_running_loop()
+    give_up = loop.time() + _START_S
+    async with aiohttp.ClientSession() as session:
+        while loop.time() < give_up and site.process.returncode is None:
+            with contextlib.suppress(aiohttp.ClientError):
+                async with session.get(f"{site.url}healthz") as answer:
+                    if answer.ok:
+                        return
+            await asyncio.sleep(_POLL_S)
+    raise RuntimeError("`myview up` did not start")
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    if process.returncode is not None:
+        return
+    process.terminate()
+    try:
+        await asyncio.wait_for(process.wait(), _END_S)
+    except TimeoutError:
+        process.kill()
+        await process.wait()

@@ -1,0 +1,55 @@
+"""The page in Chromium: which frame was shown when."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+
+from playwright.async_api import Browser
+
+from benchmarks.common.process_load import busy_now
+
+_PLAYING_MS = 60_000
+_READ_EVERY_S = 10.0
+"""The page remembers some 80 seconds of frames."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What the page showed while it was measured."""
+
+    object: int
+    at: dict[int, float]
+    """By pulse: when it was first shown, unix seconds."""
+    lookahead: int
+    """Frames of delay that the site declares."""
+    fps: float
+    cores: dict[str, float]
+    """Cores in use meanwhile, by what used them."""
+
+
+async def watch_page(browser: Browser, url: str, settle_s: float, seconds: float) -> Shown:
+    """Open the page, let it play for a while, and note the frames of the seconds after that."""
+    # The page's policy forbids eval, which it is asked with here.
+    page = await browser.new_page(viewport={"width": 1280, "height": 800}, bypass_csp=True)
+    try:
+        await page.goto(url)
+        await page.wait_for_function(
+            "myview.state === 'playing' && myview.delays.length > 0", timeout=_PLAYING_MS
+        )
+        await asyncio.sleep(settle_s)
+        begin, before = await page.evaluate("Date.now()"), busy_now()
+        at: dict[int, float] = {}
+        left = seconds
+        while left > 0:
+            await asyncio.sleep(min(left, _READ_EVERY_S))
+            left -= _READ_EVERY_S
+            for shown in await page.evaluate("myview.delays"):
+                if shown["shownAt"] >= begin:
+                    at.setdefault(shown["pulse"], shown["shownAt"] / 1e3)
+        cores = busy_now().cores_since(before)
+        site = await page.evaluate("myview.site")
+        number = await page.evaluate("myview.object")
+        return Shown(int(number), at, int(site["lookahead_frames"]), float(site["fps"]), cores)
+    finally:
+        await page.close()

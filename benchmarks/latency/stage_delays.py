@@ -1,0 +1,112 @@
+"""From what was heard and seen to the delay of every frame, split by stage; the stages add up to the whole.
+
+A GOP is decided and sent at once, when the tracks of its whole look-ahead are there: its first frame is then
+due to be shown, and its k-th frame k frames later. Both waits, for the frames ahead and behind the GOP's
+earlier frames, are the look-ahead's; together they are the same for every frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.latency.bus_subscriber import Decision, Marks
+from benchmarks.latency.shown_frames import Shown
+
+STAGES = {
+    "taken": "from when the pulse is due to the picture",
+    "encoded": "the picture to H.264",
+    "received": "over the bus, by a subscriber of the best view's router",
+    "look-ahead": "until the last frame that the decision looks at is due",
+    "solved": "until every camera in time has found, tracked, solved up to it",
+    "decided": "until it is decided and heard on the bus; late cameras awaited",
+    "shown": "HTTP, the player's buffer, decoding, the screen",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Delays:
+    """Seconds of every frame that was shown and whose way is known."""
+
+    pulses: NDArray[np.int64]
+    """``(frames,)``, ascending."""
+    stages: NDArray[np.float64]
+    """``(frames, stages)`` in the order of :data:`STAGES`."""
+    shown_share: float
+    """Frames shown, of all between the first and the last shown."""
+    unknown: int
+    """Frames shown that are left out, because a part of their way was not heard of."""
+    gops: int
+    """Decisions on what was shown."""
+    late: int
+    """Of these: made before every camera had solved its window."""
+
+    @property
+    def totals(self) -> NDArray[np.float64]:
+        """Seconds from due to shown, ``(frames,)``."""
+        total: NDArray[np.float64] = self.stages.sum(axis=1)
+        return total
+
+
+def split(marks: Marks, shown: Shown) -> Delays:
+    """Split the delay of every frame that was shown.
+
+    Raises:
+        ValueError: there is none whose way is known.
+    """
+    rows = sorted(_rows(marks, shown))
+    if not rows:
+        raise ValueError("no frame was shown whose way is known")
+    first, last = min(shown.at), max(shown.at)
+    decisions = [it for it in marks.decisions if first <= it.first <= last]
+    return Delays(
+        pulses=np.array([pulse for pulse, _ in rows]),
+        stages=np.array([stages for _, stages in rows]),
+        shown_share=len(shown.at) / (last - first + 1),
+        unknown=len(shown.at) - len(rows),
+        gops=len(decisions),
+        late=sum(_solved(marks, it, shown.lookahead).late for it in decisions),
+    )
+
+
+def _rows(marks: Marks, shown: Shown) -> Iterator[tuple[int, list[float]]]:
+    for decision in marks.decisions:
+        camera = decision.choices.get(shown.object)
+        if camera is None:
+            continue
+        solved = _solved(marks, decision, shown.lookahead)
+        for pulse in range(decision.first, decision.first + decision.frames):
+            frame, at = marks.frames.get((camera, pulse)), shown.at.get(pulse)
+            if frame is None or at is None:
+                continue
+            turn = (pulse - decision.first) / shown.fps
+            ahead = frame.due + (solved.last - pulse) / shown.fps
+            ready = ahead if solved.at is None else solved.at
+            times = [frame.due, frame.taken, frame.encoded, frame.received]
+            times += [moment + turn for moment in (ahead, ready, decision.received)]
+            yield pulse, [float(step) for step in np.diff([*times, at])]
+
+
+@dataclass(frozen=True, slots=True)
+class _Solved:
+    last: int
+    """The window's last pulse."""
+    at: float | None
+    """When the last of the cameras in time had solved it; None when no camera was."""
+    late: bool
+    """Some camera was not."""
+
+
+def _solved(marks: Marks, decision: Decision, lookahead: int) -> _Solved:
+    """Find the first window that reaches to the end of a decision's look-ahead.
+
+    Cameras that had not solved it when the decision was heard of were decided without.
+    """
+    needed = decision.first + lookahead - 1
+    last = min((last for last in marks.solved if last >= needed), default=needed)
+    times = marks.solved.get(last, {}).values()
+    in_time = [at for at in times if at <= decision.received]
+    return _Solved(last, max(in_time, default=None), len(in_time) < len(times))

@@ -1,0 +1,216 @@
+"""Four live cameras at 25 frames a second of CIF: does tracking keep up, and what does each stage cost?
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.live_cameras --out out/bench
+
+Runs a real site (`myview up`), all seven processes on this machine, on recordings played again and again or
+on the embedded scene (`--views room`). Costs are processor time inside the real camera processes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from benchmarks.common.environment import CannotRunError, finish, parser
+from benchmarks.common.process_load import OTHER, Busy, busy_now
+from benchmarks.common.recorded_views import ROOM
+from benchmarks.common.report import Report
+from benchmarks.latency.bus_subscriber import Marks, listening
+from benchmarks.latency.running_site import LOG, running_site
+from benchmarks.live_cameras.frame_counters import Counts, read_counts
+from benchmarks.live_cameras.looped_views import CAMERAS, CROWD, FPS, Live, live_views, usual_views
+from benchmarks.live_cameras.stage_times import REST, STAGES, StageTimes, hooked_environment, read_stages
+from tracking.boxes import Floats
+
+_OWN = "measuring"
+_MS = 1e3
+_WAITS = {
+    "taken": "from when the pulse is due to the picture",
+    "encoded": "the picture to H.264",
+    "received": "over the bus",
+    "solved": "from when a window's last frame is due until the window is solved",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """All that is read at one moment."""
+
+    busy: Busy
+    counts: Counts
+    stages: Mapping[str, StageTimes]
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """A run between two moments."""
+
+    start: Moment
+    stop: Moment
+    marks: Marks
+    first_pulse: int
+
+    @property
+    def milliseconds(self) -> dict[str, dict[str, float]]:
+        """Processor milliseconds per frame by camera and stage."""
+        return {
+            camera: times.milliseconds_since(self.start.stages[camera])
+            for camera, times in self.stop.stages.items()
+        }
+
+    @property
+    def counts(self) -> Counts:
+        """What was counted between."""
+        return self.stop.counts.since(self.start.counts)
+
+    @property
+    def solved(self) -> Floats:
+        """Each camera's windows: the last pulse, and the seconds from when it was due, `(windows, 2)`."""
+        due = {pulse: frame.due for (_, pulse), frame in self.marks.frames.items()}
+        rows = [
+            (last, at - due[last])
+            for last, cameras in sorted(self.marks.solved.items())
+            for at in cameras.values()
+            if last in due and last >= self.first_pulse
+        ]
+        return np.array(rows, dtype=np.float64).reshape(-1, 2)
+
+
+async def watch(live: Live, folder: Path, settle_s: float, seconds: float) -> Watched:
+    """Run the site and watch it.
+
+    Raises:
+        RuntimeError: the site did not start.
+    """
+    times = folder / "stages"
+    times.mkdir()
+
+    async def moment() -> Moment:
+        return Moment(busy_now(), await read_counts(site.url), read_stages(times))
+
+    async with running_site(live, folder, hooked_environment(times)) as site:
+        with listening(site.bus) as marks:
+            await asyncio.sleep(settle_s)
+            start = await moment()
+            first_pulse = max((pulse for _, pulse in marks.frames), default=0)
+            await asyncio.sleep(seconds)
+            stop = await moment()
+    if not start.stages:
+        raise RuntimeError("the cameras did not start in time; --settle gives them longer")
+    return Watched(start, stop, marks, first_pulse)
+
+
+def describe(report: Report, name: str, watched: Watched) -> None:
+    """Print the tables and the verdict."""
+    counts = watched.counts
+    report.table(
+        f"myview up, {CAMERAS} cameras of {name} at {FPS:g} a second: frames",
+        ["camera", "received", "missed", "not searched", "messages not understood"],
+        [
+            [camera, str(it["frames"]), str(it["missed"]), str(it["shed"]), str(it["bad_messages"])]
+            for camera, it in counts.cameras.items()
+        ],
+    )
+    _describe_stages(report, watched.milliseconds)
+    _describe_waits(report, watched)
+    cores = watched.stop.busy.cores_since(watched.start.busy)
+    own = sum(used for who, used in cores.items() if who not in {OTHER, _OWN})
+    report.say("cores in use: " + ", ".join(f"{who} {used:.2f}" for who, used in cores.items()))
+    report.say(f"MyView's processes together: {own:.2f} cores of {os.cpu_count()}")
+    keeps_up = "yes" if counts.dropped == 0 and counts.late == 0 else "NO"
+    report.say(f"keeps up: {keeps_up}; frames dropped: {counts.dropped}, windows late: {counts.late}")
+
+
+def _describe_stages(report: Report, used: Mapping[str, Mapping[str, float]]) -> None:
+    names = {**STAGES, REST: "pulses, event loop, the bus's threads, thumbnails"}
+    rows = [
+        [stage, *(f"{used[camera][stage]:.2f}" for camera in used), _cores(used, [stage]), what]
+        for stage, what in names.items()
+    ]
+    total = [f"{sum(used[camera].values()):.2f}" for camera in used]
+    rows.append(["together", *total, _cores(used, list(names)), ""])
+    report.table("processor ms per frame", ["stage", *used, "cores, all", "what"], rows)
+
+
+def _cores(used: Mapping[str, Mapping[str, float]], stages: list[str]) -> str:
+    return f"{FPS / _MS * sum(camera[stage] for camera in used.values() for stage in stages):.2f}"
+
+
+def _describe_waits(report: Report, watched: Watched) -> None:
+    frames = [it for (_, pulse), it in watched.marks.frames.items() if pulse >= watched.first_pulse]
+    times = np.array([(it.due, it.taken, it.encoded, it.received) for it in frames]).reshape(-1, 4)
+    waits = [*np.diff(times, axis=1).T, watched.solved[:, 1]]
+    rows = [
+        [name, *(f"{_MS * value:.1f}" for value in np.percentile(wait, [50, 95, 100])), what]
+        for (name, what), wait in zip(_WAITS.items(), waits, strict=True)
+    ]
+    report.table("by the clock, ms", ["stage", "p50", "p95", "most", "what"], rows)
+
+
+def plot(watched: Watched, name: str, path: Path) -> None:
+    """Draw what each stage costs, and how long windows took over time."""
+    figure = Figure(figsize=(9, 6))
+    bars, line = figure.subplots(2, 1)
+    used = watched.milliseconds
+    left = np.zeros(len(used))
+    for stage in (*STAGES, REST):
+        values = np.array([camera[stage] for camera in used.values()])
+        bars.barh(list(used), values, left=left, label=stage, height=0.6)
+        left += values
+    bars.set(
+        xlabel="processor ms per frame", title=f"myview up, {CAMERAS} cameras of {name} at {FPS:g} a second"
+    )
+    bars.axvline(_MS / FPS, color="black", linestyle="--", linewidth=1, label="one core, all of the time")
+    bars.legend(ncols=5, fontsize="small")
+    solved = watched.solved
+    line.plot((solved[:, 0] - watched.first_pulse) / FPS, _MS * solved[:, 1], ".", markersize=3)
+    line.set(xlabel="seconds", ylabel="a window is solved after, ms", ylim=(0, None))
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+def measure(options: argparse.Namespace) -> None:
+    """Measure, print and save."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    name = options.views or usual_views(options.data)
+    with tempfile.TemporaryDirectory(prefix="myview-live-") as temporary:
+        folder = Path(temporary)
+        live = live_views(name, options.data, folder)
+        report = Report()
+        try:
+            watched = asyncio.run(watch(live, folder, options.settle, options.seconds))
+        except Exception:
+            if (log := folder / LOG).exists():
+                report.say(log.read_text(encoding="utf-8"))
+            raise
+    describe(report, name, watched)
+    plot(watched, name, options.out / f"live_cameras-{name}.png")
+    report.save(options.out / f"live_cameras-{name}.txt")
+
+
+def main() -> None:
+    """Run the benchmark."""
+    options = parser(__doc__, "live_cameras")
+    options.add_argument(
+        "--views",
+        choices=(CROWD, ROOM),
+        help="recordings of the data folder or the scene; crowd where it is there",
+    )
+    options.add_argument("--settle", type=float, default=20.0, help="seconds before measuring")
+    options.add_argument("--seconds", type=float, default=60.0, help="seconds to measure")
+    try:
+        measure(options.parse_args())
+    except CannotRunError as problem:
+        finish(problem, "live_cameras")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+"""A clip tracked live, with an operator at the screen or without."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.operator_assist.clips import Clip
+from benchmarks.operator_assist.flag_selection import Desk
+from benchmarks.operator_assist.identity_failures import Failure, failures
+from benchmarks.operator_assist.simulated_operator import Flag, Operator, Person
+from server.config.sections import FlagSettings
+from tracking import CostSettings, WindowResult, WindowSettings, create_solver
+from tracking.boxes import Floats
+from tracking.interactive import InteractiveSettings, InteractiveTracker, PositionCorrection, RiskEvent
+from tracking.solvers import DEFAULT_SOLVER
+
+_ALL = FlagSettings(per_minute=600, risk=0.0)
+_BATCH = 3
+"""Frames of which pointings are sent together: a tenth of a second."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """How a camera tracks."""
+
+    window: WindowSettings
+    costs: CostSettings
+    assist: InteractiveSettings
+
+
+FISH = Setup(
+    WindowSettings(
+        max_height_ratio=2.5,
+        gate_heights=1.0,
+        gate_growth=0.4,
+        birth_max_iou=0.05,
+        birth_min_peak_score=0.7,
+        birth_min_score=0.5,
+        birth_min_visible=0.8,
+    ),
+    CostSettings(displacement=1.0, gate=1.2, motion_slack=0.5, motion_drift=0.1, reappearance_drift=0.1),
+    InteractiveSettings(enabled=True),
+)
+"""What is counted in heights of a box, for bodies that are three times as long as high, and turn.
+
+Nobody comes or goes: who is new where somebody is known is a part of them."""
+
+PLAYERS = Setup(WindowSettings(), CostSettings(), InteractiveSettings(enabled=True))
+"""MyView's defaults."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Watched:
+    """What came of a clip.
+
+    Attributes:
+        clip: the clip.
+        failures: where identities failed, with all mended that was.
+        troubles: what was foreseen, with the newest frame when it was.
+        flags: what the operator was asked.
+        tracks: the boxes by frame and id.
+    """
+
+    clip: Clip
+    failures: list[Failure]
+    troubles: list[tuple[int, RiskEvent]]
+    flags: list[Flag]
+    tracks: dict[int, dict[int, Floats]]
+
+
+def watch(clip: Clip, setup: Setup, person: Person | None = None, desk: Desk | None = None) -> Watched:
+    """Track a clip as a camera does, frame by frame; nobody helps where there is no person.
+
+    Flags are raised at the desk; without one, for all that is foreseen.
+    """
+    desk = desk or Desk(_ALL, clip.fps)
+    desk.begin()
+    tracker = InteractiveTracker(setup.window, setup.costs, create_solver(DEFAULT_SOLVER), setup.assist)
+    operator = Operator(person, desk, clip.truth, clip.fps, clip.seed) if person else None
+    shown: dict[int, dict[int, Floats]] = {}
+    troubles: list[tuple[int, RiskEvent]] = []
+    waiting: list[PositionCorrection] = []
+    count = len(clip.seen)
+    for newest in range(count + (operator.after if operator else 0)):
+        if newest < count:
+            result = tracker.push(newest, clip.seen[newest])
+            _show(shown, result)
+            found: Sequence[RiskEvent] = result.risk_events if result else ()
+            troubles += [(newest, it) for it in found]
+            if operator:
+                operator.hear(newest, found)
+        elif newest == count:
+            _show(shown, tracker.flush())
+        pointing = operator.look(newest, shown) if operator else None
+        waiting += [pointing] if pointing else []
+        if waiting and newest % _BATCH == 0:
+            _show(shown, tracker.apply_corrections(waiting))
+            waiting = []
+    _show(shown, tracker.flush())
+    _show(shown, tracker.apply_corrections(waiting))
+    failed = failures(clip.truth, shown, clip.fps)
+    return Watched(clip, failed, troubles, operator.flags if operator else [], shown)
+
+
+def _show(shown: dict[int, dict[int, Floats]], result: WindowResult | None) -> None:
+    """Replace what was said of the frames of a result."""
+    if result is None:
+        return
+    for frame in range(result.first, result.last + 1):
+        rows = {track.id: track.interpolated[frame - result.first] for track in result.tracks}
+        shown[frame] = {number: box for number, box in rows.items() if not np.isnan(box[0])}

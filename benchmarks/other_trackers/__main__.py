@@ -1,0 +1,159 @@
+"""MyView beside other trackers on the same public detections: HOTA, MOTA, IDF1, identity switches.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.other_trackers --data ../shared/data --out out/bench
+
+All with their own defaults, MyView too: what `myview track --det` gives. The peers are installed by pip into
+an environment of their own, which is kept in the user's cache; where that cannot be, only MyView is
+measured. Perfect association is the ceiling: every detection joined to the person it is at.
+"""
+
+from __future__ import annotations
+
+from argparse import BooleanOptionalAction
+from collections.abc import Iterator
+from pathlib import Path
+
+import matplotlib as mpl
+
+from benchmarks.common.environment import CannotRunError, finish, parser
+from benchmarks.common.public_detections import Recording, find_recordings, track
+from benchmarks.common.report import Report
+from benchmarks.other_trackers.plots import plot
+from benchmarks.other_trackers.virtual_environment import (
+    PACKAGES,
+    PEERS,
+    PeerEnvironment,
+    PeersAwayError,
+    default_folder,
+    peer_environment,
+)
+from tracking.evaluation import HEADINGS, Scores, average_scores, format_scores, oracle_association
+from tracking.motchallenge import MotRow, read_rows
+
+_SHOWN = (
+    "hota",
+    "deta",
+    "assa",
+    "mota",
+    "idf1",
+    "recall",
+    "precision",
+    "switches",
+    "tracks",
+    "objects",
+)
+_HEADINGS = [HEADINGS[score] for score in _SHOWN]
+
+OURS, PICTURES, CEILING = "MyView", "MyView, pictures", "perfect association"
+
+Table = dict[str, dict[str, Scores]]
+"""By sequence, then by tracker."""
+
+
+def environment(folder: Path, report: Report) -> PeerEnvironment | None:
+    """Return the peers' environment, or say why there is none."""
+    try:
+        return peer_environment(folder)
+    except PeersAwayError as problem:
+        report.say(f"without the peers, which cannot be installed here: {problem}")
+        return None
+
+
+def tracks_of(
+    sequence: Recording, peers: PeerEnvironment | None, report: Report, *, pictures: bool
+) -> Iterator[tuple[str, list[MotRow]]]:
+    """Yield everybody's tracks of a sequence, MyView's first and perfect association's last."""
+    yield OURS, track(sequence)
+    if pictures and sequence.video is not None and sequence.video.is_file():
+        yield PICTURES, track(sequence, pictures=True)
+    if peers is not None:
+        yield from _peers_tracks(sequence, peers, report)
+    yield CEILING, oracle_association(read_rows(sequence.detections), read_rows(sequence.truth))
+
+
+def _peers_tracks(
+    sequence: Recording, peers: PeerEnvironment, report: Report
+) -> Iterator[tuple[str, list[MotRow]]]:
+    for peer in PEERS:
+        try:
+            yield peer.name, peers.track(peer, sequence.detections)
+        except PeersAwayError as problem:
+            report.say(f"{sequence.name}: without {peer.name}: {problem}")
+
+
+def difference(peers: PeerEnvironment, sequence: Recording, tracks: list[MotRow], scores: Scores) -> float:
+    """Return by how much the peers' own evaluation, which follows TrackEval, differs from ours at most."""
+    theirs = peers.score(read_rows(sequence.truth), tracks)
+    return max(abs(float(getattr(scores, name)) - value) for name, value in theirs.items())
+
+
+def lead(table: Table) -> list[list[str]]:
+    """Compare MyView with the best peer of each score: more is better, but for switches."""
+    rows = []
+    names = [peer.name for peer in PEERS]
+    for sequence, found in table.items():
+        peers = [found[name] for name in names if name in found]
+        if peers:
+            ours = found[OURS]
+            shares = [
+                f"{100 * (getattr(ours, name) - max(getattr(it, name) for it in peers)):+.1f}"
+                for name in ("hota", "mota", "idf1")
+            ]
+            rows.append([sequence, *shares, f"{ours.switches - min(it.switches for it in peers):+d}"])
+    return rows
+
+
+def run(options_data: Path, out: Path, folder: Path, names: list[str] | None, *, pictures: bool) -> None:
+    """Measure, print and save."""
+    sequences = find_recordings(options_data, names)
+    report = Report()
+    report.say(f"peers: {', '.join(PACKAGES)}, with their defaults")
+    peers = environment(folder, report)
+    table: Table = {}
+    worst = 0.0
+    for sequence in sequences:
+        found = table[sequence.name] = {}
+        for name, tracks in tracks_of(sequence, peers, report, pictures=pictures):
+            scores = found[name] = sequence.score(tracks)
+            if peers is not None:
+                worst = max(worst, difference(peers, sequence, tracks, scores))
+        report.table(
+            sequence.name,
+            ["", *_HEADINGS],
+            [[name, *format_scores(scores, _SHOWN)] for name, scores in found.items()],
+        )
+    if len(table) > 1:
+        everywhere = [name for name in table[sequences[0].name] if all(name in it for it in table.values())]
+        averages = [
+            [name, *format_scores(average_scores([it[name] for it in table.values()]), _SHOWN)]
+            for name in everywhere
+        ]
+        report.table("mean of the sequences; counts are totals", ["", *_HEADINGS], averages)
+    ahead = lead(table)
+    if ahead:
+        report.table("MyView less the best peer of each score", ["", "HOTA", "MOTA", "IDF1", "IDSW"], ahead)
+        report.say(f"the peers' own evaluation differs from these scores by at most {worst:.1g}")
+    report.save(out / "other_trackers.txt")
+    plot(table, CEILING, out / "other_trackers.png")
+
+
+def main() -> None:
+    """Run it with the command line's options."""
+    options = parser(__doc__, "other_trackers")
+    options.add_argument(
+        "--environment", type=Path, default=default_folder(), help="folder that the peers are installed in"
+    )
+    options.add_argument("--sequence", action="append", help="only this one; may be repeated")
+    options.add_argument(
+        "--pictures", action=BooleanOptionalAction, default=True, help="also MyView with the video, if any"
+    )
+    chosen = options.parse_args()
+    mpl.use("Agg")
+    try:
+        run(chosen.data, chosen.out, chosen.environment, chosen.sequence, pictures=chosen.pictures)
+    except CannotRunError as problem:
+        finish(problem, "other_trackers")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,98 @@
+"""A site whose cameras are started and killed one by one."""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+import yaml
+
+from benchmarks.common.environment import ROOT, one_thread_environment
+from benchmarks.streaming.stream_site import end
+from server.cli.generated_config import free_port
+from synthetic import Scene, write_recording
+
+FPS = 25.0
+WIDTH, HEIGHT = 352, 288
+_FILMS = 4
+"""Views of the room; more cameras show the same again."""
+_PEOPLE, _SEED, _FILM_S = 4, 1, 40.0
+_PATIENCE_S = 60.0
+_POLL_S = 0.2
+LOG = "site.log"
+
+
+class Crowded:
+    """A site that is running; its cameras are its caller's matter."""
+
+    def __init__(self, config: Path, url: str, log: IO[bytes]) -> None:
+        self.url = url
+        self._config, self._log = config, log
+        self.cameras: dict[str, subprocess.Popen[bytes]] = {}
+
+    def add(self) -> None:
+        """Start one more camera."""
+        name = f"c{len(self.cameras)}"
+        self.cameras[name] = _start(self._log, "camera", str(self._config), name)
+
+    def leave(self, count: int) -> None:
+        """Kill all cameras but the first so many."""
+        gone = list(self.cameras)[count:]
+        processes = [self.cameras.pop(it) for it in gone]
+        for process in processes:
+            process.kill()
+        for process in processes:
+            process.wait()
+
+
+@contextlib.contextmanager
+def running(most: int, folder: Path) -> Iterator[Crowded]:
+    """Run a site for at most so many cameras, of which none is there yet."""
+    films = folder / "films"
+    scene = Scene("room", _FILMS, _PEOPLE, _SEED, WIDTH, HEIGHT, FPS)
+    write_recording(scene, films, _FILM_S)
+    sync, bus, http = (free_port() for _ in range(3))
+    address = f"tcp/127.0.0.1:{bus}"
+    content = {
+        "site": {"name": "load", "fps": FPS, "width": WIDTH, "height": HEIGHT},
+        "sync": {"port": sync, "start_timeout_s": 1.0},
+        "zenoh": {"connect": address, "listen": address},
+        "http": {"port": http},
+        "cameras": [
+            {"id": f"c{it}", "source": str(films / f"c{it % _FILMS}.mp4"), "at_end": "loop"}
+            for it in range(most)
+        ],
+    }
+    config = folder / "site.yaml"
+    config.write_text(yaml.safe_dump(content), encoding="utf-8")
+    with (folder / LOG).open("wb") as log:
+        started = [_start(log, it, str(config)) for it in ("bestview", "sync")]
+        site = Crowded(config, f"http://127.0.0.1:{http}/", log)
+        try:
+            _until_up(site.url)
+            yield site
+        finally:
+            end([*site.cameras.values(), *started])
+
+
+def _start(log: IO[bytes], *words: str) -> subprocess.Popen[bytes]:
+    environment = {**one_thread_environment(), "MYVIEW_SUPERVISED": "1"}
+    command = [sys.executable, "-m", "server.cli.main", *words]
+    return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=log)
+
+
+def _until_up(url: str) -> None:
+    give_up = time.monotonic() + _PATIENCE_S
+    while time.monotonic() < give_up:
+        with contextlib.suppress(urllib.error.URLError, ConnectionError):
+            urllib.request.urlopen(f"{url}healthz", timeout=_PATIENCE_S).close()  # noqa: S310 — own address
+            return
+        time.sleep(_POLL_S)
+    raise RuntimeError("the best-view service did not start")

@@ -1,0 +1,176 @@
+"""Hours of playing in minutes: does the page grow, does it fall behind?
+
+The page's clock, its timers and the site run faster together. A browser plays at sixteen times the speed at
+the most: beyond that the page, which takes it for a slow machine, jumps on now and then. All that comes goes
+through the download, the SourceBuffer, the decisions, the band and the list of people.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from playwright.async_api import CDPSession, Page
+
+from benchmarks.common.browser import chromium
+from benchmarks.common.report import Report
+from benchmarks.page.fast_site import Clock, serving
+
+_READINGS = 16
+_PLAYING_MS = 60_000
+_MOST_RATE = 16
+_FASTER = """(() => {
+  const speed = %(speed)s, begun = %(begun)s;
+  const [now, steady, later, again] = [Date.now, performance.now.bind(performance), setTimeout, setInterval];
+  Date.now = () => begun + (now() - begun) * speed;
+  performance.now = () => steady() * speed;
+  window.setTimeout = (work, wait, ...rest) => later(work, (wait ?? 0) / speed, ...rest);
+  window.setInterval = (work, wait, ...rest) => again(work, (wait ?? 0) / speed, ...rest);
+  AbortSignal.timeout = (wait) => {
+    const control = new AbortController();
+    setTimeout(() => control.abort(), wait);
+    return control.signal;
+  };
+  const frames = HTMLVideoElement.prototype.requestVideoFrameCallback;
+  HTMLVideoElement.prototype.requestVideoFrameCallback = function (tell) {
+    const told = (at, frame) => tell(at * speed, {
+      mediaTime: frame.mediaTime, expectedDisplayTime: frame.expectedDisplayTime * speed });
+    return frames.call(this, told);
+  };
+  const rate = Object.getOwnPropertyDescriptor(HTMLMediaElement.prototype, 'playbackRate');
+  Object.defineProperty(HTMLMediaElement.prototype, 'playbackRate', {
+    get() { return this.wished ?? 1; },
+    set(wished) { this.wished = wished; rate.set.call(this, Math.min(wished * speed, %(most)s)); },
+  });
+  document.addEventListener('playing', ({ target }) => { target.playbackRate = target.wished ?? 1; }, true);
+})();"""
+_STATE = """() => ({
+  delays: myview.delays.slice(-200).map((it) => it.delayMs),
+  stood: (Date.now() - myview.delays.at(-1).shownAt) / 1000,
+  ranges: video.buffered.length,
+  buffered: video.buffered.end(video.buffered.length - 1) - video.buffered.start(0),
+})"""
+# Who came last stays for an hour: the picture goes on until the next reading.
+_NEWEST = "document.querySelector('#people li:last-child button').click()"
+_WATCHED = """() => { window.shown = 0;
+  const count = () => { shown += 1; video.requestVideoFrameCallback(count); };
+  video.requestVideoFrameCallback(count); }"""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """The browser at one moment.
+
+    Attributes:
+        hours: of the site's time.
+        heap: megabytes of JavaScript after a collection.
+        nodes: of the document, those that are not collected.
+        listeners: of events.
+        ranges: of the SourceBuffer.
+        buffered: seconds of video from the first of them to the last.
+        behind: milliseconds of the site's time, the median of the last frames shown.
+        stood: seconds of the site's time since the last frame was shown.
+        shown: frames since the beginning.
+        load: of the machine, tasks per minute that ran or wanted to.
+    """
+
+    hours: float
+    heap: float
+    nodes: int
+    listeners: int
+    ranges: int
+    buffered: float
+    behind: float
+    stood: float
+    shown: int
+    load: float
+
+
+async def play(hours: float, speed: float) -> list[Reading]:
+    """Play so many hours; switch to who came last now and then, as a viewer does."""
+    clock = Clock(speed, time.time())
+    async with serving(clock) as url, chromium() as browser:
+        page = await browser.new_page(viewport={"width": 1280, "height": 800})
+        await page.add_init_script(
+            _FASTER % {"speed": speed, "begun": 1000 * clock.begun, "most": _MOST_RATE}
+        )
+        await page.goto(url)
+        await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
+        await page.evaluate(_WATCHED)
+        await page.evaluate(_NEWEST)
+        tools = await page.context.new_cdp_session(page)
+        await tools.send("Performance.enable")
+        begun, readings = clock.now(), []
+        for number in range(1, _READINGS + 1):
+            await clock.until(begun + 3600 * hours * number / _READINGS)
+            await page.evaluate(
+                _NEWEST
+            )  # who is known for an hour yet: the picture goes on until the next reading
+            await page.keyboard.press("w")
+            readings.append(await _read(page, tools, (clock.now() - begun) / 3600))
+    return readings
+
+
+async def _read(page: Page, tools: CDPSession, hours: float) -> Reading:
+    await tools.send("HeapProfiler.collectGarbage")
+    heap = (await tools.send("Runtime.getHeapUsage"))["usedSize"] / 1e6
+    metrics = {it["name"]: it["value"] for it in (await tools.send("Performance.getMetrics"))["metrics"]}
+    state = await page.evaluate(_STATE)
+    behind = [it for it in state["delays"] if it is not None]
+    return Reading(
+        hours,
+        heap,
+        int(metrics["Nodes"]),
+        int(metrics["JSEventListeners"]),
+        state["ranges"],
+        state["buffered"],
+        float(np.median(behind or [np.nan])),
+        state["stood"],
+        await page.evaluate("shown"),
+        os.getloadavg()[0],
+    )
+
+
+def describe(report: Report, readings: list[Reading], speed: float) -> None:
+    """Print the table, and what grew from the first half to the second."""
+    report.table(
+        f"the page over hours, {speed:g} times as fast",
+        [
+            "hour",
+            "heap, MB",
+            "nodes",
+            "listeners",
+            "ranges",
+            "buffered, s",
+            "behind, s",
+            "stood, s",
+            "frames",
+            "load",
+        ],
+        [
+            [
+                *(f"{it.hours:.2f}", f"{it.heap:.2f}", str(it.nodes), str(it.listeners), str(it.ranges)),
+                *(f"{it.buffered:.0f}", f"{it.behind / 1000:.1f}", f"{it.stood:.1f}"),
+                *(str(it.shown), f"{it.load:.0f}"),
+            ]
+            for it in readings
+        ],
+    )
+    half = len(readings) // 2
+    early, late = (
+        np.median([(it.heap, it.nodes, it.buffered, it.behind / 1000) for it in some], axis=0)
+        for some in (readings[1:half], readings[half:])
+    )
+    report.table(
+        "medians of both halves",
+        ["", "heap, MB", "nodes", "buffered, s", "behind, s"],
+        [[name, *(f"{value:.2f}" for value in row)] for name, row in (("first", early), ("second", late))],
+    )
+
+
+def run(report: Report, hours: float, speed: float) -> None:
+    """Run this part."""
+    describe(report, asyncio.run(play(hours, speed)), speed)

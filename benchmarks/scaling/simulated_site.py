@@ -1,0 +1,194 @@
+"""A site of simulated cameras: pulses, the real best-view process, and what it used between two moments."""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import IO
+
+import yaml
+
+from benchmarks.common.environment import ROOT, one_thread_environment
+from benchmarks.scaling.simulated_hall import HEIGHT, STRIDE, WIDTH, Hall
+from benchmarks.scaling.timed_service import LISTS, REST, STAGES, Times
+from server.cli.generated_config import free_port
+
+_PATIENCE_S = 120.0
+_POLL_S = 0.2
+_LOG = "site.log"
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What carrying a site costs the best-view process.
+
+    Attributes:
+        cameras: of the site.
+        people: in it.
+        fps: pulses a second.
+        services: best-view services that share the site; what follows is the mean of them.
+        per_camera: people in a camera's view, on average.
+        stages: processor milliseconds a frame (of all cameras together) by stage, the rest too.
+        messages: a second, at 25 pulses a second.
+        megabytes: likewise.
+        memory: resident megabytes at the end.
+        late: windows that came too late, in the measured time.
+        epochs: measured.
+    """
+
+    cameras: int
+    people: int
+    per_camera: int
+    fps: float
+    services: int
+    stages: dict[str, float]
+    messages: float
+    megabytes: float
+    memory: float
+    late: int
+    epochs: int
+
+    @property
+    def milliseconds(self) -> float:
+        """Processor milliseconds a frame."""
+        return sum(self.stages.values())
+
+
+@dataclass(frozen=True, slots=True)
+class _Service:
+    """One best-view process."""
+
+    process: subprocess.Popen[bytes]
+    times: Path
+    url: str
+
+
+def carry(hall: Hall, fps: float, folder: Path, settle: int, epochs: int, services: int = 1) -> Load:
+    """Run the site for `settle` epochs, and measure over the `epochs` after them.
+
+    Raises:
+        RuntimeError: it did not come so far in time; what the processes said is in the text.
+    """
+    folder.mkdir(parents=True)
+    with _running(hall, fps, folder, services) as running:
+        starts = [_after(it.times, settle, folder) for it in running]
+        late = sum(_late(it.url) for it in running)
+        stops = [
+            _after(it.times, start.epochs + epochs, folder) for it, start in zip(running, starts, strict=True)
+        ]
+        late = sum(_late(it.url) for it in running) - late
+        memory = sum(_resident(it.process.pid) for it in running) / services
+    loads = [_load(hall, fps, start, stop, memory, late) for start, stop in zip(starts, stops, strict=True)]
+    stages = {name: sum(it.stages[name] for it in loads) / services for name in loads[0].stages}
+    return replace(loads[0], services=services, stages=stages)
+
+
+def _load(hall: Hall, fps: float, start: Times, stop: Times, memory: float, late: int) -> Load:
+    frames = STRIDE * (stop.epochs - start.epochs)
+    stages = {name: 1e3 * (stop.seconds[name] - start.seconds[name]) / frames for name in STAGES}
+    stages[REST] = 1e3 * (stop.process - start.process) / frames - sum(stages.values())
+    # The lists are told by the clock, whatever the rate of the pulses.
+    stages[LISTS] *= frames / (25.0 * (stop.at - start.at))
+    return Load(
+        cameras=hall.cameras,
+        people=hall.people,
+        per_camera=hall.per_camera,
+        fps=fps,
+        services=1,
+        stages=stages,
+        messages=25.0 * (stop.messages - start.messages) / frames,
+        megabytes=25.0 * (stop.size - start.size) / frames / 1e6,
+        memory=memory,
+        late=late,
+        epochs=stop.epochs - start.epochs,
+    )
+
+
+@contextlib.contextmanager
+def _running(hall: Hall, fps: float, folder: Path, services: int) -> Iterator[list[_Service]]:
+    sync, bus, *https = (free_port() for _ in range(2 + services))
+    config = folder / "site.yaml"
+    address = f"tcp/127.0.0.1:{bus}"
+    content = {
+        "site": {"name": "hall", "fps": fps, "width": WIDTH, "height": HEIGHT},
+        "sync": {"port": sync, "start_timeout_s": 3.0},
+        "zenoh": {"connect": address, "listen": address},
+        # The rate is set to what is measured, not to what people would see: waiting is counted in frames.
+        "view": {"late_after_s": 12.5 / fps, "share": {"of": services}},
+        "cameras": [
+            {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
+            for name, ground in zip(hall.ids, hall.grounds, strict=True)
+        ],
+    }
+    config.write_text(yaml.safe_dump(content), encoding="utf-8")
+    halves = [range(hall.cameras // 2), range(hall.cameras // 2, hall.cameras)]
+    with (folder / _LOG).open("wb") as log:
+        started = [_start(log, "server.cli.main", "sync", str(config))]
+        running = []
+        for index, port in enumerate(https):
+            times = folder / f"times{index}.json"
+            own = {"MYVIEW_VIEW__SHARE__INDEX": f"{index}", "MYVIEW_HTTP__PORT": f"{port}"}
+            words = ["benchmarks.scaling.timed_service", str(times), "bestview", str(config)]
+            started.append(_start(log, *words, **own))
+            running.append(_Service(started[-1], times, f"http://127.0.0.1:{port}/"))
+        started += [
+            _start(
+                log,
+                "benchmarks.scaling.simulated_cameras",
+                str(config),
+                f"{hall.per_camera}",
+                f"{it.start}",
+                f"{len(it)}",
+            )
+            for it in halves
+        ]
+        try:
+            yield running
+        finally:
+            for process in started:
+                process.terminate()
+            for process in started:
+                try:
+                    process.wait(15.0)
+                except subprocess.TimeoutExpired:
+                    process.kill()
+                    process.wait()
+
+
+def _start(log: IO[bytes], *words: str, **own: str) -> subprocess.Popen[bytes]:
+    environment = {**one_thread_environment(), "MYVIEW_SUPERVISED": "1", **own}
+    return subprocess.Popen([sys.executable, "-m", *words], cwd=ROOT, env=environment, stdout=log, stderr=log)
+
+
+def _after(times: Path, epochs: int, folder: Path) -> Times:
+    """Wait until the service has decided so many epochs."""
+    give_up = time.monotonic() + _PATIENCE_S
+    while time.monotonic() < give_up:
+        found = Times.read(times)
+        if found is not None and found.epochs >= epochs:
+            return found
+        time.sleep(_POLL_S)
+    said = (folder / _LOG).read_text(encoding="utf-8", errors="replace")
+    raise RuntimeError(f"the site did not come to epoch {epochs}; its processes said:\n{said[-2000:]}")
+
+
+def _late(url: str) -> int:
+    """Windows that were decided without a camera that was there."""
+    with urllib.request.urlopen(f"{url}metrics", timeout=_PATIENCE_S) as answer:  # noqa: S310 — own address
+        metrics = answer.read().decode()
+    return next(
+        int(float(line.split()[1]))
+        for line in metrics.splitlines()
+        if line.startswith("myview_late_epochs_total")
+    )
+
+
+def _resident(pid: int) -> float:
+    lines = (Path("/proc") / str(pid) / "status").read_text().splitlines()
+    return next(float(line.split()[1]) / 1e3 for line in lines if line.startswith("VmRSS"))

@@ -1,0 +1,127 @@
+"""The real best-view process, timed stage by stage from inside.
+
+    python -m benchmarks.scaling.timed_service TIMES.json bestview SITE.yaml
+
+is `myview bestview SITE.yaml` with its classes' public methods wrapped; nothing else is changed.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.live_cameras.stage_times import ThreadWatch
+from bestview import IdentityRegistry
+from server.cli.main import main as command_line
+from server.http.api.events import Events
+from server.messaging.bus import Bus
+from server.service.decision_state import Board
+from server.service.identity.people import PersonTracker
+from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.ingest.ingest import Ingest
+from server.service.pipeline import BestViewPipeline
+from server.service.streaming.splicer import Splicer
+from server.service.view_selection.decider import ViewDecider
+from server.service.view_selection.lookahead_window import LookaheadWindow
+from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
+
+LISTS = "lists"
+STAGES = {
+    "tracks in": "the cameras' windows out of JSON, checked, laid in line",
+    "frames in": "access units made into fragments, on the shelves; small pictures",
+    "align": "epochs taken out",
+    "who is who": "identity over all cameras",
+    "people": "messages to tracks, boxes by person",
+    "quality": "of every view",
+    "costs": "laid out by frame, camera and person",
+    "choose": "the program, and the decision put together",
+    "board": "what the page, programs and the bus are told",
+    "publish": "that to JSON and onto the bus",
+    "splice": "everybody's chosen GOP",
+    LISTS: "of people and cameras for the page, every second",
+}
+REST = "rest"
+"""Of the process: zenoh's threads and router, copies off the bus, the event loop, pulses."""
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """What the service has done and used since it started.
+
+    Attributes:
+        epochs: decided.
+        seconds: processor time of each stage, without the stages inside it.
+        process: processor time of the whole process.
+        messages: that came, of all kinds.
+        size: their bytes.
+        at: when this was, seconds by a clock that never steps.
+    """
+
+    epochs: int
+    seconds: Mapping[str, float]
+    process: float
+    messages: int
+    size: int
+    at: float
+
+    @classmethod
+    def read(cls, path: Path) -> Times | None:
+        """Read what was written last; None: nothing yet."""
+        return cls(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None
+
+
+def watch(path: Path) -> None:
+    """Time this process from now on, and write into the file after every epoch."""
+    watched = ThreadWatch(STAGES)
+    count = {"epochs": 0, "messages": 0, "size": 0}
+
+    def told() -> None:
+        count["epochs"] += 1
+        part = path.with_suffix(".part")
+        used = {"seconds": watched.seconds, "process": time.process_time()}
+        now = {**count, **used, "at": time.monotonic()}
+        part.write_text(json.dumps(now), encoding="utf-8")
+        part.replace(path)
+
+    for name in ("tracks", "video", "thumbnail"):
+        _count(name, count)
+    for owner, method, stage in (
+        (Ingest, "tracks", "tracks in"),
+        (Ingest, "video", "frames in"),
+        (Ingest, "thumbnail", "frames in"),
+        (EpochAligner, "ready", "align"),
+        (IdentityRegistry, "update", "who is who"),
+        (PersonTracker, "update", "people"),
+        (ViewQualityBuffer, "put", "quality"),
+        (LookaheadWindow, "__init__", "costs"),
+        (Board, "put", "board"),
+        (BestViewPipeline, "_publish", "publish"),
+        (Bus, "publish", "publish"),
+        (Splicer, "decision", "splice"),
+        (Events, "_lists", LISTS),
+    ):
+        watched.wrap(owner, method, stage)
+    watched.wrap(ViewDecider, "step", "choose", told)
+
+
+def _count(name: str, count: dict[str, int]) -> None:
+    original = getattr(Ingest, name)
+
+    @functools.wraps(original)
+    def run(self: Ingest, message: Any) -> None:
+        count["messages"] += 1
+        count["size"] += len(message.payload) + len(message.attachment)
+        original(self, message)
+
+    setattr(Ingest, name, run)
+
+
+if __name__ == "__main__":
+    watch(Path(sys.argv.pop(1)))
+    command_line()

@@ -1,0 +1,185 @@
+"""Takes the README's pictures of the page, on the demo: a desktop's window and a phone's.
+
+    python -m benchmarks.screenshots --out docs/pictures
+
+Lets the page play for a minute, then takes a picture at several moments and keeps the one with most to see.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import io
+import sys
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from PIL import Image
+from playwright.async_api import Browser, Page
+
+from benchmarks.common.browser import check_chromium, chromium
+from benchmarks.common.environment import ROOT, CannotRunError, finish, one_thread_environment
+
+_READY = "MyView is ready: "
+_READY_S = 90.0
+_PLAYING_MS = 60_000
+_MOMENTS = 12
+"""Pictures taken of each size; the best is kept."""
+_LANDED_S = 1.5
+"""How long the page may take to show somebody else, the list to follow, and their boxes to be there."""
+_MOST_BYTES = 300_000
+_COLOURS = (256, 128, 64)
+"""Palettes tried until a picture is small enough."""
+
+_RATED = """async () => {
+  const { objects } = await (await fetch('api/objects')).json();
+  const seen = objects.filter((it) => it.visible && it.thumbnail);
+  const rated = await Promise.all(seen.map(async ({ object, camera, cameras }) => {
+    const { quality } = await (await fetch(`api/objects/${object}/choice`)).json();
+    const together = seen.filter((it) => it.cameras.includes(camera)).length;
+    const large = quality[camera] ?? 0;
+    return { object, score: seen.length + together + cameras.length + 4 * large };
+  }));
+  return rated.sort((a, b) => b.score - a.score);
+}"""
+"""Who is in view, best first: many people, in the one picture too, who are seen by many cameras and large."""
+
+_PLAYS = "myview.state === 'playing' && myview.camera !== null"
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One picture to take."""
+
+    name: str
+    width: int
+    height: int
+
+
+SHOTS = (Shot("page", 1280, 800), Shot("phone", 360, 740))
+
+
+@contextlib.asynccontextmanager
+async def demo() -> AsyncIterator[str]:
+    """Run `myview demo`; give its address once it says that it is ready.
+
+    Raises:
+        RuntimeError: it did not become ready.
+    """
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "server.cli.main", "demo", "--no-browser", "--port", "0"),
+        env={**one_thread_environment(), "PYTHONUNBUFFERED": "1"},
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.DEVNULL,
+    )
+    try:
+        yield await asyncio.wait_for(_address(process), _READY_S)
+    except TimeoutError as error:
+        raise RuntimeError(f"`myview demo` was not ready after {_READY_S:g} s") from error
+    finally:
+        if process.returncode is None:
+            process.terminate()
+        await process.wait()
+
+
+async def _address(process: asyncio.subprocess.Process) -> str:
+    assert process.stdout is not None  # noqa: S101 — it was asked for
+    async for line in process.stdout:
+        text = line.decode().strip()
+        if text.startswith(_READY):
+            return text.removeprefix(_READY).split()[0]
+    raise RuntimeError("`myview demo` ended before it was ready")
+
+
+async def take(out: Path, fill_s: float) -> list[Path]:
+    """Run the demo, open the page in all sizes, let it play, and take the pictures."""
+    async with chromium() as browser, demo() as url:
+        pages = [await _open(browser, url, shot) for shot in SHOTS]
+        await asyncio.sleep(fill_s)
+        pictures = {shot.name: await _best_picture(page) for page, shot in pages}
+    return await asyncio.to_thread(_write, pictures, out)
+
+
+def _write(pictures: dict[str, bytes], out: Path) -> list[Path]:
+    paths = []
+    for name, png in pictures.items():
+        paths.append(out / f"{name}.png")
+        paths[-1].write_bytes(small_png(png))
+    return paths
+
+
+async def _open(browser: Browser, url: str, shot: Shot) -> tuple[Page, Shot]:
+    # The page's policy forbids eval, which it is asked with here.
+    page = await browser.new_page(viewport={"width": shot.width, "height": shot.height}, bypass_csp=True)
+    await page.goto(url)
+    await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
+    return page, shot
+
+
+async def _best_picture(page: Page) -> bytes:
+    """Take pictures of whoever is seen best at several moments; give the best.
+
+    Raises:
+        RuntimeError: nobody was in view at any of them.
+    """
+    best, best_score = b"", 0.0
+    for _ in range(_MOMENTS):
+        rated = await page.evaluate(_RATED)
+        if rated:
+            await page.click(f"#people li[data-object='{rated[0]['object']}'] .person")
+        await page.mouse.move(0, 0)  # nothing is to be lit up under it
+        await page.evaluate("document.activeElement.blur(), scrollTo(0, 0)")
+        await asyncio.sleep(_LANDED_S)
+        score = await _score(page)
+        picture = await page.screenshot()
+        if score > best_score and await _score(page):
+            best, best_score = picture, score
+    if not best:
+        raise RuntimeError("nobody was in view for long enough")
+    return best
+
+
+async def _score(page: Page) -> float:
+    """Return how good the page looks; 0 when the chosen person is not being shown."""
+    if not await page.evaluate(_PLAYS):
+        return 0.0
+    number = await page.evaluate("myview.object")
+    return float(next((it["score"] for it in await page.evaluate(_RATED) if it["object"] == number), 0.0))
+
+
+def small_png(png: bytes) -> bytes:
+    """Return the picture with as many colours as fit into the size that a README's picture may have."""
+    image = Image.open(io.BytesIO(png)).convert("RGB")
+    smaller = png
+    for colours in _COLOURS:
+        if len(smaller) <= _MOST_BYTES:
+            break
+        target = io.BytesIO()
+        # The median cut gives the white of the text to the walls; k-means takes it back.
+        palette = image.quantize(colours, Image.Quantize.MEDIANCUT, kmeans=3)
+        image.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG).save(target, "PNG", optimize=True)
+        smaller = target.getvalue()
+    return smaller
+
+
+def main() -> None:
+    """Take the pictures."""
+    options = argparse.ArgumentParser(
+        prog="python -m benchmarks.screenshots", description=__doc__.splitlines()[0]
+    )
+    options.add_argument("--out", type=Path, default=ROOT / "docs" / "pictures", help="folder to write into")
+    options.add_argument("--fill", type=float, default=62.0, help="seconds to let the page play before")
+    chosen = options.parse_args()
+    try:
+        check_chromium()
+        chosen.out.mkdir(parents=True, exist_ok=True)
+        for path in asyncio.run(take(chosen.out, chosen.fill)):
+            print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
+    except CannotRunError as problem:
+        finish(problem, "screenshots")
+
+
+if __name__ == "__main__":
+    main()

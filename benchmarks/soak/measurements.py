@@ -1,0 +1,36 @@
+"""The measurements of a soak test: samples of every process, delays of viewers, disk use."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from benchmarks.live_cameras.frame_counters import Counts
+from benchmarks.soak.accelerated_site import CAMERAS, Tempo
+from benchmarks.soak.samples import Sample
+from benchmarks.soak.visitors import Visitors
+
+PROCESSES = ("bestview", "sync", "up", *(f"camera {it}" for it in CAMERAS))
+
+
+@dataclass(frozen=True, slots=True)
+class LatencyMedians:
+    """Median delays of recent pictures to viewers of a camera and of a person, milliseconds."""
+
+    hours: float
+    camera: float
+    person: float
+
+
+@dataclass(slots=True)
+class SoakMeasurements:
+    """What a soak test sampled: processes, delays, disk use, and the counters at its end."""
+
+    tempo: Tempo
+    visitors: Visitors
+    samples: dict[str, list[Sample]] = field(default_factory=lambda: {it: [] for it in PROCESSES})
+    delays: list[LatencyMedians] = field(default_factory=list)
+    recorded: list[float] = field(default_factory=list)
+    """Megabytes on the disk."""
+    counts: Counts = field(default_factory=lambda: Counts({}, 0))
+    seconds: float = 0.0
+    broken: str = ""

@@ -1,0 +1,123 @@
+"""What a soak found, as tables and curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from benchmarks.common.report import Report
+from benchmarks.soak.measurements import SoakMeasurements
+from benchmarks.soak.samples import DELAY, RESIDENT, Rule, Sample, Verdict, judge
+
+_DISK = Rule("recorded, MB", 0.05, 1.0)
+_LEAST = 8
+"""Samples of which quarters can be told: two in each."""
+_NAMED = 5
+"""Numbers of a table's row."""
+
+_CURVES: tuple[tuple[str, Callable[[Sample], float]], ...] = (
+    ("resident memory, MB", lambda it: it.resident),
+    ("descriptors", lambda it: it.descriptors),
+    ("threads", lambda it: it.threads),
+    ("tasks of the event loop", lambda it: it.tasks),
+    ("Python's memory blocks, thousands", lambda it: it.blocks / 1e3),
+)
+
+
+def verdicts(soaked: SoakMeasurements) -> list[tuple[str, Verdict]]:
+    """Judge everything that was sampled."""
+    found = [(name, it) for name, samples in soaked.samples.items() for it in judge(samples)]
+    hours = [it.hours for it in soaked.delays]
+    for name, values in (
+        ("viewer of a camera", [it.camera for it in soaked.delays]),
+        ("viewer of a person", [it.person for it in soaked.delays]),
+    ):
+        there = [place for place, value in enumerate(values) if np.isfinite(value)]
+        found.append((name, DELAY.judge([hours[it] for it in there], [values[it] for it in there])))
+    return [*found, ("recording", _DISK.judge(hours, soaked.recorded))]
+
+
+def describe(report: Report, soaked: SoakMeasurements) -> bool:
+    """Print the tables; say whether all is well."""
+    tempo, visitors = soaked.tempo, soaked.visitors
+    hours = soaked.delays[-1].hours if soaked.delays else 0.0
+    report.say(
+        f"{hours:.2f} hours of the site in {soaked.seconds / 60:.1f} minutes:"
+        f" {tempo.fps:g} pulses a second, {visitors.camera.pulse} frames of each camera"
+    )
+    well = not soaked.broken
+    if len(soaked.delays) >= _LEAST:
+        judged = verdicts(soaked)
+        report.table(
+            "the second and the fourth quarter of the time: medians; of the delay, its best tenth",
+            ["what", "second", "fourth", "change", "of", "flat"],
+            [
+                [
+                    who,
+                    f"{it.second:.1f}",
+                    f"{it.fourth:.1f}",
+                    f"{100 * (it.fourth / it.second - 1):+.1f} %" if it.second else "+0.0 %",
+                    it.rule.name,
+                    "yes" if it.flat else "NO",
+                ]
+                for who, it in judged
+            ],
+        )
+        well &= all(it.flat for _, it in judged)
+    else:
+        well = False
+        report.say("too short to be judged: there are too few samples")
+    holes = {"of a camera": visitors.camera.holes, "of a person": visitors.person.holes}
+    counts = soaked.counts
+    searched = {name: f"{it['shed'] + it['missed']} of {it['frames']}" for name, it in counts.cameras.items()}
+    report.say(f"visits: {_listed(dict(sorted(visitors.visits.items())))}")
+    report.say(f"events heard: {visitors.events}; frames missing in a stream: {_listed(holes)}")
+    report.say(f"frames missed or not searched: {_listed(searched)}")
+    report.say(f"windows late: {counts.late}")
+    faults = ", ".join(f"{what} ({count})" for what, count in sorted(visitors.faults.items())) or "none"
+    report.say(f"faults that visitors met: {faults}")
+    if soaked.broken:
+        report.say(f"BROKEN: {soaked.broken}")
+    well &= not any(holes.values()) and not visitors.faults
+    report.say("flat: " + ("yes" if well else "NO"))
+    return well
+
+
+def plot(soaked: SoakMeasurements, path: Path) -> None:
+    """Draw the curves over the site's time."""
+    figure = Figure(figsize=(10, 17))
+    axes = figure.subplots(len(_CURVES) + 2, 1, sharex=True)
+    for axis, (name, value) in zip(axes, _CURVES, strict=False):
+        for process, samples in soaked.samples.items():
+            axis.plot([it.hours for it in samples], [value(it) for it in samples], label=process, linewidth=1)
+        axis.set(ylabel=name, ylim=(0, None))
+    hours = [it.hours for it in soaked.delays]
+    axes[0].set_title(f"{hours[-1]:.1f} hours of a site, {soaked.tempo.speed:g} times as fast")
+    axes[0].legend(ncols=_NAMED, fontsize="small")
+    delay = axes[len(_CURVES)]
+    _line(delay, hours, [it.camera for it in soaked.delays], "of a camera")
+    _line(delay, hours, [it.person for it in soaked.delays], "of a person")
+    delay.set(ylabel="delay to a viewer, ms", yscale="log")
+    delay.legend(fontsize="small")
+    axes[-1].plot(hours, soaked.recorded, linewidth=1)
+    axes[-1].set(ylabel=_DISK.name, ylim=(0, None), xlabel=f"hours of the site; memory may grow {_share()}")
+    for axis in axes:
+        axis.grid(alpha=0.3)
+    figure.tight_layout()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=100)
+
+
+def _listed(counts: Mapping[str, object]) -> str:
+    return ", ".join(f"{what} {count}" for what, count in counts.items())
+
+
+def _share() -> str:
+    return f"by {100 * RESIDENT.share:.0f} % from the second quarter to the fourth"
+
+
+def _line(axis: object, hours: Sequence[float], values: Sequence[float], label: str) -> None:
+    axis.plot(hours, values, label=label, linewidth=1)  # type: ignore[attr-defined]

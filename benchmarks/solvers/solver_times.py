@@ -1,0 +1,119 @@
+"""How long solvers take on windows: processor time, so that other work on the machine does not count."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.solvers.random_windows import Size, moving_windows, random_window, walking_window
+from tracking.model.network import CostSettings, Network, build_network
+from tracking.model.settings import PAPER_COSTS
+from tracking.solvers import Solution, create_solver
+
+GATE = 60.0
+"""Pixels a frame; people at 25 frames a second and CIF move a tenth of it."""
+
+REPEATS = 3
+"""Solves whose median is a quick solver's time."""
+
+Window = Callable[[Size, CostSettings, int], Network]
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A kind of window: `name`, how it is made, and the layout term's weight μ."""
+
+    name: str
+    window: Window
+    size: Size
+    layout: float = 0.0
+
+    def network(self, seed: int, gate: float | None = None) -> Network:
+        """Build one."""
+        return self.window(self.size, replace(PAPER_COSTS, layout=self.layout, gate=gate), seed)
+
+
+CASES = (
+    Case("random", random_window, Size(3, 50)),
+    Case("walking", walking_window, Size(3, 50)),
+    Case("random", random_window, Size(10, 40)),
+    Case("random", random_window, Size(20, 40)),
+    Case("walking", walking_window, Size(20, 40)),
+    Case("walking", walking_window, Size(3, 50), layout=0.001),
+    Case("random", random_window, Size(3, 50), layout=0.001),
+)
+
+EXACT_CASES = (
+    Case("random", random_window, Size(10, 40)),
+    Case("walking", walking_window, Size(3, 20), layout=0.0003),
+    Case("walking", walking_window, Size(3, 50), layout=0.001),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Timed:
+    """A solution, and the processor time it took."""
+
+    seconds: float
+    solution: Solution
+
+
+def timed(solver: str, network: Network) -> Timed:
+    """Solve once."""
+    found = create_solver(solver)
+    start = time.process_time()
+    solution = found.solve(network)
+    return Timed(time.process_time() - start, solution)
+
+
+def seconds(solver: str, network: Network, repeats: int = 1) -> float:
+    """Return the median time of some solves."""
+    return float(np.median([timed(solver, network).seconds for _ in range(repeats)]))
+
+
+def warm_up() -> None:
+    """Load what solvers load when they are first used."""
+    seconds("columns", random_window(Size(2, 5, 3), PAPER_COSTS, 0))
+
+
+@dataclass(frozen=True, slots=True)
+class Ratio:
+    """Medians over windows, seconds, and the median ratio."""
+
+    arcs: float
+    columns: float
+    ratio: float
+
+
+def against_arcs(case: Case, seeds: int, gate: float | None) -> Ratio:
+    """Time the program of all arcs and `columns` on the same windows."""
+    networks = [case.network(seed, gate) for seed in range(seeds)]
+    arcs = np.array([seconds("arcs", network) for network in networks])
+    columns = np.array([seconds("columns", network, REPEATS) for network in networks])
+    return Ratio(float(np.median(arcs)), float(np.median(columns)), float(np.median(arcs / columns)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Live:
+    """Windows one after the other: `seconds` of each, the network's building included, and `rounds`."""
+
+    seconds: np.ndarray
+    rounds: np.ndarray
+
+
+def live(size: Size, steps: int, *, told: bool) -> Live:
+    """Solve windows at a stride of one frame; `told`: each with the hint of the one before."""
+    solver, settings = create_solver("columns"), replace(PAPER_COSTS, gate=GATE)
+    times, rounds = [], []
+    hint = None
+    for templates, frames in moving_windows(size, steps, seed=0):
+        start = time.process_time()
+        solution = solver.solve(build_network(templates, frames, settings), hint)
+        if told:
+            hint = solution.warm_start.shift(1, range(size.objects))
+        times.append(time.process_time() - start)
+        rounds.append(solution.report.rounds)
+    return Live(np.array(times), np.array(rounds))

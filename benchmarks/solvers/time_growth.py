@@ -1,0 +1,108 @@
+"""How solvers' times grow with the window, and the paper's Fig. 21 and Table I as plots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.solvers.random_windows import Size, random_window
+from benchmarks.solvers.solver_times import REPEATS, seconds
+from tracking.model.settings import PAPER_COSTS
+
+SOLVERS = ("arcs", "columns")
+TABLE1_SOLVERS = ("extended-dp", "arcs", "exact", "columns", "greedy-dp", "separate-dp")
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """Sizes along one axis of Fig. 21."""
+
+    label: str
+    sizes: tuple[Size, ...]
+    values: tuple[int, ...]
+
+
+_PLACES, _OBJECTS, _FRAMES = (5, 10, 20, 40, 60), (1, 2, 4, 6, 8), (5, 10, 20, 40)
+
+SWEEPS = (
+    Sweep("observations a frame (3 objects)", tuple(Size(3, k) for k in _PLACES), _PLACES),
+    Sweep("objects (20 observations a frame)", tuple(Size(n, 20) for n in _OBJECTS), _OBJECTS),
+    Sweep("frames (3 objects, 20 observations)", tuple(Size(3, 20, m) for m in _FRAMES), _FRAMES),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """The mean times of a solver along a sweep, and the exponent fitted to them."""
+
+    sweep: Sweep
+    solver: str
+    times: tuple[float, ...]
+    exponent: float
+
+
+def paper_growth(size: Size) -> float:
+    """Return n² k m (2 log k + 2 log n + log m), the average complexity that II.D states."""
+    n, k, m = size.objects, size.places, size.frames
+    return float(n**2 * k * m * (2 * np.log(k) + 2 * np.log(n) + np.log(m)))
+
+
+def exponent(sizes: tuple[Size, ...], times: tuple[float, ...]) -> float:
+    """Fit the e of time ~ (the paper's growth)^e; up to 1 is no worse than the paper's."""
+    return float(np.polyfit(np.log([paper_growth(size) for size in sizes]), np.log(times), 1)[0])
+
+
+def grown(sweep: Sweep, solver: str, seeds: int) -> Growth:
+    """Time a solver along a sweep: the mean over random windows, as in the paper."""
+    repeats = REPEATS if solver != "arcs" else 1
+    times = tuple(
+        float(np.mean([seconds(solver, random_window(size, PAPER_COSTS, k), repeats) for k in range(seeds)]))
+        for size in sweep.sizes
+    )
+    return Growth(sweep, solver, times, exponent(sweep.sizes, times))
+
+
+def exponent_of_all(growths: list[Growth], solver: str) -> float:
+    """Fit one exponent to all sweeps of a solver."""
+    own = [growth for growth in growths if growth.solver == solver]
+    sizes = tuple(size for growth in own for size in growth.sweep.sizes)
+    return exponent(sizes, tuple(time for growth in own for time in growth.times))
+
+
+def plot_growth(growths: list[Growth], path: Path) -> None:
+    """Draw Fig. 21: time over observations, objects and frames."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 — loading it would count as a solver's time
+
+    figure = Figure(figsize=(13, 4), layout="constrained")
+    for axis, sweep in zip(figure.subplots(1, len(SWEEPS)), SWEEPS, strict=True):
+        for growth in growths:
+            if growth.sweep is sweep:
+                label = f"{growth.solver}, growth^{growth.exponent:.2f}"
+                axis.plot(sweep.values, 1e3 * np.array(growth.times), marker="o", label=label)
+        axis.set(xlabel=sweep.label, ylabel="processor time, ms", yscale="log")
+        axis.legend()
+    figure.suptitle("Random windows (paper Fig. 21)")
+    figure.savefig(path, dpi=120)
+
+
+def table1() -> dict[str, float]:
+    """Time all solvers at the size of Table I: three objects, 50 observations, 20 frames."""
+    network = random_window(Size(3, 50), PAPER_COSTS, 0)
+    return {
+        solver: seconds(solver, network, 1 if solver in {"extended-dp", "arcs"} else REPEATS)
+        for solver in TABLE1_SOLVERS
+    }
+
+
+def plot_table1(times: dict[str, float], path: Path) -> None:
+    """Draw Table I."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 — loading it would count as a solver's time
+
+    figure = Figure(figsize=(7, 3.5), layout="constrained")
+    axis = figure.subplots()
+    axis.barh(list(times), [1e3 * value for value in times.values()])
+    axis.set(xlabel="processor time, ms (the paper: 20 s, and 18800 s for its extended DP)", xscale="log")
+    axis.invert_yaxis()
+    figure.savefig(path, dpi=120)

@@ -1,0 +1,166 @@
+"""How late HLS is: a player by the rules of RFC 8216, one that knows parts, and the same service for both."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import aiohttp
+import numpy as np
+
+from benchmarks.scaling.simulated_hall import Hall
+from benchmarks.streaming.delay_drift import Source
+from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE
+from server.camera.encoding.encoder import AccessUnit
+from server.config.sections import CameraSettings, HttpSettings
+from server.config.site_config import Config
+from server.http.app import make_app, serving
+from server.messaging.messages import GopChoices
+from server.service.pipeline import BestViewPipeline
+from server.service.service import BestViewService
+
+_PER_CAMERA = 2
+_BEFORE_S = 8.0
+"""What has been shown when the players come."""
+_PART = r'#EXT-X-PART:DURATION=([\d.]+),URI="([^"]+)".*'
+_SEGMENT = r"#EXTINF:([\d.]+),\n(\S+)"
+_LINE = re.compile(rf"^(?:{_PART}|{_SEGMENT})$", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class Late:
+    """Seconds from when a frame was decided to when a player has it, and to when it shows it; medians."""
+
+    fetched: float
+    shown: float
+    stalls: int
+
+
+@dataclass
+class _Player:
+    """Plays from as far behind the end as it is told to stay; it stops where what comes next is not there."""
+
+    clock: Callable[[], float]
+    decided: dict[int, float]
+    """When each GOP was, by its first pulse."""
+    begun: float = 0.0
+    """The clock at which media time 0 would be shown."""
+    fetched: list[float] = field(default_factory=list)
+    shown: list[float] = field(default_factory=list)
+    stalls: int = 0
+
+    def take(self, first: int, pulses: int) -> None:
+        """Take what was fetched just now."""
+        now = self.clock()
+        due = self.begun + first / SITE.fps
+        if not self.fetched:
+            self.begun = now - first / SITE.fps
+        elif now > due:
+            self.stalls += 1
+            self.begun += now - due
+        for pulse in range(first, first + pulses):
+            decided = self.decided[pulse // ENCODE.gop * ENCODE.gop]
+            self.fetched.append(now - decided)
+            self.shown.append(self.begun + pulse / SITE.fps - decided)
+
+    @property
+    def late(self) -> Late:
+        """What it saw."""
+        return Late(float(np.median(self.fetched)), float(np.median(self.shown)), self.stalls)
+
+
+async def hls_delays(films: Sequence[Sequence[AccessUnit]], seconds: float) -> tuple[Late, Late]:
+    """Serve a camera as late as a best view, in real time; give what is seen without parts, and with them."""
+    hall = Hall(CAMERAS, _PER_CAMERA)
+    cameras = [
+        CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
+        for name, ground in zip(hall.ids, hall.grounds, strict=True)
+    ]
+    service = BestViewPipeline(Config(site=SITE, encode=ENCODE, cameras=cameras))
+    source, decided, clock = Source(service, films, hall), dict[int, float](), asyncio.get_running_loop().time
+
+    def note(choices: GopChoices) -> None:
+        decided[choices.first] = clock()
+
+    service.on_decision.append(note)
+    before = round(_BEFORE_S * SITE.fps)
+    for number in range(before):
+        source.pulse(number)
+
+    async def go_on() -> None:
+        begin = clock()
+        for number in range(before, before + round((seconds + 1) * SITE.fps)):
+            await asyncio.sleep(max(0.0, begin + (number - before) / SITE.fps - clock()))
+            source.pulse(number)
+
+    players = [_Player(clock, decided) for _ in range(2)]
+    async with (
+        serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port,
+        aiohttp.ClientSession(f"http://127.0.0.1:{port}/cameras/{hall.ids[0]}/hls/") as session,
+    ):
+        going = asyncio.create_task(go_on())
+        await asyncio.sleep(1.0)  # what was shown before came at once
+        async with asyncio.TaskGroup() as group:
+            group.create_task(_segments(session, players[0], seconds - 1))
+            group.create_task(_parts(session, players[1], seconds - 1))
+        await going
+    service.close()
+    return players[0].late, players[1].late
+
+
+async def _segments(session: aiohttp.ClientSession, player: _Player, seconds: float) -> None:
+    """Play whole segments, begun three target durations before the end (RFC 8216, 6.3.3 and 6.3.4)."""
+    end, at = player.clock() + seconds, -1
+    while player.clock() < end:
+        text = await _text(session, "index.m3u8")
+        target = int(_tag(text, "#EXT-X-TARGETDURATION:"))
+        listed = [(float(it[3]), it[4]) for it in _LINE.finditer(text) if it[4]]
+        frames = round(listed[0][0] * SITE.fps)
+        numbers = [int(uri.partition(".")[0]) for _, uri in listed]
+        if at < 0:
+            last = (numbers[-1] + 1) * frames - 3 * target * SITE.fps
+            at = max(it for it in numbers if it * frames <= max(last, numbers[0] * frames))
+        news = [it for it in numbers if it >= at]
+        for number in news:
+            await _fetch(session, f"{number}.m4s")
+            player.take(number * frames, frames)
+            at = number + 1
+        await asyncio.sleep(target if news else target / 2)
+
+
+async def _parts(session: aiohttp.ClientSession, player: _Player, seconds: float) -> None:
+    """Play parts, begun as far before the end as the playlist says, each asked for before it is there."""
+    end = player.clock() + seconds
+    text = await _text(session, "index.m3u8")
+    each = round(float(_tag(text, "#EXT-X-PART-INF:PART-TARGET=")) * SITE.fps)
+    back = float(_tag(text, ".*PART-HOLD-BACK="))
+    uris = [it[2] for it in _LINE.finditer(text) if it[2]]
+    waiting = uris[-max(1, round(back * SITE.fps / each)) :]
+    per = len({uri for uri in uris if uri.startswith(uris[0].partition(".")[0] + ".")})
+    while player.clock() < end:
+        for uri in waiting:
+            segment, index = map(int, uri.split(".")[:2])
+            await _fetch(session, uri)
+            player.take((segment * per + index) * each, each)
+            uris.append(uri)
+        number, index = divmod(segment * per + index + 1, per)
+        text = await _text(session, f"index.m3u8?_HLS_msn={number}&_HLS_part={index}")
+        waiting = [it[2] for it in _LINE.finditer(text) if it[2] and it[2] not in uris]
+
+
+async def _text(session: aiohttp.ClientSession, path: str) -> str:
+    return (await _fetch(session, path)).decode()
+
+
+async def _fetch(session: aiohttp.ClientSession, path: str) -> bytes:
+    async with session.get(path) as answer:
+        answer.raise_for_status()
+        return await answer.read()
+
+
+def _tag(text: str, name: str) -> str:
+    found = re.search(rf"^{name}([\d.]+)", text, re.MULTILINE)
+    assert found is not None  # noqa: S101 — every playlist of ours has it
+    return found[1]

@@ -1,0 +1,96 @@
+"""Cameras for the stream's measurements: real H.264 of the synthetic room, and simulated trackers of a hall.
+
+    python -m benchmarks.streaming.simulated_cameras SITE.yaml PICTURES PER_CAMERA
+
+publishes on the pulses what all cameras of a site would, through the real bus. The pictures are encoded
+once, by the site's encoder, and sent again and again: the best-view service never looks into them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+
+from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, Hall, Tracker
+from camsync import PulseClient
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.loader import load_config
+from server.config.sections import EncodeSettings, SiteSettings
+from server.config.site_config import Config
+from server.messaging.bus import Bus
+from server.messaging.messages import FrameHeader, ZenohKeys
+from server.system.child_process import terminate_with_parent
+from synthetic import Scene
+
+CAMERAS = 4
+SITE = SiteSettings(name="stream", width=352, height=288, fps=25)
+"""CIF."""
+ENCODE = EncodeSettings()
+_START = 200
+"""The scene's first frame: people are in sight."""
+
+
+def draw_room(frames: int) -> list[list[AccessUnit]]:
+    """Encode so many frames of the room for each camera: about 500 kbit/s."""
+    scene = Scene("room", CAMERAS, 4, 1, SITE.width, SITE.height, SITE.fps)
+    films = []
+    for camera in range(CAMERAS):
+        encoder = Encoder(SITE, ENCODE)
+        films.append([encoder.encode(place, scene.image(camera, _START + place)) for place in range(frames)])
+    return films
+
+
+def save(films: list[list[AccessUnit]], path: Path) -> None:
+    """Keep what was encoded."""
+    path.write_bytes(msgspec.msgpack.encode(films))
+
+
+def load(path: Path) -> list[list[AccessUnit]]:
+    """Read what was kept."""
+    return msgspec.msgpack.decode(path.read_bytes(), type=list[list[AccessUnit]])
+
+
+async def serve(config: Config, films: list[list[AccessUnit]], hall: Hall) -> None:
+    """Publish until told to end."""
+    boot = time.time_ns() // 1_000_000
+    trackers = [Tracker(hall, camera, boot) for camera in range(hall.cameras)]
+    keys, bus = ZenohKeys(config.site.name), Bus.client(config.zenoh)
+    there = asyncio.Event()
+    bus.watch_alive(keys.bestview("alive"), lambda _, alive: there.set() if alive else None)
+    await there.wait()
+    for name in hall.ids:
+        bus.declare_alive(keys.camera(name, "alive"))
+    client = PulseClient(config.sync.host, config.sync.port, hall.ids[0], fps_hint=config.site.fps)
+    try:
+        async with client as pulses:
+            async for pulse in pulses:
+                now = time.time()
+                for name, film in zip(hall.ids, films, strict=True):
+                    unit = film[pulse.number % len(film)]
+                    head = FrameHeader(
+                        pulse=pulse.number, key=unit.key, boot=boot, due=pulse.due, taken=now, encoded=now
+                    )
+                    bus.publish(keys.camera(name, "video"), unit.data, msgspec.json.encode(head))
+                if (pulse.number + 1) % STRIDE == 0:
+                    places = hall.places(max(0, pulse.number + 1 - WINDOW), pulse.number)
+                    for name, tracker in zip(hall.ids, trackers, strict=True):
+                        message = tracker.message(pulse.number // STRIDE, places)
+                        bus.publish(keys.camera(name, "tracks"), msgspec.json.encode(message))
+                        await asyncio.sleep(0)  # the bus's threads and the next pulse want their turn
+    finally:
+        bus.close()
+
+
+def main() -> None:
+    """Read the command line and run."""
+    terminate_with_parent()
+    config = load_config(Path(sys.argv[1]))
+    asyncio.run(serve(config, load(Path(sys.argv[2])), Hall(CAMERAS, int(sys.argv[3]))))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,137 @@
+"""What a splice costs: the splicer's work for an object and a frame, against decoding and encoding them."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import AsyncIterator, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import av
+import numpy as np
+from av.codec.context import Flags
+
+from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import CameraSettings
+from server.config.site_config import Config
+from server.media.codec import stream_format_for
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.splicer import Splicer
+from server.service.streaming.subscriber_queue import Chunk
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+from server.service.view_selection.explanation import SelectionReasons
+
+_NAMES = tuple(f"c{number}" for number in range(CAMERAS))
+_NO_REASON = cast("SelectionReasons", None)
+_US = 1e6
+
+
+class Cut:
+    """A splicer over shelves that are filled from films, and decisions that are made up."""
+
+    def __init__(self, films: Sequence[Sequence[AccessUnit]], config: Config) -> None:
+        self._films, self.gop = films, config.encode.gop
+        self.agreement = agreement = stream_format_for(
+            config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
+        )
+        self._shelves = {
+            name: FrameBuffer(config.site.fps, 4 * self.gop, agreement) for name in config.camera_ids
+        }
+        self.splicer = Splicer(self._shelves, agreement, config)
+
+    def shelve(self, gop: int) -> None:
+        """Put a GOP of every camera on the shelves; films go round."""
+        for frame_buffer, film in zip(self._shelves.values(), self._films, strict=True):
+            for pulse in range(gop * self.gop, (gop + 1) * self.gop):
+                unit = film[pulse % len(film)]
+                frame_buffer.put(pulse, 1, unit.data, key=unit.key)
+
+    def decide(self, gop: int, cameras: Sequence[int]) -> GopDecision:
+        """Show each object, by place, a camera."""
+        names = list(self._shelves)
+        choices = tuple(ObjectChoice(n, names[it], None, away=False) for n, it in enumerate(cameras, start=1))
+        return GopDecision(gop * self.gop, self.gop, choices, {}, {}, (), _NO_REASON)
+
+
+def cif_config() -> Config:
+    """Return the site of the films."""
+    cameras = [CameraSettings(id=name, source="rtsp://nowhere/") for name in _NAMES]
+    return Config(site=SITE, encode=ENCODE, cameras=cameras)
+
+
+@dataclass(frozen=True, slots=True)
+class Splice:
+    """Processor microseconds; the median of the GOPs."""
+
+    objects: int
+    shelved: float
+    """To put a frame of a camera on its shelf: once, whoever watches."""
+    spliced: float
+    """For an object and a frame."""
+
+    @property
+    def shelved_share(self) -> float:
+        """What shelving all cameras adds to an object's frame."""
+        return CAMERAS * self.shelved / self.objects
+
+
+async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int) -> Splice:
+    """Splice with a viewer for every object, who takes the bytes as they come."""
+    cut, rng = Cut(films, cif_config()), np.random.default_rng(0)
+    shelved, decided = [], []
+    viewers: list[AsyncIterator[Chunk]] = []
+    for gop in range(gops + 1):
+        decision = cut.decide(gop, rng.integers(0, CAMERAS, objects).tolist())
+        began = time.process_time()
+        cut.shelve(gop)
+        between = time.process_time()
+        cut.splicer.publish_decision(decision)
+        sizes = [len((await anext(viewer)).data) for viewer in viewers]
+        end = time.process_time()
+        if gop:  # the first one makes the streams
+            assert len(sizes) == objects  # noqa: S101 — everybody has got something
+            shelved.append(_US * (between - began) / (CAMERAS * cut.gop))
+            decided.append(_US * (end - between) / (objects * cut.gop))
+        else:
+            viewers = [it.subscribe().chunks() for it in cut.splicer.persons.values()]
+            for viewer in viewers:
+                await anext(viewer)
+    return Splice(objects, statistics.median(shelved), statistics.median(decided))
+
+
+@dataclass(frozen=True, slots=True)
+class Encoded:
+    """Processor microseconds a frame; the median of the GOPs."""
+
+    decoded: float
+    encoded: float
+    """With the conversion to the encoder's colours and back, as where boxes are burnt in."""
+
+    @property
+    def whole(self) -> float:
+        """Of a frame."""
+        return self.decoded + self.encoded
+
+
+def encode_again(film: Sequence[AccessUnit], gops: int) -> Encoded:
+    """Decode a film and encode it with the site's encoder."""
+    decoder, encoder = av.CodecContext.create("h264", "r"), Encoder(SITE, ENCODE)
+    assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — tells mypy what h264 is
+    decoder.thread_count = 1
+    decoder.flags |= Flags.low_delay
+    decoded, encoded = [], []
+    for gop in range(gops + 1):
+        first = gop * ENCODE.gop
+        began = time.process_time()
+        units = [film[pulse % len(film)] for pulse in range(first, first + ENCODE.gop)]
+        frames = [frame for unit in units for frame in decoder.decode(av.Packet(unit.data))]
+        between = time.process_time()
+        for place, frame in enumerate(frames):
+            encoder.encode(first + place, frame.to_ndarray(format="bgr24").astype(np.uint8, copy=False))
+        end = time.process_time()
+        if gop:
+            decoded.append(_US * (between - began) / ENCODE.gop)
+            encoded.append(_US * (end - between) / ENCODE.gop)
+    return Encoded(statistics.median(decoded), statistics.median(encoded))

@@ -1,0 +1,149 @@
+"""Viewers who never read: whether the others notice, measured by turns with and without them."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import statistics
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.common.report import Report
+from benchmarks.streaming.simulated_cameras import ENCODE, SITE
+from benchmarks.streaming.stream_site import StreamSite, Viewers
+from benchmarks.streaming.viewing_cost import send_delays
+from server.media.rendering_messages import TIMESCALE
+
+STALLED_SHARE = 0.1
+"""Of all viewers."""
+_FILL_S = 4.0
+"""Until nothing more fits into the system's buffers: from then on the server must lose what waits."""
+_LEAVE_S = 1.0
+_TRIES, _LEAST_GOPS = 10, 3
+_BUFFER = 4096
+"""Bytes that the system keeps for a stalled viewer, about."""
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """One turn: the others' delays, and how much of what was sent has come to them.
+
+    Attributes:
+        p50: milliseconds from when a GOP was given to the streams to when its end was read.
+        p99: likewise.
+        arrived: share of the GOPs that anybody was sent.
+        cores: that the best-view process has used: work for who stalls would be seen here, too.
+    """
+
+    p50: float
+    p99: float
+    arrived: float
+    cores: float
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """The others alone, and beside those who stall; round by round.
+
+    Attributes:
+        good: how many read.
+        stalled: how many do not.
+    """
+
+    good: int
+    stalled: int
+    alone: list[Turn]
+    beside: list[Turn]
+
+    @property
+    def ratio(self) -> float:
+        """The p99 beside stalled viewers against that alone: the medians of the rounds."""
+        alone, beside = (statistics.median(it.p99 for it in turns) for turns in (self.alone, self.beside))
+        return beside / alone
+
+
+def beside_stalled(
+    site: StreamSite, crowd: Viewers, numbers: Sequence[int], viewers: int, seconds: float, rounds: int
+) -> Beside:
+    """Let most read and, every other turn, a tenth besides never; the order of the turns changes, too."""
+    stalled = round(STALLED_SHARE * viewers)
+    good = viewers - stalled
+    paths = [f"/objects/{numbers[place % len(numbers)]}/best.mp4" for place in range(good)]
+    crowd.watch(paths, _FILL_S)
+    alone, beside = [], []
+    for number in range(rounds):
+        if number % 2 == 0:
+            alone.append(_turn(site, crowd, good, seconds))
+        with stalling(site.http, paths[:stalled]):
+            crowd.read(_FILL_S)
+            beside.append(_turn(site, crowd, good, seconds))
+        crowd.read(_LEAVE_S)
+        if number % 2:
+            alone.append(_turn(site, crowd, good, seconds))
+    crowd.watch([])
+    return Beside(good, stalled, alone, beside)
+
+
+def _turn(site: StreamSite, crowd: Viewers, good: int, seconds: float) -> Turn:
+    """Read for so long; longer where the machine is so busy that hardly a GOP comes.
+
+    Raises:
+        RuntimeError: next to nothing comes.
+    """
+    before, passed = site.used, 0.0
+    ticks: list[int] = []
+    delays: list[NDArray[np.float64]] = []
+    for _ in range(_TRIES):
+        heard = crowd.read(seconds)
+        ticks += heard.ticks
+        delays.append(send_delays(heard, {first: it.began for first, it in site.sent.items()}))
+        passed += heard.seconds
+        times, counts = np.unique(ticks, return_counts=True)
+        ends = np.rint(times * SITE.fps / TIMESCALE).astype(int) % ENCODE.gop == ENCODE.gop - 1
+        whole = counts[ends][1:-1]  # those at both ends had come, or have yet to come, to some
+        if len(whole) >= _LEAST_GOPS:
+            p50, p99 = np.percentile(np.concatenate(delays), [50, 99]).tolist()
+            return Turn(p50, p99, float(whole.mean()) / good, (site.used - before) / passed)
+    raise RuntimeError(f"{len(whole)} GOPs came in {passed:.0f} s: the machine is too busy to measure this")
+
+
+@contextlib.contextmanager
+def stalling(port: int, paths: Sequence[str]) -> Iterator[list[socket.socket]]:
+    """Have viewers who ask for a stream each, and read nothing of it."""
+    with contextlib.ExitStack() as stack:
+        found = []
+        for path in paths:
+            viewer = stack.enter_context(socket.socket())
+            viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+            viewer.connect(("127.0.0.1", port))
+            viewer.sendall(f"GET {path} HTTP/1.1\r\nHost: here\r\n\r\n".encode())
+            found.append(viewer)
+        yield found
+
+
+def describe_stalled(report: Report, found: Beside) -> None:
+    """Print the rounds, and their medians."""
+    rows = [
+        [str(number), *(_cell(it, alone, beside) for it in _COLUMNS)]
+        for number, (alone, beside) in enumerate(zip(found.alone, found.beside, strict=True), 1)
+    ]
+    report.table(
+        f"{found.good} viewers alone / beside {found.stalled} who never read: ms until a GOP has come",
+        ["round", "p50", "p99", "arrived", "cores of the service"],
+        rows,
+    )
+    report.say(f"p99 beside stalled viewers, against alone: {found.ratio:.2f} (medians of the rounds)")
+    alone, beside = (statistics.median(it.cores for it in turns) for turns in (found.alone, found.beside))
+    report.say(f"cores of the service: {beside:.3f} against {alone:.3f} (likewise)")
+
+
+_COLUMNS = {"p50": 1, "p99": 1, "arrived": 3, "cores": 2}
+"""With so many digits."""
+
+
+def _cell(name: str, alone: Turn, beside: Turn) -> str:
+    digits = _COLUMNS[name]
+    return f"{getattr(alone, name):.{digits}f} / {getattr(beside, name):.{digits}f}"

@@ -1,0 +1,158 @@
+"""A site for the stream's measurements: pulses, simulated cameras, the real best-view process, viewers."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import IO
+
+import msgspec
+import yaml
+
+from benchmarks.common.environment import ROOT, one_thread_environment
+from benchmarks.scaling.simulated_hall import Hall
+from benchmarks.streaming import timed_service as stream_service
+from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE, save
+from benchmarks.streaming.viewer_crowd import Heard
+from server.camera.encoding.encoder import AccessUnit
+from server.cli.generated_config import free_port
+
+PER_CAMERA = 20
+"""People in a camera's view, on average: some sixty in the hall."""
+_PATIENCE_S = 90.0
+_POLL_S = 0.2
+_LOG = "site.log"
+_MANY = 100_000
+_TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
+
+
+class Viewers:
+    """A process of viewers (:mod:`benchmarks.streaming.viewer_crowd`)."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self.process = process
+
+    def watch(self, paths: Sequence[str], seconds: float = 0.0) -> Heard:
+        """Let these be watched instead, and read for a while."""
+        return self._ask({"watch": list(paths), "for": seconds})
+
+    def read(self, seconds: float) -> Heard:
+        """Read for a while."""
+        return self._ask({"for": seconds})
+
+    def _ask(self, command: object) -> Heard:
+        assert self.process.stdin is not None  # noqa: S101 — it was started with pipes
+        assert self.process.stdout is not None  # noqa: S101 — likewise
+        self.process.stdin.write(msgspec.json.encode(command) + b"\n")
+        self.process.stdin.flush()
+        return msgspec.json.decode(self.process.stdout.readline(), type=Heard)
+
+
+class StreamSite:
+    """A site that is running."""
+
+    def __init__(self, http: int, service: subprocess.Popen[bytes], folder: Path) -> None:
+        self.http, self.folder = http, folder
+        self.pid = service.pid
+
+    @property
+    def used(self) -> float:
+        """Processor seconds of the best-view process so far."""
+        words = Path(f"/proc/{self.pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+        return (int(words[11]) + int(words[12])) * _TICK_S
+
+    @property
+    def sent(self) -> dict[int, stream_service.Given]:
+        """When each GOP was given to the streams."""
+        return stream_service.read(self.folder / "sent")
+
+    def objects(self, at_least: int) -> list[int]:
+        """Wait until so many can be watched, and list them.
+
+        Raises:
+            RuntimeError: they do not come; what the processes said is in the text.
+        """
+        give_up = time.monotonic() + _PATIENCE_S
+        while time.monotonic() < give_up:
+            with contextlib.suppress(urllib.error.URLError, ConnectionError):
+                address = f"http://127.0.0.1:{self.http}/api/objects"
+                with urllib.request.urlopen(address, timeout=_PATIENCE_S) as answer:
+                    numbers = [it["object"] for it in json.load(answer)["objects"]]
+                if len(numbers) >= at_least:
+                    return numbers
+            time.sleep(_POLL_S)
+        said = (self.folder / _LOG).read_text(encoding="utf-8", errors="replace")
+        raise RuntimeError(f"{at_least} people did not come; the site's processes said:\n{said[-2000:]}")
+
+
+@contextlib.contextmanager
+def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[StreamSite]:
+    """Run a site of such pictures."""
+    folder.mkdir(parents=True)
+    save([list(film) for film in films], folder / "films")
+    sync, bus, http = (free_port() for _ in range(3))
+    hall = Hall(CAMERAS, PER_CAMERA)
+    config, address = folder / "site.yaml", f"tcp/127.0.0.1:{bus}"
+    content = {
+        "site": {"name": SITE.name, "fps": SITE.fps, "width": SITE.width, "height": SITE.height},
+        "encode": {"gop": ENCODE.gop},
+        "sync": {"port": sync, "start_timeout_s": 3.0},
+        "zenoh": {"connect": address, "listen": address},
+        "http": {"port": http, "viewers_max": _MANY, "viewers_per_object": _MANY},
+        "cameras": [
+            {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
+            for name, ground in zip(hall.ids, hall.grounds, strict=True)
+        ],
+    }
+    config.write_text(yaml.safe_dump(content), encoding="utf-8")
+    with (folder / _LOG).open("wb") as log:
+        started = [_start(log, "server.cli.main", "sync", str(config))]
+        service = _start(
+            log, "benchmarks.streaming.timed_service", str(folder / "sent"), "bestview", str(config)
+        )
+        cameras = [str(config), str(folder / "films"), f"{PER_CAMERA}"]
+        started += [service, _start(log, "benchmarks.streaming.simulated_cameras", *cameras)]
+        try:
+            yield StreamSite(http, service, folder)
+        finally:
+            end(started)
+
+
+@contextlib.contextmanager
+def viewers(port: int) -> Iterator[Viewers]:
+    """Run a process of viewers of a server on this machine."""
+    pipe = subprocess.PIPE
+    words = [sys.executable, "-m", "benchmarks.streaming.viewer_crowd", f"{port}"]
+    process = subprocess.Popen(words, cwd=ROOT, env=one_thread_environment(), stdin=pipe, stdout=pipe)
+    try:
+        yield Viewers(process)
+    finally:
+        end([process])
+        for end_of_pipe in (process.stdin, process.stdout):
+            assert end_of_pipe is not None  # noqa: S101 — it was started with pipes
+            end_of_pipe.close()
+
+
+def end(processes: Sequence[subprocess.Popen[bytes]]) -> None:
+    """End processes, kindly first."""
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        try:
+            process.wait(15.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _start(log: IO[bytes], *words: str) -> subprocess.Popen[bytes]:
+    environment = {**one_thread_environment(), "MYVIEW_SUPERVISED": "1"}
+    return subprocess.Popen([sys.executable, "-m", *words], cwd=ROOT, env=environment, stdout=log, stderr=log)

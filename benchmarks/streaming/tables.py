@@ -1,0 +1,231 @@
+"""What was found about the stream: tables and the plot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from benchmarks.common.report import Report
+from benchmarks.streaming.bare_sockets import Bare
+from benchmarks.streaming.delay_drift import Drift
+from benchmarks.streaming.ffmpeg_and_nginx import Served
+from benchmarks.streaming.frame_correctness import Right
+from benchmarks.streaming.hls_latency import Late
+from benchmarks.streaming.simulated_cameras import SITE
+from benchmarks.streaming.splice_cost import Encoded, Splice
+from benchmarks.streaming.viewing_cost import Step, Watched
+
+_SOON_MS = 40.0
+"""A frame: later than that and more than one picture may be missing."""
+_WHOLE = 0.9
+"""Where less than this share of the GOPs came, viewers cost less than they should."""
+
+
+@dataclass
+class Found:
+    """What has been measured so far."""
+
+    encoded: Encoded | None = None
+    spliced: list[Splice] = field(default_factory=list)
+    ffmpeg: float | None = None
+    """Microseconds a frame."""
+    watched: Watched | None = None
+    steps: list[Step] = field(default_factory=list)
+    bare: Bare | None = None
+    too_many: list[int] = field(default_factory=list)
+    """Viewers that a process here may not have."""
+    here: Served | None = None
+    nginx: Served | None = None
+    first: NDArray[np.float64] | None = None
+    """(requests,) milliseconds."""
+    right: Right | None = None
+    drift: Drift | None = None
+    hls: tuple[Late, Late] | None = None
+    """Without parts, and with them."""
+
+
+def describe(report: Report, found: Found) -> None:
+    """Print the tables."""
+    if found.spliced and found.encoded:
+        _splices(report, found, found.encoded)
+    if found.steps:
+        _steps(report, found)
+    rows = summary(found)
+    if rows:
+        report.table("The stream", ["what", "measured", "to reach", "how"], rows)
+
+
+def _splices(report: Report, found: Found, encoded: Encoded) -> None:
+    rows = [
+        [
+            f"spliced, objects: {it.objects}",
+            f"{it.spliced:.2f}",
+            f"{encoded.whole / it.spliced:.0f}",
+            f"{encoded.whole / (it.spliced + it.shelved_share):.0f}",
+            "with a viewer each, who takes it",
+        ]
+        for it in found.spliced
+    ]
+    rows.append(["decoded", f"{encoded.decoded:.0f}", "", "", "one thread"])
+    rows.append(["encoded again", f"{encoded.encoded:.0f}", "1", "1", "the site's encoder, from BGR"])
+    if found.ffmpeg is None:
+        report.say("ffmpeg: left out: needs ffmpeg; on Debian: apt install ffmpeg")
+    else:
+        rows.append(["ffmpeg", f"{found.ffmpeg:.0f}", "", "", "switches all four cameras, and encodes"])
+    columns = ["", "µs a frame", "times cheaper", "with shelving", "how"]
+    report.table("An object's frame, processor time; decoding and encoding it against", columns, rows)
+
+
+def _steps(report: Report, found: Found) -> None:
+    rows = [
+        [
+            f"{it.viewers}",
+            f"{it.cores:.2f}",
+            f"{it.crowd:.2f}",
+            f"{it.kbits:.0f}",
+            f"{100 * it.arrived:.0f} %",
+            f"{it.given:.0f}",
+            *(f"{value:.0f}" for value in it.delays),
+            f"{it.load:.1f}",
+        ]
+        for it in found.steps
+    ]
+    columns = ["viewers", "cores", "reader's", "kbit/s each", "arrived"]
+    columns += ["sent ms", "p50 ms", "p95 ms", "p99 ms", "load"]
+    report.table("Viewers of 50 objects: from when a GOP is given out to when its end is read", columns, rows)
+    if found.bare:
+        report.say(_bare(found.bare))
+    for count in found.too_many:
+        report.say(f"{count} viewers: left out: a process may not open so many files (ulimit -Hn)")
+    if found.here:
+        report.say(f"HLS here: {_served(found.here)}")
+    if found.nginx:
+        report.say(f"HLS of nginx, the same files: {_served(found.nginx)}")
+    else:
+        report.say("HLS of nginx: left out: needs nginx; on Debian: apt install nginx-light")
+
+
+def _bare(it: Bare) -> str:
+    late = ", ".join(f"{value:.0f}" for value in it.delays)
+    return (
+        f"A bare loop of sends to {it.viewers} sockets, beside it: {it.each:.1f} µs of the processor each, "
+        f"sent in {it.given:.0f} ms; read after {late} ms (p50, p95, p99)"
+    )
+
+
+def _served(served: Served) -> str:
+    return (
+        f"{served.microseconds:.0f} µs for a playlist and a segment of {served.kilobytes:.0f} kB, "
+        f"which is {served.per_core:.0f} viewers of a segment a second per core"
+    )
+
+
+def summary(found: Found) -> list[list[str]]:
+    """Return the rows of the table of all that was measured."""
+    rows = []
+    if found.spliced and found.encoded:
+        last = found.spliced[-1]
+        ratio = found.encoded.whole / last.spliced
+        rows.append(
+            [
+                "splice against re-encoding",
+                f"{ratio:.0f}x",
+                "1000x",
+                f"an object and a frame; {last.objects} objects",
+            ]
+        )
+    if found.watched:
+        rows += _watched_rows(found.watched)
+    if found.steps:
+        rows += _viewer_rows(found)
+    if found.first is not None:
+        middle, late = np.percentile(found.first, [50, 95])
+        what = f"of {len(found.first)} requests; p50 {middle:.1f} ms"
+        rows.append(["request to first picture, p95", f"{late:.1f} ms", "100 ms", f"decoded, {what}"])
+    if found.right:
+        it = found.right
+        good = it.contained if it.ts is None else min(it.contained, it.ts)
+        how = f"{it.cuts} cuts; {'WebM' if it.ts is None else 'MP4 and transport stream'}, to the pixel"
+        rows.append(["right camera on every frame", f"{good} of {it.frames}", "all", how])
+    if found.drift:
+        rows += _drift_rows(found.drift)
+    if found.hls:
+        rows += _hls_rows(*found.hls)
+    return rows
+
+
+def _hls_rows(segments: Late, parts: Late) -> list[list[str]]:
+    return [
+        [
+            f"HLS, {what}: decided to shown, p50",
+            f"{it.shown:.1f} s",
+            "",
+            f"fetched after {it.fetched:.2f} s; {it.stalls} stalls",
+        ]
+        for what, it in (("whole segments", segments), ("parts", parts))
+    ]
+
+
+def _watched_rows(watched: Watched) -> list[list[str]]:
+    how = f"cores: {watched.all:.3f}, {watched.one:.3f}, nobody {watched.nobody:.3f}; {watched.rounds} rounds"
+    rows = [[f"watching {watched.objects} objects against 1", f"{watched.ratio:.2f}x", "1.10x", how]]
+    how = f"worked out: {watched.nobody + watched.encoded:.2f} cores with an encoder for each"
+    rows.append(["re-encoding each against that", f"{watched.against_encoding:.1f}x", "14x", how])
+    return rows
+
+
+def per_core(steps: Sequence[Step]) -> tuple[float, float]:
+    """Fit a line to the cores: give what the service uses without viewers, and how many fill a core."""
+    slope, alone = np.polyfit([it.viewers for it in steps], [it.cores for it in steps], 1)
+    return float(alone), float((1.0 - alone) / slope)
+
+
+def _viewer_rows(found: Found) -> list[list[str]]:
+    soon = max((it.viewers for it in found.steps if it.delays[2] < _SOON_MS), default=0)
+    rows = [["viewers with p99 below 40 ms", f"{soon}", "4000", "of the counts tried; all get a GOP at once"]]
+    whole = [it for it in found.steps if it.arrived > _WHOLE]
+    if len(whole) > 1:
+        alone, count = per_core(whole)
+        how = (
+            f"by processor time, beside the service's own {alone:.2f} cores; a line up to {whole[-1].viewers}"
+        )
+        rows.insert(0, ["viewers that fill a core", f"{count:.0f}", "4000", how])
+    return rows
+
+
+def _drift_rows(it: Drift) -> list[list[str]]:
+    minutes = it.pulses / SITE.fps / 60
+    return [
+        [
+            f"delay in {minutes:.0f} minutes",
+            f"{it.least} to {it.most} pulses",
+            "no drift",
+            f"{it.gops} GOPs; times off by {it.off} ticks of 1/90000 s",
+        ],
+        [
+            "cost of a pulse, last tenth",
+            f"{it.costs[-1] / it.costs[0]:.2f}x",
+            "no drift",
+            f"of the first tenth's {it.costs[0]:.2f} ms",
+        ],
+    ]
+
+
+def plot(found: Found, path: Path) -> None:
+    """Draw what viewers cost, and how late they are served."""
+    figure = Figure(figsize=(9, 4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    viewers = [it.viewers for it in found.steps]
+    left.plot(viewers, [it.cores for it in found.steps], marker="o")
+    left.set(xlabel="viewers", ylabel="cores of the best-view process", xlim=(0, None), ylim=(0, None))
+    for place, name in enumerate(("p50", "p95", "p99")):
+        right.plot(viewers, [it.delays[place] for it in found.steps], marker="o", label=name)
+    right.axhline(_SOON_MS, color="black", linestyle="--", linewidth=1, label="40 ms")
+    right.set(xlabel="viewers", ylabel="ms until a GOP has come", xlim=(0, None), ylim=(0, None))
+    right.legend()
+    figure.savefig(path, dpi=110)

@@ -1,0 +1,51 @@
+"""The real best-view process, which notes when each GOP was given to the streams, and how long that took.
+
+    python -m benchmarks.streaming.timed_service NOTES bestview SITE.yaml
+
+is `myview bestview SITE.yaml` with one method wrapped; nothing else is changed.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.cli.main import main as command_line
+from server.service.streaming.splicer import Splicer
+from server.service.view_selection.decider import GopDecision
+
+
+def note(path: Path) -> None:
+    """Write a line for each GOP: its first pulse, when it was given out, when all sockets had been tried."""
+    original = Splicer.publish_decision
+    notes = path.open("a", encoding="ascii", buffering=1)
+
+    @functools.wraps(original)
+    def run(self: Splicer, decision: GopDecision) -> None:
+        began = time.monotonic()
+        original(self, decision)
+        notes.write(f"{decision.first} {began} {time.monotonic()}\n")
+
+    Splicer.publish_decision = run  # type: ignore[method-assign]
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """When a GOP was given out, and when every viewer's socket had accepted it or was found full."""
+
+    began: float
+    ended: float
+
+
+def read(path: Path) -> dict[int, Given]:
+    """Return when each GOP was sent, by its first pulse."""
+    lines = (line.split() for line in path.read_text(encoding="ascii").split("\n")[:-1])
+    return {int(first): Given(float(began), float(ended)) for first, began, ended in lines}
+
+
+if __name__ == "__main__":
+    note(Path(sys.argv.pop(1)))
+    command_line()

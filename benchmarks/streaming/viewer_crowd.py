@@ -1,0 +1,132 @@
+"""A process that is many viewers: raw sockets that read streams, and note when each GOP has come.
+
+    python -m benchmarks.streaming.viewer_crowd PORT
+
+Commands are lines of JSON on standard input, each answered by a line. `{"watch": ["/objects/1/best.mp4", …]}`
+lets a viewer watch each, instead of those before; `{"for": 5.0}` reads for so long and tells what came.
+"""
+
+from __future__ import annotations
+
+import array
+import contextlib
+import selectors
+import socket
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import msgspec
+
+_RECEIVED = 262_144
+_TOGETHER = 100
+"""Connections that are opened before what comes is read: a server's backlog is no longer."""
+_TFDT = b"tfdt"
+_TIME_AT = 8
+"""Where the time stands behind that word: version and flags lie between."""
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What all viewers were sent in a while."""
+
+    megabytes: float
+    seconds: float
+    busy: float
+    """Processor seconds of this process."""
+    gone: int
+    """Viewers whose connection has ended."""
+    ticks: list[int] = field(default_factory=list)
+    """Of every piece received: the time in its last fragment."""
+    at: list[float] = field(default_factory=list)
+    """When it came, seconds by a clock that never steps and all processes share."""
+
+
+class Crowd:
+    """Viewers of streams of one server."""
+
+    def __init__(self, port: int) -> None:
+        self._port = port
+        self._selector = selectors.DefaultSelector()
+        self._viewers: list[socket.socket] = []
+        self._buffer = bytearray(_RECEIVED)
+        self._gone = 0
+
+    def watch(self, paths: Sequence[str]) -> None:
+        """Let one viewer watch each path, instead of those who watched before."""
+        self.leave()
+        for place, path in enumerate(paths):
+            viewer = socket.create_connection(("127.0.0.1", self._port))
+            viewer.sendall(f"GET {path} HTTP/1.1\r\nHost: here\r\n\r\n".encode())
+            viewer.settimeout(0.0)
+            self._selector.register(viewer, selectors.EVENT_READ)
+            self._viewers.append(viewer)
+            if place % _TOGETHER == _TOGETHER - 1:
+                self.read(0.02)
+
+    def leave(self) -> None:
+        """Let nobody watch."""
+        for viewer in self._viewers:
+            with contextlib.suppress(KeyError):
+                self._selector.unregister(viewer)
+            viewer.close()
+        self._viewers, self._gone = [], 0
+
+    def read(self, seconds: float) -> Heard:
+        """Read whatever comes."""
+        ticks, at = array.array("q"), array.array("d")
+        buffer, total = self._buffer, 0
+        began, busy = time.monotonic(), time.process_time()
+        while (left := began + seconds - time.monotonic()) > 0:
+            for key, _ in self._selector.select(left):
+                viewer = key.fileobj
+                assert isinstance(viewer, socket.socket)  # noqa: S101 — nothing else was registered
+                size = self._receive(viewer)
+                total += size
+                found = buffer.rfind(_TFDT, 0, size)
+                if 0 <= found < size - 16:
+                    ticks.append(int.from_bytes(buffer[found + _TIME_AT : found + _TIME_AT + 8], "big"))
+                    at.append(time.monotonic())
+        return Heard(
+            total / 1e6,
+            time.monotonic() - began,
+            time.process_time() - busy,
+            self._gone,
+            ticks.tolist(),
+            at.tolist(),
+        )
+
+    def _receive(self, viewer: socket.socket) -> int:
+        try:
+            size = viewer.recv_into(self._buffer)
+        except BlockingIOError:
+            return 0
+        except ConnectionError:
+            size = 0
+        if not size:
+            self._selector.unregister(viewer)
+            self._gone += 1
+        return size
+
+
+class Command(msgspec.Struct, forbid_unknown_fields=True):
+    """One of the two."""
+
+    watch: list[str] | None = None
+    seconds: float = msgspec.field(default=0.0, name="for")
+
+
+def main() -> None:
+    """Do as told until the input ends."""
+    crowd = Crowd(int(sys.argv[1]))
+    for line in sys.stdin.buffer:
+        command = msgspec.json.decode(line, type=Command)
+        if command.watch is not None:
+            crowd.watch(command.watch)
+        sys.stdout.buffer.write(msgspec.json.encode(crowd.read(command.seconds)) + b"\n")
+        sys.stdout.buffer.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,184 @@
+"""What watching costs the real best-view process: many objects, many viewers, the first picture."""
+
+from __future__ import annotations
+
+import io
+import os
+import socket
+import statistics
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.streaming.simulated_cameras import ENCODE, SITE
+from benchmarks.streaming.splice_cost import encode_again
+from benchmarks.streaming.stream_site import StreamSite, Viewers
+from benchmarks.streaming.timed_service import Given
+from benchmarks.streaming.viewer_crowd import Heard
+from server.camera.encoding.encoder import AccessUnit
+from server.media.rendering_messages import TIMESCALE
+
+_SETTLE_S = 2.0
+_PAUSE_S = 0.037
+"""Between requests: they come at every place within a GOP."""
+_ENCODED_GOPS = 20
+_RECEIVED = 65_536
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """Cores that the best-view process uses, by how many objects are watched; medians of the rounds."""
+
+    objects: int
+    nobody: float
+    one: float
+    all: float
+    encoded: float
+    """That an encoder of its own for each object would use instead, worked out."""
+    rounds: int
+
+    @property
+    def ratio(self) -> float:
+        """What all cost against one."""
+        return self.all / self.one
+
+    @property
+    def against_encoding(self) -> float:
+        """What encoding for each costs against all."""
+        return (self.nobody + self.encoded) / self.all
+
+
+def watch_objects(
+    site: StreamSite,
+    viewers: Viewers,
+    numbers: Sequence[int],
+    film: Sequence[AccessUnit],
+    seconds: float,
+    rounds: int,
+) -> Watched:
+    """Let nobody, one and all of the objects be watched by turns, one viewer each; encode between them.
+
+    A busy machine makes all of them dearer: hence by turns.
+    """
+    cores: dict[int, list[float]] = {0: [], 1: [], len(numbers): []}
+    again = []
+    for _ in range(rounds):
+        again.append(SITE.fps * encode_again(film, _ENCODED_GOPS).whole / 1e6)
+        for count, found in cores.items():
+            viewers.watch([_path(number) for number in numbers[:count]], _SETTLE_S)
+            found.append(_used(site, viewers, seconds)[0])
+    nobody, one, everybody = (statistics.median(found) for found in cores.values())
+    encoded = len(numbers) * statistics.median(again)
+    return Watched(len(numbers), nobody, one, everybody, encoded, rounds)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """So many viewers at once."""
+
+    viewers: int
+    cores: float
+    """Of the best-view process, with all that it does besides."""
+    crowd: float
+    """Of the process that reads."""
+    kbits: float
+    """A viewer's stream, a second."""
+    arrived: float
+    """Share of what was sent meanwhile; what is lost is whole GOPs."""
+    delays: tuple[float, float, float]
+    """Milliseconds from when a GOP was given to the streams to when its end was read: p50, p95, p99."""
+    given: float
+    """Milliseconds until the last viewer's socket has accepted a GOP; the median."""
+    load: float
+    """Of the machine, over the last minute."""
+
+
+def step_up(
+    site: StreamSite, viewers: Viewers, numbers: Sequence[int], counts: Sequence[int], seconds: float
+) -> list[Step]:
+    """Let ever more watch, spread over the objects."""
+    steps = []
+    for count in counts:
+        viewers.watch([_path(numbers[place % len(numbers)]) for place in range(count)], _SETTLE_S)
+        cores, heard = _used(site, viewers, seconds)
+        sent = site.sent
+        delays = send_delays(heard, {first: it.began for first, it in sent.items()})
+        low, middle, high = np.percentile(delays, [50, 95, 99]).tolist()
+        steps.append(
+            Step(
+                viewers=count,
+                cores=cores,
+                crowd=heard.busy / heard.seconds,
+                kbits=8e3 * heard.megabytes / heard.seconds / count,
+                arrived=len(delays) / (count * heard.seconds * SITE.fps / ENCODE.gop),
+                delays=(low, middle, high),
+                given=statistics.median(_given(heard, sent)),
+                load=os.getloadavg()[0],
+            )
+        )
+    return steps
+
+
+def _given(heard: Heard, sent: dict[int, Given]) -> list[float]:
+    """Return the milliseconds that giving out took, of the GOPs that have come."""
+    gops = {round(tick * SITE.fps / TIMESCALE) // ENCODE.gop * ENCODE.gop for tick in heard.ticks}
+    return [1e3 * (it.ended - it.began) for first, it in sent.items() if first in gops]
+
+
+def send_delays(heard: Heard, sent: dict[int, float]) -> NDArray[np.float64]:
+    """Return the milliseconds from when each GOP was sent to when its end was read."""
+    gop = ENCODE.gop
+    last = (round(tick * SITE.fps / TIMESCALE) for tick in heard.ticks)
+    return np.array(
+        [
+            1e3 * (at - sent[pulse - gop + 1])
+            for pulse, at in zip(last, heard.at, strict=True)
+            if pulse % gop == gop - 1 and pulse - gop + 1 in sent
+        ]
+    )
+
+
+def first_pictures(site: StreamSite, numbers: Sequence[int], count: int) -> NDArray[np.float64]:
+    """Ask for streams one after the other: milliseconds until a picture of each is decoded."""
+    return np.array([_first_picture(site.http, numbers[place % len(numbers)]) for place in range(count)])
+
+
+def _first_picture(port: int, number: int) -> float:
+    time.sleep(_PAUSE_S)
+    data, began = b"", time.perf_counter()
+    with socket.create_connection(("127.0.0.1", port)) as viewer:
+        viewer.sendall(f"GET {_path(number)} HTTP/1.0\r\n\r\n".encode())
+        while not (end := end_of_first_fragment(data.partition(b"\r\n\r\n")[2])):
+            some = viewer.recv(_RECEIVED)
+            if not some:
+                raise RuntimeError(f"the stream of object {number} ended before its first picture")
+            data += some
+    film = data.partition(b"\r\n\r\n")[2][:end]
+    with av.open(io.BytesIO(film), "r") as container:
+        next(container.decode(video=0))
+    return 1e3 * (time.perf_counter() - began)
+
+
+def end_of_first_fragment(data: bytes) -> int:
+    """Return where the first media data end; 0: they are not whole yet."""
+    at = 0
+    while at + 8 <= len(data):
+        size, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
+        at += size
+        if kind == b"mdat":
+            return at if at <= len(data) else 0
+    return 0
+
+
+def _used(site: StreamSite, viewers: Viewers, seconds: float) -> tuple[float, Heard]:
+    before = site.used
+    heard = viewers.read(seconds)
+    return (site.used - before) / heard.seconds, heard
+
+
+def _path(number: int) -> str:
+    return f"/objects/{number}/best.mp4"

@@ -1,0 +1,170 @@
+"""Times of the whole decision, from what cameras send to everybody's camera, on made-up crowds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.common.stopwatch import Stopwatch, Watched
+from bestview import IdentityUpdate, QualitySettings, TrackletKey, TrackUpdate
+from server.config.loader import build_config
+from server.config.site_config import Config
+from server.messaging.epochs import end_of_epoch
+from server.messaging.messages import AppearanceHistogram, CameraTracks, TrackMessage
+from server.service.decision_state import Board
+from server.service.identity.camera_window import WindowReader
+from server.service.identity.people import PersonTracker
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.view_selection import decider as decider_module
+from server.service.view_selection.decider import ViewDecider
+from server.service.view_selection.lookahead_window import LookaheadPart, LookaheadWindow
+from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
+
+_SEED, _WIDTH, _HEIGHT = 5, 1280, 720
+_WARM = 6
+"""Epochs before it counts: the look-ahead has to fill."""
+_ALL = QualitySettings(
+    size=1.0,
+    truncation=0.5,
+    occlusion=0.5,
+    centering=0.5,
+    sharpness=0.5,
+    facing=0.5,
+    confidence=0.5,
+    relative=True,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Crowd:
+    """People who walk, each before as many of the cameras."""
+
+    people: int
+    cameras: int
+    seen_by: int
+
+    def epochs(self, config: Config, count: int) -> Iterator[Epoch]:
+        """Yield what the cameras say: each window anew, as the tracker sends it."""
+        rng = np.random.default_rng(_SEED)
+        window, stride = config.track.window.window, config.track.window.stride
+        cameras = [rng.permutation(self.cameras)[: self.seen_by] for _ in range(self.people)]
+        height = rng.uniform(40, 120, self.people)
+        begin = rng.uniform((0, 200), (_WIDTH, _HEIGHT), (self.people, 2))
+        walk = rng.normal(0, 1.5, (self.people, 2))
+        for number in range(count):
+            last = end_of_epoch(number, stride)
+            first = max(0, last - window + 1)
+            said: dict[str, list[TrackMessage]] = {camera: [] for camera in config.camera_ids}
+            for person in range(self.people):
+                feet = begin[person] + walk[person] * np.arange(first, last + 1)[:, None]
+                tall = height[person]
+                boxes = (feet[:, [0, 1, 0, 1]] + np.array([-0.2, -1.0, 0.2, 0.0]) * tall).tolist()
+                track = TrackMessage(
+                    id=person,
+                    boxes=[(a, b, c, d) for a, b, c, d in boxes],
+                    confidence=0.7,
+                    appearance=[AppearanceHistogram(first=first, last=first, histogram=[float(person + 1)])],
+                )
+                for camera in cameras[person]:
+                    said[config.camera_ids[camera]].append(track)
+            yield Epoch(number, last, {it: _message(it, number, first, last, said[it]) for it in said})
+
+
+@dataclass(frozen=True, slots=True)
+class Spent:
+    """Seconds of processor time a frame."""
+
+    reading: float
+    """Boxes out of messages."""
+    quality: float
+    """Of views, from boxes."""
+    costs: float
+    """Laid out by person."""
+    choice: float
+    """The program."""
+    rest: float
+    """Whose each shot is, and what is said of it."""
+    people: float
+    """Who is who, with the numbers given: only the keeping of them."""
+    telling: float
+    """Boxes and choices written down as messages."""
+
+    @property
+    def decision(self) -> float:
+        """From messages to everybody's camera."""
+        return self.reading + self.quality + self.costs + self.choice + self.rest
+
+
+class _Given:
+    """A registry that reads people's numbers off their looks."""
+
+    def update(
+        self, tracks: Sequence[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+    ) -> IdentityUpdate:
+        """Return everybody their number."""
+        del last_frame, pictures
+        numbers = {TrackletKey(*it.key, 0): int(it.appearance[0].histogram[0]) for it in tracks}
+        return IdentityUpdate(numbers, created=(), returned=(), departed=(), merged=(), split=())
+
+
+def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> Spent:
+    """Decide for a crowd, and give what the stages cost."""
+    config = _config(crowd, gop, asdict(_ALL) if all_terms else {})
+    ground = np.array([[1.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.002, 1.0]])
+    decider = ViewDecider(config, dict.fromkeys(config.camera_ids, ground), lambda _camera, _pulse: True)
+    decider.people._registry = _Given()  # type: ignore[assignment]  # noqa: SLF001 — joining is measured elsewhere
+    board, watch = Board(25.0), Stopwatch()
+    stages: tuple[Watched, ...] = (
+        (WindowReader, "read", "reading"),
+        (ViewQualityBuffer, "put", "quality"),
+        (LookaheadWindow, "__init__", "costs"),
+        (LookaheadWindow, "part", "costs"),
+        (LookaheadPart, "gops", "costs"),
+        (decider_module, "choose_by_gops", "choice"),
+        (ViewDecider, "step", "rest"),
+        (PersonTracker, "update", "people"),
+        (PersonTracker, "boxes", "telling"),
+        (Board, "put", "telling"),
+    )
+    for epoch in crowd.epochs(config, _WARM + epochs):
+        if epoch.number < _WARM:
+            decider.step(epoch)
+            continue
+        with watch.watching(*stages):
+            for decision in decider.step(epoch):
+                board.put(decision)
+    frames = epochs * config.track.window.stride
+    return Spent(**{stage: spent / frames for stage, spent in watch.seconds.items()})
+
+
+def _config(crowd: Crowd, gop: int, quality: dict[str, float]) -> Config:
+    cameras = [{"id": f"c{number}", "source": "scene:room"} for number in range(crowd.cameras)]
+    return build_config(
+        {
+            "site": {"width": _WIDTH, "height": _HEIGHT},
+            "encode": {"gop": gop},
+            "cameras": cameras,
+            "view": {"quality": quality},
+        },
+        where="the benchmark",
+        folder=Path(),
+    )
+
+
+def _message(camera: str, epoch: int, first: int, last: int, tracks: list[TrackMessage]) -> CameraTracks:
+    return CameraTracks(
+        camera=camera,
+        boot=1,
+        size=(_WIDTH, _HEIGHT),
+        epoch=epoch,
+        first=first,
+        last=last,
+        final_to=first,
+        ended=False,
+        shed=[],
+        tracks=tracks,
+        solve=None,
+    )
