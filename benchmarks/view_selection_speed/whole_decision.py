@@ -123,7 +123,7 @@ def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> S
         (LookaheadWindow, "__init__", "costs"),
         (LookaheadWindow, "part", "costs"),
         (LookaheadPart, "gops", "costs"),
-        (decider_module, "choose_by_gops", "choice"),
+        (decider_module, "select_views_by_gop", "choice"),
         (ViewDecider, "step", "rest"),
         (PersonTracker, "update", "people"),
         (PersonTracker, "boxes", "telling"),

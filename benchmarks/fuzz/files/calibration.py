@@ -138,7 +138,7 @@ class Plans(_Files):
         out = self._path / "ground.json"
         drawn = zlib.crc32(data) % _DRAWN_EVERY == 0
         try:
-            with nullcontext() if drawn else patch.object(calibration, "plot_plan", _laid_out):
+            with nullcontext() if drawn else patch.object(calibration, "plot_floor_plan", _laid_out):
                 lines = calibration.calibrate_points(self.written(data), out, self._path / "plan.png", None)
         except UserError as error:
             return refused(error)
