@@ -1,1 +1,1 @@
-"""Who is who: from every camera's own tracks to one number per person, which they keep."""
+"""Person identities: maps every camera's tracks to one persistent number per person."""

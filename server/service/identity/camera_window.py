@@ -1,4 +1,4 @@
-"""What a camera said of an epoch, read once: its tracks' names, and their boxes as arrays."""
+"""A camera's track message of one epoch, decoded: track keys, and boxes as arrays."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ class CameraWindow:
     """One camera's T tracks over a window of F frames.
 
     Attributes:
-        message: as it came.
-        keys: what the tracks are called here; T of them.
-        locals: (T,) their numbers.
-        fit: how the camera's own picture lies in the site's.
+        message: the message itself.
+        keys: the site-wide keys of the tracks; T of them.
+        locals: (T,) the keys' local ids.
+        fit: the letterbox from the camera's own picture to the site's.
         boxes: (T, F, 4) pixels of the site's picture, NaN where hidden.
-        fresh: the first frame that was not final before: the first of all, unless the past was mended.
+        fresh: the first frame that was not final before; later than `first` for a revision of the past.
     """
 
     message: CameraTracks
@@ -45,7 +45,7 @@ class CameraWindow:
         return self.message.first
 
     def local_tracks(self) -> list[TrackUpdate]:
-        """Return what is final of the tracks, where it is anything, boxes in the camera's own picture."""
+        """Return the newly final, visible parts of the tracks, boxes in the camera's own pixels."""
         _, height = self.message.size
         known = slice(self.fresh - self.first, max(0, self.message.final_to - self.first + 1))
         hidden = np.isnan(self.boxes[:, known, 0])
@@ -64,48 +64,48 @@ class CameraWindow:
         ]
 
     def seen_spans(self) -> list[tuple[int, int]]:
-        """Return each track's first and last frame with a box; the last is lower: none."""
-        there = ~np.isnan(self.boxes[:, :, 0])
-        if not there.size:
+        """Return each track's first and last frame with a box; without any, the last is before the first."""
+        visible = ~np.isnan(self.boxes[:, :, 0])
+        if not visible.size:
             return [(self.first, self.first - 1)] * len(self.keys)
-        begins = self.first + there.argmax(axis=1)
-        ends = self.first + there.shape[1] - 1 - there[:, ::-1].argmax(axis=1)
-        ends[~there.any(axis=1)] = self.first - 1
+        begins = self.first + visible.argmax(axis=1)
+        ends = self.first + visible.shape[1] - 1 - visible[:, ::-1].argmax(axis=1)
+        ends[~visible.any(axis=1)] = self.first - 1
         return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
 def _appearance_samples(
-    looks: Sequence[messages.AppearanceHistogram], first: int
+    histograms: Sequence[messages.AppearanceHistogram], first: int
 ) -> tuple[AppearanceSample, ...]:
-    """Return the looks in the frames from `first` on."""
+    """Return the samples in the frames from `first` on."""
     return tuple(
         AppearanceSample(max(it.first, first), it.last, np.array(it.histogram, dtype=np.float64))
-        for it in looks
+        for it in histograms
         if it.last >= first
     )
 
 
 class WindowReader:
-    """Parses epochs into camera windows, and keeps the tracks' names and each camera's letterbox."""
+    """Decodes epochs into camera windows; keeps the track keys and each camera's letterbox."""
 
     def __init__(self, site_size: tuple[int, int]) -> None:
         self._site_size = site_size
         self.locals = LocalNumbers()
         self.fits: dict[str, Letterbox] = {}
-        """Of each camera, known from its first word on; its picture has another size after another source."""
+        """By camera, from its first message on; replaced when the size of its picture changes."""
         self._final: dict[str, int] = {}
         """By camera, the last frame that was final."""
 
     def read(self, epoch: Epoch) -> Sequence[CameraWindow]:
-        """Return what all cameras said, in the order of the epoch."""
+        """Decode the messages of all cameras, in the order of the epoch."""
         windows = [self._window(message) for message in epoch.tracks.values()]
         self._final |= {it.message.camera: it.message.final_to for it in windows}
         return windows
 
     def read_late(self, epoch: Epoch) -> Iterator[CameraWindow]:
-        """Yield what has mended the past, and came too late for its own epoch, one word after the other.
+        """Yield the revisions of the past that came too late for their own epoch.
 
-        Each is read when it is asked for: the one before may have changed what tracks are called.
+        Decoded lazily: the repair of one may exchange the keys that the next is decoded with.
         """
         for message in epoch.mended:
             yield self._window(message)
@@ -124,6 +124,6 @@ class WindowReader:
         return CameraWindow(message, keys, locals_, fit, boxes.reshape(len(keys), frames, 4), fresh)
 
     def with_current_keys(self, window: CameraWindow) -> CameraWindow:
-        """Return a window by what its tracks are called now."""
+        """Return a window with its tracks' current keys."""
         keys = self.locals.of(window.message)
         return replace(window, keys=keys, locals=np.array([key.local_id for key in keys], dtype=np.int64))

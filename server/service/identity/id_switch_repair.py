@@ -1,4 +1,4 @@
-"""Numbers follow the people where a camera's past was mended: its tracks had taken them for each other."""
+"""Repairs person numbers after a camera revised its past because two tracks had switched identities."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ Parts = dict[TrackKey, Sequence[TrackPart]]
 
 
 class IdSwitchRepair:
-    """Applies windows whose past was corrected.
+    """Applies windows that revise the past: exchanges the keys of tracks that had switched.
 
-    A track is what goes its way without a jump: where a camera's two tracks exchange their people, they
-    exchange their names here, and what is known of them stays true. Whose they are from then on is said.
+    A key stands for one continuous path: where a camera's two tracks exchange people, their keys are
+    exchanged here, so that earlier evidence stays valid. From then on their person numbers are fixed.
     """
 
     def __init__(self, registry: IdentityRegistry, reader: WindowReader) -> None:
         self._registry, self._reader = registry, reader
         self._switches: dict[TrackKey, TrackPart] = {}
-        """Since when a track is whose, until the evidence speaks of that time no more."""
+        """By track, the number it has since a switch, until the registry no longer revises that time."""
 
     def read(
         self,
@@ -32,10 +32,10 @@ class IdSwitchRepair:
         parts: Parts,
         needed_from: int,
     ) -> tuple[CameraWindow, list[Split]]:
-        """Return a window by what its tracks are called now, and what has turned out about numbers.
+        """Return the window with its tracks' current keys, and the splits that follow.
 
-        ``before`` is what was said of its frames that were final; ``parts``, whose tracks are, is changed:
-        of frames before ``asked_from`` it may be forgotten.
+        ``before`` are the earlier windows of its final frames. ``parts``, each track's person numbers, is
+        updated in place; for frames before ``needed_from`` it may be incomplete.
         """
         splits: list[Split] = []
         for one, two, frame in find_id_switches(window, before):
@@ -48,7 +48,7 @@ class IdSwitchRepair:
         return self._reader.with_current_keys(window), splits
 
     def overlay(self, parts: Parts) -> None:
-        """Put what was said of tracks over what is worked out."""
+        """Override the registry's numbers with those fixed by a switch."""
         for key, since in self._switches.items():
             if key not in parts:
                 continue
@@ -56,13 +56,13 @@ class IdSwitchRepair:
             parts[key] = [*(it for it in parts[key] if it.first < since.first), since, *later]
 
     def merge(self, merged: Mapping[int, int]) -> None:
-        """Take over that numbers are another's now."""
+        """Replace merged numbers."""
         self._switches = {
             key: TrackPart(it.first, merged.get(it.number, it.number)) for key, it in self._switches.items()
         }
 
     def keep_only(self, parts: Parts, needed_from: int) -> None:
-        """Forget what nobody asks for any more."""
+        """Drop switches before the frames that are still needed."""
         self._switches = {
             key: it
             for key, it in self._switches.items()
@@ -71,7 +71,7 @@ class IdSwitchRepair:
 
 
 def _person_at(parts: Sequence[TrackPart], frame: int, needed_from: int) -> int:
-    """Return whose a track was in a frame, 0: nobody's; where that is forgotten, in the first that is not."""
+    """Return a track's person number in a frame, or in the first frame still known; 0: unconfirmed."""
     if frame < parts[0].first <= needed_from:
         frame = parts[0].first
     number = int(person_numbers([parts], frame, 1)[0, 0])

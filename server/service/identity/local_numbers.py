@@ -1,4 +1,4 @@
-"""One number per track and camera, over all runs of the camera's process."""
+"""Numbers tracks per camera across restarts of the camera's process."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from server.messaging.messages import CameraTracks
 
 
 class TrackName(msgspec.Struct, frozen=True, array_like=True):
-    """A track by the name that its camera gives it."""
+    """A track as its camera identifies it."""
 
     camera: str
     boot: int
-    """Which run of the camera's process."""
+    """The run of the camera's process."""
     track: int
 
 
 class LocalNumbers:
-    """Numbers each camera's tracks from 1 in the order they are heard of.
+    """Maps each camera's tracks to numbers from 1, in order of appearance.
 
-    A restarted camera's tracker counts from 1 again: the boot tells its tracks from earlier ones.
+    A restarted camera's tracker counts from 1 again; the boot distinguishes its tracks from earlier ones.
     """
 
     def __init__(self) -> None:
         self._keys: dict[tuple[str, int], dict[int, TrackKey]] = {}
-        """Of each run of a camera, by the tracker's numbers."""
+        """By run of a camera, then by the tracker's number."""
         self._origin: dict[TrackKey, tuple[int, int]] = {}
         """The run and the tracker's number."""
         self._counts: dict[str, int] = {}
 
     def of(self, message: CameraTracks) -> tuple[TrackKey, ...]:
-        """Return what the tracks of a message are called here."""
+        """Return the keys of a message's tracks, new ones for new tracks."""
         if not message.tracks:
             return ()
         keys = self._keys.setdefault((message.camera, message.boot), {})
@@ -41,21 +41,21 @@ class LocalNumbers:
         return tuple([keys[track.id] for track in message.tracks])
 
     def known(self, camera: str, boot: int, track: int) -> TrackKey | None:
-        """Return what a track that was in some message is called here."""
+        """Return the key of a track; None: it is unknown or forgotten."""
         return self._keys.get((camera, boot), {}).get(track)
 
     def origin(self, key: TrackKey) -> TrackName:
-        """Return what the camera calls a track that is not forgotten."""
+        """Return the camera's own name of a known track."""
         return TrackName(key.camera, *self._origin[key])
 
     def exchange(self, one: TrackKey, two: TrackKey) -> None:
-        """Let two tracks of one run of a camera take each other's name here from now on."""
+        """Exchange the keys of two tracks of one run of a camera from now on."""
         (boot, first), (_, second) = self._origin[one], self._origin[two]
         self._origin[one], self._origin[two] = (boot, second), (boot, first)
         self._keys[one.camera, boot] |= {first: two, second: one}
 
     def forget(self, key: TrackKey) -> None:
-        """Let go of a track; should it come back it has a new number."""
+        """Forget a track; if it comes back it gets a new number."""
         origin = self._origin.pop(key, None)
         if origin is None:
             return

@@ -1,7 +1,7 @@
-"""What somebody who knows them has said of people: who two numbers are one person, and what they are called.
+"""Manual merges of person numbers, applied on top of the automatic association.
 
-It lies over what is worked out, which goes on as ever; here its numbers are read as what was said. So a merge
-by hand holds whatever the evidence says, and the page, the streams and the files know it as any other merge.
+The association goes on unchanged, and its numbers are mapped here. So a manual merge holds whatever the
+evidence says, and the page, the streams and the files see it as any other merge.
 """
 
 from __future__ import annotations
@@ -13,26 +13,26 @@ from bestview import IdentityUpdate, Merge, Split
 
 
 class ManualOverrides:
-    """Numbers that an operator has merged, split or named."""
+    """Numbers that an operator has merged."""
 
     def __init__(self) -> None:
         self._person_of: dict[int, int] = {}
-        """By a number that is worked out: whose it is said to be."""
+        """By automatic number: the number it was merged into."""
         self._departed: set[int] = set()
-        """Of those numbers and whose they are said to be: who is worked out to be away."""
+        """The numbers involved in manual merges that the association considers departed."""
 
     @property
     def merged(self) -> dict[int, int]:
-        """Return whose number each is said to be that is said to be another's."""
+        """Return the manual merges: by merged number, the number that was kept."""
         return dict(sorted(self._person_of.items()))
 
     def current(self, number: int) -> int:
-        """Return whose number this is."""
+        """Return the number that this one goes by now."""
         return self._person_of.get(number, number)
 
     def automatic_numbers(self, number: int) -> list[int]:
-        """Return the numbers that are worked out of somebody, in order."""
-        return sorted({number, *(raw for raw, said in self._person_of.items() if said == number)})
+        """Return the automatic numbers behind a number, in order."""
+        return sorted({number, *(raw for raw, kept in self._person_of.items() if kept == number)})
 
     def merge(self, kept: int, lost: int, away: Collection[int] = ()) -> None:
         """Merge two numbers into one person; `away` names the absent one of numbers never merged."""
@@ -41,7 +41,7 @@ class ManualOverrides:
             self._person_of[raw] = kept
 
     def apply(self, update: IdentityUpdate) -> IdentityUpdate:
-        """Read an update as what was said."""
+        """Return an update with all numbers mapped by the manual merges."""
         if not self._person_of:
             return update
         self._departed = ((self._departed | set(update.departed)) & self._involved) - set(update.returned)
@@ -61,16 +61,16 @@ class ManualOverrides:
         )
 
     def apply_splits(self, splits: Iterable[Split]) -> tuple[Split, ...]:
-        """Read splits as what was said: of two numbers that are said to be one person's there are none."""
-        said = {Split(self.current(it.kept), self.current(it.split_off), it.camera) for it in splits}
-        return tuple(sorted(it for it in said if it.kept != it.split_off))
+        """Return splits with mapped numbers; a split within one manually merged person is dropped."""
+        mapped = {Split(self.current(it.kept), self.current(it.split_off), it.camera) for it in splits}
+        return tuple(sorted(it for it in mapped if it.kept != it.split_off))
 
     @property
     def _involved(self) -> set[int]:
         return {*self._person_of, *self._person_of.values()}
 
     def _merged(self, merged: Iterable[Merge]) -> Iterable[Merge]:
-        """Read merges: whoever one of them is said to be, the other is, too."""
+        """Yield merges with mapped numbers; they extend the manual merges they touch."""
         for it in merged:
             self._departed.discard(it.lost)
             kept, lost = self.current(it.kept), self.current(it.lost)

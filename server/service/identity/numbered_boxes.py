@@ -1,4 +1,4 @@
-"""Everybody's boxes in a camera's frames, by the people's numbers."""
+"""The boxes of a camera's frames, labeled with person numbers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from server.service.identity.camera_window import CameraWindow
 from server.service.ingest.window_history import HistorySpan
 
 Numbers = Callable[[Sequence[TrackKey], int, int], NDArray[np.int64]]
-"""The people's numbers behind T tracks in some frames: tracks, first frame, frames -> (T, frames)."""
+"""Maps T tracks to person numbers: tracks, first frame, frames -> (T, frames)."""
 
 
 def numbered_boxes(
@@ -22,7 +22,7 @@ def numbered_boxes(
 ) -> list[list[NumberedBox]]:
     """Return the boxes of each of the frames from `first` on, by rising number.
 
-    Of two tracks of one person in one frame the first counts. Negative numbers are nobody's.
+    Of two tracks of one person in one frame the first counts. Negative numbers are unconfirmed tracks.
     """
     boxes_per_frame: list[list[NumberedBox]] = [[] for _ in range(frames)]
     for span in spans:

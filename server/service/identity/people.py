@@ -1,4 +1,4 @@
-"""Who is who: from every camera's own track numbers to one number per person."""
+"""The person tracker: assigns one number per person to the tracks of all cameras."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.window_history import WindowHistory
 
 ALL = ShareSettings()
-"""One service for everybody."""
+"""A single service for all people."""
 _RECENT_FRAMES = 100
-"""Frames that tell whether a camera looks; at least those of an epoch."""
+"""Frames by which it is judged whether a camera detects; at least those of an epoch."""
 
 
 class PersonTracker:
-    """Joins the cameras' tracks epoch by epoch, and remembers who was where.
+    """Associates the cameras' tracks epoch by epoch, and keeps everybody's recent boxes.
 
-    ``homographies`` map each camera's own picture to the ground; None where there is none. ``share`` says
-    whom this service decides for; who is who is worked out for everybody, the same in every service. ``lag``
-    frames before an epoch's end tracks are final: who is who is worked out up to there. ``overhead`` are the
+    ``homographies`` map each camera's own picture to the ground; None where there is none. ``share`` is
+    this service's shard; identities are computed for all people, identically in every service. Tracks are
+    final ``lag`` frames before an epoch's end, and are associated up to there. ``overhead`` are the
     cameras that look straight down; ``fps`` are the site's frames a second.
     """
 
@@ -61,34 +61,34 @@ class PersonTracker:
         self._registry = IdentityRegistry(settings, homographies, overhead, fps)
         self._forget_after = settings.forget_after
         self.registry = PersonRegistry(settings.maximum_departed_people)
-        """Everybody, also those whom another service decides for."""
+        """All people, those of other shards included."""
         self._share = share
         self._histories = {camera: WindowHistory[CameraWindow]() for camera in cameras}
         self._reader = WindowReader(site_size)
         self._lag = lag
         self._id_switch_repair = IdSwitchRepair(self._registry, self._reader)
         self.undetected = UndetectedFrames()
-        """Frames in which cameras could not have found anybody."""
+        """Frames without detection, by camera."""
         self.published = PublishedTracks()
-        """By which tracks people were shown in GOPs that are told."""
+        """The tracks behind the boxes of published GOPs."""
         self._parts: dict[TrackKey, Sequence[TrackPart]] = {}
         self._last_reported: dict[TrackKey, int] = {}
         self._needed_from = 0
-        """Nobody asks for frames before this one any more."""
+        """The first frame that is still needed."""
         self._corrections: list[Merge | Split] = []
         self._overrides = ManualOverrides()
         self._expected: dict[TrackName, tuple[int, int]] = {}
-        """Tracks that are not heard of yet: whose they were in an earlier run, and when that ended."""
+        """Tracks expected from an earlier run: their person number, and the pulse at which that run ended."""
         self._newest = -1
-        """The last frame that was spoken of."""
+        """The last frame of the newest epoch."""
 
     def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
-        """Take over what all cameras said about an epoch; give it as it was read."""
+        """Associate an epoch's tracks; return its windows, late revisions first."""
         late = [self._stored(window) for window in self._reader.read_late(epoch)]
         windows = [self._stored(window) for window in self._reader.read(epoch)]
         self._recall(windows)
         tracks = [track for window in windows for track in window.local_tracks()]
-        since = max(self._newest + 1, epoch.last + 1 - _RECENT_FRAMES)  # there may be a long time in between
+        since = max(self._newest + 1, epoch.last + 1 - _RECENT_FRAMES)  # epochs may have been skipped
         pictures = self._pictures(windows, since - self._lag, epoch.last - self._lag)
         self._newest = epoch.last
         update = self._overrides.apply(self._registry.update(tracks, epoch.last - self._lag, pictures))
@@ -109,23 +109,23 @@ class PersonTracker:
 
     @property
     def fits(self) -> Mapping[str, Letterbox]:
-        """How each camera's own picture lies in the site's; known from its first word on."""
+        """The letterbox of each camera's picture, known from its first message on."""
         return self._reader.fits
 
     @property
     def known(self) -> list[int]:
-        """Everybody's number whom this service decides for, in order; those who are away too."""
+        """The numbers of this shard's people, in order; departed ones included."""
         return own_numbers(self.registry.everybody, self.registry.merged, self._share)
 
     @property
     def remote(self) -> list[int]:
-        """The other people's numbers, in order: another service decides for them."""
+        """The numbers of the other shards' people, in order."""
         mine = set(self.known)
         return [number for number in self.registry.everybody if number not in mine]
 
     @property
     def next_number(self) -> int:
-        """The first number that nobody was given yet."""
+        """The first unused number."""
         return self._registry.next_id
 
     def begin_at(self, number: int) -> None:
@@ -133,23 +133,23 @@ class PersonTracker:
         self._registry.reserve_below(number)
 
     def expect(self, tracks: Mapping[TrackName, int], pulse: int) -> None:
-        """Take over whose tracks are that are not heard of yet, from a run that ended with a pulse."""
+        """Expect tracks that belonged to these people in an earlier run, which ended with a pulse."""
         self._expected |= {
             track: (number, pulse) for track, number in tracks.items() if not self.is_known(track)
         }
 
     def cancel_expected(self, tracks: Iterable[TrackName]) -> None:
-        """Take these tracks, should they be heard of, for somebody's of whom nothing is known."""
+        """Expect these tracks no more: should they appear, they are new people's."""
         for track in tracks:
             self._expected.pop(track, None)
 
     @property
     def merged_by_hand(self) -> dict[int, int]:
-        """Return by number that was said to be another's whose it is."""
+        """Return the manual merges: by merged number, the number that was kept."""
         return self._overrides.merged
 
     def merge(self, kept: int, lost: int) -> None:
-        """Take somebody's word that two numbers are one person's, whatever the evidence says from now on."""
+        """Merge two people by the operator's order, whatever the evidence says from now on."""
         here = not {kept, lost} <= self.registry.away
         self._overrides.merge(kept, lost, self.registry.away)
         self._merge(kept, lost)
@@ -158,10 +158,10 @@ class PersonTracker:
         self._corrections.append(Merge(kept, lost))
 
     def split_off(self, number: int, cameras: Collection[str]) -> int | None:
-        """Take somebody's word that whom these cameras show as this person now is somebody new.
+        """Split the tracks of these cameras off a person as a new person, by the operator's order.
 
         Returns:
-            Their number; None: none of the cameras shows the person now.
+            The new number; None: none of the cameras shows the person now.
         """
         tracks = [
             key
@@ -173,7 +173,7 @@ class PersonTracker:
         new = self._registry.split_off(tracks, self._overrides.automatic_numbers(number))
         if new is None:
             return None
-        for key in tracks:  # those that the registry has settled it does not speak of again
+        for key in tracks:  # the registry does not report settled tracks again
             since = max(self._needed_from, self._parts[key][-1].first)
             self._parts[key] = [*self._parts[key], TrackPart(since, new)]
             self.registry.note([TrackPart(since, new)], since, max(since, self._newest))
@@ -181,26 +181,26 @@ class PersonTracker:
         return new
 
     def number(self, camera: str, local: int, pulse: int) -> int | None:
-        """Return person's number behind a camera's local one in a frame; None while it is not confirmed."""
+        """Return the person of a camera's local track in a frame; None while it is not confirmed."""
         number = int(self.numbers([TrackKey(camera, local)], pulse, 1)[0, 0])
         return None if number == NOBODY_YET else number
 
     def boxes(self, camera: str, first: int, frames: int) -> list[list[NumberedBox]]:
-        """Return everybody's box in each of a camera's frames from `first` on, in the numbers' order."""
-        told = self._histories[camera].over(first, first + frames - 1)
-        return numbered_boxes(told, self.numbers, first, frames)
+        """Return the numbered boxes of each of a camera's frames from `first` on, by rising number."""
+        spans = self._histories[camera].over(first, first + frames - 1)
+        return numbered_boxes(spans, self.numbers, first, frames)
 
     def person_of(self, camera: str, boot: int, track: int, pulse: int) -> int | None:
-        """Return the person's number behind a tracker's number in a frame."""
+        """Return the person of a tracker's track in a frame; None: unknown or not confirmed."""
         key = self._reader.locals.known(camera, boot, track)
         return None if key is None else self.number(key.camera, key.local_id, pulse)
 
     def is_known(self, track: TrackName) -> bool:
-        """Return whether a camera has spoken of this track, lately."""
+        """Return whether a camera has reported this track recently."""
         return self._reader.locals.known(track.camera, track.boot, track.track) is not None
 
     def followed(self, numbers: Collection[int], since: int) -> dict[int, list[TrackName]]:
-        """Return the tracks by which these people were followed since a pulse; who was not is left out."""
+        """Return these people's tracks that were reported since a pulse; people without any are left out."""
         found: dict[int, list[TrackName]] = {}
         wanted = set(numbers)
         for key, parts in self._parts.items():
@@ -209,19 +209,19 @@ class PersonTracker:
         return dict(sorted(found.items()))
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
-        """Return the persons' numbers behind T tracks, frame by frame, (T, frames); -1: nobody yet."""
+        """Return the persons' numbers behind T tracks, frame by frame, (T, frames); -1: not confirmed."""
         return person_numbers([self._parts.get(key, UNKNOWN) for key in keys], first, frames)
 
     def take_corrections(self) -> tuple[Merge | Split, ...]:
-        """Return what has turned out about numbers since this was last asked, in order."""
+        """Return the merges and splits since the last call, in order."""
         taken, self._corrections = tuple(self._corrections), []
         return taken
 
     def forget_boxes_before(self, pulse: int) -> None:
-        """Let go of the boxes before a pulse, and of who they were."""
+        """Forget the boxes and person numbers before a pulse."""
         if self.published.frames:
-            said = [it for history in self._histories.values() for it in history.over(0, pulse - 1)]
-            for it in sorted(said, key=lambda it: it.last):
+            spans = [it for history in self._histories.values() for it in history.over(0, pulse - 1)]
+            for it in sorted(spans, key=lambda it: it.last):
                 self.published.note(it, self.numbers(it.window.keys, it.last, 1)[:, 0])
         self._needed_from = max(self._needed_from, pulse)
         self.undetected.forget_before(pulse)
@@ -230,7 +230,7 @@ class PersonTracker:
             history.forget_before(pulse)
 
     def _pictures(self, windows: Sequence[CameraWindow], first: int, last: int) -> dict[str, tuple[int, int]]:
-        """Return pictures of the cameras that could have seen anybody in the frames that are final now."""
+        """Return the picture sizes of the cameras that ran detection in any of these frames."""
         return {
             it.message.camera: it.message.size
             for it in windows
@@ -238,7 +238,7 @@ class PersonTracker:
         }
 
     def _stored(self, window: CameraWindow) -> CameraWindow:
-        """Take a window over, by what its tracks are called if its past was mended."""
+        """Store a window, after repairing identity switches where it revises the past."""
         self.undetected.note(window.message)
         history = self._histories[window.message.camera]
         if window.message.revised_from is not None:
@@ -249,7 +249,7 @@ class PersonTracker:
         return window
 
     def _recall(self, windows: Iterable[CameraWindow]) -> None:
-        """Know the tracks again that an earlier run knew, when they are first heard of."""
+        """Assign expected tracks to their people of an earlier run when they first appear."""
         for key in chain.from_iterable(it.keys for it in windows) if self._expected else ():
             number, pulse = self._expected.pop(self._reader.locals.origin(key), (0, 0))
             if number:
@@ -264,8 +264,8 @@ class PersonTracker:
         }
 
     def _forget(self, now: int) -> None:
-        """Let go of tracks and people that were not heard of for as long as the registry remembers."""
-        for key in [key for key, heard in self._last_reported.items() if heard < now - self._forget_after]:
+        """Forget tracks and people not seen for ``forget_after`` frames, as the registry does."""
+        for key in [key for key, last in self._last_reported.items() if last < now - self._forget_after]:
             del self._last_reported[key]
             self._parts.pop(key, None)
             self._reader.locals.forget(key)

@@ -1,4 +1,4 @@
-"""By which of its tracks a camera showed somebody in frames that were told: whom somebody points at."""
+"""Remembers which track was behind a person's published box, so that corrections reach the right track."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class PublishedTracks:
         self._oldest: int | None = None
 
     def note(self, span: HistorySpan[CameraWindow], numbers: NDArray[np.int64]) -> None:
-        """Take over by which tracks a camera shows people, (T,) their numbers; those below 0 are nobody's.
+        """Record the person numbers (T,) of a window's tracks; those below 0 are unconfirmed.
 
-        Frames come in their order, of one camera as of another.
+        Spans must come in frame order across all cameras.
         """
         if self._oldest is None:
             self._oldest = span.first
@@ -39,13 +39,13 @@ class PublishedTracks:
             self._oldest = self._published.popleft()[1] + 1
 
     def remembers(self, pulse: int) -> bool:
-        """Return whether a frame is one of those that are remembered."""
+        """Return whether a frame is still remembered."""
         return self._oldest is not None and self._oldest <= pulse
 
     def of(self, camera: str, numbers: Collection[int], pulse: int) -> TrackName | None:
-        """Return the track that showed somebody in a frame, or else last before it; None: none did.
+        """Return the track that showed a person in a frame, or else last before it; None: none did.
 
-        ``numbers`` are all that the person has had.
+        ``numbers`` are all numbers of the person, former ones included.
         """
         for first, _, tracks in reversed(self._published):
             if first <= pulse:

@@ -1,4 +1,4 @@
-"""Which best-view service decides for whom, where several share one site."""
+"""Distributes people over the best-view services that share one site."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def shard_of(number: int, share: ShareSettings) -> int:
 def own_numbers(numbers: Iterable[int], merged: Mapping[int, int], share: ShareSettings) -> list[int]:
     """Return the numbers that belong to this service's shard, in the given order.
 
-    It does for its own numbers, and for whoever turned out to be one of its own: who watches an old number
-    stays there.
+    Besides the shard's own numbers these are people into whom one of them was merged, so that viewers of the
+    old number need not change the service.
     """
     if share.of == 1:
         return list(numbers)

@@ -1,4 +1,4 @@
-"""Who is who goes on when the service is started anew: tracks that are still followed are whose they were."""
+"""Recovery of person numbers after a restart, from the snapshots that the cameras retain."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from server.service.identity.local_numbers import TrackName
 from server.service.identity.people import PersonTracker
 
 SINGLE_CAMERA_NUMBER_MAX = 1_000_000
-"""The first free number that is believed of one camera alone: larger ones another must say, too."""
+"""The largest first free number that one camera alone is trusted with; another must confirm larger ones."""
 _NUMBER_SLACK = 10_000
-"""Numbers by which the newest word may be ahead of the one before: nobody gives so many in a second."""
+"""Numbers by which the newest snapshot may be ahead of the one before: far more than a second's."""
 MAX_DOWNTIME_S = 30.0
-"""Seconds that the service may be away: in a longer time a track may have gone over to somebody else."""
+"""The longest downtime that tracks are recovered after: in more time a track may have switched people."""
 
 
 def state_for_cameras(
     people: PersonTracker, cameras: Iterable[str], pulse: int, recent: int, since: float
 ) -> dict[str, IdentitySnapshot]:
-    """Build the state that each camera retains: whom it followed lately, and the first free number."""
+    """Build the snapshot for each camera: the people it tracked recently, and the first free number."""
     followed = people.followed(people.registry.everybody, pulse - recent)
     boots: dict[str, int] = {}
     for it in chain.from_iterable(followed.values()):
@@ -43,13 +43,13 @@ def state_for_cameras(
             continue
         mine: dict[str, list[int]] = {}
         for it in tracks:
-            if it.boot == boots[it.camera]:  # of a run of the camera that is over nobody remembers anything
+            if it.boot == boots[it.camera]:  # tracks of an earlier run of the camera are over
                 mine.setdefault(it.camera, []).append(it.track)
-        for camera, theirs in mine.items():
+        for camera, local_ids in mine.items():
             known[camera].append(
                 PersonSnapshot(
                     number=number,
-                    tracks=theirs,
+                    tracks=local_ids,
                     aliases=also.get(number, [])[-ALIASES_MAX:],
                     name=people.registry.names.get(number, ""),
                     manual=number in by_hand,
@@ -66,7 +66,7 @@ def state_for_cameras(
 
 @dataclass(frozen=True, slots=True)
 class _Awaited:
-    """One person, whom tracks of several cameras may follow."""
+    """A person to recover, and their tracks in all cameras."""
 
     number: int
     tracks: tuple[TrackName, ...]
@@ -76,12 +76,12 @@ class _Awaited:
 
 
 class StateRecovery:
-    """Restores people's numbers and manual overrides after a restart, as their tracks are seen again.
+    """Restores people's numbers and manual overrides after a restart, as their tracks reappear.
 
     Args:
-        said: what each camera remembers; only what is said of now counts.
-        pulse: where the service begins.
-        longest: frames that it may have been away.
+        said: each camera's snapshot; those older than ``longest`` only reserve numbers.
+        pulse: the first pulse of this run.
+        longest: the longest downtime, in frames.
     """
 
     def __init__(self, said: dict[str, IdentitySnapshot], pulse: int, longest: int) -> None:
@@ -90,16 +90,16 @@ class StateRecovery:
         self._tracks: dict[TrackName, int] = {}
         self._awaited: list[_Awaited] = []
         self._found: dict[TrackName, int] = {}
-        """The pulse at which each track was first heard of again."""
+        """The pulse at which each track reappeared."""
         self.next_number = max((first_free_number(it) for it in said.values()), default=1)
-        """No number below it is given any more, however long ago that was."""
+        """The first number to assign in this run, whatever the downtime."""
         recent = {camera: it for camera, it in said.items() if it.pulse < pulse <= it.pulse + longest}
-        # All that were told of lately were told the same: one that says otherwise does not decide.
+        # Recent snapshots agree; the median keeps a single deviating camera from deciding.
         since = sorted(it.numbered_since for it in recent.values())
         self.numbered_since = (
             since[len(since) // 2] if since else max((it.numbered_since for it in said.values()), default=inf)
         )
-        """When numbers began, unix seconds; infinite: nobody remembers."""
+        """When numbering began, unix seconds; infinite: unknown."""
         if recent:
             self._until = max(it.pulse for it in recent.values()) + longest
             self._awaited = _awaited(recent)
@@ -107,12 +107,12 @@ class StateRecovery:
 
     @property
     def over(self) -> bool:
-        """Whether nobody is awaited any more: tracks of those who were found may still come."""
+        """Whether recovery has ended: no more tracks are recovered."""
         return self._over
 
     @property
     def numbers(self) -> Collection[int]:
-        """The numbers of those who are awaited, with those that they once had."""
+        """The numbers of the people still to be recovered, merged ones included."""
         return {number for it in self._awaited for number in (it.number, *it.also)}
 
     def begin(self, people: PersonTracker, pulse: int) -> None:
@@ -121,14 +121,14 @@ class StateRecovery:
         people.expect(self._tracks, pulse - 1)
 
     def look(self, people: PersonTracker, pulse: int) -> None:
-        """Look for them after an epoch that ends with a pulse was taken in."""
+        """Recover people whose tracks have reappeared, after the epoch that ends with a pulse."""
         if pulse > self._until:
             self._awaited, self._over = [], True
             people.cancel_expected(self._tracks)
         self._awaited = [it for it in self._awaited if not self._restore(it, people, pulse)]
 
     def _restore(self, awaited: _Awaited, people: PersonTracker, pulse: int) -> bool:
-        """Return whether somebody is here again, with all that is to be said of them said."""
+        """Restore a reappeared person's name and merges; return whether nothing is left to restore."""
         found = [self._number(it, people, pulse) for it in awaited.tracks]
         numbers = sorted({it for it in found if it is not None})
         if not numbers:
@@ -143,7 +143,7 @@ class StateRecovery:
         return not awaited.by_hand or None not in found
 
     def _number(self, track: TrackName, people: PersonTracker, pulse: int) -> int | None:
-        """Return whose a track was when it was first heard of again; None: nobody knows."""
+        """Return a track's person number when it reappeared; None: it has not, or is not confirmed."""
         if people.is_known(track):
             self._found.setdefault(track, pulse)
         first = self._found.get(track)
@@ -151,33 +151,35 @@ class StateRecovery:
 
 
 def first_free_number(said: IdentitySnapshot) -> int:
-    """Return the first number that is and was never used; a camera's state may contradict itself."""
+    """Return the first unused number of a snapshot, which may contradict itself."""
     return max([said.next_number, *(number + 1 for it in said.people for number in (it.number, *it.aliases))])
 
 
 def trusted_first_free(firsts: Iterable[int]) -> int:
-    """Return the highest first free number that is believed: one camera alone cannot raise it far.
+    """Return the highest first free number that is trusted: one camera alone cannot raise it far.
 
-    >>> believed([7, 5]), believed([900_000_000, 5]), believed([2_000_007, 2_000_005])
-    (1000000, 1000000, 2010005)
+    >>> trusted_first_free([7, 5]), trusted_first_free([900_000_000, 5])
+    (1000000, 1000000)
+    >>> trusted_first_free([2_000_007, 2_000_005])
+    2010005
     """
     _, other, *_ = [*sorted(firsts, reverse=True), 1, 1]
     return max(other + _NUMBER_SLACK, SINGLE_CAMERA_NUMBER_MAX)
 
 
 def _awaited(said: dict[str, IdentitySnapshot]) -> list[_Awaited]:
-    """Put together what the cameras remember: the newest word on somebody counts."""
+    """Combine the cameras' snapshots; of a person, the newest counts."""
     newest: dict[int, PersonSnapshot] = {}
     tracks: dict[int, set[TrackName]] = {}
     whose: dict[int, int] = {}
-    """By an old number: who had it."""
+    """By merged number: the number that was kept."""
     for camera, it in sorted(said.items(), key=lambda named: (named[1].pulse, named[0])):
         for known in it.people:
             newest[known.number] = known
             whose |= dict.fromkeys(known.aliases, known.number)
             theirs = tracks.setdefault(known.number, set())
             theirs |= {TrackName(camera, it.boot, track) for track in known.tracks}
-    for old in sorted(whose.keys() & newest.keys()):  # some camera had not heard yet that two are one
+    for old in sorted(whose.keys() & newest.keys()):  # a camera's snapshot was older than a merge
         kept = whose[old]
         if kept != old and kept in newest:
             tracks[kept] |= tracks.pop(old)

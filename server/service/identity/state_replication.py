@@ -1,4 +1,4 @@
-"""The cameras remember who is who: what they are told, and what they say to a service that begins anew."""
+"""Replication of identity state to the cameras, which return it to a restarted service."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from server.service.identity.state_recovery import (
 log = logging.getLogger(__name__)
 
 PATIENCE_S = 1.0
-"""How long a camera that has come is waited for until it says what it remembers."""
+"""How long to wait for the snapshot of a camera that has connected."""
 _RECENT_S = 10.0
-"""A camera whose words come late, on a machine with too much to do, goes on following all the same."""
+"""Tracks reported this recently are replicated: a camera on a busy machine reports late."""
 _JOIN_S = 10.0
-"""How long after the beginning a camera may still come that remembers more people: its way may be slow."""
+"""How long after the start a camera may still connect with more people in its snapshot."""
 _INTERVAL_S = 1.0
-"""Seconds between two words of the same to a camera: each says when it was true."""
+"""Seconds between two equal snapshots to a camera: each carries its pulse."""
 
 
 class StateReplication:
     """Starts from the state that cameras retain, and sends them the state to retain.
 
     Args:
-        people: who is who.
+        people: the person tracker.
         cameras: all of them.
         fps: frames a second.
-        send: sends a camera its word.
+        send: sends a camera its snapshot.
         tells: whether this service does so; of several one is enough, since they agree.
         clock: seconds that only go forward.
     """
@@ -58,19 +58,19 @@ class StateReplication:
         self._people, self._cameras, self._fps = people, cameras, fps
         self._send, self._sends, self._clock = send, sends, clock
         self._came_at: dict[str, float] = {}
-        """When each camera came first that has not said yet what it remembers; it may come again."""
+        """When each camera first connected whose snapshot has not come yet."""
         self._present: set[str] = set()
         self._snapshots: dict[str, IdentitySnapshot] = {}
         self._first_free: dict[str, int] = {}
-        """The first free number by what each camera said last."""
+        """By camera, the first free number of its last snapshot."""
         self._recoveries: list[StateRecovery] = []
-        """First of all who had come when this began, then a camera each that came later."""
+        """The first of all cameras present at the start, then one for each that came later."""
         self._any_camera = False
         self._began_at: float | None = None
         self._free = math.inf
-        """From this number on this run gives them anew, by what it began with; before that it gives none."""
+        """The first number that this run assigns; infinite before the start."""
         self._reported: set[str] = set()
-        """Cameras that have said what they remember: told sooner, they would have forgotten it."""
+        """Cameras whose snapshot has come: sending to them earlier would overwrite it."""
         self._sent: dict[str, IdentitySnapshot] = {}
         self._since = time.time()
 
@@ -80,19 +80,18 @@ class StateReplication:
         if camera in self._cameras and is_present:
             self._any_camera = True
             self._present.add(camera)
-            if camera not in self._reported:  # its token may come after its word
+            if camera not in self._reported:  # the token may come after the snapshot
                 self._came_at.setdefault(camera, self._clock())
         else:
             self._present.discard(camera)
 
     def snapshot_received(self, message: Message) -> None:
-        """A camera says what it remembers.
+        """Take in a camera's retained snapshot.
 
-        One that reached the service only after the beginning is heard, too; of what a camera says again only
-        the numbers that are taken are of use.
+        One that comes after the start is used, too; of a second snapshot only the first free number.
 
         Raises:
-            DecodeError or another of `UNREADABLE`: it is none.
+            DecodeError or another of `DECODE_ERRORS`: it cannot be decoded.
         """
         camera = camera_of_key(message.key)
         if camera not in self._cameras:
@@ -111,7 +110,7 @@ class StateReplication:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a camera may still say what it remembers, so that nothing should be decided yet."""
+        """Whether a snapshot is still to come, so that nothing should be decided yet."""
         if self._began_at is not None:
             return False
         now = self._clock()
@@ -120,7 +119,7 @@ class StateReplication:
         )
 
     def may_recover(self, number: int) -> bool:
-        """Return whether a person of this number may be re-identified, or is so in a decision to come."""
+        """Return whether a person of this number is known, or may still be recovered."""
         if (
             self._began_at is None
             or self._people.registry.current(number) in self._people.registry.first_seen
@@ -131,19 +130,19 @@ class StateReplication:
 
     @property
     def numbers_since(self) -> float:
-        """When numbers began, unix seconds: since then none was given twice. 0: nobody has one yet."""
+        """When numbering began, unix seconds: since then no number was assigned twice. 0: none was assigned."""
         return self._since if self._began_at is not None or self._people.registry.first_seen else 0.0
 
     def begin(self, pulse: int) -> None:
-        """Begin with what is remembered, before an epoch that ends with a pulse is taken in.
+        """Start recovery from the snapshots, before the epoch that ends with a pulse is processed.
 
-        As long as no camera has come there is nothing to begin with. What is said later adds to it.
+        Does nothing before the first camera has connected. Later snapshots start further recoveries.
         """
         if not self._any_camera or (self._began_at is not None and not self._snapshots):
             return
         most = trusted_first_free(self._first_free.values())
         for camera in [camera for camera, it in self._snapshots.items() if first_free_number(it) > most]:
-            log.warning("camera %s alone remembers numbers beyond %d: it is not believed", camera, most)
+            log.warning("camera %s: snapshot ignored: it alone has person numbers beyond %d", camera, most)
             del self._snapshots[camera]
         snapshot = {camera: _below(self._free, it) for camera, it in self._snapshots.items()}
         self._snapshots = {}
@@ -154,10 +153,12 @@ class StateReplication:
             self._began_at, self._free = self._clock(), self._people.next_number
             self._since = min(self._since, recovery.numbered_since)
         if snapshot:
-            log.info("%s: remembered %d people", ", ".join(sorted(snapshot)), len(recovery.numbers))
+            log.info(
+                "%s: %d people restored from snapshots", ", ".join(sorted(snapshot)), len(recovery.numbers)
+            )
 
     def take(self, pulse: int) -> None:
-        """Look at people after an epoch that ends with a pulse was taken in."""
+        """Continue recovery, and send snapshots, after the epoch that ends with a pulse was processed."""
         for recovery in self._recoveries:
             recovery.look(self._people, pulse)
         self._recoveries = [it for it in self._recoveries if not it.over]
@@ -179,7 +180,7 @@ class StateReplication:
 
 
 def _below(free: float, snapshot: IdentitySnapshot) -> IdentitySnapshot:
-    """Leave out whom this run does not know by the number, since it may have given it to somebody else."""
+    """Leave out people whose number this run may have assigned to somebody else."""
     known = [it for it in snapshot.people if max([it.number, *it.aliases]) < free]
     return msgspec.structs.replace(snapshot, people=known)
 

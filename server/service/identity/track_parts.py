@@ -1,4 +1,4 @@
-"""From which frame on a track is whose: the parts of a track, and the numbers that follow for each frame."""
+"""The parts of a track by person number, and the numbers of each frame that follow from them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from bestview import TrackKey, TrackletKey
 
 NOBODY_YET = -1
-"""Stands for a person's number where a track is not confirmed to be anybody."""
+"""The person number of a track that is not confirmed yet."""
 
 
 class TrackPart(NamedTuple):
-    """From which frame on a track is a person's.
+    """The part of a track that belongs to one person, from a frame on.
 
     A named tuple, since one is made of every track in every update.
     """
@@ -25,11 +25,11 @@ class TrackPart(NamedTuple):
 
 
 UNKNOWN = (TrackPart(0, NOBODY_YET),)
-"""The parts of a track that nothing was said of."""
+"""The parts of an unknown track."""
 
 
 def track_parts(numbers: Mapping[TrackletKey, int]) -> dict[TrackKey, list[TrackPart]]:
-    """Sort the numbers of episodes by track, the episodes of each in order."""
+    """Group the numbers of tracklets by track, in frame order."""
     parts: dict[TrackKey, list[TrackPart]] = {}
     for key, number in numbers.items():
         parts.setdefault(key.track, []).append(TrackPart(key.first_frame, number or NOBODY_YET))
@@ -39,10 +39,9 @@ def track_parts(numbers: Mapping[TrackletKey, int]) -> dict[TrackKey, list[Track
 def merge_settled_parts(
     before: Sequence[TrackPart], parts: list[TrackPart], needed_from: int
 ) -> list[TrackPart]:
-    """Put parts that the registry has settled before those that may still change.
+    """Prepend the settled parts of a track to those that may still change.
 
-    A long look-ahead asks for frames that are older than what the registry still speaks of; ``asked_from`` is
-    the first that anybody asks for.
+    A long look-ahead needs frames older than those the registry still reports; ``needed_from`` is the first.
     """
     settled = [part for part in before if part.first < parts[0].first]
     if not settled:

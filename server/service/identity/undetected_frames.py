@@ -1,4 +1,4 @@
-"""In which frames a camera could not have found anybody: it was not there to see them."""
+"""The frames in which a camera ran no detection, so that absence of a box proves nothing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class UndetectedFrames:
         self._frames: dict[str, set[int]] = defaultdict(set)
 
     def note(self, message: CameraTracks) -> None:
-        """Take in what a camera says of an epoch."""
+        """Add the frames that a camera's message reports."""
         self._frames[message.camera].update(message.without_detection)
 
     def over(self, camera: str, first: int, frames: int) -> NDArray[np.bool_]:
@@ -26,6 +26,6 @@ class UndetectedFrames:
         return np.array([it in known for it in range(first, first + frames)], dtype=np.bool_)
 
     def forget_before(self, pulse: int) -> None:
-        """Let go of the frames before a pulse."""
+        """Forget the frames before a pulse."""
         for camera, frames in self._frames.items():
             self._frames[camera] = {it for it in frames if it >= pulse}

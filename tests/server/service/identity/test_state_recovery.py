@@ -415,7 +415,7 @@ def lying(site: Site, camera: str, **changes: object) -> None:
 @pytest.mark.parametrize(
     "lie",
     [
-        {"next": PERSON_NUMBER_MAX + 1},
+        {"next_number": PERSON_NUMBER_MAX + 1},
         {"people": [PersonSnapshot(number=PERSON_NUMBER_MAX, tracks=[3])]},
         {"people": [PersonSnapshot(number=5, tracks=[3], aliases=[PERSON_NUMBER_MAX])]},
     ],
