@@ -130,7 +130,7 @@ class StateReplication:
 
     @property
     def numbers_since(self) -> float:
-        """When numbering began, unix seconds: since then no number was assigned twice. 0: none was assigned."""
+        """When numbering began, unix seconds: no number was assigned twice since. 0: none was assigned."""
         return self._since if self._began_at is not None or self._people.registry.first_seen else 0.0
 
     def begin(self, pulse: int) -> None:
