@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import chain, zip_longest
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -32,10 +31,6 @@ class Rendering:
     choices: list[Choice]
 
 
-_NOTHING_NEW: dict[str, Any] = {it.name: () for it in fields(IdentityUpdate) if it.name != "numbers"}
-"""Nobody is born, gone, back or merged."""
-
-
 class GivenNumbers:
     """A registry that knows who everybody is: a track's place is its person's, in every camera."""
 
@@ -48,7 +43,7 @@ class GivenNumbers:
         """Return everybody their number."""
         del last_frame, pictures
         numbers = {TrackletKey(*it.key, 0): self._people[it.key.local_id - 1] for it in tracks}
-        return IdentityUpdate(numbers, **_NOTHING_NEW)
+        return IdentityUpdate(numbers, created=(), returned=(), departed=(), merged=(), split=())
 
 
 def decide(config: Config, messages: Messages, people: Sequence[int] | None = None) -> Rendering:

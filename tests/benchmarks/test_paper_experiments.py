@@ -136,4 +136,4 @@ def test_an_experiment_prints_its_table_and_saves_its_plot(tmp_path: Path) -> No
     text = (tmp_path / "table.txt").read_text(encoding="utf-8")
     assert "paper: separate-dp" in text
     assert "3 of 3" in text
-    assert (tmp_path / "experiments-tiny.png").stat().st_size > 10_000
+    assert (tmp_path / "paper_experiments-tiny.png").stat().st_size > 10_000

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from random import Random
-from typing import Any
 
 import msgspec
 from prometheus_client import generate_latest
@@ -47,6 +46,7 @@ from server.service.service import BestViewService
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.media_chunk import MediaChunk
+from server.service.streaming.subscriber_queue import Subscriber
 
 _EPOCHS = 3
 """Two GOPs are decided, and one is looked ahead to."""
@@ -226,7 +226,7 @@ class Sessions(Scripts):
         if len(script) % _ASKED_EVERY == 0:
             ask(service)
         for viewer in viewers:
-            drink(viewer)
+            drain(viewer)
         return service.dropped == 0
 
     def close(self) -> None:
@@ -244,14 +244,14 @@ def ask(service: Fed) -> None:
     generate_latest(make_app(facade)[METRICS])
 
 
-def drink(viewer: Any) -> None:
-    """Take what waits for a viewer, in every form."""
-    for piece in list(viewer._queue):
+def drain(subscriber: Subscriber) -> None:
+    """Read all queued media of a subscriber in every container format, and empty the queue."""
+    for piece in list(subscriber._queue):
         if isinstance(piece, MediaChunk):
             assert piece.data
             assert piece.mpegts
             assert piece.data_with_audio
-    viewer._queue.clear()
+    subscriber._queue.clear()
 
 
 def _plain(key: str) -> str:

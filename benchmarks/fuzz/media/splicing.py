@@ -5,17 +5,18 @@ from __future__ import annotations
 import asyncio
 from dataclasses import replace
 from random import Random
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 
-from benchmarks.fuzz.bus.messages import ask, drink
+from benchmarks.fuzz.bus.messages import ask, drain
 from benchmarks.fuzz.engine.fed_site import CAMERAS, STRIDE, Fed, pictures, site, tracks, video, word
 from benchmarks.fuzz.engine.target import Scripts
 from benchmarks.fuzz.media.damaged_media import wrong
 from server.camera.encoding.encoder import AccessUnit
 from server.config.site_config import Config
 from server.messaging.epochs import end_of_epoch
+from server.service.streaming.broadcaster import Broadcaster
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 _EPOCHS = 4
@@ -84,7 +85,7 @@ class _Splice(Scripts):
             published(decision)
 
         service._publish = publish  # type: ignore[method-assign]  # what a cut is made like
-        viewers = [it.join() for it in _channels(service)]
+        viewers = [broadcaster.subscribe() for broadcaster in _broadcasters(service)]
         for epoch in range(_EPOCHS):
             self._show(service, units, epoch)
             for name in CAMERAS:
@@ -93,13 +94,13 @@ class _Splice(Scripts):
             service.decide()
         ask(service)
         for viewer in viewers:
-            drink(viewer)
+            drain(viewer)
         return not any(it.refused for it in service.intake.states.values())
 
     async def _cut(self, cuts: _Cuts, units: _Units) -> bool:
         """Cut where the input says, as it may come to anybody's mind: to pictures that never came, too."""
         service = Fed(self._config)
-        viewers = [it.join() for it in _channels(service)]
+        viewers = [broadcaster.subscribe() for broadcaster in _broadcasters(service)]
         before: dict[int, str | None] = dict.fromkeys(_PEOPLE)
         for gop, chosen in enumerate(cuts):
             self._show(service, units, gop)
@@ -117,7 +118,7 @@ class _Splice(Scripts):
                 viewers += [it.subscribe() for it in service.splicer.persons.values()]
             before = now
         for viewer in viewers:
-            drink(viewer)
+            drain(viewer)
         return not any(it.refused for it in service.intake.states.values())
 
     def _show(self, service: Fed, units: _Units, gop: int) -> None:
@@ -132,7 +133,7 @@ class _Splice(Scripts):
         self._loop.close()
 
 
-def _channels(service: Fed) -> list[Any]:
+def _broadcasters(service: Fed) -> list[Broadcaster]:
     return [*service.splicer.cameras.values(), *service.splicer.decided_cameras.values()]
 
 
