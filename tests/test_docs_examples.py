@@ -19,7 +19,6 @@ import pytest
 import typer.main
 from prometheus_client import CollectorRegistry
 
-from fakes import cameras
 from fakes.paths import DOCS, ROOT
 from fakes.timeouts import PATIENCE
 from server.cli.main import app as command_line
@@ -72,7 +71,7 @@ EXAMPLES = list(examples())
 @pytest.fixture
 def by_hand() -> Any:
     """Return the module of test cameras whose every frame and track is scripted."""
-    return cameras
+    return scripted_cameras
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from contextlib import AsyncExitStack
 
 import pytest
 
-from fakes.pulses import ByHand, Connect, JumpingClock
+from fakes.camsync.pulse_clients import ByHand, Connect, JumpingClock
 
 
 async def _close(writer: asyncio.StreamWriter) -> None:

@@ -11,7 +11,7 @@ import pytest
 from camsync import ListedClient, PulseServer, SyncError, query_clients
 from camsync.messages import ClientList, Greeting, Pong
 from camsync.protocol import MAX_SERVER_LINE, encode, parse_server_line
-from fakes.pulses import Connect
+from fakes.camsync.pulse_clients import Connect
 from fakes.timeouts import PATIENCE
 
 FPS = 50.0

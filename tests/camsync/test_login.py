@@ -25,8 +25,8 @@ from camsync import (
 )
 from camsync.messages import ErrorMessage, Greeting, LoginMessage, LoginRequest, Pong
 from camsync.protocol import encode, parse_server_line
+from fakes.camsync.pulse_clients import ByHand, Connect
 from fakes.programs import needs_openssl
-from fakes.pulses import ByHand, Connect
 from fakes.timeouts import PATIENCE
 
 FPS = 400.0

@@ -26,7 +26,7 @@ from camsync.clock import steady_unix_clock
 from camsync.messages import Greeting, PulseMessage
 from camsync.protocol import encode
 from camsync.pulse_axis import PulseAxis
-from fakes.pulses import BUSY, FPS, QUICK, JumpingClock, pretended_server, take
+from fakes.camsync.pulse_clients import BUSY, FPS, QUICK, JumpingClock, pretended_server, take
 from fakes.timeouts import PATIENCE
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from camsync import PulseServer, ServerLimits
 from camsync.messages import ErrorMessage, Greeting, Pong, PulseMessage, WaitMessage
 from camsync.protocol import parse_server_line
-from fakes.pulses import Connect, JumpingClock
+from fakes.camsync.pulse_clients import Connect, JumpingClock
 from fakes.timeouts import PATIENCE
 
 FPS = 400.0

@@ -14,7 +14,7 @@ from camsync.axis_claims import AxisClaims
 from camsync.messages import CountedPulse, Hello, LoginMessage, LoginRequest, Pong
 from camsync.protocol import LAST_PULSE, ProtocolError, encode, parse_client_line, parse_server_line
 from camsync.pulse_axis import PulseAxis
-from fakes.pulses import BUSY, ByHand, Connect
+from fakes.camsync.pulse_clients import BUSY, ByHand, Connect
 from fakes.timeouts import PATIENCE
 from server.messaging import number_types
 

@@ -11,7 +11,7 @@ from camsync.clock import steady_unix_clock
 from camsync.messages import Greeting, Pong, PulseMessage
 from camsync.protocol import encode
 from camsync.pulse_axis import PulseAxis
-from fakes.pulses import FPS, QUICK, Connect, JumpingClock, pretended_server, take
+from fakes.camsync.pulse_clients import FPS, QUICK, Connect, JumpingClock, pretended_server, take
 from fakes.timeouts import PATIENCE
 
 

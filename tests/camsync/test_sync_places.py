@@ -12,7 +12,7 @@ from camsync import ClientSettings, Credentials, PulseClient, PulseServer, Serve
 from camsync.limits import select_evicted
 from camsync.messages import Greeting, LoginMessage, LoginRequest, Pong
 from camsync.protocol import encode
-from fakes.pulses import ByHand, Connect
+from fakes.camsync.pulse_clients import ByHand, Connect
 from fakes.timeouts import PATIENCE
 
 FPS = 400.0

@@ -9,7 +9,7 @@ import pytest
 
 from camsync import AxisLostError, ClientSettings, Pulse, PulseClient, PulseServer, ServerLimits
 from camsync.messages import Pong
-from fakes.pulses import BUSY, Connect
+from fakes.camsync.pulse_clients import BUSY, Connect
 from fakes.timeouts import PATIENCE
 
 FPS = 200.0

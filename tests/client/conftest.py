@@ -11,7 +11,7 @@ from aiohttp.test_utils import TestServer
 from playwright.async_api import Browser
 
 from benchmarks.common.browser import chromium
-from fakes.http_server import HandMadeSite
+from fakes.http.handmade_server import HandMadeSite
 
 
 @pytest_asyncio.fixture(scope="session", loop_scope="session")

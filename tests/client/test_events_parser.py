@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import client
 from client.sse_parser import MAX_EVENT, EventStreamError, SentEvent, SseParser
-from fakes.http_server import CAMERAS, OBJECTS, SITE, HandMadeSite, gop, nothing_more, sent
+from fakes.http.handmade_server import CAMERAS, OBJECTS, SITE, HandMadeSite, gop, nothing_more, sent
 from fakes.timeouts import PATIENCE
 
 FLAG = {"id": 1, "objects": [7, 9], "cameras": ["c0"], "reason": "alike", "pulse": 80} | {

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import client
 from client.fmp4 import BoxReader, Mp4Error
-from fakes.http_server import (
+from fakes.http.handmade_server import (
     FPS,
     GOP,
     SITE,

@@ -18,7 +18,7 @@ from client.recording import Recording
 from client.sse_parser import EventStreamError, SseParser
 from client.webm import LARGEST, ElementReader, WebmError, made
 from client.webm_recording import WebmRecording
-from fakes.http_server import OBJECTS, box, fragment, header
+from fakes.http.handmade_server import OBJECTS, box, fragment, header
 from fakes.timeouts import PATIENCE
 
 PIECE = bytes(1 << 16)

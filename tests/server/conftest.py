@@ -6,9 +6,9 @@ import os
 
 import pytest
 
-from fakes.command_line import myview
-from fakes.site import busy, hall
-from fakes.vp8_site import free
+from fakes.cli.command_line import myview
+from fakes.service.fed_site import busy, hall
+from fakes.service.vp8_site import free
 
 __all__ = ["busy", "free", "hall", "myview"]
 

@@ -15,7 +15,7 @@ from av.audio.stream import AudioStream
 from av.video.stream import VideoStream
 from numpy.typing import NDArray
 
-from fakes.cameras import GOP, FedService
+from fakes.service.scripted_cameras import GOP, FedService
 from server.camera.audio import EncodedAudioFrame, RecordedAudioSource, consecutive_runs
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings

@@ -13,8 +13,8 @@ import msgspec
 import pytest
 import zenoh
 
-from fakes.camera_processes import FPS, Running, in_folder
 from fakes.media.videos import write_video
+from fakes.service.camera_processes import FPS, Running, in_folder
 from fakes.timeouts import PATIENCE
 from server.camera.load.load_monitor import LoadMonitor
 from server.camera.load.load_shedder import LevelBounds, LoadShedder, shed_levels

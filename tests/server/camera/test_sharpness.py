@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fakes.cameras import word
+from fakes.service.scripted_cameras import word
 from server.camera.sharpness import SharpnessMemory, sharpness
 from server.messaging.messages import Box
 

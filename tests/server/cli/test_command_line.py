@@ -18,7 +18,7 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
-from fakes.command_line import Run, refusal
+from fakes.cli.command_line import Run, refusal
 from fakes.media.videos import write_video
 from fakes.system.ports import free
 from fakes.timeouts import PATIENCE

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 import client
-from fakes.cameras import CAMERAS, LARGE, SMALL
-from fakes.command_line import Run, myview
+from fakes.cli.command_line import Run, myview
 from fakes.media.videos import write_video
-from fakes.recordings import A, B, pictures
-from fakes.site import Hall, opened
+from fakes.service.fed_site import Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL
+from fakes.service.scripted_recordings import A, B, pictures
 from fakes.system.full_disk import files_of_at_most
 from server.cli.watch import run_watch
 from server.system.errors import UserError

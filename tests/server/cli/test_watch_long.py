@@ -14,9 +14,9 @@ from client.model import Box, Gop, Site
 from client.sidecar import sidecars, write_sidecars
 from client.spool import Spool
 from client.stream_events import Commentary, Frame
-from fakes.cameras import CAMERAS, GOP, LARGE, SMALL
-from fakes.recordings import A, B
-from fakes.site import Hall, opened
+from fakes.service.fed_site import Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, GOP, LARGE, SMALL
+from fakes.service.scripted_recordings import A, B
 
 SITE = Site("hall", 25.0, 320, 240, GOP, 25, None, None, 0.0, ("c0",))
 BOX = Box(1, 40.04, 60.0, 80.0, 160.0)

@@ -20,10 +20,10 @@ from benchmarks.common.browser import chromium
 from client.model import Box, Site
 from client.sidecar import write_sidecars
 from client.stream_events import Frame
-from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH
 from fakes.programs import needs_chromium, needs_ffprobe
-from fakes.recordings import A, B, own_pictures, pictures
-from fakes.site import Hall, opened
+from fakes.service.fed_site import Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH
+from fakes.service.scripted_recordings import A, B, own_pictures, pictures
 from server.cli.main import app
 
 FIRST = 2 * GOP  # of what is watched here

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 import client
 from client.webm import CLUSTER, ElementReader, WebmError, at_time, made, number
 from client.webm_recording import WebmChangedError, WebmRecording, write_indexed
-from fakes.cameras import FPS, GOP, HEIGHT, STRIDE, WIDTH, encoded
 from fakes.programs import needs_ffmpeg
-from fakes.site import Hall
-from fakes.vp8_site import EPOCHS, feed, own
+from fakes.service.fed_site import Hall
+from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, STRIDE, WIDTH, encoded
+from fakes.service.vp8_site import EPOCHS, feed, own
 from server.media.containers.webm import cluster, header
 
 

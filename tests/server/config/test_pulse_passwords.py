@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from camsync import Credentials, PulseClient, query_clients
-from fakes.command_line import Run, refusal
+from fakes.cli.command_line import Run, refusal
 from fakes.timeouts import PATIENCE
 from server.cli.generated_config import free_port
 from server.config.loader import load_config

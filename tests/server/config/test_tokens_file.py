@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from fakes.command_line import Run, refusal
-from fakes.tokens import LATER, line_of, write_tokens
+from fakes.cli.command_line import Run, refusal
+from fakes.http.tokens import LATER, line_of, write_tokens
 from server.config.tokens_file import read_tokens, token_digest
 from server.system.errors import UserError
 

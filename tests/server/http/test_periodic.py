@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from fakes.cameras import FedService, small_config
-from fakes.tokens import line_of, write_tokens
+from fakes.http.tokens import line_of, write_tokens
+from fakes.service.scripted_cameras import FedService, small_config
 from server.http.access.authentication import Authenticator
 from server.http.access.authorization import AccessControl
 from server.http.api.events import Events

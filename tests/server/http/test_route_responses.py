@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from fakes.cameras import status, tracks, word
-from fakes.site import A, B, Hall
+from fakes.service.fed_site import A, B, Hall
+from fakes.service.scripted_cameras import status, tracks, word
 from server.http.api import openapi
 from server.http.app import make_app
 from server.service.service import BestViewService

@@ -15,11 +15,11 @@ import aiohttp
 import pytest
 from pydantic import ValidationError
 
-from fakes.cameras import CAMERAS, SMALL
-from fakes.certificates import make_certificate
+from fakes.http.certificates import make_certificate
+from fakes.http.tokens import line_of, token_of, write_tokens
 from fakes.programs import needs_openssl
-from fakes.site import A, B, opened
-from fakes.tokens import line_of, token_of, write_tokens
+from fakes.service.fed_site import A, B, opened
+from fakes.service.scripted_cameras import CAMERAS, SMALL
 from server.config.loader import build_config
 from server.config.sections import TlsSettings
 from server.http.access.csrf import CSRF_HEADER

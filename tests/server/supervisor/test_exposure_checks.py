@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 import yaml
 
-from fakes.cameras import small_config
-from fakes.command_line import Run, refusal
+from fakes.cli.command_line import Run, refusal
+from fakes.http.tokens import line_of, write_tokens
 from fakes.paths import CONFIGS
-from fakes.tokens import line_of, write_tokens
+from fakes.service.scripted_cameras import small_config
 from server.cli.generated_config import DEMO
 from server.config.loader import load_config
 from server.config.sections import AccessSettings

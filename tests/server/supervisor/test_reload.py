@@ -18,7 +18,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.cameras import CAMERAS, FedService, small_config
+from fakes.service.scripted_cameras import CAMERAS, FedService, small_config
 from fakes.timeouts import PATIENCE
 from server.cli.generated_config import free_port
 from server.config.config_diff import changed_keys

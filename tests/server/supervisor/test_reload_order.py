@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fakes.cameras import small_config
+from fakes.service.scripted_cameras import small_config
 from server.config.running_config import ACTIVE_CONFIG_VARIABLE, ActiveConfig
 from server.supervisor.reload import plan_reload
 

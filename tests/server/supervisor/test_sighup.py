@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import yaml
 
-from fakes.command_line import Run
+from fakes.cli.command_line import Run
 from fakes.timeouts import PATIENCE
 from server.cli import site_commands
 from server.cli.generated_config import free_port

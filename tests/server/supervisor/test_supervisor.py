@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from fakes.cameras import CAMERAS, small_config
+from fakes.service.scripted_cameras import CAMERAS, small_config
 from fakes.timeouts import PATIENCE
 from server.supervisor import supervisor
 from server.supervisor.shutdown import EXIT_FINISHED

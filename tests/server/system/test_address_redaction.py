@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from fakes.passwords import HOST, PASSWORDS, PLACES, tells
+from fakes.http.passwords import HOST, PASSWORDS, PLACES, tells
 from server.config.source_address import SourceKind, source_kind
 from server.system.address_redaction import redact_address, redact_addresses, redact_endpoint
 

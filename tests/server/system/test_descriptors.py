@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from fakes.cameras import small_config
-from fakes.command_line import Run
+from fakes.cli.command_line import Run
+from fakes.service.scripted_cameras import small_config
 from fakes.system.few_descriptors import FEW, MYVIEW, awaited, connected, running, written
 from fakes.system.ports import free
 from fakes.timeouts import PATIENCE

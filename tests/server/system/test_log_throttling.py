@@ -12,10 +12,10 @@ import av
 import msgspec
 import pytest
 
-from fakes.cameras import GOP, small_config
 from fakes.media.videos import write_video
-from fakes.rendering import CANVAS, fragments
-from fakes.site import Hall
+from fakes.service.fed_site import Hall
+from fakes.service.rendering import CANVAS, fragments
+from fakes.service.scripted_cameras import GOP, small_config
 from logthrottle import LogThrottle
 from server.camera.audio import LiveAudioSource, RecordedAudioSource, recorded_source
 from server.camera.peers.detection_exchange import PeerDetectionExchange

@@ -15,8 +15,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.command_line import Run
-from fakes.passwords import PASSWORDS, PLACES, tells
+from fakes.cli.command_line import Run
+from fakes.http.passwords import PASSWORDS, PLACES, tells
 from fakes.system.ports import free
 from server.camera.audio import open_audio
 from server.camera.passthrough.opening import open_passthrough

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from fakes.cameras import CAMERAS, GOP, HEIGHT, SMALL, WIDTH, FedService, small_config
-from fakes.decisions import choice, decision
-from fakes.recordings import AMPLE, A, filled, head, piece, written
+from fakes.service.decisions import choice, decision
+from fakes.service.scripted_cameras import CAMERAS, GOP, HEIGHT, SMALL, WIDTH, FedService, small_config
+from fakes.service.scripted_recordings import AMPLE, A, filled, head, piece, written
 from fakes.system.unprivileged import nobodys_folder
 from server.cli.doctor.disk import disk_findings
 from server.cli.doctor.findings import Level

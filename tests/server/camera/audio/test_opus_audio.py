@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 import client
 from benchmarks.common.browser import chromium
-from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, video
 from fakes.media.audio import (
     BEEPS,
     EVERY,
@@ -33,7 +32,8 @@ from fakes.media.audio import (
 from fakes.media.browser_playback import PLAY
 from fakes.media.ffprobe import probed
 from fakes.programs import needs_chromium, needs_ffprobe
-from fakes.site import A, Hall, opened
+from fakes.service.fed_site import A, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, video
 from server.camera.audio import EncodedAudioFrame, RecordedAudioSource
 from server.camera.audio.encoder import AudioEncoder
 from server.camera.audio.passthrough import AudioPassthrough

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.cameras import small_config
+from fakes.service.scripted_cameras import small_config
 from server.camera.load.load_monitor import LoadMonitor
 from server.camera.load.load_shedder import LevelBounds, LoadShedder, ShedLevel, shed_levels
 

@@ -21,11 +21,11 @@ from av.video.stream import VideoStream
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.cameras import FPS, GOP, HEIGHT, WIDTH, encoded, small_config
 from fakes.media.rtsp_camera import RtspCamera
 from fakes.media.videos import write_video
 from fakes.paths import DOCS
 from fakes.programs import needs_ffmpeg
+from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH, encoded, small_config
 from fakes.timeouts import PATIENCE
 from server.camera.audio import LiveAudioSource
 from server.camera.encoding.encoder import AccessUnit, Encoder

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.camera_processes import Running, in_folder
+from fakes.service.camera_processes import Running, in_folder
 from fakes.timeouts import PATIENCE
 from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
 from server.camera.peers.detection_exchange import PeerDetectionExchange

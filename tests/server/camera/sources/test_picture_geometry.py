@@ -18,7 +18,7 @@ from av.video.stream import VideoStream
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 
-from fakes.command_line import Run, myview
+from fakes.cli.command_line import Run, myview
 from fakes.media.videos import frame_in, write_timed, write_video
 from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
 from server.camera.passthrough.recording_source import PassthroughRecording

@@ -14,7 +14,7 @@ from av.video.stream import VideoStream
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.command_line import Run, myview
+from fakes.cli.command_line import Run, myview
 from fakes.media.videos import STEP, damage, frame_in, write_timed, write_video
 from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
 from server.camera.passthrough.recording_source import PassthroughRecording

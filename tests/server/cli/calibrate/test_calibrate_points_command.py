@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bestview import to_ground
-from fakes.command_line import Run
+from fakes.cli.command_line import Run
 from server.config.loader import build_config
 
 FLOOR = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0], [2.0, 1.0], [1.0, 2.0], [3.0, 2.5]])

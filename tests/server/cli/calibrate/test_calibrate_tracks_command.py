@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fakes.command_line import Run, refusal
+from fakes.cli.command_line import Run, refusal
 from fakes.media.videos import write_video
 from server.config.loader import build_config
 from tracking.motchallenge import MotRow, write_rows

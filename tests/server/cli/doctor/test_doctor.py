@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 import pytest
 
 from camsync import Credentials, PulseClient, PulseServer
-from fakes.cameras import FPS, HEIGHT, WIDTH, encoded
-from fakes.command_line import Run
-from fakes.doctor import SIZE, config, site
+from fakes.cli.command_line import Run
+from fakes.cli.doctor_configs import SIZE, config, site
 from fakes.media.rtsp_camera import RtspCamera
 from fakes.media.videos import write_video
 from fakes.programs import needs_openssl
-from fakes.site import Hall
+from fakes.service.fed_site import Hall
+from fakes.service.scripted_cameras import FPS, HEIGHT, WIDTH, encoded
 from fakes.system.ports import free
 from server.cli.doctor import machine
 from server.cli.doctor.camera_probe import CameraProbe

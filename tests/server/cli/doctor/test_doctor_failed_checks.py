@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from fakes.command_line import Run
-from fakes.doctor import config, site
+from fakes.cli.command_line import Run
+from fakes.cli.doctor_configs import config, site
 from fakes.programs import needs_openssl
 from fakes.system.ports import free
 from server.cli.doctor import command, files, ports

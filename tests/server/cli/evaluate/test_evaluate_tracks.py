@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fakes.command_line import Run, refusal
+from fakes.cli.command_line import Run, refusal
 from tracking.motchallenge import MotRow, format_rows
 
 Printed = Callable[..., str]

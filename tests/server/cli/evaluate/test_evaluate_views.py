@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fakes.command_line import BAD_INPUT, Run, refusal
+from fakes.cli.command_line import BAD_INPUT, Run, refusal
 from fakes.media.videos import write_video
 
 FRAMES = 20

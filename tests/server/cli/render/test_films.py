@@ -10,10 +10,20 @@ import numpy as np
 import pytest
 
 from bestview import Merge, Split
-from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH, encoded, small_config
-from fakes.decisions import choice, decision
 from fakes.media.audio import BEEPS, STEP, beeps, flashes, flashing, heard, write_flashes
 from fakes.media.audio import FRAMES as SOUNDING
+from fakes.service.decisions import choice, decision
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    FPS,
+    GOP,
+    HEIGHT,
+    LARGE,
+    SMALL,
+    WIDTH,
+    encoded,
+    small_config,
+)
 from server.cli.render.films import FilmWriter
 from server.cli.render.soundtrack import Soundtrack
 from server.config.sections import SiteSettings

@@ -15,11 +15,11 @@ from rich.console import Console
 
 import client
 from client.status.prometheus_text import Metrics, service_of
-from fakes.cameras import CAMERAS, FPS, small_config, status, tracks, word
-from fakes.command_line import Run
-from fakes.site import A, B, Hall, see
+from fakes.cli.command_line import Run
+from fakes.http.tokens import locked, token_of
+from fakes.service.fed_site import A, B, Hall, see
+from fakes.service.scripted_cameras import CAMERAS, FPS, small_config, status, tracks, word
 from fakes.timeouts import PATIENCE
-from fakes.tokens import locked, token_of
 from server.cli.status import command
 from server.cli.status.command import status_live, status_once
 from server.cli.status.display import Rates, render_status

@@ -9,9 +9,9 @@ import pytest
 from aiohttp import ClientTimeout, web
 from aiohttp.test_utils import TestClient, TestServer
 
-from fakes.cameras import LARGE, SMALL
-from fakes.site import A, B, Hall, see
-from fakes.tokens import EVERYBODY, bearer, locked
+from fakes.http.tokens import EVERYBODY, bearer, locked
+from fakes.service.fed_site import A, B, Hall, see
+from fakes.service.scripted_cameras import LARGE, SMALL
 from server.http.access.authentication import Authenticator
 from server.http.access.authorization import ACCESS, AccessControl, authorize
 from server.http.access.csrf import CSRF_HEADER

@@ -11,9 +11,9 @@ from typing import Any
 import aiohttp
 import pytest
 
-from fakes.cameras import LARGE, SMALL, tracks, word
-from fakes.site import A, B, Hall, see
-from fakes.tokens import bearer, locked, token_of
+from fakes.http.tokens import bearer, locked, token_of
+from fakes.service.fed_site import A, B, Hall, see
+from fakes.service.scripted_cameras import LARGE, SMALL, tracks, word
 from server.messaging.operator_messages import RiskEvent
 
 

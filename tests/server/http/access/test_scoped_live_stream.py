@@ -8,8 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fakes.cameras import CAMERAS, FPS, GOP, LARGE
-from fakes.departure import (
+from fakes.http.tokens import token_of
+from fakes.media.audio import FRAMES as SOUNDING
+from fakes.media.audio import beeps, sends, write_flashes
+from fakes.media.browser_playback import PLAY, seen_in_chromium
+from fakes.programs import needs_chromium
+from fakes.service.departure import (
     EPOCHS,
     PATIENT,
     begun,
@@ -24,12 +28,8 @@ from fakes.departure import (
     own,
     to_the_end,
 )
-from fakes.media.audio import FRAMES as SOUNDING
-from fakes.media.audio import beeps, sends, write_flashes
-from fakes.media.browser_playback import PLAY, seen_in_chromium
-from fakes.programs import needs_chromium
-from fakes.site import Hall
-from fakes.tokens import token_of
+from fakes.service.fed_site import Hall
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE
 from server.service.streaming.subscriber_queue import Chunk
 
 HLS = {**PATIENT, "hls_segment_s": 0.4, "hls_window_s": 8.0}

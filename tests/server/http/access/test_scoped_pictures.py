@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 import pytest
 
-from fakes.cameras import GOP
-from fakes.departure import GREY, begun, fetched, go_on, left
-from fakes.drawn_site import Drawn, Image, drawn_room, parts, read_film
-from fakes.tokens import bearer, line_of, write_tokens
+from fakes.http.tokens import bearer, line_of, write_tokens
+from fakes.service.departure import GREY, begun, fetched, go_on, left
+from fakes.service.drawn_site import Drawn, Image, drawn_room, parts, read_film
+from fakes.service.scripted_cameras import GOP
 
 NEARLY = 3
 """Levels that a picture may be off when it was encoded."""

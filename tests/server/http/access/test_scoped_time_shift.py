@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fakes.cameras import FPS, GOP
-from fakes.departure import (
+from fakes.media.audio import FRAMES as SOUNDING
+from fakes.media.audio import beeps, sends, write_flashes
+from fakes.service.departure import (
     EPOCHS,
     PATIENT,
     Picture,
@@ -26,9 +27,8 @@ from fakes.departure import (
     left,
     to_the_end,
 )
-from fakes.media.audio import FRAMES as SOUNDING
-from fakes.media.audio import beeps, sends, write_flashes
-from fakes.site import Hall
+from fakes.service.fed_site import Hall
+from fakes.service.scripted_cameras import FPS, GOP
 from server.messaging.messages import GopChoices
 
 Kept = tuple[Hall, list[GopChoices]]

@@ -13,8 +13,8 @@ import pytest
 from aiohttp import ClientSession, CookieJar, web
 from aiohttp.test_utils import make_mocked_request
 
-from fakes.site import Hall, opened
-from fakes.tokens import bearer, line_of, locked, token_of, write_tokens
+from fakes.http.tokens import bearer, line_of, locked, token_of, write_tokens
+from fakes.service.fed_site import Hall, opened
 from server.config.tokens_file import token_digest
 from server.http.access.authentication import COOKIE_PREFIX, Authenticator, Credential
 from server.http.access.csrf import CSRF_HEADER

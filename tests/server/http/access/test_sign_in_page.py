@@ -11,11 +11,11 @@ import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
 from benchmarks.common.browser import chromium
+from fakes.http.tokens import line_of, locked, token_of, write_tokens
 from fakes.paths import AXE
 from fakes.programs import needs_chromium
-from fakes.site import Hall, see
+from fakes.service.fed_site import Hall, see
 from fakes.timeouts import PATIENCE_MS
-from fakes.tokens import line_of, locked, token_of, write_tokens
 
 pytestmark = [
     needs_chromium,

@@ -14,9 +14,9 @@ import aiohttp
 import msgspec
 import pytest
 
-from fakes.cameras import CAMERAS, SMALL
-from fakes.site import A, B, Hall
-from fakes.tokens import LATER, bearer, line_of, locked, token_of, write_tokens
+from fakes.http.tokens import LATER, bearer, line_of, locked, token_of, write_tokens
+from fakes.service.fed_site import A, B, Hall
+from fakes.service.scripted_cameras import CAMERAS, SMALL
 from server.config.tokens_file import token_digest
 from server.http.access.csrf import CSRF_HEADER
 from server.http.access.token_file import TokenFile

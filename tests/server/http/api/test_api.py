@@ -7,8 +7,20 @@ import re
 
 import pytest
 
-from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH, encoded, status, thumbnail, video
-from fakes.site import A, B, Hall
+from fakes.service.fed_site import A, B, Hall
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    FPS,
+    GOP,
+    HEIGHT,
+    LARGE,
+    SMALL,
+    WIDTH,
+    encoded,
+    status,
+    thumbnail,
+    video,
+)
 from server.messaging.inbox import Inbox
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import aiohttp
 
-from fakes.cameras import CAMERAS, GOP, LARGE, SMALL
-from fakes.site import A, B, Hall
+from fakes.service.fed_site import A, B, Hall
+from fakes.service.scripted_cameras import CAMERAS, GOP, LARGE, SMALL
 from fakes.timeouts import PATIENCE
 from server.http.access.permissions import ALL
 from server.http.api.events import Events

@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.cameras import SMALL
-from fakes.certificates import make_certificate
+from fakes.http.certificates import make_certificate
+from fakes.http.tokens import bearer, locked
 from fakes.programs import needs_openssl
-from fakes.site import A, B, Hall, opened, see
+from fakes.service.fed_site import A, B, Hall, opened, see
+from fakes.service.scripted_cameras import SMALL
 from fakes.system.few_descriptors import MYVIEW, awaited, connected, running, written
-from fakes.tokens import bearer, locked
 from server.http.access.csrf import CSRF_HEADER
 from server.http.access.networks import network_of
 from server.http.connections.connection_pool import Connection, ConnectionLimits, ConnectionPool

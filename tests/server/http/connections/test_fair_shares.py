@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.site import Hall, opened, see
-from fakes.tokens import bearer, locked
+from fakes.http.tokens import bearer, locked
+from fakes.service.fed_site import Hall, opened, see
 from server.http.access.permissions import ClientIdentity
 from server.http.viewers.fair_share import FairShare, Slot
 

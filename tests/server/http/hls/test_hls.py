@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import pytest
 
-from fakes.cameras import CAMERAS, FPS, GOP, LARGE, SMALL
-from fakes.site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL
 
 SEGMENT = "hls/index.m3u8"
 

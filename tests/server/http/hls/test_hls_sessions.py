@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.cameras import CAMERAS, SMALL
-from fakes.site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, SMALL
 from server.http.access.permissions import ClientIdentity
 from server.http.viewers.fair_share import FairShare
 from server.http.viewers.hls_sessions import HlsClient, HlsSessions

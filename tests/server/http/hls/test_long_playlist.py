@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 import server.http.hls.long_playlist as long_module
-from fakes.cameras import CAMERAS, FPS
-from fakes.hls_recording import GOPS, HTTP, LENGTH, forget, numbers, shows, text, until_written
-from fakes.recordings import PULSE0
-from fakes.site import Hall, opened
+from fakes.http.hls_recording import GOPS, HTTP, LENGTH, forget, numbers, shows, text, until_written
+from fakes.service.fed_site import Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, FPS
+from fakes.service.scripted_recordings import PULSE0
 from server.http.hls import time_shift_playlist
 from server.http.hls.long_playlist import MOST_GROWING, long_playlist, trimmed
 from server.service.streaming.hls_segmenter import segment_layout

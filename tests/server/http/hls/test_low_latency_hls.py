@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, video
 from fakes.programs import needs_ffmpeg
-from fakes.site import A, Hall, opened
+from fakes.service.fed_site import A, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, video
 from fakes.timeouts import PATIENCE
 from server.http.hls.live_playlist import _cached
 from server.service.streaming.hls_segmenter import HlsSegmenter

@@ -14,14 +14,25 @@ import numpy as np
 import pytest
 
 from benchmarks.common.browser import chromium
-from fakes.cameras import CAMERAS, FPS, GOP
-from fakes.hls_recording import FRAMES, GOPS, HTTP, LENGTH, fetch, forget, numbers, shows, text, until_written
+from fakes.http.hls_recording import (
+    FRAMES,
+    GOPS,
+    HTTP,
+    LENGTH,
+    fetch,
+    forget,
+    numbers,
+    shows,
+    text,
+    until_written,
+)
 from fakes.media.audio import FRAMES as SOUNDING
 from fakes.media.audio import heard, sends, write_flashes
 from fakes.media.browser_playback import HLS_BY_ITSELF
 from fakes.programs import needs_chromium, needs_ffmpeg
-from fakes.recordings import Picture, own_pictures
-from fakes.site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP
+from fakes.service.scripted_recordings import Picture, own_pictures
 from fakes.timeouts import PATIENCE
 
 NOTHING = "of camera c0 nothing is kept from p999 on; there is p0 to p104"

@@ -9,10 +9,10 @@ import msgspec
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from fakes.cameras import CAMERAS, FPS, GOP, LARGE, SMALL, encoded, status, tracks, word
 from fakes.prometheus.monitoring_files import ALERTS
 from fakes.prometheus.promql_series import selectors
-from fakes.site import A, B, Hall, see
+from fakes.service.fed_site import A, B, Hall, see
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL, encoded, status, tracks, word
 from server.http.metrics.event_loop_lag import LoopLag
 from server.http.viewers.traffic import Traffic
 from server.messaging.inbox import Message

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from fakes.cameras import CAMERAS, status, tracks, word
 from fakes.paths import CONFIGS
 from fakes.prometheus.monitoring_files import (
     ALERTS,
@@ -15,7 +14,8 @@ from fakes.prometheus.monitoring_files import (
     VARIABLES,
 )
 from fakes.prometheus.promql_series import Printed, given, selectors
-from fakes.site import Hall
+from fakes.service.fed_site import Hall
+from fakes.service.scripted_cameras import CAMERAS, status, tracks, word
 
 SEVERITIES = {"critical", "warning", "info"}
 

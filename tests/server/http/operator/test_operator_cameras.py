@@ -7,8 +7,8 @@ from contextlib import aclosing
 import pytest
 
 from camsync import Credentials, PulseClient, PulseServer
-from fakes.cameras import CAMERAS, status
-from fakes.site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, status
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
 

@@ -9,8 +9,8 @@ from typing import Any
 import msgspec
 import pytest
 
-from fakes.cameras import FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, tracks, word
-from fakes.site import A, B, Hall, opened, see
+from fakes.service.fed_site import A, B, Hall, opened, see
+from fakes.service.scripted_cameras import FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, tracks, word
 from server.camera.operator_corrections import CorrectionInbox
 from server.http.access.csrf import CSRF_HEADER
 from server.messaging.inbox import Message

@@ -7,7 +7,7 @@ import io
 
 import pytest
 
-from fakes.site import A, B, Hall
+from fakes.service.fed_site import A, B, Hall
 
 
 async def rows(hall: Hall, what: str, span: str) -> list[dict[str, str]]:

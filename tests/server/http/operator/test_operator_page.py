@@ -20,13 +20,13 @@ from playwright.async_api import Browser, Page, Route, expect
 
 from benchmarks.common.browser import chromium
 from bestview import IdentityRegistry
-from fakes.calibration_walk import SITE, curved, errors_on_floor, words
-from fakes.cameras import CAMERAS, FPS, LARGE, SMALL, small_config, status, tracks, word
+from fakes.cli.calibration_walk import SITE, curved, errors_on_floor, words
+from fakes.http.tokens import line_of, token_of, write_tokens
 from fakes.paths import AXE
 from fakes.programs import needs_chromium
-from fakes.site import A, B, Hall, opened, see
+from fakes.service.fed_site import A, B, Hall, opened, see
+from fakes.service.scripted_cameras import CAMERAS, FPS, LARGE, SMALL, small_config, status, tracks, word
 from fakes.timeouts import PATIENCE_MS
-from fakes.tokens import line_of, token_of, write_tokens
 from server.cli.calibrate.points_file import read_points
 from server.messaging.messages import ZenohKeys
 from server.messaging.operator_messages import RiskEvent

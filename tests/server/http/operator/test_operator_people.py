@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from bestview import IdentityRegistry
-from fakes.cameras import CAMERAS, LARGE, SMALL
-from fakes.site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL
 from server.cli.watch import run_watch
 from server.http.access.csrf import CSRF_HEADER
 from server.service.view_selection.decider import camera_homographies

@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from bestview.quality import QualitySettings
-from fakes.cameras import CAMERAS, LARGE, SMALL, TrackNumbers, epoch_of, small_config, word
-from fakes.site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, TrackNumbers, epoch_of, small_config, word
 from server.config.sections import ViewSettings
 from server.config.site_config import Config
 from server.http.access.csrf import CSRF_HEADER

@@ -8,9 +8,9 @@ from collections.abc import AsyncIterator
 import pytest
 
 from benchmarks.common.browser import chromium
-from fakes.cameras import FPS, GOP
-from fakes.drawn_site import Drawn, drawn_room
 from fakes.programs import needs_chromium, needs_ffmpeg
+from fakes.service.drawn_site import Drawn, drawn_room
+from fakes.service.scripted_cameras import FPS, GOP
 
 LOOKS = """
 async () => {

@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 import pytest
 
-from fakes.drawn_site import CAMERAS, GOP, SIZE, Drawn, Image, decoded, drawn_room, parts, read_film
-from fakes.site import B, Hall
+from fakes.service.drawn_site import CAMERAS, GOP, SIZE, Drawn, Image, decoded, drawn_room, parts, read_film
+from fakes.service.fed_site import B, Hall
 from server.http.app_keys import SERVICE
 from server.service.rendering.render_pool import CameraView, PersonView, RenderPool
 from server.service.rendering.worker.box_overlay import CHOSEN_COLOR

@@ -17,10 +17,22 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.common.browser import chromium
-from fakes.cameras import CAMERAS, FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, encoded, tracks, video, word
 from fakes.media.browser_playback import HLS_BY_ITSELF
 from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv, needs_vlc
-from fakes.site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    FPS,
+    HEIGHT,
+    LARGE,
+    SMALL,
+    STRIDE,
+    WIDTH,
+    encoded,
+    tracks,
+    video,
+    word,
+)
 from fakes.timeouts import PATIENCE
 from server.messaging.epochs import end_of_epoch
 

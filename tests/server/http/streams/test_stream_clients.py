@@ -8,8 +8,8 @@ import struct
 
 import pytest
 
-from fakes.cameras import CAMERAS, GOP, SMALL
-from fakes.site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, GOP, SMALL
 from server.service.streaming.subscriber_queue import BytesChunk
 
 STREAMS = {

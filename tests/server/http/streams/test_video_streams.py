@@ -10,8 +10,8 @@ import av
 import numpy as np
 import pytest
 
-from fakes.cameras import CAMERAS, FPS, GOP, LARGE, SMALL, encoded
-from fakes.site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL, encoded
 
 
 async def read_stream(answer: aiohttp.ClientResponse, fragments: int) -> bytes:

@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 from benchmarks.common.browser import chromium
-from fakes.cameras import (
+from fakes.media.browser_playback import PLAY, seen_in_chromium
+from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv
+from fakes.service.fed_site import A, B, Hall
+from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
     GOP,
@@ -25,11 +28,8 @@ from fakes.cameras import (
     video,
     word,
 )
-from fakes.media.browser_playback import PLAY, seen_in_chromium
-from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv
-from fakes.site import A, B, Hall
+from fakes.service.vp8_site import EPOCHS, feed, own
 from fakes.timeouts import PATIENCE_MS
-from fakes.vp8_site import EPOCHS, feed, own
 from server.messaging.epochs import end_of_epoch
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 

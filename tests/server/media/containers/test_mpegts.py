@@ -11,10 +11,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.cameras import CAMERAS, FPS, GOP, encoded
 from fakes.media.ffprobe import probed
 from fakes.media.mpegts import check_counters, taken_apart
 from fakes.programs import needs_ffprobe
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, encoded
 from server.media.containers.fmp4 import FragmentSample, fragment, ticks
 from server.media.containers.mpegts import ContinuityCounters, count_packets, pack
 from server.media.picture import EncodedPicture

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from fakes.cameras import FPS, GOP, HEIGHT, WIDTH
 from fakes.media.h264 import PRESETS, decoded, encoded, how
-from fakes.parameter_sets import MAKES, sent
+from fakes.service.parameter_sets import MAKES, sent
+from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH
 from server.camera.encoding.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fakes.calibration_walk import HEIGHT, SITE, WIDTH, curved, errors_on_floor, walk_config, words
-from fakes.cameras import FPS, STRIDE
-from fakes.site import A, B, Hall, opened
+from fakes.cli.calibration_walk import HEIGHT, SITE, WIDTH, curved, errors_on_floor, walk_config, words
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import FPS, STRIDE
 from server.config.loader import build_config
 from server.http.access.csrf import CSRF_HEADER
 from server.service.calibration import walk_session as walking_module

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fakes.cameras import CAMERAS, GOP, HEIGHT, SMALL, WIDTH
-from fakes.decisions import behind, choice, decision, noted
+from fakes.service.decisions import behind, choice, decision, noted
+from fakes.service.scripted_cameras import CAMERAS, GOP, HEIGHT, SMALL, WIDTH
 from fakes.system.full_disk import files_of_at_most
 from server.media.letterbox import Letterbox
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter

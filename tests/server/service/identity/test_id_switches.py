@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import TrackKey
-from fakes.cameras import HEIGHT, WIDTH, word
+from fakes.service.scripted_cameras import HEIGHT, WIDTH, word
 from server.media.letterbox import Letterbox
 from server.service.identity.camera_window import CameraWindow
 from server.service.identity.id_switches import IdSwitch, find_id_switches

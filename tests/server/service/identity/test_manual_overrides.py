@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bestview import IdentityUpdate, Merge, Split
-from fakes.cameras import CAMERAS, LARGE, SMALL, STRIDE, epoch_of, word
-from fakes.people import Dictated, boxes, people, said
+from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, STRIDE, epoch_of, word
+from fakes.service.scripted_identities import Dictated, boxes, people, said
 from server.service.identity.manual_overrides import ManualOverrides
 from server.service.identity.people import PersonTracker
 

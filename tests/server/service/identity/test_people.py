@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import IdentitySettings, IdentityUpdate, Merge, Split, TrackKey, TrackletKey, TrackUpdate
-from fakes.cameras import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
-from fakes.people import Dictated, boxes, people, said
+from fakes.service.scripted_cameras import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
+from fakes.service.scripted_identities import Dictated, boxes, people, said
 from server.service.identity.local_numbers import LocalNumbers
 from server.service.identity.people import PersonTracker
 from server.service.ingest.window_history import WindowHistory

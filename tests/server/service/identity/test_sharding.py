@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import IdentityUpdate, Merge, TrackletKey, TrackUpdate
-from fakes.cameras import (
+from fakes.service.scripted_cameras import (
     CAMERAS,
     LARGE,
     SMALL,

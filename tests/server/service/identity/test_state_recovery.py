@@ -12,7 +12,17 @@ from aiohttp.test_utils import TestClient, TestServer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.cameras import CAMERAS, FPS, LARGE, SMALL, STRIDE, FedService, small_config, tracks, word
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    FPS,
+    LARGE,
+    SMALL,
+    STRIDE,
+    FedService,
+    small_config,
+    tracks,
+    word,
+)
 from server.camera.retained_state import RetainedState
 from server.http.app import make_app
 from server.messaging.epochs import end_of_epoch

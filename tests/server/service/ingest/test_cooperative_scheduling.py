@@ -7,10 +7,10 @@ import itertools
 
 import pytest
 
-from fakes.cameras import (
+from fakes.service.decisions import EPOCHS, behind, noted
+from fakes.service.scripted_cameras import (
     STRIDE,
 )
-from fakes.decisions import EPOCHS, behind, noted
 from server.messaging.inbox import Inbox
 from server.service.ingest.backlog import BacklogMonitor
 from server.service.ingest.epoch_aligner import Epoch

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import IdentitySettings
-from fakes.cameras import (
+from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
     HEIGHT,

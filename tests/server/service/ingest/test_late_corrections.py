@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from bestview import IdentitySettings
-from fakes.cameras import HEIGHT, STRIDE, WIDTH, epoch_of, word
+from fakes.service.scripted_cameras import HEIGHT, STRIDE, WIDTH, epoch_of, word
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, CameraTracks
 from server.service.identity.people import PersonTracker

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fakes.cameras import CAMERAS, FPS, STRIDE, epoch_of, word
+from fakes.service.scripted_cameras import CAMERAS, FPS, STRIDE, epoch_of, word
 from server.media.stream_format import StreamFormat
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.ingest import CameraState

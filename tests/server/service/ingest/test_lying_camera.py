@@ -12,7 +12,7 @@ import msgspec
 import pytest
 from prometheus_client import generate_latest
 
-from fakes.cameras import (
+from fakes.service.scripted_cameras import (
     CAMERAS,
     GOP,
     LARGE,

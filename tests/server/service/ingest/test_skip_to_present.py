@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from fakes.cameras import (
+from fakes.media.decoding import decodes_without_errors
+from fakes.service.decisions import noted
+from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
     GOP,
@@ -22,9 +24,7 @@ from fakes.cameras import (
     video,
     word,
 )
-from fakes.decisions import noted
-from fakes.media.decoding import decodes_without_errors
-from fakes.recordings import everything_that_plays
+from fakes.service.scripted_recordings import everything_that_plays
 from server.media.audio.aac import SAMPLES
 from server.media.audio.audio_format import AudioFormat
 from server.messaging.epochs import end_of_epoch

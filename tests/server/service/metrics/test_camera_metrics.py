@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.cameras import SMALL, word
+from fakes.service.scripted_cameras import SMALL, word
 from server.messaging.messages import FrameHeader, SolverReport
 from server.service.metrics.camera_metrics import CameraMetrics, RecentSeconds
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fakes.cameras import CAMERAS, FPS, GOP, FedService, small_config
-from fakes.recordings import A, ClocksByHand, filled, head, piece
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, FedService, small_config
+from fakes.service.scripted_recordings import A, ClocksByHand, filled, head, piece
 from server.service.recording.recording_folder import RecordingFolder
 from server.service.recording.retention import RetentionLimits
 from server.service.recording.session_files import InitSegments

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, FedService, video
 from fakes.media.audio import (
     BEEPS,
     FRAMES,
@@ -28,8 +27,9 @@ from fakes.media.audio import (
 from fakes.media.ffprobe import probed
 from fakes.media.mpegts import check_counters, taken_apart
 from fakes.programs import needs_ffprobe
-from fakes.recordings import AMPLE, PULSE0, ClocksByHand, head, piece
-from fakes.site import A, Hall, opened
+from fakes.service.fed_site import A, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, FedService, video
+from fakes.service.scripted_recordings import AMPLE, PULSE0, ClocksByHand, head, piece
 from server.media.audio.aac import SAMPLES as FRAME
 from server.media.audio.audio_chunk import AudioChunk
 from server.media.audio.audio_format import AudioFormat

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from fakes.cameras import CAMERAS, FPS, GOP, LARGE, SMALL
-from fakes.recordings import AMPLE, A, B, filled, head, pictures, piece
-from fakes.site import Hall, opened
+from fakes.service.fed_site import Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL
+from fakes.service.scripted_recordings import AMPLE, A, B, filled, head, pictures, piece
 from fakes.system.full_disk import files_of_at_most
 from fakes.system.unprivileged import nobodys_folder
 from server.service.recording.recording_folder import RecordingFolder

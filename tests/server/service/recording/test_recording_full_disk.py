@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from fakes.cameras import CAMERAS, FPS, GOP, FedService, small_config
-from fakes.recordings import AMPLE, PULSE0, A, ClocksByHand, filled, head, pictures, piece
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, FedService, small_config
+from fakes.service.scripted_recordings import AMPLE, PULSE0, A, ClocksByHand, filled, head, pictures, piece
 from fakes.system.full_disk import files_of_at_most
 from server.service.recording.recording_folder import RecordingFolder
 from server.service.recording.recording_session import RecordingSession

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fakes.cameras import FPS, GOP
 from fakes.media.decoding import decodes_without_errors
-from fakes.recordings import (
+from fakes.service.scripted_cameras import FPS, GOP
+from fakes.service.scripted_recordings import (
     AMPLE,
     PULSE0,
     A,

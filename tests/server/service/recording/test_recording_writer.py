@@ -9,8 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from fakes.cameras import CAMERAS, GOP, SMALL, FedService, TrackNumbers, encoded, small_config, video
-from fakes.recordings import A, B, pictures, piece
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    GOP,
+    SMALL,
+    FedService,
+    TrackNumbers,
+    encoded,
+    small_config,
+    video,
+)
+from fakes.service.scripted_recordings import A, B, pictures, piece
 from fakes.timeouts import PATIENCE
 from server.service.recording.recording_folder import GopRecord
 from server.service.recording.writer_thread import WriterThread

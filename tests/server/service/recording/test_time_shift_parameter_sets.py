@@ -11,10 +11,10 @@ import av
 import numpy as np
 import pytest
 
-from fakes.cameras import FPS, GOP
-from fakes.parameter_sets import GOPS, MISSING, OWN, decision, expected, put
-from fakes.recordings import PULSE0
-from fakes.site import Hall, opened
+from fakes.service.fed_site import Hall, opened
+from fakes.service.parameter_sets import GOPS, MISSING, OWN, decision, expected, put
+from fakes.service.scripted_cameras import FPS, GOP
+from fakes.service.scripted_recordings import PULSE0
 from server.messaging.messages import GopChoices
 
 FRAMES = GOPS * GOP

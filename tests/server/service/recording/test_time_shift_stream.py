@@ -16,8 +16,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fakes.cameras import CAMERAS, FPS, GOP, LARGE, SMALL
-from fakes.recordings import (
+from fakes.service.fed_site import Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL
+from fakes.service.scripted_recordings import (
     AMPLE,
     PULSE0,
     A,
@@ -30,7 +31,6 @@ from fakes.recordings import (
     piece,
     written,
 )
-from fakes.site import Hall, opened
 from server.media.containers.mpegts import ContinuityCounters
 from server.media.picture import EncodedPicture as Shown
 from server.media.stream_format import StreamFormat

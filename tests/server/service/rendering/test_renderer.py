@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.cameras import FPS, GOP, encoded
-from fakes.rendering import CANVAS, fragments, shown
+from fakes.service.rendering import CANVAS, fragments, shown
+from fakes.service.scripted_cameras import FPS, GOP, encoded
 from server.media.audio.audio_format import AudioFormat
 from server.media.rendering_messages import EncodedFrame, JpegPicture, RenderResult
 from server.messaging.messages import AudioHeader, GopChoices

@@ -12,8 +12,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.cameras import FPS, GOP, HEIGHT, WIDTH
-from fakes.rendering import CANVAS, fragments, shown
+from fakes.service.rendering import CANVAS, fragments, shown
+from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH
 from fakes.timeouts import PATIENCE
 from server.media.containers.fmp4 import FragmentSample, fragment
 from server.media.rendering_messages import RenderRequest, RenderResult, encode_message, is_in_series

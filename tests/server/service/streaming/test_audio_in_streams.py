@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import client
-from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, SMALL, FedService, encoded, small_config, video
 from fakes.media.audio import (
     BEEPS,
     FRAMES,
@@ -29,7 +28,18 @@ from fakes.media.browser_playback import PLAY, seen_in_chromium
 from fakes.media.ffprobe import probed
 from fakes.media.mpegts import check_counters, taken_apart
 from fakes.programs import needs_chromium, needs_ffprobe
-from fakes.site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    FPS,
+    GOP,
+    NO_REASON,
+    SMALL,
+    FedService,
+    encoded,
+    small_config,
+    video,
+)
 from server.camera.audio import RecordedAudioSource
 from server.config.sections import SoundSettings
 from server.media.audio.aac import SAMPLES as FRAME

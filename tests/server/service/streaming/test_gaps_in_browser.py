@@ -6,10 +6,10 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, SMALL, encoded
 from fakes.media.browser_playback import PLAY, seen_in_chromium
 from fakes.programs import needs_chromium
-from fakes.site import A, Hall, opened
+from fakes.service.fed_site import A, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, SMALL, encoded
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 GOPS = 12

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, NO_REASON, WIDTH, encoded, small_config
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, HEIGHT, NO_REASON, WIDTH, encoded, small_config
 from server.media.containers.fmp4 import init_segment
 from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer

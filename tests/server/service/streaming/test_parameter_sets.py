@@ -12,11 +12,11 @@ import av
 import numpy as np
 import pytest
 
-from fakes.cameras import FPS, GOP, HEIGHT, WIDTH, small_config
 from fakes.media.browser_playback import READ, seen_in_chromium
-from fakes.parameter_sets import GOPS, MAKES, OWN, decision, expected, put, sent
 from fakes.programs import needs_chromium, needs_ffmpeg
-from fakes.site import Hall, opened
+from fakes.service.fed_site import Hall, opened
+from fakes.service.parameter_sets import GOPS, MAKES, OWN, decision, expected, put, sent
+from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH, small_config
 from server.config.site_config import Config
 from server.media.codec import stream_format_for
 from server.media.h264.annexb import nal_units, parameter_sets

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
 from fakes.timeouts import PATIENCE
 from server.media.stream_format import StreamFormat
 from server.messaging.messages import NumberedBox

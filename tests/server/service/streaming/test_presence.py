@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fakes.cameras import CAMERAS, GOP, NO_REASON
+from fakes.service.scripted_cameras import CAMERAS, GOP, NO_REASON
 from server.service.streaming.presence import Presence, PresenceLog
 from server.service.view_selection.decider import GopDecision
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable
 
-from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
-from fakes.decisions import choice
+from fakes.service.decisions import choice
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
 from fakes.timeouts import PATIENCE
 from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer

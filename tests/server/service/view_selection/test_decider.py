@@ -11,7 +11,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.cameras import CAMERAS, GOP, LARGE, SMALL, STRIDE, TrackNumbers, epoch_of, small_config, word
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    GOP,
+    LARGE,
+    SMALL,
+    STRIDE,
+    TrackNumbers,
+    epoch_of,
+    small_config,
+    word,
+)
 from server.messaging.messages import Box
 from server.service.decision_state import Board, reason
 from server.service.view_selection.decider import GopDecision, ViewDecider

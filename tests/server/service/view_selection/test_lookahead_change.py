@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.cameras import (
+from fakes.service.fed_site import A, B, Hall
+from fakes.service.scripted_cameras import (
     CAMERAS,
     GOP,
     LARGE,
@@ -21,7 +22,6 @@ from fakes.cameras import (
     small_config,
     word,
 )
-from fakes.site import A, B, Hall
 from server.config.sections import ViewSettings
 from server.http.access.csrf import CSRF_HEADER
 from server.service.streaming.subscriber_queue import Chunk

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import TrackKey
-from fakes.cameras import CAMERAS, STRIDE, TrackNumbers, epoch_of, small_config, word
+from fakes.service.scripted_cameras import CAMERAS, STRIDE, TrackNumbers, epoch_of, small_config, word
 from server.messaging.messages import Box, CameraTracks
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch

@@ -9,8 +9,8 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from fakes.cameras import FPS, GOP, HEIGHT, NO_REASON, WIDTH
-from fakes.site import A, B
+from fakes.service.fed_site import A, B
+from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, NO_REASON, WIDTH
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.service.streaming.frame_buffer import FrameBuffer

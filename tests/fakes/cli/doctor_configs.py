@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from fakes.cameras import HEIGHT, WIDTH
+from fakes.service.scripted_cameras import HEIGHT, WIDTH
 from fakes.system.ports import free
 from server.config.loader import load_config
 from server.config.site_config import Config

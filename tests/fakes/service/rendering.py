@@ -7,7 +7,7 @@ from functools import cache
 import av
 import numpy as np
 
-from fakes.cameras import FPS, GOP, HEIGHT, WIDTH, encoded
+from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH, encoded
 from server.media.containers.fmp4 import FragmentSample, fragment
 from server.media.h264.annexb import join_sample, nal_units
 from server.media.rendering_messages import Canvas

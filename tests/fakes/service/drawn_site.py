@@ -13,8 +13,17 @@ import numpy as np
 from aiohttp import web
 from numpy.typing import NDArray
 
-from fakes.cameras import GOP, STRIDE, FedService, TrackNumbers, small_config, tracks, video, word
-from fakes.site import Hall
+from fakes.service.fed_site import Hall
+from fakes.service.scripted_cameras import (
+    GOP,
+    STRIDE,
+    FedService,
+    TrackNumbers,
+    small_config,
+    tracks,
+    video,
+    word,
+)
 from fakes.timeouts import PATIENCE
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import HttpSettings

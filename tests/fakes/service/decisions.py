@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bestview import Merge, Split
-from fakes.cameras import (
+from fakes.service.scripted_cameras import (
     CAMERAS,
     GOP,
     LARGE,

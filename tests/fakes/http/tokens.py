@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from fakes.site import Hall, opened
+from fakes.service.fed_site import Hall, opened
 from server.config.tokens_file import token_digest
 
 LATER = "2100-01-01T00:00:00Z"

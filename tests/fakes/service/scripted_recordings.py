@@ -11,7 +11,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, WIDTH, encoded
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, HEIGHT, WIDTH, encoded
 from server.media.containers.fmp4 import init_segment
 from server.media.stream_format import StreamFormat
 from server.messaging.messages import GopChoices

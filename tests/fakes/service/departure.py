@@ -15,9 +15,9 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from fakes.cameras import CAMERAS, FPS, GOP, LARGE, SMALL, encoded
-from fakes.site import A, B, Hall
-from fakes.tokens import bearer, locked
+from fakes.http.tokens import bearer, locked
+from fakes.service.fed_site import A, B, Hall
+from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL, encoded
 from server.messaging.messages import Box, GopChoices
 
 Picture = NDArray[np.uint8]

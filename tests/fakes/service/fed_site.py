@@ -9,7 +9,7 @@ from typing import Any
 import aiohttp
 import pytest
 
-from fakes.cameras import CAMERAS, LARGE, SMALL, FedService, TrackNumbers, small_config
+from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, FedService, TrackNumbers, small_config
 from fakes.timeouts import PATIENCE
 from server.config.sections import HttpSettings
 from server.http.app import make_app, serving

@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import re
 
-from fakes.cameras import CAMERAS, GOP, NO_REASON, encoded, video
-from fakes.recordings import PULSE0
-from fakes.site import Hall
+from fakes.service.fed_site import Hall
+from fakes.service.scripted_cameras import CAMERAS, GOP, NO_REASON, encoded, video
+from fakes.service.scripted_recordings import PULSE0
 from server.messaging.messages import GopChoices
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 

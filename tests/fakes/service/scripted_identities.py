@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bestview import IdentitySettings, IdentityUpdate, Merge, Split, TrackletKey, TrackUpdate
-from fakes.cameras import CAMERAS, HEIGHT, WIDTH
+from fakes.service.scripted_cameras import CAMERAS, HEIGHT, WIDTH
 from server.messaging.messages import Box
 from server.service.identity.people import PersonTracker
 

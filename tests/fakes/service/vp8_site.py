@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fakes.cameras import CAMERAS, LARGE, SMALL, encoded
-from fakes.site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, encoded
 
 EPOCHS = 8
 """As many as a camera by hand has pictures of."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview import to_ground
-from fakes.cameras import STRIDE, small_config
+from fakes.service.scripted_cameras import STRIDE, small_config
 from server.config.site_config import Config
 from server.messaging.messages import Box, CameraTracks, TrackMessage
 from server.service.ingest.epoch_aligner import Epoch

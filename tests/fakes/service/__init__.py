@@ -1,0 +1,1 @@
+"""Fakes and helpers for tests of the best-view service."""
