@@ -20,6 +20,7 @@ import typer.main
 from prometheus_client import CollectorRegistry
 
 from fakes.paths import DOCS, ROOT
+from fakes.service import scripted_cameras
 from fakes.timeouts import PATIENCE
 from server.cli.main import app as command_line
 from server.config.sections import HttpSettings
