@@ -164,7 +164,9 @@ export class Player {
       if (run.left) return;
     }
     const all = [...run.early.splice(0), ...segments];
-    await buffer.append(join(all.map((segment) => segment.bytes)), this.video.currentTime);
+    // What comes of a past is not long over while the picture is still to go there.
+    const goes = run.landed || Number.isNaN(run.start) ? Infinity : run.start;
+    await buffer.append(join(all.map((segment) => segment.bytes)), Math.min(this.video.currentTime, goes));
     if (!first) return;
     if (Number.isNaN(run.since)) run.since = performance.now();
     this.#land(run, buffer);

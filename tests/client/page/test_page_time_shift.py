@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+import asyncio
+from itertools import count, pairwise
 
 import numpy as np
 import pytest
@@ -111,7 +112,25 @@ async def test_what_a_browser_paused_unseen_is_live_when_somebody_looks(browser:
         assert not any("from=" in address for address in asked)
 
 
-@pytest.mark.slow  # on a busy machine the press on the band is now and then lost
+async def test_a_past_that_comes_slowly_is_shown(browser: Browser) -> None:
+    comes = asyncio.Event()
+    async with visiting(browser, FakeSite(recorded=1800, past_comes=comes)) as visit:
+        await visit.playing(1)
+        await visit.page.keyboard.press("Space")
+        await visit.until("video.paused && myview.state === 'paused'")
+        await visit.page.get_by_label("How much of the past the band shows").select_option("Last 10 minutes")
+        stopped = await visit.get("myview.pulse")
+        strip = visit.page.locator("#strip")
+        box = await strip.bounding_box()
+        assert box is not None
+        # In the middle of a GOP: its first frame is not the one that is wished for.
+        x = next(x for x in count(100) if 4 <= (stopped + (x / box["width"] * 620 - 600) * FPS) % GOP <= 6)
+        await strip.click(position={"x": x, "y": 5})
+        await visit.until("video.buffered.length && video.buffered.start(0) < video.currentTime - 100")
+        comes.set()
+        await visit.until(f"myview.pulse < {stopped - 100 * FPS}")
+
+
 async def test_the_band_reaches_back_over_all_that_is_recorded(browser: Browser) -> None:
     async with visiting(browser, FakeSite(recorded=1800)) as visit:
         await visit.playing(1)

@@ -56,6 +56,7 @@ class FakeSite:
         fetched: First pulses of the segments of HLS that were asked for, in order.
         kept_from: The first pulse that can be seen again.
         recorded: Seconds of the past that are recorded.
+        past_comes: Set when more of a past is to be sent than its first frame; None: all comes at once.
         ahead: Seconds that the streams run ahead of the clock: minutes pass in no time.
         blind: Pulses, from GOP to GOP, at which the first camera finds nobody.
         unfound: Share of the look-ahead in which every camera does not find whom others know to be there.
@@ -78,6 +79,7 @@ class FakeSite:
     fetched: list[int] = field(default_factory=list)
     kept_from: int = 0
     recorded: int = 0
+    past_comes: asyncio.Event | None = None
     ahead: float = 0.0
     blind: range = range(0)
     unfound: float = 0.0
@@ -335,6 +337,7 @@ class SiteServer:
         if "from" in request.query and first < site.kept_from:
             return web.json_response({"error": "nothing is kept there"}, status=416)
         first -= first % GOP
+        waits = site.past_comes if "from" in request.query else None
         response = web.StreamResponse(headers={"Content-Type": "video/mp4"})
         await response.prepare(request)
         transport = request.transport
@@ -346,6 +349,8 @@ class SiteServer:
                 if pulse not in site.skipped:
                     shown = site.shown(k, pulse, held, request.query.get("prefer"))
                     await response.write(pattern(shown).fragment(pulse))
+                if waits:
+                    await waits.wait()
         return response
 
     async def _playlist(self, request: web.Request) -> web.Response:

@@ -27,7 +27,7 @@ export class MediaBuffer {
 
   /**
    * @param {Uint8Array} bytes whole segments
-   * @param {number} time media time now shown: what is long before it may go
+   * @param {number} time media time now shown, or to be shown next: what is long before it may go
    * @returns {Promise<void>}
    */
   append(bytes, time) {
