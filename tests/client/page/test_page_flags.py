@@ -152,6 +152,20 @@ async def test_who_is_watched_can_be_pointed_at_while_a_flag_is_about_others(bro
         await expect(visit.page.locator("#flag-words")).to_have_text("2 fades, or is lost from sight")
 
 
+async def test_who_is_pointed_at_by_key_is_so_though_a_flag_is_answered(browser: Browser) -> None:
+    site = FakeSite(operates=True)
+    site.flags.append(flag(site, objects=[1, 2]))
+    async with visiting(browser, site) as visit:
+        await visit.playing(1)
+        await visit.until("!document.querySelector('#point').hidden && myview.flags.length === 1")
+        await visit.page.keyboard.press("h")
+        site.flags.append(flag(site, objects=[1, 2], state="answered"))
+        await visit.until("myview.flags.length === 0")
+        assert await visit.get("myview.pointing.object") == 1, "its first place may be wrong"
+        await visit.page.keyboard.press("h")
+        await visit.until("myview.pointing.object === null")
+
+
 async def test_a_finger_points_while_it_is_down(browser: Browser) -> None:
     site = FakeSite(operates=True)
     async with visiting(browser, site) as visit:

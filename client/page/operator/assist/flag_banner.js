@@ -19,6 +19,7 @@ export class Banner {
   #toggle = element('point');
   /** @type {string | null} the camera that is held to point in its picture */
   #held = null;
+  #answers = false; // who is pointed at is so for a flag, not because the operator wished it of who is watched
   #back = false; // what is shown is past, to point at somebody there
 
   /**
@@ -36,7 +37,7 @@ export class Banner {
   take(flag) {
     this.flags.take(flag);
     const { object } = this.pointing;
-    const mine = object !== null && flag.objects.includes(object);
+    const mine = this.#answers && object !== null && flag.objects.includes(object);
     if (flag.state === 'answered' && mine && !this.flags.about(object, this.#now)) this.#leave();
     this.show();
   }
@@ -54,6 +55,7 @@ export class Banner {
     const { viewer, pointing } = this;
     if (pointing.object !== null || viewer.object === null) return this.answer();
     pointing.begin(viewer.object);
+    this.#answers = false;
     this.show();
   }
 
@@ -88,7 +90,8 @@ export class Banner {
     const { viewer, pointing } = this;
     const over = pulse < this.#now;
     pointing.begin(object);
-    if (pointing.object === null) return;
+    this.#answers = pointing.object !== null;
+    if (!this.#answers) return;
     viewer.choose(object);
     if (viewer.override.camera !== camera) {
       viewer.hold(camera);
