@@ -23,6 +23,8 @@ _SIZE = 180, 320
 _WIDE, _TALL, _TOP = 20, 60, 60
 _FAR, _STEP = 100, 2
 """Pixels from where they meet to where they stand, and that they walk a frame."""
+STAND = MET + _FAR // _STEP
+"""The pulse from which they stand."""
 _BEHIND = 6
 """Frames before and after, in which one hides the other."""
 _GREY, _GREEN = 110, (60, 200, 60)
