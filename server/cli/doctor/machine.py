@@ -116,9 +116,10 @@ async def _offset(host: str, port: int, tls: ssl.SSLContext | None) -> float | N
         async with asyncio.timeout(_ANSWER_S):
             asked = time.time()
             reader, writer = await asyncio.open_connection(host, port, ssl=tls)
-            line = await reader.readline()
-            writer.close()
-            said = parse_server_line(line.rstrip(b"\r\n"))
+            try:
+                said = parse_server_line((await reader.readline()).rstrip(b"\r\n"))
+            finally:
+                writer.close()
     except (OSError, TimeoutError, ProtocolError, ValueError):
         return None
     return said.now - (asked + time.time()) / 2 if isinstance(said, Greeting | LoginRequest) else None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import json
 import os
 import socket
@@ -21,6 +23,7 @@ from fakes.programs import needs_openssl
 from fakes.service.fed_site import Hall
 from fakes.service.scripted_cameras import FPS, HEIGHT, WIDTH, encoded
 from fakes.system.ports import free
+from fakes.timeouts import PATIENCE
 from server.cli.doctor import machine
 from server.cli.doctor.camera_probe import CameraProbe
 from server.cli.doctor.cameras import camera_findings, probe_cameras, sound_findings
@@ -155,6 +158,23 @@ async def test_a_closed_pulse_server_is_this_site_s_where_it_knows_one_of_its_pa
         found, _ = await port_findings(there)
         assert only(found, "sync.port").level is Level.BAD
         assert server.clients()[0].name == "bestview", "who asks takes nobody's place"
+
+
+async def test_what_is_no_pulse_server_is_left_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(machine, "_ANSWER_S", PATIENCE)
+    there, left = config(tmp_path), asyncio.Event()
+
+    async def endless(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"a" * 100_000)  # no line has so many
+        with contextlib.suppress(ConnectionError):
+            await reader.read()
+        writer.close()
+        left.set()
+
+    async with await asyncio.start_server(endless, "127.0.0.1", there.sync.port):
+        assert "is not running" in only(await clock_findings(there), "pulse server").text
+        async with asyncio.timeout(PATIENCE):
+            await left.wait()
 
 
 def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
