@@ -210,9 +210,11 @@ class RenderedStream:
         finally:
             for task in tasks:
                 task.cancel()
-            await process.end()
-            self.pid = None
-            await asyncio.gather(*tasks, return_exceptions=True)
+            try:
+                await asyncio.gather(*tasks, return_exceptions=True)
+            finally:
+                await process.end()
+                self.pid = None
 
     async def _feed(self, process: RenderWorker) -> None:
         """Draw what comes, while somebody wants it, until the stream ends."""

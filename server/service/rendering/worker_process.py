@@ -13,6 +13,7 @@ from server.system.child_process import start_worker
 
 _ANSWER_S = 5.0
 """An answer that takes longer does not come: the process hangs."""
+_PART_BYTES = 1 << 16
 
 
 class WorkerDiedError(Exception):
@@ -81,8 +82,11 @@ class RenderWorker:
         raise WorkerDiedError("died")
 
     async def end(self) -> None:
-        """End it: it has nothing to save."""
+        """End it: it has nothing to save. Nobody asks it any more."""
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
         self._requests.close()
+        # Until somebody has read what is left of a long answer its pipe stays open, and is waited for.
+        while await self._answers.read(_PART_BYTES):
+            pass
         await self._process.wait()

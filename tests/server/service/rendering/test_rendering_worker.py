@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import subprocess
 import sys
+from pathlib import Path
 
 import cv2
 import msgspec
@@ -22,6 +24,7 @@ from server.service.rendering.worker.__main__ import serve
 from server.service.rendering.worker.box_overlay import CHOSEN_COLOR, OTHER_COLOR, Image, draw_boxes
 from server.service.rendering.worker.demuxers import demux_mp4
 from server.service.rendering.worker.stream_renderer import StreamRenderer
+from server.service.rendering.worker_process import RenderWorker
 
 rates = st.floats(0.1, 60)
 
@@ -177,3 +180,17 @@ def test_the_process_itself_ends_when_nobody_is_left_to_ask() -> None:
     )
     assert msgspec.msgpack.decode(out[4:], type=RenderResult).newest == 0
     assert process.returncode == 0
+
+
+async def test_a_worker_that_is_ended_while_it_answers_leaves_nothing_open() -> None:
+    before = set(Path("/proc/self/fd").iterdir())
+    endless = "import os\nwhile True: os.write(1, bytes(65536))"
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", endless, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE
+    )
+    async with asyncio.timeout(PATIENCE):
+        while not getattr(process.stdout, "_paused"):  # noqa: ASYNC110, B009 — more has come than is kept
+            await asyncio.sleep(0)
+        await RenderWorker(process).end()
+        while not before.issuperset(Path("/proc/self/fd").iterdir()):  # noqa: ASYNC110
+            await asyncio.sleep(0)
