@@ -33,7 +33,8 @@ def left_to_right(gop: Gop) -> list[int]:
 async def test_who_is_pointed_at_has_their_number_again_and_the_stream_goes_on(tmp_path: Path) -> None:
     """Who came from the left went back there; the tracker has the two pass each other."""
     # One camera, whose boxes are given: also a machine with much to do sees how they meet.
-    async with helped(tmp_path, [camera(ALIKE, tmp_path)], memory_frames=FRAMES) as site, opened(site) as page:
+    cameras = [camera(ALIKE, tmp_path)]
+    async with helped(tmp_path, cameras, memory_frames=FRAMES) as site, opened(site) as page:
         await point(site, page)
 
 
