@@ -23,7 +23,7 @@ TEMPORAL_TRACKER = "temporal"
 """Person-to-blob matching over a window of samples: it has settings of its own."""
 
 # Imported when asked for: a camera with the default tracker loads none of them.
-_METHODS = {
+PREDICTION_METHODS = {
     "kalman": ("tracking.baselines.kalman_prediction", "KalmanPrediction"),
     "klt": ("tracking.baselines.optical_flow", "OpticalFlow"),
     "mcmc": ("tracking.baselines.mcmc", "McmcFilter"),
@@ -32,6 +32,7 @@ _METHODS = {
     "occlusion-cues": ("tracking.baselines.occlusion_cues", "OcclusionCues"),
     "particle": ("tracking.baselines.particle_filter", "ParticleFilters"),
 }
+"""Module and class of each frame-by-frame tracker's prediction method, by the tracker's name."""
 
 _GRAPH = "track-graph"
 
@@ -63,7 +64,7 @@ class PrescanTracker(Protocol):
 
 def tracker_names() -> tuple[str, ...]:
     """Return the names of all trackers."""
-    return (DEFAULT_TRACKER, *sorted((*_METHODS, TEMPORAL_TRACKER, _GRAPH)))
+    return (DEFAULT_TRACKER, *sorted((*PREDICTION_METHODS, TEMPORAL_TRACKER, _GRAPH)))
 
 
 def needs_images(name: str) -> bool:
@@ -111,8 +112,8 @@ def create_tracker(
 
 
 def _method_of(name: str) -> type[PredictionMethod[Any]]:
-    if name not in _METHODS:
+    if name not in PREDICTION_METHODS:
         raise ValueError(f"no tracker is called {name!r}; there are {', '.join(tracker_names())}")
-    module, method = _METHODS[name]
+    module, method = PREDICTION_METHODS[name]
     found: type[PredictionMethod[Any]] = getattr(import_module(module), method)
     return found

@@ -85,7 +85,7 @@ def compute_view_quality(tracks: TrackWindow, layout: CameraLayout, settings: Qu
     terms = np.empty((len(settings.terms), *sides.shape[1:])).transpose(0, 2, 1)
     quality = np.ones(sides.shape[1:]).T
     for index, name in enumerate(settings.terms):
-        terms[index] = _TERMS[name](inputs)
+        terms[index] = TERMS[name](inputs)
         quality *= 1.0 - weights[name] * (1.0 - terms[index])
     hidden = np.isnan(inputs.boxes[..., 0])
     if hidden.any():
@@ -117,7 +117,7 @@ def _facing(rows: _TermInputs) -> Floats:
     return whole_window[:, None]
 
 
-_TERMS: dict[str, Callable[[_TermInputs], Floats]] = {
+TERMS: dict[str, Callable[[_TermInputs], Floats]] = {
     "size": lambda rows: size_quality(rows.boxes, *rows.looks.size),
     "truncation": lambda rows: visible_share(rows.boxes, rows.picture_boxes),
     "occlusion": lambda rows: unoccluded_share(rows.boxes, rows.seen.camera),
@@ -126,7 +126,7 @@ _TERMS: dict[str, Callable[[_TermInputs], Floats]] = {
     "facing": _facing,
     "confidence": lambda rows: rows.seen.confidence[:, None],
 }
-"""Each (T, N), or (T, 1) where it is the same in all frames; any value where hidden."""
+"""The terms by name; each is (T, N), or (T, 1) where all frames are alike; any value where hidden."""
 
 
 def _check(tracks: TrackWindow, layout: CameraLayout) -> None:
