@@ -21,7 +21,7 @@ from server.service.ingest.ingest import Thumbnail
 from server.service.pipeline import BestViewPipeline
 
 __all__ = [
-    "ManualOverrides",
+    "PersonOverrides",
     "MergePeople",
     "PeopleService",
     "PersonSummary",
@@ -116,7 +116,7 @@ class ViewSelection(msgspec.Struct, frozen=True):
 
 
 @dataclass(frozen=True, slots=True)
-class ManualOverrides:
+class PersonOverrides:
     """What the operator has corrected by hand."""
 
     names: dict[int, str]
@@ -246,10 +246,10 @@ class PeopleService:
             return "several services share this site (view.share): they must agree who is who, by themselves"
         return ""
 
-    def manual_overrides(self) -> ManualOverrides:
+    def manual_overrides(self) -> PersonOverrides:
         """Return the names and merges that the operator has given."""
         people = self._pipeline.decider.people
-        return ManualOverrides(dict(sorted(people.registry.names.items())), people.merged_by_hand)
+        return PersonOverrides(dict(sorted(people.registry.names.items())), people.merged_by_hand)
 
     def check_editable(self, number: int) -> None:
         """Check that a person can be edited.

@@ -1,0 +1,40 @@
+"""The tree stays readable: bounds on folders, names, docstrings and documents."""
+
+from __future__ import annotations
+
+import pytest
+
+from conventions import (
+    PRODUCT,
+    docstrings_beginning_with,
+    flat_folders,
+    rooms,
+    shared_class_names,
+    words_of,
+)
+
+MAX_FILES_PER_FOLDER = 20
+MAX_LINES_PER_MODULE = 350
+MAX_WORDS = {"README.md": 700, "docs": 25_000}
+
+
+def test_no_folder_is_a_heap() -> None:
+    assert flat_folders(MAX_FILES_PER_FOLDER) == {}
+
+
+def test_no_module_of_the_product_holds_several_ideas() -> None:
+    product = [room for room in rooms() if room.name.split("/")[0] in PRODUCT]
+    assert {room.largest_file: room.largest for room in product if room.largest > MAX_LINES_PER_MODULE} == {}
+
+
+def test_no_two_public_classes_of_a_room_share_a_name() -> None:
+    assert shared_class_names() == {}
+
+
+def test_docstrings_say_what_is_returned_or_done() -> None:
+    assert docstrings_beginning_with(("Give", "Tell", "Say"), ".") == []
+
+
+@pytest.mark.parametrize("document", MAX_WORDS)
+def test_documents_fit_a_head(document: str) -> None:
+    assert words_of(document) <= MAX_WORDS[document]
