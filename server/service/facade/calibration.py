@@ -44,7 +44,7 @@ class OperatorWalk(msgspec.Struct, frozen=True):
     """Seconds after which nothing more is taken in."""
     cameras: list[WalkCamera]
     pairs: list[WalkPair]
-    losses: list[str]
+    lacking: list[str]
     """Where to walk, too, as far as can be told before it is calibrated from."""
     error: str
     """Why nothing has come of it; empty: something has, or it is not done."""
@@ -67,7 +67,7 @@ class CalibrationService:
         walking = self._walking
         done = walking.done or CalibrationResult()
         covered = walking.coverage()
-        losses = [
+        lacking = [
             it.words
             for seen in covered.cameras
             for it in coverage_gaps(seen.camera, seen.thirds, seen.deep or float("inf"))
@@ -78,7 +78,7 @@ class CalibrationService:
             most=MAX_WALK_S,
             cameras=[WalkCamera(it.camera, it.feet, list(it.thirds), it.deep) for it in covered.cameras],
             pairs=[WalkPair(it.one, it.other, it.seconds) for it in covered.pairs],
-            losses=losses,
+            lacking=lacking,
             error=done.error,
             lines=done.lines,
             too_little=done.too_little,

@@ -155,7 +155,7 @@ def test_a_camera_takes_what_is_said_of_its_own_tracks_and_no_more_than_it_can_h
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     pointed = CorrectionInbox("c0", boot=2)
-    point = {"track": 1, "x": 1.0, "y": 2.0, "reach": 3.0}
+    point = {"track": 1, "x": 1.0, "y": 2.0, "tolerance": 3.0}
 
     def hear(content: Any) -> None:
         payload = content if isinstance(content, bytes) else msgspec.json.encode(content)
@@ -164,7 +164,7 @@ def test_a_camera_takes_what_is_said_of_its_own_tracks_and_no_more_than_it_can_h
     hear({"boot": 1, "points": [{"pulse": 1, **point}]})
     for first in (0, 200):
         hear({"boot": 2, "points": [{"pulse": first + it, **point} for it in range(200)]})
-    sharp = {"boot": 2, "points": [{"pulse": 1, **point, "reach": 1e-200}]}
+    sharp = {"boot": 2, "points": [{"pulse": 1, **point, "tolerance": 1e-200}]}
     for bad in (b"", b"[" * 100_000, b"{}", {"boot": 2, "points": [{"pulse": -1, **point}]}, sharp):
         hear(bad)
     assert pointed.bad_messages == 5
