@@ -82,7 +82,7 @@ async def test_a_camera_that_nobody_understands_is_told_of_once_and_not_by_frame
     clock[0] += 60.0
     hear("c1", found("c1", 1750))
     none, well = caplog.messages
-    assert none.startswith("camera c0: a message on myview/hall/camera/c1/found is none: Object missing")
+    assert none.startswith("camera c0: a message on myview/hall/camera/c1/detections is none: Object missing")
     assert well == "camera c0: what c1 says is understood again; 250 messages were not"
     assert exchange.bad_messages == 250
 
