@@ -219,11 +219,11 @@ async def test_cameras_hear_what_others_found_and_not_what_they_see(settings: Ze
             auditor.publish(SITE.camera("c1", "detections"), b"false")
             c0.publish(SITE.camera("c0", "detections"), b"detections")
 
-        await heard.until("c0/found found", all_of_it)
+        await heard.until("c0/detections detections", all_of_it)
         await everything.until("c0/video seen", all_of_it)  # it may come in mid-round
-        await everything.until("c0/found found", all_of_it)
-        assert set(heard.texts) == {"c0/found found"}
-        assert set(everything.texts) == {"c0/video seen", "c0/found found"}, "who listens sends nothing"
+        await everything.until("c0/detections detections", all_of_it)
+        assert set(heard.texts) == {"c0/detections detections"}
+        assert set(everything.texts) == {"c0/video seen", "c0/detections detections"}, "who listens sends nothing"
 
 
 async def test_another_best_view_service_hears_and_says_all(settings: ZenohSettings) -> None:

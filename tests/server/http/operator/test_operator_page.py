@@ -31,7 +31,7 @@ from server.cli.calibrate.points_file import read_points
 from server.messaging.messages import ZenohKeys
 from server.messaging.operator_messages import RiskEvent
 
-SECTIONS = ["cameras", "floor", "known", "flagged", "downloads", "marks", "walk", "choosing", "configuration"]
+SECTIONS = ["cameras", "floor", "known", "flagged", "downloads", "zones", "calibration", "view-selection", "configuration"]
 PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
 
@@ -371,7 +371,7 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         cost = page.get_by_label("Cut cost λ, s")
         await expect(cost).to_have_value("0.04")
         await cost.fill("2")
-        await page.get_by_label("Central").fill("0.5")
+        await page.get_by_label("Centering").fill("0.5")
         await page.keyboard.press("Enter")
         await expect(page.locator("#selection-state")).to_have_text("2 tried out, not as the file says.")
         assert (decider.view.switch_cost_s, decider.view.quality.centering) == (2.0, 0.5)
@@ -385,7 +385,7 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         await expect(page.locator("#selection-state")).to_have_text("3 tried out, not as the file says.")
         assert decider.view.lookahead == 15
         await page.get_by_label("Size").fill("0")  # the page lets it pass, the site does not: all are 0
-        for name in ("Whole", "Unhidden", "Central"):
+        for name in ("Truncation", "Occlusion", "Centering"):
             await page.get_by_label(name).fill("0")
         await page.get_by_role("button", name="Try it").click()
         await expect(page.locator("#trouble")).to_contain_text("all weights are 0")
