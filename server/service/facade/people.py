@@ -21,9 +21,9 @@ from server.service.ingest.ingest import Thumbnail
 from server.service.pipeline import BestViewPipeline
 
 __all__ = [
-    "PersonOverrides",
     "MergePeople",
     "PeopleService",
+    "PersonOverrides",
     "PersonSummary",
     "RemotePerson",
     "RenamePerson",

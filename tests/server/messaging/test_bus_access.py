@@ -223,7 +223,9 @@ async def test_cameras_hear_what_others_found_and_not_what_they_see(settings: Ze
         await everything.until("c0/video seen", all_of_it)  # it may come in mid-round
         await everything.until("c0/detections detections", all_of_it)
         assert set(heard.texts) == {"c0/detections detections"}
-        assert set(everything.texts) == {"c0/video seen", "c0/detections detections"}, "who listens sends nothing"
+        assert set(everything.texts) == {"c0/video seen", "c0/detections detections"}, (
+            "who listens sends nothing"
+        )
 
 
 async def test_another_best_view_service_hears_and_says_all(settings: ZenohSettings) -> None:

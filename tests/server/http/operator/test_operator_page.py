@@ -31,7 +31,8 @@ from server.cli.calibrate.points_file import read_points
 from server.messaging.messages import ZenohKeys
 from server.messaging.operator_messages import RiskEvent
 
-SECTIONS = ["cameras", "floor", "known", "flagged", "downloads", "zones", "calibration", "view-selection", "configuration"]
+SECTIONS = ["cameras", "floor", "known", "flagged", "downloads"]
+SECTIONS += ["zones", "calibration", "view-selection", "configuration"]
 PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
 
