@@ -159,7 +159,10 @@ def test_after_a_week_off_what_is_too_old_goes_soon_after_the_start_if_the_clock
         gone.append(30 - len([it for it in kept(tmp_path) if it < 30]))
     assert gone == [10, 20, 30, 30], "in parts"
     told = [it for it in caplog.messages if "deleted the oldest" in it]
-    assert "10 older than record.keep_s (86400 s); 20 more are too old and go in the next passes" in told[0]
+    assert (
+        "10 older than record.keep_s (86400 s); 20 more are too old and are deleted in the next passes"
+        in told[0]
+    )
     store.close()
 
 
@@ -295,7 +298,7 @@ def test_a_damaged_ledger_takes_nothing_away(tmp_path: Path, clocks: ClocksByHan
     store.close()
 
 
-@pytest.mark.parametrize("age_clock_at_pulse0", [1e9, -1e9])
+@pytest.mark.parametrize("clock0", [1e9, -1e9])
 def test_a_run_of_another_clock_takes_no_other_one_away_and_is_not_kept_for_ever(
     tmp_path: Path, clocks: ClocksByHand, clock0: float
 ) -> None:
