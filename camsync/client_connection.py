@@ -94,7 +94,7 @@ class ClientConnection(asyncio.Protocol):
         self._transport: asyncio.Transport | None = None
         self._handshake: asyncio.Task[None] | None = None
         self._sent = self._dropped = self._behind = self._errors = 0
-        self._joined_owner = False
+        self._is_registered = False
         self._early: list[bytes] = []
         """Lines that came with the end of the TLS handshake."""
         self.address = self._host = "?"
@@ -236,14 +236,14 @@ class ClientConnection(asyncio.Protocol):
         self._early.clear()
 
     def _join(self) -> None:
-        self._joined_owner = True
+        self._is_registered = True
         self._owner.joined(self)
 
     def _take(self, line: bytes) -> None:
         if self._handshake is not None:
             self._early.append(line)
             return
-        if not self._joined_owner:
+        if not self._is_registered:
             if self._gate is not None and (user := self._gate.check(self, line)) is not None:
                 self.user = user
                 self._join()
