@@ -1,7 +1,7 @@
 """What the best-view service and a drawing process say to each other, over the process's pipes.
 
-One request, one answer, each a msgpack message behind its length. The first message, which has no answer, is
-:class:`Canvas`. This module loads nothing of the configuration: a drawing process must be there at once.
+One request, one answer, each a msgpack message behind its length. The first message is :class:`Canvas`; its
+answer is :data:`READY`. This module does not load the configuration: a drawing process must start at once.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ Still = Literal["plain", "boxed"]
 
 LENGTH_BYTES = 4
 """The length before every message, big-endian."""
+READY = bytes(LENGTH_BYTES)
+"""What a drawing process writes when it has loaded its libraries: an empty message."""
 TIMESCALE = 90_000
 """Ticks a second in fragments of MP4: divisible by 24, 25, 30 and 50 frames a second."""
 

@@ -13,7 +13,7 @@ from server.media.rendering_messages import Canvas, JpegPicture, RenderRequest, 
 from server.service.rendering.decided_boxes import GopOverlay
 from server.service.rendering.mjpeg_streams import MjpegStreams
 from server.service.rendering.overlay_video import OverlayVideo
-from server.service.rendering.worker_process import RenderWorker, WorkerDiedError
+from server.service.rendering.worker_process import START_S, RenderWorker, WorkerDiedError
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.media_chunk import MediaChunk
@@ -34,18 +34,20 @@ class StillRequests:
     def __init__(self) -> None:
         self._wishes: dict[Still, _StillRequest] = {}
         self.asked = asyncio.Event()
-        """Somebody has asked since it was cleared."""
+        """A request came since it was cleared."""
+        self._closed = False
 
     async def get(self, kind: Still, pulse: int) -> JpegPicture | None:
         """Wait for a picture of this frame or a newer one; None: there will be none."""
-        while True:
+        while not self._closed:
             wish = self._wishes.get(kind)
             if wish is None:
                 wish = self._wishes[kind] = _StillRequest(pulse, asyncio.Event())
             self.asked.set()
             await wish.given.wait()
             if wish.picture is None or wish.picture.pulse >= pulse:
-                return wish.picture  # else it was good enough for who has asked before
+                return wish.picture  # an older picture answered an earlier request
+        return None
 
     def possible(self, newest: int) -> list[Still]:
         """Return the kinds that can be answered when ``newest`` is the newest frame."""
@@ -58,7 +60,8 @@ class StillRequests:
         wish.given.set()
 
     def close(self) -> None:
-        """Answer all requests: there will be no picture."""
+        """Answer all requests, and those to come: there will be no picture."""
+        self._closed = True
         for kind in list(self._wishes):
             self.give(kind, None)
 
@@ -67,7 +70,7 @@ log = logging.getLogger(__name__)
 
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.1, 5.0
 _PATIENCE_S = 8.0
-"""How long somebody waits for a first picture: a process may have to start, and even to be replaced."""
+"""How long a request waits for its first picture once a process is ready, which may be replaced meanwhile."""
 
 
 class PictureTimeoutError(Exception):
@@ -101,6 +104,8 @@ class RenderedStream:
         self._stills = StillRequests()
         self._used = asyncio.Event()
         self._shown = asyncio.Event()
+        self._ready = asyncio.Event()
+        """Set while a process has loaded its libraries."""
         self.newest = -1
         """The last frame that the present process has drawn."""
         self._answered = False
@@ -138,9 +143,10 @@ class RenderedStream:
         """Return a picture of this frame or a newer one.
 
         Raises:
-            NoPictureError: none came in time.
+            PictureTimeoutError: none came in time.
         """
         with contextlib.suppress(TimeoutError):
+            await self._wait_until_ready()
             async with asyncio.timeout(_PATIENCE_S):
                 picture = await self._stills.get(kind, pulse)
                 if picture is not None:
@@ -151,13 +157,18 @@ class RenderedStream:
         """Return the init segment of the overlay video, as soon as there is one.
 
         Raises:
-            NoPictureError: none came in time.
+            PictureTimeoutError: none came in time.
         """
         with contextlib.suppress(TimeoutError):
+            await self._wait_until_ready()
             await asyncio.wait_for(self.film.begun.wait(), _PATIENCE_S)
         if self.film.head is None:
             raise PictureTimeoutError
         return self.film.head
+
+    async def _wait_until_ready(self) -> None:
+        async with asyncio.timeout(START_S):
+            await self._ready.wait()
 
     async def run(self) -> None:
         """Draw until the stream ends; a process that dies is replaced."""
@@ -191,6 +202,7 @@ class RenderedStream:
         self.film.close()
         self.series.close()
         self._stills.close()
+        self._ready.set()
 
     def _begin(self) -> None:
         """Begin anew what is made of it: whoever comes must not be shown what others saw before."""
@@ -213,11 +225,14 @@ class RenderedStream:
             try:
                 await asyncio.gather(*tasks, return_exceptions=True)
             finally:
+                self._ready.clear()
                 await process.end()
                 self.pid = None
 
     async def _feed(self, process: RenderWorker) -> None:
-        """Draw what comes, while somebody wants it, until the stream ends."""
+        """Draw the stream's chunks while the stream has users, until it ends."""
+        await process.wait_until_ready()
+        self._ready.set()
         while True:
             await self._used.wait()
             viewer = self._viewer = self._stream.subscribe()

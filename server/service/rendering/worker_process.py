@@ -8,16 +8,25 @@ from typing import NoReturn, Self
 
 import msgspec
 
-from server.media.rendering_messages import LENGTH_BYTES, Canvas, RenderRequest, RenderResult, encode_message
+from server.media.rendering_messages import (
+    LENGTH_BYTES,
+    READY,
+    Canvas,
+    RenderRequest,
+    RenderResult,
+    encode_message,
+)
 from server.system.child_process import start_worker
 
+START_S = 30.0
+"""How long a process may take to load its libraries, on a busy machine as well."""
 _ANSWER_S = 5.0
-"""An answer that takes longer does not come: the process hangs."""
+"""A worker that takes longer to answer hangs."""
 _PART_BYTES = 1 << 16
 
 
 class WorkerDiedError(Exception):
-    """The drawing process has ended, or hangs and was killed."""
+    """The render worker has ended, or hangs and was killed."""
 
 
 class RenderWorker:
@@ -28,14 +37,15 @@ class RenderWorker:
         assert process.stdout is not None  # noqa: S101
         self._process, self._requests, self._answers = process, process.stdin, process.stdout
         self._turn = asyncio.Lock()
+        self._is_ready = False
         self._decoder = msgspec.msgpack.Decoder(RenderResult)
 
     @classmethod
     async def start(cls, canvas: Canvas) -> Self:
-        """Start one.
+        """Start a process; :meth:`wait_until_ready` waits for it.
 
         Raises:
-            ProcessDiedError: the system does not let it start.
+            WorkerDiedError: the system does not let it start.
         """
         try:
             process = await start_worker("server.service.rendering.worker")
@@ -50,14 +60,33 @@ class RenderWorker:
         """Its number in the system."""
         return self._process.pid
 
+    async def wait_until_ready(self) -> None:
+        """Wait until the process has loaded its libraries and answers requests.
+
+        Raises:
+            WorkerDiedError: it died, or took longer than :data:`START_S`.
+        """
+        async with self._turn:
+            if self._is_ready:
+                return
+            try:
+                async with asyncio.timeout(START_S):
+                    await self._answers.readexactly(len(READY))
+            except TimeoutError as error:
+                raise WorkerDiedError(f"was not ready within {START_S:g} s") from error
+            except (OSError, asyncio.IncompleteReadError) as error:
+                raise WorkerDiedError("died") from error
+            self._is_ready = True
+
     async def ask(self, request: RenderRequest) -> RenderResult:
         """Send a request and return the answer; requests are answered one at a time.
 
-        Whoever gives up waiting must end the process: the answer would be taken for another's.
+        A caller that is cancelled must end the process: the next caller would read its answer.
 
         Raises:
-            ProcessDiedError: there is none, and the process is of no use any more.
+            WorkerDiedError: no answer came; the process must be replaced.
         """
+        await self.wait_until_ready()
         async with self._turn:
             try:
                 async with asyncio.timeout(_ANSWER_S):
@@ -70,23 +99,23 @@ class RenderWorker:
             except (OSError, asyncio.IncompleteReadError) as error:
                 raise WorkerDiedError("died") from error
             except msgspec.DecodeError as error:
-                raise WorkerDiedError(f"gave no sense: {error}") from error
+                raise WorkerDiedError(f"sent an invalid answer: {error}") from error
 
     async def watch(self) -> NoReturn:
-        """Wait until it dies by itself, which may be long before it is asked again.
+        """Wait until the process dies by itself, which may be long before its next request.
 
         Raises:
-            ProcessDiedError: it has died.
+            WorkerDiedError: it has died.
         """
         await self._process.wait()
         raise WorkerDiedError("died")
 
     async def end(self) -> None:
-        """End it: it has nothing to save. Nobody asks it any more."""
+        """Kill the process, which has nothing to save, and wait until it is gone."""
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
         self._requests.close()
-        # Until somebody has read what is left of a long answer its pipe stays open, and is waited for.
+        # `wait()` returns only when the pipe is closed, and that stays open until a long answer was read.
         while await self._answers.read(_PART_BYTES):
             pass
         await self._process.wait()

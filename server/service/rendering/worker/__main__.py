@@ -13,7 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import cv2
 import msgspec
 
-from server.media.rendering_messages import LENGTH_BYTES, Canvas, RenderRequest, encode_message
+from server.media.rendering_messages import LENGTH_BYTES, READY, Canvas, RenderRequest, encode_message
 from server.service.rendering.worker.stream_renderer import StreamRenderer
 from server.system.log_format import formatter
 
@@ -25,6 +25,8 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
         return
     studio = StreamRenderer(msgspec.msgpack.decode(first, type=Canvas))
     decoder = msgspec.msgpack.Decoder(RenderRequest)
+    answers.write(READY)
+    answers.flush()
     while (body := _message(requests)) is not None:
         answers.write(encode_message(studio.draw(decoder.decode(body))))
         answers.flush()

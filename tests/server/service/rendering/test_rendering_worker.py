@@ -18,7 +18,7 @@ from fakes.service.rendering import CANVAS, fragments, shown
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH
 from fakes.timeouts import PATIENCE
 from server.media.containers.fmp4 import FragmentSample, fragment
-from server.media.rendering_messages import RenderRequest, RenderResult, encode_message, is_in_series
+from server.media.rendering_messages import READY, RenderRequest, RenderResult, encode_message, is_in_series
 from server.service.rendering.decided_boxes import first_pulse
 from server.service.rendering.worker.__main__ import serve
 from server.service.rendering.worker.box_overlay import CHOSEN_COLOR, OTHER_COLOR, Image, draw_boxes
@@ -159,7 +159,8 @@ def test_the_process_answers_until_its_input_ends() -> None:
     for cut in (0, 1, 7):
         answers = io.BytesIO()
         serve(io.BytesIO(asked[: len(asked) - cut]), answers)
-        data, found = answers.getvalue(), []
+        assert answers.getvalue().startswith(READY)
+        data, found = answers.getvalue()[len(READY) :], []
         while data:
             size = int.from_bytes(data[:4], "big")
             found.append(msgspec.msgpack.decode(data[4 : 4 + size], type=RenderResult))
@@ -178,7 +179,7 @@ def test_the_process_itself_ends_when_nobody_is_left_to_ask() -> None:
     out, _ = process.communicate(
         encode_message(CANVAS) + encode_message(RenderRequest(fragments=fragments(0, 1))), timeout=PATIENCE
     )
-    assert msgspec.msgpack.decode(out[4:], type=RenderResult).newest == 0
+    assert msgspec.msgpack.decode(out[len(READY) + 4 :], type=RenderResult).newest == 0
     assert process.returncode == 0
 
 
