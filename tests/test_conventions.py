@@ -12,6 +12,7 @@ from conventions import (
     shared_class_names,
     words_of,
 )
+from docstring_names import stale_names
 
 MAX_FILES_PER_FOLDER = 20
 MAX_LINES_PER_MODULE = 350
@@ -33,6 +34,10 @@ def test_no_two_public_classes_of_a_room_share_a_name() -> None:
 
 def test_docstrings_say_what_is_returned_or_done() -> None:
     assert docstrings_beginning_with(("Give", "Tell", "Say"), ".") == []
+
+
+def test_docstrings_name_what_is_there() -> None:
+    assert stale_names() == []
 
 
 @pytest.mark.parametrize("document", MAX_WORDS)

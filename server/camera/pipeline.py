@@ -126,7 +126,7 @@ class CameraPipeline:
         """Return the site-sized picture of a pulse, None where the source has none yet.
 
         Raises:
-            SourceEnded: the recording is over.
+            SourceEndedError: the recording is over.
         """
         own = self.source.take(pulse)
         if own is None:

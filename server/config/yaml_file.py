@@ -73,7 +73,7 @@ def _loaded(text: str) -> Any:
 
     Raises:
         DuplicateKeyError: a mapping in it has a key twice.
-        YAMLError: it is no YAML.
+        yaml.YAMLError: it is no YAML.
         ValueError, LookupError, TypeError, AttributeError: a value is not of the kind that it says it is.
     """
     loader = _Loader(text)
@@ -115,7 +115,7 @@ def _check_depth(text: str) -> None:
     """Check that lists in lists end somewhere, before anything is made of them.
 
     Raises:
-        YAMLError: they do not, or the text is no YAML.
+        yaml.YAMLError: they do not, or the text is no YAML.
     """
     depth = 0
     for event in yaml.parse(text, Loader=SafeLoader):

@@ -48,7 +48,7 @@ async def read_json(request: web.Request, kind: type[Body]) -> Body:
     """Read the body of a request.
 
     Raises:
-        HTTPBadRequest: it is not JSON of that kind.
+        web.HTTPBadRequest: it is not JSON of that kind.
     """
     try:
         with _reading_body(request):

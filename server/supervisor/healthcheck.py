@@ -109,7 +109,7 @@ def check(words: Sequence[str]) -> None:
     """Check what is asked for.
 
     Raises:
-        UnhealthyError, OSError, ValueError, KeyError, TypeError, HTTPException: the check failed.
+        UnhealthyError, OSError, ValueError, KeyError, TypeError, http.client.HTTPException: the check failed.
     """
     match words:
         case ["sync"]:

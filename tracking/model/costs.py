@@ -17,11 +17,12 @@ from tracking.model.settings import CostSettings
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionCosts:
-    """What arcs to the places of a window cost objects of known motion; nothing for the others.
+    """Costs of motion on the arcs to each observation; 0 for objects whose motion is unknown.
 
     Attributes:
-        off_course: (n, M, K) coming from another place.
-        returned: (n, M, K) coming out of hiding; infinite where nobody comes back so far off, or so unlike.
+        moving: (n, M, K) of arcs from another observation.
+        reappearing: (n, M, K) of arcs out of an occlusion; infinite where the observation is too far off
+            the predicted course, or looks too different.
     """
 
     moving: Floats
@@ -31,7 +32,7 @@ class MotionCosts:
 def motion_costs(
     templates: Sequence[Template], likeness: Floats, places: ObservationArrays, settings: CostSettings
 ) -> MotionCosts | None:
-    """Charge all objects; `likeness` is (n, M, K). `None` where it costs nobody anything."""
+    """Return the costs of all objects; `likeness` is (n, M, K). `None` where all would be 0."""
     known = any(template.motion is not None for template in templates)
     if not known or not (settings.motion or settings.reappearance):
         return None
@@ -48,16 +49,16 @@ def motion_costs(
 def _object_motion_costs(
     motion: MotionModel, boxes: Floats, likeness: Floats, settings: CostSettings
 ) -> tuple[Floats, Floats]:
-    """Return the two charges of one object for boxes (M, K, 4), both (M, K)."""
+    """Return the costs `moving` and `reappearing` of one object for boxes (M, K, 4), both (M, K)."""
     away, moved = motion.deviations(boxes), motion.damped_elapsed(len(boxes))[:, None]
     share = np.minimum(away / (settings.motion_slack + settings.motion_drift * moved), 1.0)
-    off_course = settings.motion * share
+    moving = settings.motion * share
     if not settings.reappearance:
-        return off_course, off_course
+        return moving, moving
     share = away / (settings.motion_slack + settings.reappearance_drift * moved)
-    returned = off_course + settings.reappearance * share**2
-    returned[(share > 1.0) | (likeness > settings.reappearance_max_distance)] = np.inf
-    return off_course, returned
+    reappearing = moving + settings.reappearance * share**2
+    reappearing[(share > 1.0) | (likeness > settings.reappearance_max_distance)] = np.inf
+    return moving, reappearing
 
 
 def node_costs(likeness: Floats, places: ObservationArrays, settings: CostSettings) -> Floats:

@@ -50,7 +50,7 @@ class Sighting:
         frame: the frame number.
         box: `(4,)` pixels.
         histogram: `(B,)` of that box.
-        alone: nobody else is close enough to be in the box.
+        is_isolated: no other object is close enough to be in the box.
     """
 
     frame: int
@@ -67,7 +67,7 @@ class TrackedObject:
         histogram: `(B,)`, its template, renewed by every sighting.
         box: `(4,)`, where it was last seen.
         frame: the frame in which that was.
-        confirmed: it was seen in a final frame; before that it may vanish.
+        is_confirmed: it was seen in a final frame; before that it may vanish.
         present: it was seen in the last final frame.
     """
 

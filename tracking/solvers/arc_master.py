@@ -68,8 +68,8 @@ class ArcMasterSolution:
     Attributes:
         objective: its cost.
         prices: (R,) what going through each conflict row costs, not negative.
-        pulls: (n, M - 1, 4) what a move by a pixel earns, by the layout term.
-        worths: (n,) the cost below which a path of an object would better the program.
+        layout_prices: (n, M - 1, 4) what a move by a pixel earns, by the layout term.
+        reduced_cost_limits: (n,) the cost below which a path of an object would better the program.
         charge: what the prices and the layout term take off the bound.
     """
 

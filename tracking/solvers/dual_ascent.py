@@ -169,7 +169,7 @@ class DualGuess:
     Attributes:
         rows: the conflict rows that cost, or that paths broke.
         prices: (R,) what going through them costs.
-        pulls: (n, M - 1, 4) what a move by a pixel earns.
+        layout_prices: (n, M - 1, 4) what a move by a pixel earns.
         paths: (G, n, M) the last paths met, of all objects at a time.
     """
 

@@ -23,7 +23,7 @@ class PathMasterSolution:
     Attributes:
         objective: its cost.
         prices: (R,) what going through each conflict row costs, not negative.
-        worths: (n,) the cost below which a path of an object would better the program.
+        reduced_cost_limits: (n,) the cost below which a path of an object would better the program.
     """
 
     objective: float

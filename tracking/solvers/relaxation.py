@@ -28,7 +28,7 @@ class RelaxedSolution:
             which the cheapest paths prove the bound.
         rounds: how often paths or arcs were priced.
         prices: the conflict rows that bind, where all objects share them.
-        pulls: (n, M - 1, 4) what moves earn by the layout term; none without.
+        layout_prices: (n, M - 1, 4) what moves earn by the layout term; none without.
         charges: (M,) what the prices of a frame's rows take off the bound; none without layout term.
     """
 

@@ -109,8 +109,8 @@ class MinMarginals:
     """Both passes over a trellis: what the best ways into and out of each state cost.
 
     Attributes:
-        ahead: (M, n, S) from the source into each state, the state counted.
-        behind: (M, n, S) from each state to the sink, the state not counted.
+        forward: (M, n, S) from the source into each state, the state counted.
+        backward: (M, n, S) from each state to the sink, the state not counted.
         least: (n,) the costs of the cheapest paths.
     """
 
@@ -199,7 +199,7 @@ class PathPricer:
 
     Attributes:
         trellis: the trellis without prices.
-        ahead: its `forward` pass, (M, n, S).
+        forward: its forward pass, (M, n, S).
         alone: the cheapest paths without prices.
     """
 

@@ -57,7 +57,7 @@ class CompatibilityCheck:
         """Look at what a video says of itself.
 
         Raises:
-            MisfitError: it does not fit.
+            IncompatibleStreamError: it does not fit.
         """
         wanted, codec = self._wanted, opened.stream.codec_context.name
         if codec != "h264":
@@ -77,7 +77,7 @@ class CompatibilityCheck:
         """Look at how its pictures are shown.
 
         Raises:
-            MisfitError: not as they are stored, and nothing in a site's streams says so.
+            IncompatibleStreamError: not as they are stored, and nothing in a site's streams says so.
         """
         if orientation.words:
             raise IncompatibleStreamError(f"its pictures are shown {orientation.words}")
@@ -86,7 +86,7 @@ class CompatibilityCheck:
         """Look at when a frame of a recording is shown, after its first one.
 
         Raises:
-            MisfitError: at another pulse than the one that it would be passed on at.
+            IncompatibleStreamError: at another pulse than the one that it would be passed on at.
         """
         if (place := frame_index(seconds, self._wanted.fps)) != frame:
             raise IncompatibleStreamError(
@@ -98,7 +98,7 @@ class CompatibilityCheck:
         """Look at the next access unit; ``shown`` and ``decoded`` are its times, where it has any.
 
         Raises:
-            MisfitError: it does not fit.
+            IncompatibleStreamError: it does not fit.
         """
         gop = self._wanted.gop
         later = shown is not None and self._shown is not None and shown <= self._shown

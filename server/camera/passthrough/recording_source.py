@@ -31,7 +31,7 @@ class PassthroughRecording:
 
     Raises:
         UserError: there is no such file, or no video in it.
-        MisfitError: not all of it can stand in the site's streams; it is read through to find out.
+        IncompatibleStreamError: the site's streams cannot hold all of it; it is read to the end to find out.
     """
 
     recorded = True

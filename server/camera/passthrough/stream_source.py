@@ -40,7 +40,7 @@ class PassthroughStream(LiveStream):
 
     Raises:
         UserError: it cannot be opened.
-        MisfitError: what it sends cannot stand in the site's streams.
+        IncompatibleStreamError: what it sends cannot stand in the site's streams.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ def _check(url: str, options: Mapping[str, str], wanted: RequiredFormat) -> None
 
     Raises:
         UserError: it cannot be opened, or stops meanwhile.
-        MisfitError: what it sends cannot stand in the site's streams.
+        IncompatibleStreamError: what it sends cannot stand in the site's streams.
     """
     opened, fitting = open_video(url, options, (OPEN_S, READ_S)), CompatibilityCheck(wanted)
     try:

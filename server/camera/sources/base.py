@@ -28,7 +28,7 @@ class PictureSource(Protocol):
         """Return the picture of a pulse; pulses must grow. None: there is none (yet).
 
         Raises:
-            SourceEnded: the recording is over.
+            SourceEndedError: the recording is over.
         """
         ...
 

@@ -29,7 +29,7 @@ def grey_picture(parameters: ParameterSets, idr_pic_id: int) -> bytes:
     ``idr_pic_id`` differs between two key pictures in a row (7.4.3).
 
     Raises:
-        UnfitError: the parameter sets are damaged, or use what hardly any camera does.
+        UnsupportedParametersError: the parameter sets are damaged, or use what hardly any camera does.
     """
     head = parse_slice_head_format(parameters)
     bits = BitWriter()

@@ -121,7 +121,7 @@ def parse_repeatable(parameters: ParameterSets) -> SliceHeadFormat:
     """Parse the parameter sets of streams whose last picture can be repeated.
 
     Raises:
-        UnfitError: they are damaged, or use what x264 without B pictures does not.
+        UnsupportedParametersError: they are damaged, or use what x264 without B pictures does not.
     """
     found = parse_slice_head_format(parameters)
     if found.order_bits:
@@ -134,7 +134,7 @@ def parse_slice_head_format(parameters: ParameterSets) -> SliceHeadFormat:
     """Parse the format of slice headers from the parameter sets.
 
     Raises:
-        UnfitError: they are damaged, or use what hardly any camera does.
+        UnsupportedParametersError: they are damaged, or use what hardly any camera does.
     """
     try:
         sps = _read_sps(BitReader(unescape_payload(parameters.sps)))

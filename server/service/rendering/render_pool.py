@@ -111,7 +111,7 @@ class RenderPool:
         """Use a source while inside; the subject must be there.
 
         Raises:
-            FullError: there is none, and no place for another.
+            RenderPoolFullError: there is none, and no place for another.
             KeyError: nobody has this number, or no camera this name.
         """
         running = self._running.get(subject)

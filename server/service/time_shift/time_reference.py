@@ -26,7 +26,7 @@ def parse_time_reference(text: str, *, now: int, fps: float, pulse0: float | Non
     become pulse 0.
 
     Raises:
-        MomentError: it cannot be parsed.
+        TimeReferenceError: it cannot be parsed.
     """
     if match := _BACK.fullmatch(text):
         return max(0, now - round(float(match[1]) * fps))

@@ -1,0 +1,73 @@
+"""Find names in docstrings that the code does not have: what a rename has left behind."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import re
+from collections.abc import Iterator
+
+from conventions import PRODUCT, parsed
+
+_ENTRY = re.compile(r"^    (\*{0,2}[\w.]+(?:, [\w.]+)*)(?: \(.*?\))?:", re.MULTILINE)
+_ROLE = re.compile(r":(?:class|func|data|meth|mod|attr|exc):`~?([\w.]+)`")
+_DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+def stale_names() -> list[str]:
+    """Return names under Args, Attributes or Raises, or in a role, that do not exist, with their places."""
+    modules = list(parsed(*PRODUCT, "logthrottle", "benchmarks"))
+    defined = {name for path, tree in modules for name in (*path.with_suffix("").parts, *_defined_in(tree))}
+    return [
+        f"{path}:{getattr(node, 'lineno', 1)} {name}"
+        for path, tree in modules
+        for node in ast.walk(tree)
+        for name in _stale_in(node, defined)
+    ]
+
+
+def _stale_in(node: ast.AST, defined: set[str]) -> Iterator[str]:
+    """Yield the stale names of one docstring, and of what stands below an attribute or a constant."""
+    if (
+        isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
+    ):
+        yield from (name for name in _ROLE.findall(node.value.value) if name.split(".")[-1] not in defined)
+    if not isinstance(node, _DOCUMENTED):
+        return
+    docstring = ast.get_docstring(node) or ""
+    yield from (name for name in _entries(docstring, "Raises") if not _is_known(name, defined))
+    if isinstance(node, ast.ClassDef):
+        own = set(_defined_in(node))
+        yield from (name for name in _entries(docstring, "Attributes") if name not in own)
+    elif not isinstance(node, ast.Module):
+        arguments = {argument.arg for argument in ast.walk(node.args) if isinstance(argument, ast.arg)}
+        yield from (name for name in _entries(docstring, "Args") if name.strip("*") not in arguments)
+
+
+def _entries(docstring: str, section: str) -> Iterator[str]:
+    found = re.search(rf"^{section}:\n((?:    .*\n?|\n)+)", docstring, re.MULTILINE)
+    for names in _ENTRY.findall(found[1]) if found else ():
+        yield from names.split(", ")
+
+
+def _is_known(name: str, defined: set[str]) -> bool:
+    """Return whether an exception is built in, defined here, or named by the module that it comes from."""
+    return hasattr(builtins, name) or name.split(".", maxsplit=1)[0] in defined
+
+
+def _defined_in(tree: ast.AST) -> Iterator[str]:
+    """Yield what is defined, assigned or imported in a module or class, however deep."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.ClassDef() | ast.FunctionDef() | ast.AsyncFunctionDef():
+                yield node.name
+            case ast.Name(id=name, ctx=ast.Store()) | ast.Attribute(attr=name, ctx=ast.Store()):
+                yield name
+            case ast.arg(arg=name):
+                yield name
+            case ast.alias():
+                yield (node.asname or node.name).split(".")[-1]
+            case _:
+                pass
