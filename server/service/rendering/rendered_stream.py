@@ -7,6 +7,7 @@ import contextlib
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NoReturn
 
 from logthrottle import LogThrottle
 from server.media.rendering_messages import Canvas, JpegPicture, RenderRequest, Still
@@ -213,7 +214,7 @@ class RenderedStream:
         self.newest, self._answered = -1, False
         process = await RenderWorker.start(self._canvas)
         self.pid = process.pid
-        works = (self._feed(process), self._give_stills(process), process.watch())
+        works = (self._feed(process), self._give_stills(process), self._watch(process))
         tasks = [asyncio.create_task(work) for work in works]
         try:
             finished, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -229,10 +230,14 @@ class RenderedStream:
                 await process.end()
                 self.pid = None
 
-    async def _feed(self, process: RenderWorker) -> None:
-        """Draw the stream's chunks while the stream has users, until it ends."""
+    async def _watch(self, process: RenderWorker) -> NoReturn:
+        """Let requests know when the process is ready, and wait until it dies."""
         await process.wait_until_ready()
         self._ready.set()
+        await process.watch()
+
+    async def _feed(self, process: RenderWorker) -> None:
+        """Draw the stream's chunks while the stream has users, until it ends."""
         while True:
             await self._used.wait()
             viewer = self._viewer = self._stream.subscribe()
