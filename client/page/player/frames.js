@@ -8,7 +8,8 @@
  */
 
 const SAME_PLAYBACK_S = 0.5; // a VideoFrame whose time is further off than this counts time otherwise
-const ARRIVING_MS = 1000; // for two frames to be shown after a seek, by a browser with much else to do
+const ARRIVING_MS = 1000; // for two frames to be shown after a seek
+const ARRIVING_BUSY_MS = 5000; // likewise, by a visible page of a browser with much else to do
 
 /**
  * @typedef {object} Frame
@@ -49,7 +50,8 @@ export function arrived(video, then) {
     if (waits) then();
     waits = false;
   };
-  setTimeout(end, ARRIVING_MS); // a page that is hidden is told of no frame
+  // A hidden page is told of no frame; a visible one that is late has no new picture yet.
+  setTimeout(() => (document.hidden ? end() : setTimeout(end, ARRIVING_BUSY_MS - ARRIVING_MS)), ARRIVING_MS);
   video.requestVideoFrameCallback(() => video.requestVideoFrameCallback(end));
 }
 

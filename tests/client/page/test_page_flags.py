@@ -92,7 +92,8 @@ async def test_what_is_over_is_seen_again_to_point_at_it_and_then_what_happens_n
         there, down, *_ = await middle(visit, 2)
         await visit.page.mouse.move(there, down)
         await visit.until("myview.pointing.taken >= 5")
-        assert over["pulse"] - 2 * 25 < points(site)[0]["pulse"] < over["pulse"] + 25
+        # However long the pointer took to get there: the past is as far behind as it was.
+        assert over["pulse"] - 2 * 25 < points(site)[0]["pulse"] < site.edge - 3 * 25
         await visit.page.keyboard.press("Escape")
         await expect(visit.page.locator("#live")).to_be_hidden()
         await visit.until("myview.delays.at(-1).delayMs < 3000")

@@ -21,9 +21,13 @@ class Video {
   }
 }
 
-/** @param {Video} video */
-function told(video) {
+/**
+ * @param {Video} video
+ * @param {boolean} hidden
+ */
+function told(video, hidden = false) {
   const then = mock.fn();
+  Object.defineProperty(globalThis, 'document', { value: { hidden }, configurable: true });
   arrived(/** @type {HTMLVideoElement} */ (/** @type {unknown} */ (video)), then);
   return then.mock;
 }
@@ -43,7 +47,17 @@ test('the first frame may be from before the seek; the second is not, and it is 
 
 test('a page that is hidden is told of no frame, and does not wait for one for ever', (test) => {
   test.mock.timers.enable({ apis: ['setTimeout'] });
+  const then = told(new Video(), true);
+  assert.equal(then.callCount(), 0);
+  test.mock.timers.tick(1000);
+  assert.equal(then.callCount(), 1);
+});
+
+test('a page that is seen waits for a browser that is busy, but not for ever', (test) => {
+  test.mock.timers.enable({ apis: ['setTimeout'] });
   const then = told(new Video());
+  test.mock.timers.tick(1000);
+  test.mock.timers.tick(3000);
   assert.equal(then.callCount(), 0);
   test.mock.timers.tick(1000);
   assert.equal(then.callCount(), 1);
