@@ -49,7 +49,7 @@ class SeenObject(msgspec.Struct, frozen=True):
     """Who sees it now."""
     thumbnail: str | None
     """A path on the server."""
-    also: tuple[int, ...] = ()
+    aliases: tuple[int, ...] = ()
     """Other numbers that this person once had; they go on to work."""
     name: str | None = None
     """What the operator calls them."""
@@ -90,10 +90,10 @@ class Choice(msgspec.Struct, frozen=True):
     """By camera: how well it shows the object, 0 to 1; None: it does not see it."""
     terms: dict[str, dict[str, float]] = {}
     """By camera: what the quality is made of, 0 to 1 each."""
-    unfound: dict[str, float] = {}
+    undetected: dict[str, float] = {}
     """By camera: the share of the look-ahead in which it does not find the object, which stands before it as
     others know."""
-    unfound_quality: dict[str, float | None] = {}
+    undetected_quality: dict[str, float | None] = {}
     """By camera: what such a view is taken to be worth, 0 to 1; None: there is none."""
     weights: dict[str, float] = {}
     """By term: the share of a view's worth that is lost where the term is 0."""
@@ -133,10 +133,10 @@ class Merged(msgspec.Struct, frozen=True):
 
 
 class Split(msgspec.Struct, frozen=True):
-    """Whom a camera showed as ``kept`` turned out to be ``parted``, somebody else."""
+    """Whom a camera showed as ``kept`` turned out to be ``new_object``, somebody else."""
 
     kept: int
-    parted: int
+    new_object: int
     camera: str
 
 
@@ -164,7 +164,7 @@ class Flag(msgspec.Struct, frozen=True):
     cameras: tuple[str, ...]
     """Where it is foreseen."""
     reason: str
-    """alike, exchange, fading or gap."""
+    """crossing, id_switch, track_loss or optimality_gap."""
     pulse: int
     """When it is expected."""
     raised: int

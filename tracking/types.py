@@ -46,9 +46,9 @@ class Detections:
         return cls(np.empty((0, BOX_SIDES)), np.empty(0), np.empty((0, bins)))
 
 
-RiskReason = Literal["alike", "exchange", "fading", "gap"]
-"""`alike`: two similar objects are about to cross; `exchange`: two could as well have swapped identities;
-`fading`: an object fades into the background; `gap`: the window's solution is not proven optimal."""
+RiskReason = Literal["crossing", "id_switch", "track_loss", "optimality_gap"]
+"""`crossing`: two similar objects are about to cross; `id_switch`: two may have swapped identities;
+`track_loss`: an object fades or stays hidden; `optimality_gap`: the solution is not proven optimal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class RiskEvent:
         reason: the kind of failure.
         objects: the ids of the one or two tracks concerned; the first is the one to correct.
         frame: when it is expected. The newest frame or later for what is ahead; within the window for what
-            has been seen to be doubtful (`exchange`: where the identities would part): pictures are shown
+            has been seen to be doubtful (`id_switch`: where the identities would part): pictures are shown
             later than they are tracked, so that it may still be ahead of who looks at them.
         margin: certainty of the tracker, as a cost: 0 is undecided.
         length: frames for which the two overlap, or an object is hidden.

@@ -34,7 +34,7 @@ from tracking.motchallenge import MotRow, format_rows
 LEAST_IOU = 0.5
 BRIDGE = 20
 """Frames that somebody may be hidden for and still count as shown."""
-FOUND_ONLY = {"unfound": 0.0}
+FOUND_ONLY = {"undetected_weight": 0.0}
 LOOKS_ALONE = {"identity": {"maximum_travel_evidence": 0.0}}
 TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
 OURS, CALIBRATED, WITHOUT = "MyView", "MyView, calibrated", "no homographies"

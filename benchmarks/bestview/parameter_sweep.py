@@ -21,10 +21,11 @@ STRIDE = 5
 LOOKAHEADS = (10, 15, 25, 50, 100)
 GOPS = (1, 5, 10, 25)
 SWITCH_COSTS_S = (0.0, 0.1, 0.2, 0.3, 0.5, 1.0)
-GOES_ON_S = (0.0, 0.25, 0.5, 1.0, 2.0)
-QUICK_LOOKAHEADS, QUICK_GOPS, QUICK_SWITCH_COSTS_S, QUICK_GOES_ON_S = (10, 25), (1, 10), (0.1, 0.3), (0.0,)
+EXTRAPOLATE_S = (0.0, 0.25, 0.5, 1.0, 2.0)
+QUICK_LOOKAHEADS, QUICK_GOPS, QUICK_SWITCH_COSTS_S = (10, 25), (1, 10), (0.1, 0.3)
+QUICK_EXTRAPOLATE_S = (0.0,)
 DEFAULT_LOOKAHEAD, DEFAULT_GOP = ViewSettings().lookahead, EncodeSettings().gop
-DEFAULT_SWITCH_COST_S, DEFAULT_GOES_ON_S = ViewSettings().switch_cost_s, ViewSettings().goes_on_s
+DEFAULT_SWITCH_COST_S, DEFAULT_EXTRAPOLATE_S = ViewSettings().switch_cost_s, ViewSettings().extrapolate_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +35,7 @@ class Setting:
     lookahead: int | None
     gop: int
     switch_cost_s: float
-    goes_on_s: float = DEFAULT_GOES_ON_S
+    extrapolate_s: float = DEFAULT_EXTRAPOLATE_S
 
     def delay_s(self, fps: float) -> float:
         """Return the longest that the first frame of a GOP waits for its decision, seconds."""
@@ -61,9 +62,9 @@ def settings_of(*, quick: bool) -> Iterator[Setting]:
     for cost in QUICK_SWITCH_COSTS_S if quick else SWITCH_COSTS_S:
         if cost != DEFAULT_SWITCH_COST_S:
             yield Setting(DEFAULT_LOOKAHEAD, DEFAULT_GOP, cost)
-    for goes_on in QUICK_GOES_ON_S if quick else GOES_ON_S:
-        if goes_on != DEFAULT_GOES_ON_S:
-            yield Setting(DEFAULT_LOOKAHEAD, DEFAULT_GOP, DEFAULT_SWITCH_COST_S, goes_on)
+    for extrapolate_s in QUICK_EXTRAPOLATE_S if quick else EXTRAPOLATE_S:
+        if extrapolate_s != DEFAULT_EXTRAPOLATE_S:
+            yield Setting(DEFAULT_LOOKAHEAD, DEFAULT_GOP, DEFAULT_SWITCH_COST_S, extrapolate_s)
 
 
 def sweep(case: Case, truth: SceneTruth, *, quick: bool) -> list[Swept]:
@@ -83,7 +84,7 @@ def sweep(case: Case, truth: SceneTruth, *, quick: bool) -> list[Swept]:
                 view={
                     "lookahead": setting.lookahead,
                     "switch_cost_s": setting.switch_cost_s,
-                    "goes_on_s": setting.goes_on_s,
+                    "extrapolate_s": setting.extrapolate_s,
                 },
             )
             choices = decide_given(config, rows, frames).choices
@@ -114,7 +115,7 @@ def sweep_tables(report: Report, swept: Mapping[str, Sequence[Swept]]) -> None:
                     "all" if it.setting.lookahead is None else str(it.setting.lookahead),
                     str(it.setting.gop),
                     f"{it.setting.switch_cost_s:g}",
-                    f"{it.setting.goes_on_s:g}",
+                    f"{it.setting.extrapolate_s:g}",
                     "-" if it.setting.lookahead is None else f"{it.delay_s:.2f}",
                     *(f"{100 * share:.2f}" for share in (it.score.regret, it.score.visible)),
                     f"{it.score.cuts_per_minute:.1f}",

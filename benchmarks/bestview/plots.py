@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.bestview.methods import Outcome
 from benchmarks.bestview.parameter_sweep import (
-    DEFAULT_GOES_ON_S,
+    DEFAULT_EXTRAPOLATE_S,
     DEFAULT_GOP,
     DEFAULT_LOOKAHEAD,
     DEFAULT_SWITCH_COST_S,
@@ -46,7 +46,7 @@ def plot_sweeps(swept: Mapping[str, Sequence[Swept]], out: Path) -> None:
     figure = new_figure((12.0, 0.8 + 3.0 * len(swept)))
     axes = figure.subplots(len(swept), 3, squeeze=False)
     for line, (name, found) in zip(axes, swept.items(), strict=True):
-        plain = [it for it in found if it.setting.goes_on_s == DEFAULT_GOES_ON_S]
+        plain = [it for it in found if it.setting.extrapolate_s == DEFAULT_EXTRAPOLATE_S]
         usual = [it for it in plain if it.setting.switch_cost_s == DEFAULT_SWITCH_COST_S]
         for gop in sorted({it.setting.gop for it in usual}):
             mine = [it for it in usual if it.setting.gop == gop and it.setting.lookahead is not None]

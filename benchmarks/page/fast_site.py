@@ -180,7 +180,7 @@ def _people(first: int) -> dict[str, Any]:
         "objects": [
             {
                 "object": number,
-                "also": [],
+                "aliases": [],
                 "first_seen": 0,
                 "last_seen": first,
                 "visible": True,

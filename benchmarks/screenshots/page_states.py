@@ -57,7 +57,7 @@ _LEFT = """async () => {
   const { objects } = await (await fetch('api/objects')).json();
   return objects.filter((it) => !it.visible && it.thumbnail).map((it) => it.object);
 }"""
-_SECTIONS = ("cameras", "floor", "known", "marks", "walk", "choosing")
+_SECTIONS = ("cameras", "floor", "known", "zones", "calibration", "view-selection")
 """Of the operator's page."""
 _MEASURED_MS = 8_000
 """Until a section has its pictures, and what is measured over some seconds."""

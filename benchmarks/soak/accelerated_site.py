@@ -95,7 +95,7 @@ class Filmed:
                 "folder": str(recorded),
                 "keep_s": seconds(3600.0 * keep_hours),
                 "segment_s": seconds(60.0),
-                "most_mb": 200.0,
+                "max_mb": 200.0,
             },
         }
 

@@ -118,8 +118,8 @@ export class Viewer {
   /** @param {Gop} gop */
   addGop(gop) {
     this.decisions.add(gop);
-    for (const { kept, parted, camera } of gop.split ?? []) {
-      if (kept === this.object) this.say(`${camera} took somebody else for person ${kept}: that is person ${parted}.`);
+    for (const { kept, new_object: split, camera } of gop.split ?? []) {
+      if (kept === this.object) this.say(`${camera} took somebody else for person ${kept}: that is person ${split}.`);
     }
   }
 
@@ -230,7 +230,7 @@ export class Viewer {
   #followMerge() {
     const { object } = this;
     this.beside.rename(this.people);
-    const same = this.people?.find((person) => object !== null && person.also?.includes(object));
+    const same = this.people?.find((person) => object !== null && person.aliases?.includes(object));
     if (!same || this.chosen) return;
     this.say(`Person ${object} turned out to be person ${same.object}.`);
     this.#turnTo(same.object, this.#asked);

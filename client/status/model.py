@@ -16,7 +16,7 @@ class CameraNow(msgspec.Struct, frozen=True):
     missed: int
     shed: int
     late: int
-    in_step: bool
+    synchronized: bool
     """It follows the pulse server, and does not count by itself."""
     sync_error_s: float | None = None
     """Median: how long after its pulse a frame was taken lately."""

@@ -89,9 +89,9 @@ def _measured(camera: CameraNow, metrics: Metrics | None) -> CameraNow:
         missed=camera.missed,
         shed=camera.shed,
         late=camera.late,
-        in_step=camera.in_step,
-        sync_error_s=metrics.get("myview_camera_sync_error_seconds", camera=name, lately="median"),
-        tracking_delay_s=metrics.get("myview_camera_tracking_delay_seconds", camera=name, lately="median"),
+        synchronized=camera.synchronized,
+        sync_error_s=metrics.get("myview_camera_sync_error_seconds", camera=name, statistic="median"),
+        tracking_delay_s=metrics.get("myview_camera_tracking_delay_seconds", camera=name, statistic="median"),
         certified=metrics.share(
             "myview_camera_certified_windows_total", "myview_camera_windows_total", camera=name
         ),

@@ -59,7 +59,7 @@ class StatusMeter:
             waiting=waiting,
             load_level=load.level,
             load=load.words,
-            in_step=sync is not None and sync.connected,
+            synchronized=sync is not None and sync.connected,
             clock_offset=(sync.offset if sync is not None else None) or 0.0,
             round_trip=(sync.round_trip if sync is not None else None) or 0.0,
         )

@@ -206,7 +206,7 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """Places that an operator pointed at and the tracker was given, since the start."""
     bad_messages: Number = 0
     """Messages to the camera that it could not understand, since the start."""
-    in_step: bool
+    synchronized: bool
     """Pulses come from the server; otherwise the camera goes on at its own rate."""
     clock_offset: Time
     """Server's clock minus the camera's, seconds."""
@@ -238,10 +238,10 @@ class PersonMerge(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PersonSplit(msgspec.Struct, frozen=True, kw_only=True):
-    """Whom a camera showed as ``kept`` turned out to be ``parted``, somebody else."""
+    """Whom a camera showed as ``kept`` turned out to be ``new_object``, somebody else."""
 
     kept: int
-    parted: int
+    new_object: int
     camera: str
 
 

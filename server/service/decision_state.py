@@ -50,7 +50,7 @@ class Board:
                 if isinstance(it, Merge)
             ],
             split=[
-                PersonSplit(kept=it.kept, parted=it.split_off, camera=it.camera)
+                PersonSplit(kept=it.kept, new_object=it.split_off, camera=it.camera)
                 for it in decision.corrections
                 if isinstance(it, Split)
             ],
@@ -97,7 +97,7 @@ def reason(choice: ObjectChoice, why: Explanation) -> str:
     camera = choice.camera
     if camera is None:
         return "No camera's picture can be shown at the moment."
-    if choice.away or not any(view.seen or view.unfound for view in why.views.values()):
+    if choice.away or not any(view.seen or view.undetected for view in why.views.values()):
         return f"Nobody sees this person at the moment; {camera} saw them last."
     return _compared(camera, why)
 
@@ -105,7 +105,7 @@ def reason(choice: ObjectChoice, why: Explanation) -> str:
 def _compared(camera: str, why: Explanation) -> str:
     """Return why this camera was selected among those that see, or should see, the person."""
     shown = why.views.get(camera)
-    if shown is not None and not shown.seen and shown.unfound:
+    if shown is not None and not shown.seen and shown.undetected:
         return f"{camera} does not find this person, but others know that they stand before it."
     possible = {name: view.cost for name, view in why.views.items() if view.cost is not None}
     if camera not in possible:  # it has a hole ahead

@@ -14,7 +14,7 @@ from client.sse_parser import MAX_EVENT, EventStreamError, SentEvent, SseParser
 from fakes.http.handmade_server import CAMERAS, OBJECTS, SITE, HandMadeSite, gop, nothing_more, sent
 from fakes.timeouts import PATIENCE
 
-FLAG = {"id": 1, "objects": [7, 9], "cameras": ["c0"], "reason": "alike", "pulse": 80} | {
+FLAG = {"id": 1, "objects": [7, 9], "cameras": ["c0"], "reason": "crossing", "pulse": 80} | {
     "raised": 50,
     "margin": 0.5,
     "risk": 0.5,

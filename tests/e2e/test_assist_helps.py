@@ -1,4 +1,4 @@
-"""The operator's help helps: two are taken for each other; pointed at by who knows better, all is mended."""
+"""Operator corrections help: two people are taken for each other, and pointing at them corrects it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytestmark = [
     pytest.mark.asyncio,
     needs_chromium,
 ]
-ALIKE = "alike"
+ALIKE = "crossing"
 
 
 def left_to_right(gop: Gop) -> list[int]:

@@ -62,8 +62,8 @@ async def test_a_bad_file_changes_nothing_and_a_good_one_breaks_no_stream(
         await read_again(site, config, cameras=cameras, view={"switch_cost_s": 0.7}, encode={"crf": 30})
         await said(site, "bestview: the configuration was read again: in force now: view.switch_cost_s")
         await said(site, "c1: the configuration was read again, and changes this camera")
-        assert (await ask("api/operator/choosing"))["values"]["switch_cost_s"] == 0.7
-        assert (await ask("api/operator/config"))["waiting"] == ["encode.crf"]
+        assert (await ask("api/operator/view_selection"))["values"]["switch_cost_s"] == 0.7
+        assert (await ask("api/operator/config"))["pending_restart"] == ["encode.crf"]
         await bounded(viewer)
         await said(site, "waits for a restart of all processes: encode.crf")
         now = site.children()

@@ -37,14 +37,14 @@ class RiskFeatures:
 
 
 WEIGHTS: Mapping[RiskReason, tuple[float, float, float, float, float]] = {
-    "exchange": (-0.50, -0.84, 0.00, 0.00, 0.26),
-    "alike": (-2.40, -0.02, 0.45, -0.08, 0.48),
-    "fading": (-4.71, -0.02, -0.05, -0.12, 1.23),
-    "gap": (-3.00, -1.00, 0.00, 0.00, 0.00),
+    "id_switch": (-0.50, -0.84, 0.00, 0.00, 0.26),
+    "crossing": (-2.40, -0.02, 0.45, -0.08, 0.48),
+    "track_loss": (-4.71, -0.02, -0.05, -0.12, 1.23),
+    "optimality_gap": (-3.00, -1.00, 0.00, 0.00, 0.00),
 }
-"""By reason; learned by `python -m benchmarks.operator_assist.risk_weights`, except for `gap`: the default
-solver proves its answers, so that no school ever has such a trouble. What stands there is a guess, no
-likelier than one in twenty, and less the surer the two are told apart."""
+"""By reason; learned by `python -m benchmarks.operator_assist.risk_weights`, except for `optimality_gap`:
+the default solver proves its answers, so there are no examples of it. Its weights are a guess: at most
+one in twenty, and less the larger the margin."""
 
 
 def failure_probability(reason: RiskReason, signs: RiskFeatures) -> float:

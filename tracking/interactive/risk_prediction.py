@@ -52,7 +52,7 @@ class RiskPredictor:
         first, second = np.nonzero(np.triu((found.margins < self._settings.swap_margin) & settled, 1))
         return [
             _risk_event(
-                "exchange",
+                "id_switch",
                 _pair(window, a, b),
                 window,
                 window.first + int(found.frames[a, b]),
@@ -67,7 +67,7 @@ class RiskPredictor:
         found = predict_crossings(window, self._settings.horizon_frames, self._costs)
         return [
             _risk_event(
-                "alike",
+                "crossing",
                 tuple(sorted((it.first, it.second))),
                 window,
                 window.last + 1 + it.frame,
@@ -100,9 +100,9 @@ class RiskPredictor:
             margin = length * max(differ - self._costs.unknown_appearance, 0.0)
             if covers[b] > _MIN_OVERLAP and margin < self._settings.crossing_margin:
                 pair = window.known_ids[n], window.known_ids[b]
-                found.append(_risk_event("alike", pair, window, frame, margin, hidden))
+                found.append(_risk_event("crossing", pair, window, frame, margin, hidden))
             else:
-                found.append(_risk_event("fading", (window.known_ids[n],), window, frame, 0.0, hidden))
+                found.append(_risk_event("track_loss", (window.known_ids[n],), window, frame, 0.0, hidden))
         return found
 
     def _low_confidence(self, window: SolvedWindow) -> list[RiskEvent]:
@@ -117,7 +117,7 @@ class RiskPredictor:
             left = (level - faint) / -slope if slope < 0.0 else np.inf
             if level <= faint or left <= self._settings.horizon_frames:
                 frame = window.last + max(int(left), 0) if level > faint else window.last
-                found.append(_risk_event("fading", (number,), window, frame, float(level - faint), 0))
+                found.append(_risk_event("track_loss", (number,), window, frame, float(level - faint), 0))
         return found
 
     def _unproven(self, window: SolvedWindow, margins: Floats) -> list[RiskEvent]:
@@ -128,7 +128,12 @@ class RiskPredictor:
         pair = _pair(window, a, b)
         return [
             _risk_event(
-                "gap", pair, window, window.last, float(margins[a, b]), _ambiguous_frames(window, a, b)
+                "optimality_gap",
+                pair,
+                window,
+                window.last,
+                float(margins[a, b]),
+                _ambiguous_frames(window, a, b),
             )
         ]
 

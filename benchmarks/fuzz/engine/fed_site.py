@@ -108,7 +108,9 @@ def word(rng: Random, camera: str, epoch: int) -> CameraTracks:
         solve=SolverReport(objective=1.0, bound=1.0, gap=0.0, integral=True, rounds=1),
         solved_at=(first + STRIDE) / FPS,
         risk_events=[
-            RiskEvent(reason="alike", tracks=[1, 2], pulse=first + 9, margin=rng.random(), risk=rng.random())
+            RiskEvent(
+                reason="crossing", tracks=[1, 2], pulse=first + 9, margin=rng.random(), risk=rng.random()
+            )
         ],
         revised_from=first if rng.random() < 0.1 else None,
     )
@@ -165,7 +167,7 @@ def status(camera: str, pulse: int) -> Message:
         fps=25.0,
         missed=0,
         shed=0,
-        in_step=True,
+        synchronized=True,
         clock_offset=0.0,
         round_trip=0.001,
     )

@@ -194,9 +194,9 @@ class Tried(Target):
         """Return changes to some settings."""
         changes = {
             "switch_cost_s": 0.3,
-            "goes_on_s": 0.5,
-            "missed_s": 1.0,
-            "unfound": 1.0,
+            "extrapolate_s": 0.5,
+            "presence_decay_s": 1.0,
+            "undetected_weight": 1.0,
             "min_shot_s": 0.0,
             "quality": {"relative": 1.0},
         }

@@ -12,26 +12,26 @@ from server.http.access.csrf import CSRF_HEADER
 _ASKED: tuple[tuple[str, str, Any], ...] = (
     ("POST", "/api/operator/people", {"object": 1, "name": "Ada"}),
     ("POST", "/api/operator/people", {"object": 1, "merge": 2}),
-    ("POST", "/api/operator/people", {"object": 1, "part": ["c0", "c1"]}),
+    ("POST", "/api/operator/people", {"object": 1, "split": ["c0", "c1"]}),
     (
         "POST",
         "/api/operator/pointing",
-        {"object": 1, "camera": "c0", "points": [{"pulse": 12, "x": 9.5, "y": 20.0, "reach": 3.0}]},
+        {"object": 1, "camera": "c0", "points": [{"pulse": 12, "x": 9.5, "y": 20.0, "tolerance": 3.0}]},
     ),
-    ("PUT", "/api/operator/choosing", {"switch_cost_s": 0.2, "goes_on_s": 0.5, "lookahead": 10}),
+    ("PUT", "/api/operator/view_selection", {"switch_cost_s": 0.2, "extrapolate_s": 0.5, "lookahead": 10}),
     (
         "PUT",
-        "/api/operator/choosing",
-        {"missed_s": 1.0, "unfound": 0.5, "quality": {"relative": 1.0}},
+        "/api/operator/view_selection",
+        {"presence_decay_s": 1.0, "undetected_weight": 0.5, "quality": {"relative": 1.0}},
     ),
-    ("DELETE", "/api/operator/choosing", None),
-    ("POST", "/api/operator/walk", {"do": "start"}),
-    ("POST", "/api/operator/walk", {"do": "go_on", "person": 1.75}),
+    ("DELETE", "/api/operator/view_selection", None),
+    ("POST", "/api/operator/walk", {"action": "start"}),
+    ("POST", "/api/operator/walk", {"action": "resume", "person": 1.75}),
     ("DELETE", "/api/operator/walk", None),
     ("POST", "/api/session", {"token": "secret"}),
     ("GET", "/api/operator/people", None),
     ("GET", "/api/operator/walk", None),
-    ("GET", "/api/operator/choosing", None),
+    ("GET", "/api/operator/view_selection", None),
 )
 """To finish a walk starts a process: that is for other tests."""
 

@@ -13,7 +13,7 @@ _CHANGES_SHARE = 0.8
 _BODIES = (
     {"object": 1, "name": "Ada"},
     {"object": 1, "merge": 2},
-    {"object": 1, "part": ["c0"]},
+    {"object": 1, "split": ["c0"]},
     {"switch_cost_s": 0.2, "quality.relative": True},
     {"token": "secret"},
     {"boxes": [[1.0, 2.0, 3.0, 4.0]]},

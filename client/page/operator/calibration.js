@@ -40,11 +40,11 @@ export class CalibrationWalk {
   constructor(tell) {
     this.tell = tell;
     this.#repeated = new Repeated(async () => this.#show(await ask('walk')), EVERY_MS, tell);
-    this.#start.addEventListener('click', () => void this.#do('POST', { do: 'start' }));
+    this.#start.addEventListener('click', () => void this.#do('POST', { action: 'start' }));
     this.#finish.addEventListener('click', () => {
-      if (this.#person.reportValidity()) void this.#do('POST', { do: 'finish', person: this.#person.valueAsNumber });
+      if (this.#person.reportValidity()) void this.#do('POST', { action: 'finish', person: this.#person.valueAsNumber });
     });
-    this.#on.addEventListener('click', () => void this.#do('POST', { do: 'go_on' }));
+    this.#on.addEventListener('click', () => void this.#do('POST', { action: 'resume' }));
     this.#forget.addEventListener('click', () => void this.#do('DELETE'));
     element('walk-copy').addEventListener('click', async () => {
       const done = await copy(this.#lines.value);
@@ -86,7 +86,7 @@ export class CalibrationWalk {
     element('walk-cameras').replaceChildren(...walk.cameras.map(row));
     const pairs = walk.pairs.map(({ one, other, seconds }) => make('li', { textContent: `${one} and ${other}: ${seconds.toFixed(0)} s` }));
     element('walk-pairs').replaceChildren(...pairs);
-    list('walk-lacking', state === 'walking' ? walk.lacking : []);
+    list('walk-uncovered', state === 'walking' ? walk.uncovered : []);
     this.#showResult(walk);
   }
 
@@ -106,21 +106,21 @@ export class CalibrationWalk {
 }
 
 /** @param {Walk} walk */
-function said({ state, seconds, most }) {
+function said({ state, seconds, max_seconds: most }) {
   if (state === 'walking' && seconds >= most) return `That is enough: after ${most / 60} minutes nothing more is taken in.`;
   const minutes = `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, '0')}`;
   return state === 'none' ? WORDS.none : `${WORDS[state]} ${minutes} minutes so far.`;
 }
 
 /** @param {Walk} walk */
-function found({ too_little: lacking }) {
-  return lacking ? `It is a guess, since the walk covered too little: ${lacking}.` : 'The cameras are calibrated; what is in force is as before.';
+function found({ insufficient }) {
+  return insufficient ? `It is a guess, since the walk covered too little: ${insufficient}.` : 'The cameras are calibrated; what is in force is as before.';
 }
 
 /** @param {WalkCamera} camera */
-function row({ camera, feet, thirds, deep }) {
+function row({ camera, foot_points: feet, thirds, depth_ratio: depth }) {
   const shares = thirds.map((share) => make('td', { textContent: feet ? `${Math.round(100 * share)} %` : '–' }));
-  return make('tr', {}, make('th', { scope: 'row', textContent: camera }), ...shares, make('td', { textContent: deep === null ? '–' : `${deep.toFixed(1)} times` }));
+  return make('tr', {}, make('th', { scope: 'row', textContent: camera }), ...shares, make('td', { textContent: depth === null ? '–' : `${depth.toFixed(1)} times` }));
 }
 
 /**

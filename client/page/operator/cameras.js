@@ -17,7 +17,7 @@ const STATES = { live: 'Live', gone: 'Gone', ended: 'Ended', starting: 'Starting
 const ROWS = [
   ['Rate', 'Frames taken per second', (it) => `${it.fps.toFixed(1)} fps`],
   ['Behind the pulse', 'From when a frame was due to when it was taken: median, worst', (it) => spread(it.sync_error)],
-  ['Pulses', 'Whether they come from the server', (it) => (it.in_step ? 'in step' : 'by itself')],
+  ['Pulses', 'Whether they come from the server', (it) => (it.synchronized ? 'in step' : 'by itself')],
   ['Clock', "The pulse server's clock minus the camera's", (it) => seconds(it.clock_offset)],
   ['Tracking', 'From when a frame was due to when its window was solved: median, worst', (it) => spread(it.tracking_delay)],
   ['Certified', 'Windows whose answer is proven to be the optimum', certified],
@@ -102,7 +102,7 @@ class Tile {
 }
 
 /** @param {OperatorCamera} camera */
-function past({ last_trouble: last }) {
+function past({ last_error: last }) {
   if (!last) return '';
   const at = new Date(last.at * 1000);
   const now = new Date();

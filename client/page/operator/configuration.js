@@ -25,9 +25,9 @@ export class Configuration {
   }
 
   open() {
-    void ask('config').then((/** @type {Settings} */ { settings, error, waiting }) => {
+    void ask('config').then((/** @type {Settings} */ { settings, error, pending_restart: pending }) => {
       this.#settings = settings;
-      put(element('config-on-disk'), onDisk(error, waiting));
+      put(element('config-on-disk'), onDisk(error, pending));
       this.#show();
     }, this.tell);
   }
@@ -50,11 +50,11 @@ export class Configuration {
 
 /**
  * @param {string} error
- * @param {string[]} waiting
+ * @param {string[]} pending
  */
-function onDisk(error, waiting) {
+function onDisk(error, pending) {
   if (error) return `The file is not in force: ${error}`;
-  return waiting.length ? `The file says something else, which is not in force: ${waiting.join(', ')}` : '';
+  return pending.length ? `The file says something else, which is not in force: ${pending.join(', ')}` : '';
 }
 
 /** @param {Setting} setting */

@@ -21,9 +21,9 @@ export class KnownPeople {
   /** @type {HTMLSelectElement} */
   #lost = element('merge-lost');
   /** @type {HTMLSelectElement} */
-  #who = element('part-who');
+  #who = element('split-who');
   /** @type {HTMLSelectElement} */
-  #camera = element('part-camera');
+  #camera = element('split-camera');
 
   /**
    * @param {Site} site
@@ -37,16 +37,16 @@ export class KnownPeople {
       const [kept, lost] = [Number(this.#kept.value), Number(this.#lost.value)];
       void this.#say({ object: kept, merge: lost }, () => `${lost} is ${kept} from now on.`);
     });
-    element('part-form').addEventListener('submit', (event) => {
+    element('split-form').addEventListener('submit', (event) => {
       event.preventDefault();
-      const part = this.#camera.value === EVERY_CAMERA ? [] : [this.#camera.value];
-      void this.#say({ object: Number(this.#who.value), part }, ({ parted }) => `They are ${parted} from now on.`);
+      const split = this.#camera.value === EVERY_CAMERA ? [] : [this.#camera.value];
+      void this.#say({ object: Number(this.#who.value), split }, ({ new_object }) => `They are ${new_object} from now on.`);
     });
   }
 
   open() {
-    void ask('people').then((/** @type {ByHand} */ { cannot }) => {
-      if (cannot) put(this.#words, cannot);
+    void ask('people').then((/** @type {ByHand} */ { unavailable }) => {
+      if (unavailable) put(this.#words, unavailable);
     }, this.tell);
   }
 
@@ -124,8 +124,8 @@ class Card {
   }
 
   /** @param {Person} person */
-  show({ name, cameras, also, thumbnail }) {
-    const once = also?.length ? `, once ${also.join(', ')}` : '';
+  show({ name, cameras, aliases, thumbnail }) {
+    const once = aliases?.length ? `, once ${aliases.join(', ')}` : '';
     put(this.seen, (cameras.length ? `seen by ${cameras.join(', ')}` : 'not in view') + once);
     const typing = document.activeElement === this.input || this.input.value !== this.#name;
     if (!typing) this.input.value = name ?? '';

@@ -11,9 +11,9 @@ import { copy } from '../shared/tools.js';
 const FIELDS = [
   ['lookahead', 'Look-ahead, frames', 'How many frames are seen before a view is chosen; all of it is delay.'],
   ['switch_cost_s', 'Cut cost λ, s', 'How many seconds of not seeing the person are worth a cut.'],
-  ['goes_on_s', 'Goes on, s', 'For how long the views at the end of the look-ahead are taken to go on.'],
-  ['missed_s', 'Missed, s', 'For how long somebody who is not found any more is taken to be still there.'],
-  ['unfound', 'Unfound', 'What a view counts for of somebody whom only other cameras find, 0 to 1.'],
+  ['extrapolate_s', 'Extrapolation, s', 'For how long the views at the end of the look-ahead are taken to go on.'],
+  ['presence_decay_s', 'Presence decay, s', 'For how long somebody who is not found any more is taken to be still there.'],
+  ['undetected_weight', 'Undetected weight', 'What a view counts for of somebody whom only other cameras find, 0 to 1.'],
   ['min_shot_s', 'Shortest shot, s', 'For how long a camera is shown at least.'],
   ['quality.size', 'Size', 'How large the person is in the picture.'],
   ['quality.truncation', 'Truncation', "How much of the person the picture's edges leave."],
@@ -51,7 +51,7 @@ export class ViewSelectionForm {
   }
 
   open() {
-    void ask('choosing').then((choosing) => this.#show(choosing), this.tell);
+    void ask('view_selection').then((settings) => this.#show(settings), this.tell);
   }
 
   close() {}
@@ -62,7 +62,7 @@ export class ViewSelectionForm {
    */
   async #change(method, values) {
     try {
-      this.#show(await ask('choosing', method, values));
+      this.#show(await ask('view_selection', method, values));
       this.tell(null);
     } catch (error) {
       this.tell(error);
@@ -80,8 +80,8 @@ export class ViewSelectionForm {
     return values;
   }
 
-  /** @param {SelectionSettings} choosing */
-  #show({ values, file, lines, least_lookahead: least, most_lookahead: most }) {
+  /** @param {SelectionSettings} settings */
+  #show({ values, file, lines, min_lookahead: least, max_lookahead: most }) {
     this.#values = values;
     if (!this.#fields.size) element('selection-fields').append(...FIELDS.filter(([key]) => key in values).map((it) => this.#field(it)));
     const ahead = this.#fields.get('lookahead')?.input;
@@ -104,7 +104,7 @@ export class ViewSelectionForm {
     const weight = key.startsWith('quality.');
     const input = make('input', key === 'quality.relative' ? { type: 'checkbox' } : { type: 'number', min: '0', step: 'any', required: true });
     if (weight) input.max = '1';
-    input.id = `choosing-${key}`;
+    input.id = `selection-${key}`;
     const help = make('small', { id: `${input.id}-help`, textContent: does });
     input.setAttribute('aria-describedby', help.id);
     const file = make('span', { className: 'file' });

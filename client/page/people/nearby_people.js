@@ -43,7 +43,7 @@ export class Beside {
 
   /** @param {Person[] | null} people some of whom once had other numbers */
   rename(people) {
-    const now = this.numbers.map((it) => people?.find((person) => person.also?.includes(it))?.object ?? it);
+    const now = this.numbers.map((it) => people?.find((person) => person.aliases?.includes(it))?.object ?? it);
     this.numbers = [...new Set(now)];
   }
 }

@@ -86,16 +86,16 @@ export class Why {
 /** @param {Choice} choice */
 function table(choice) {
   const terms = Object.keys(choice.weights);
-  const { unfound = {} } = choice;
-  const some = Object.values(unfound).some((share) => share > 0);
+  const { undetected = {} } = choice;
+  const some = Object.values(undetected).some((share) => share > 0);
   const views = document.createElement('table');
   const head = views.createTHead().insertRow();
-  head.append(...['camera', 'cost', 'sees', ...(some ? ['unfound'] : []), ...terms].map((name) => made('th', name)));
+  head.append(...['camera', 'cost', 'sees', ...(some ? ['undetected'] : []), ...terms].map((name) => made('th', name)));
   const body = views.createTBody();
   for (const [camera, cost] of Object.entries(choice.costs)) {
     const row = body.insertRow();
     if (camera === choice.camera) row.setAttribute('aria-current', 'true');
-    const shares = some ? [choice.seen[camera], unfound[camera]] : [choice.seen[camera]];
+    const shares = some ? [choice.seen[camera], undetected[camera]] : [choice.seen[camera]];
     const values = [cost, ...shares, ...terms.map((term) => choice.terms[camera]?.[term])];
     row.append(made('th', camera), ...values.map((value) => made('td', number(value))));
   }

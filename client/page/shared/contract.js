@@ -27,7 +27,7 @@
  * @typedef {object} Person an entry of /api/objects
  * @property {number} object
  * @property {string | null} [name] what the operator calls them
- * @property {number[]} [also] other numbers that this person once had
+ * @property {number[]} [aliases] other numbers that this person once had
  * @property {number} first_seen pulse
  * @property {number} last_seen pulse
  * @property {boolean} visible
@@ -58,13 +58,13 @@
  * @property {Record<string, Box[][]>} boxes by camera, one list per frame
  * @property {Cut[]} cuts
  * @property {{kept: number, lost: number}[]} [merged] numbers that turned out to be one person
- * @property {{kept: number, parted: number, camera: string}[]} [split] whom a camera showed as another than they are
+ * @property {{kept: number, new_object: number, camera: string}[]} [split] whom a camera showed as another than they are
  *
  * @typedef {object} Flag what an operator is asked to look at
  * @property {number} id
  * @property {number[]} objects whom it is about: point at the first of them
  * @property {string[]} cameras where it is foreseen
- * @property {'alike' | 'exchange' | 'fading' | 'gap'} reason
+ * @property {'crossing' | 'id_switch' | 'track_loss' | 'optimality_gap'} reason
  * @property {number} pulse when it is expected
  * @property {number} raised the newest pulse when it was raised
  * @property {number} margin by how much the tracker is sure, as a cost
@@ -78,7 +78,7 @@
  * @property {string} reason one plain sentence
  * @property {Record<string, number | null>} costs by camera, mean of a frame; null: it cannot be shown
  * @property {Record<string, number>} seen by camera, share of the look-ahead
- * @property {Record<string, number>} [unfound] likewise: in which it does not find them, who stand before it as others know
+ * @property {Record<string, number>} [undetected] likewise: in which it does not find them, who stand before it as others know
  * @property {Record<string, Record<string, number>>} terms by camera: what its quality is made of
  * @property {Record<string, number>} weights by term
  * @property {string | null} before the camera of the GOP before

@@ -31,10 +31,10 @@ export class Decisions {
     this.#gops = [];
   }
 
-  /** @param {{object: number, also?: number[]}[]} people with the numbers that they once had: what was said of those is theirs */
+  /** @param {{object: number, aliases?: number[]}[]} people with the numbers that they once had: what was said of those is theirs */
   rename(people) {
-    this.#once = new Map(people.map(({ object, also }) => [object, also ?? []]));
-    this.#now = new Map(people.flatMap(({ object, also }) => (also ?? []).map((it) => [it, object])));
+    this.#once = new Map(people.map(({ object, aliases }) => [object, aliases ?? []]));
+    this.#now = new Map(people.flatMap(({ object, aliases }) => (aliases ?? []).map((it) => [it, object])));
   }
 
   /**

@@ -39,7 +39,7 @@ from server.system.errors import UserError
 
 T = TypeVar("T")
 
-_LONGEST = "record.most_mb"
+_LONGEST = "record.max_mb"
 """The longest name of a check, but for those that have a camera's in it."""
 _MEND = "mend it there; configs/demo.yaml explains every setting"
 

@@ -59,13 +59,13 @@ def _sizes(config: Config, probes: Mapping[str, CameraProbe], free: float, held:
             kept = f"what {hours} of {who} take is not known"
     if guessed:
         kept += f", with {', '.join(guessed)} as encode.max_kbps allows"
-    if wanted > record.most_mb:
-        fits = f"{'at most' if unknown else 'about'} {_hours(record.keep_s * record.most_mb / wanted)}"
-        text = f"{kept}, but record.most_mb is {record.most_mb:.0f}: {fits} are kept"
-        found.append(warning("record.most_mb", text, "raise it, or lower record.keep_s"))
+    if wanted > record.max_mb:
+        fits = f"{'at most' if unknown else 'about'} {_hours(record.keep_s * record.max_mb / wanted)}"
+        text = f"{kept}, but record.max_mb is {record.max_mb:.0f}: {fits} are kept"
+        found.append(warning("record.max_mb", text, "raise it, or lower record.keep_s"))
     text = f"{kept}; {free:.0f} MB are free, and {held:.0f} MB are recorded already"
-    if min(wanted, record.most_mb) > free + held:
-        do = "lower record.keep_s or record.most_mb, or take a larger disk"
+    if min(wanted, record.max_mb) > free + held:
+        do = "lower record.keep_s or record.max_mb, or take a larger disk"
         found.append(bad("disk", text, do))
     else:
         found.append(warning("disk", text, _TRY_AGAIN) if unknown else ok("disk", text))

@@ -92,7 +92,7 @@ def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
             "-" if it.waiting is None else str(it.waiting),
             "-" if it.certified is None else f"{100 * it.certified:.0f} %",
         )
-        step = "" if it.in_step or it.state != "live" else "counts by itself"
+        step = "" if it.synchronized or it.state != "live" else "counts by itself"
         words += [
             Text(printable(f"{it.camera}: {said}"), style="yellow") for said in (it.message, step) if said
         ]

@@ -17,7 +17,7 @@ class AccessSettings(Section):
     """The file of tokens; none: whoever reaches `http.host` may watch, and only this machine may operate."""
     open_to_all: bool = False
     """Without tokens, `http.host` may be reached from other machines."""
-    unseen_s: Annotated[float, Field(ge=0.0, le=86_400.0)] = 3.0
+    hide_after_s: Annotated[float, Field(ge=0.0, le=86_400.0)] = 3.0
     """Seconds for which somebody was seen by no camera: then a token for them alone shows no live picture."""
     trusted_network: bool = False
     """`sync.bind` and `zenoh.listen` may be reached from other machines: whoever does is believed."""

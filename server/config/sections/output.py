@@ -73,7 +73,7 @@ class RecordSettings(Section):
     """Seconds after which it is taken away."""
     trust_clock: bool = False
     """The time that the machine was off counts by its clock also where nobody keeps that right (NTP)."""
-    most_mb: PositiveFloat = 10_000.0
+    max_mb: PositiveFloat = 10_000.0
     """Megabytes that it takes on the disk at most; the oldest goes first."""
     segment_s: PositiveFloat = 60.0
     """Seconds in a file: only whole files are taken away."""

@@ -15,9 +15,9 @@ from tracking.types import RiskReason
 LIVE_VIEW_SETTINGS = (
     "lookahead",
     "switch_cost_s",
-    "goes_on_s",
-    "missed_s",
-    "unfound",
+    "extrapolate_s",
+    "presence_decay_s",
+    "undetected_weight",
     "min_shot_s",
     "quality",
 )
@@ -55,7 +55,7 @@ class FlagSettings(Section):
     """Flags raised a minute at most, where identities are likeliest to fail; those of 3 minutes are saved."""
     risk: Annotated[float, Field(ge=0, le=1)] = 0.1
     """How likely a failure is at least for which one is raised, as far as the trackers can tell."""
-    reasons: list[RiskReason] = ["alike", "exchange", "fading", "gap"]
+    reasons: list[RiskReason] = ["crossing", "id_switch", "track_loss", "optimality_gap"]
     """For which of the troubles that are foreseen one is raised."""
     answer_s: Annotated[float, Field(gt=0, le=600)] = 8.0
     """Seconds after the expected moment in which a flag can be answered; see `track.assist.memory_frames`."""
@@ -69,11 +69,11 @@ class ViewSettings(Section):
     switch_cost_s: Seconds = 0.3
     """λ: how many seconds of not seeing the person, while another camera does, are worth a cut; of a view
     that is worth half the best one it takes twice as many."""
-    goes_on_s: Seconds = 0.5
+    extrapolate_s: Seconds = 0.5
     """For how long the views at the end of the look-ahead are taken to go on as they are."""
-    missed_s: Seconds = 1.0
+    presence_decay_s: Seconds = 1.0
     """Who is not found any more is taken to be still there, less and less, for so long; 0: not at all."""
-    unfound: Annotated[float, Field(ge=0, le=1)] = 1.0
+    undetected_weight: Annotated[float, Field(ge=0, le=1)] = 1.0
     """What a view of somebody counts for whom the camera does not find, though they stand before it as others
     know: this share of what it is worth by how surely people show there; 0: nothing."""
     min_shot_s: Annotated[float, Field(ge=0, le=600)] = 0.0

@@ -33,7 +33,7 @@ def objects_info(service: BestViewService) -> Objects:
         ObjectInfo(
             object=it.number,
             name=it.name,
-            also=it.former_numbers,
+            aliases=it.former_numbers,
             first_seen=it.first_seen,
             last_seen=it.last_seen,
             visible=bool(it.cameras),

@@ -36,7 +36,7 @@ class ObjectInfo(msgspec.Struct, frozen=True):
     object: int
     name: str | None
     """What the operator calls them."""
-    also: list[int]
+    aliases: list[int]
     """Other numbers that this person once had; they go on to work."""
     first_seen: int
     """Pulse."""

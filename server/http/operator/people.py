@@ -22,7 +22,7 @@ class PersonEdit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: str | None = None
     merge: int | None = None
     """The number that is theirs, too."""
-    part: list[str] | None = None
+    split: list[str] | None = None
     """Cameras that show somebody else as them; none: all do."""
 
 
@@ -39,23 +39,23 @@ async def post_people(request: web.Request) -> web.Response:
     people = service.people
     edit = await read_json(request, PersonEdit)
     people.check_editable(edit.object)
-    if sum(getattr(edit, it) is not None for it in ("name", "merge", "part")) != 1:
-        return error_response(400, "say one thing at a time: name, merge or part")
+    if sum(getattr(edit, it) is not None for it in ("name", "merge", "split")) != 1:
+        return error_response(400, "say one thing at a time: name, merge or split")
     new = None
     if edit.name is not None:
         people.rename_person(RenamePerson(edit.object, edit.name))
     elif edit.merge is not None:
         people.merge_people(MergePeople(edit.object, edit.merge))
     else:
-        new = people.split_person(SplitPerson(edit.object, edit.part or []))
+        new = people.split_person(SplitPerson(edit.object, edit.split or []))
     return json_response(_people(service, new))
 
 
-def _people(service: BestViewService, parted: int | None = None) -> PeopleByHand:
+def _people(service: BestViewService, new_object: int | None = None) -> PeopleByHand:
     overrides = service.people.manual_overrides()
     return PeopleByHand(
         names=overrides.names,
         merged=overrides.merged,
-        parted=parted,
-        cannot=service.people.editing_blocked,
+        new_object=new_object,
+        unavailable=service.people.editing_blocked,
     )

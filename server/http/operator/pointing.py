@@ -24,7 +24,7 @@ class PointBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     pulse: Pulse
     x: float
     y: float
-    reach: Annotated[float, msgspec.Meta(gt=0)] | None = None
+    tolerance: Annotated[float, msgspec.Meta(gt=0)] | None = None
     """How far off it may be; null: a little."""
 
 
@@ -47,13 +47,13 @@ async def post_pointing(request: web.Request) -> web.Response:
     """Correct a person's position in a camera's picture, now or in the past; its tracker uses it."""
     service = request.app[SERVICE]
     body = await read_json(request, PointingBody)
-    places = [PointedPlace(it.pulse, it.x, it.y, it.reach) for it in body.points]
+    places = [PointedPlace(it.pulse, it.x, it.y, it.tolerance) for it in body.points]
     pointed = service.assist.point_at_person(PointAtPerson(body.object, body.camera, places))
     return json_response(_pointing(service, pointed, len(places) - pointed.accepted))
 
 
-def _pointing(service: BestViewService, pointed: Pointed, left_out: int) -> Pointing:
+def _pointing(service: BestViewService, pointed: Pointed, too_old: int) -> Pointing:
     assist = service.assist
     return Pointing(
-        assist.memory, OPERATOR_POINTS_MAX, assist.blocked, pointed.accepted, left_out, pointed.flags
+        assist.memory, OPERATOR_POINTS_MAX, assist.blocked, pointed.accepted, too_old, pointed.flags
     )

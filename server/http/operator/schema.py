@@ -33,11 +33,11 @@ class Settings(msgspec.Struct, frozen=True):
     settings: list[Setting]
     error: str
     """Why the file, as it is on the disk now, cannot be in force; empty: it can."""
-    waiting: list[str]
+    pending_restart: list[str]
     """Keys in which the file differs from what is in force."""
 
 
-class Choosing(msgspec.Struct, frozen=True):
+class SelectionSettings(msgspec.Struct, frozen=True):
     """What views are chosen by; keys such as switch_cost_s and quality.size."""
 
     values: dict[str, float | bool]
@@ -46,9 +46,9 @@ class Choosing(msgspec.Struct, frozen=True):
     """What the configuration says."""
     lines: str
     """Of the configuration, for what is in force and is not its default or not what the file says."""
-    least_lookahead: int
+    min_lookahead: int
     """Frames, as few as tracks allow."""
-    most_lookahead: int
+    max_lookahead: int
     """Frames, as many as what the service keeps allows."""
 
 
@@ -58,24 +58,24 @@ class PeopleByHand(msgspec.Struct, frozen=True):
     names: dict[int, str]
     merged: dict[int, int]
     """By number that was merged by hand: whose it is said to be."""
-    parted: int | None
+    new_object: int | None
     """The number of somebody who was just said to be new."""
-    cannot: str
+    unavailable: str
     """Why nothing can be said here; empty: it can."""
 
 
 class Pointing(msgspec.Struct, frozen=True):
     """What becomes of it where the operator points."""
 
-    memory: int
+    memory_frames: int
     """How many frames back somebody can be pointed at."""
-    most: int
+    max_points: int
     """Places in one request at most."""
-    cannot: str
+    unavailable: str
     """Why nobody can be pointed at here; empty: they can."""
-    taken: int
+    accepted: int
     """Of the places that were just sent, those that the camera is told."""
-    left_out: int
+    too_old: int
     """Those that it is not told: too far back."""
     flags: list[int]
     """The flags that are followed by them."""
@@ -89,7 +89,7 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/people": PeopleByHand,
     "/api/operator/pointing": Pointing,
     "/api/operator/config": Settings,
-    "/api/operator/choosing": Choosing,
+    "/api/operator/view_selection": SelectionSettings,
 }
 """What GET of each address answers; what changes something answers with the same, as it is then."""
 

@@ -18,7 +18,7 @@ from server.config.yaml_file import dump_yaml, dump_yaml_inline
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import ON_DISK, SERVICE
 from server.http.json_responses import error_response, json_response, read_json
-from server.http.operator.schema import Choosing, Setting, Settings
+from server.http.operator.schema import SelectionSettings, Setting, Settings
 from server.service.service import BestViewService
 from server.system.address_redaction import HIDDEN, redact_address, redact_endpoint
 from server.system.errors import UserError
@@ -38,14 +38,14 @@ async def get_config(request: web.Request) -> web.Response:
     return json_response(Settings(settings, found.error, list(found.waiting)))
 
 
-@routes.get(f"{OPERATOR_PATH}/choosing")
-async def get_choosing(request: web.Request) -> web.Response:
+@routes.get(f"{OPERATOR_PATH}/view_selection")
+async def get_view_selection(request: web.Request) -> web.Response:
     """Return the view selection's settings in force, and the configured ones."""
-    return json_response(_choosing(request.app[SERVICE]))
+    return json_response(_selection_settings(request.app[SERVICE]))
 
 
-@routes.put(f"{OPERATOR_PATH}/choosing")
-async def put_choosing(request: web.Request) -> web.Response:
+@routes.put(f"{OPERATOR_PATH}/view_selection")
+async def put_view_selection(request: web.Request) -> web.Response:
     """Choose views by other settings, to try them out: until they are changed again or the service ends."""
     service = request.app[SERVICE]
     operations = service.operations
@@ -62,15 +62,15 @@ async def put_choosing(request: web.Request) -> web.Response:
         )
     except UserError as error:
         return error_response(400, str(error))
-    return json_response(_choosing(service))
+    return json_response(_selection_settings(service))
 
 
-@routes.delete(f"{OPERATOR_PATH}/choosing")
-async def delete_choosing(request: web.Request) -> web.Response:
+@routes.delete(f"{OPERATOR_PATH}/view_selection")
+async def delete_view_selection(request: web.Request) -> web.Response:
     """Choose views by what the configuration says again."""
     service = request.app[SERVICE]
     service.operations.reset_view_settings()
-    return json_response(_choosing(service))
+    return json_response(_selection_settings(service))
 
 
 def settings_of(config: Config) -> Iterator[Setting]:
@@ -129,7 +129,7 @@ def _shown(value: Any) -> Any:
             return redact_address(str(value))
 
 
-def _choosing(service: BestViewService) -> Choosing:
+def _selection_settings(service: BestViewService) -> SelectionSettings:
     now, file, usual = (
         _flat(service.operations.view_settings),
         _flat(service.config.view),
@@ -138,7 +138,7 @@ def _choosing(service: BestViewService) -> Choosing:
     lines = {key: value for key, value in now.items() if value != usual[key] or value != file[key]}
     written = "" if not lines else dump_yaml({"view": _nested(lines)})
     least, most = service.config.least_lookahead, service.operations.most_lookahead
-    return Choosing(values=now, file=file, lines=written, least_lookahead=least, most_lookahead=most)
+    return SelectionSettings(values=now, file=file, lines=written, min_lookahead=least, max_lookahead=most)
 
 
 def _flat(view: ViewSettings) -> dict[str, float | bool]:

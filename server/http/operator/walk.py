@@ -17,7 +17,7 @@ routes = web.RouteTableDef()
 class WalkCommand(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What is to be done with the walk."""
 
-    do: Literal["start", "go_on", "finish"]
+    action: Literal["start", "resume", "finish"]
     person: Annotated[float, msgspec.Meta(ge=0.1, le=1000)] = 1.75
     """To finish: how tall people are, metres."""
 
@@ -33,10 +33,10 @@ async def post_walk(request: web.Request) -> web.Response:
     """Start a walk, go on with it, or finish it: then it is calibrated from."""
     calibration = request.app[SERVICE].calibration
     command = await read_json(request, WalkCommand)
-    match command.do:
+    match command.action:
         case "start":
             calibration.start()
-        case "go_on":
+        case "resume":
             calibration.resume()
         case "finish":
             calibration.finish(command.person)

@@ -17,11 +17,11 @@ class WalkCamera(msgspec.Struct, frozen=True):
     """What one camera has seen of a walk."""
 
     camera: str
-    feet: int
+    foot_points: int
     """Feet that were seen while another camera saw somebody, too, some five a second."""
     thirds: list[float]
     """What shares of them were in the left, the middle and the right third of the picture."""
-    deep: float | None
+    depth_ratio: float | None
     """How many times as tall the nearest of them appear as the farthest; null: too few were seen."""
 
 
@@ -40,17 +40,17 @@ class OperatorWalk(msgspec.Struct, frozen=True):
     """none, walking, working (it is calibrated from) or done."""
     seconds: float
     """For how long was walked."""
-    most: float
+    max_seconds: float
     """Seconds after which nothing more is taken in."""
     cameras: list[WalkCamera]
     pairs: list[WalkPair]
-    lacking: list[str]
+    uncovered: list[str]
     """Where to walk, too, as far as can be told before it is calibrated from."""
     error: str
     """Why nothing has come of it; empty: something has, or it is not done."""
     lines: list[str]
     """What has come of it, in words."""
-    too_little: str
+    insufficient: str
     """What was not walked, where the result is a guess for want of that; else empty."""
     configuration: str
     """The lines for the configuration; empty: there is no ground file."""
@@ -67,7 +67,7 @@ class CalibrationService:
         walking = self._walking
         done = walking.done or CalibrationResult()
         covered = walking.coverage()
-        lacking = [
+        uncovered = [
             it.words
             for seen in covered.cameras
             for it in coverage_gaps(seen.camera, seen.thirds, seen.deep or float("inf"))
@@ -75,13 +75,13 @@ class CalibrationService:
         return OperatorWalk(
             state=walking.state.value,
             seconds=walking.seconds,
-            most=MAX_WALK_S,
+            max_seconds=MAX_WALK_S,
             cameras=[WalkCamera(it.camera, it.feet, list(it.thirds), it.deep) for it in covered.cameras],
             pairs=[WalkPair(it.one, it.other, it.seconds) for it in covered.pairs],
-            lacking=lacking,
+            uncovered=uncovered,
             error=done.error,
             lines=done.lines,
-            too_little=done.too_little,
+            insufficient=done.too_little,
             configuration=_LINES + done.offsets if done.ground else "",
         )
 

@@ -28,7 +28,7 @@ class CameraInfo(msgspec.Struct, frozen=True):
     shed: int
     load_level: int
     """How much is left out because the machine has too much to do; 0: nothing."""
-    in_step: bool
+    synchronized: bool
     """Pulses come from the server; otherwise the camera goes on at its own rate."""
     message: str
 
@@ -57,7 +57,7 @@ class OperatorCamera(CameraInfo, frozen=True):
     """Share of the windows whose answer is proven to be the optimum."""
     windows: int
     """How many windows that is about."""
-    last_trouble: CameraProblem | None
+    last_error: CameraProblem | None
     """What last went wrong, and when; it stays when the camera is well again."""
     picture: OwnPicture | None
     """Null: it has not said."""
@@ -132,7 +132,7 @@ class CameraService:
             missed=status.missed if status else 0,
             shed=status.shed if status else 0,
             load_level=status.load_level if status else 0,
-            in_step=status.in_step if status else False,
+            synchronized=status.synchronized if status else False,
             message=state.message,
         )
 
@@ -146,7 +146,7 @@ class CameraService:
             tracking_delay=gauge.tracking_delay,
             certified=gauge.certified,
             windows=gauge.windows,
-            last_trouble=gauge.last_trouble,
+            last_error=gauge.last_error,
             picture=None if gauge.size is None else self._picture(gauge.size),
         )
 

@@ -93,10 +93,10 @@ class ViewSelection(msgspec.Struct, frozen=True):
     """How well each camera shows the person where it sees them, 0 to 1; null: it does not."""
     terms: dict[str, dict[str, float]]
     """By camera: the terms of that quality, likewise; empty where it does not see the person."""
-    unfound: dict[str, float]
+    undetected: dict[str, float]
     """Share of the look-ahead in which each camera does not find the person, who stands before it as the
     others know."""
-    unfound_quality: dict[str, float | None]
+    undetected_quality: dict[str, float | None]
     """What such a view is taken to be worth: quality, times how surely they show; null: there is none."""
     weights: dict[str, float]
     """By term: the share of a view's worth that is lost where the term is 0."""
@@ -218,8 +218,8 @@ class PeopleService:
             seen={camera: view.seen for camera, view in why.views.items()},
             quality={camera: view.quality for camera, view in why.views.items()},
             terms={camera: view.terms for camera, view in why.views.items()},
-            unfound={camera: view.unfound for camera, view in why.views.items()},
-            unfound_quality={camera: view.unfound_quality for camera, view in why.views.items()},
+            undetected={camera: view.undetected for camera, view in why.views.items()},
+            undetected_quality={camera: view.undetected_quality for camera, view in why.views.items()},
             weights=why.weights,
             before=standing.choice.before,
             lookahead=why.frames,

@@ -165,7 +165,7 @@ class RecordingService:
         presence = None
         if scoped:
             fps = pipeline.config.site.fps
-            presence = PresenceHistory(past, numbers, round(pipeline.config.access.unseen_s * fps), fps)
+            presence = PresenceHistory(past, numbers, round(pipeline.config.access.hide_after_s * fps), fps)
         return RecordedStream(pipeline, PersonPlayback(past, numbers, presence), f"object {number}")
 
     def of_camera(self, camera: str) -> RecordedStream:

@@ -29,9 +29,9 @@ class CameraCollector(Collector):
         yield self._stages()
         yield self._gauge("fps", "Frames taken a second.", _of_status(lambda it: it.fps))
         yield self._gauge(
-            "in_step",
+            "synchronized",
             "Pulses come from the server: the camera does not count by itself.",
-            _of_status(lambda it: float(it.in_step)),
+            _of_status(lambda it: float(it.synchronized)),
         )
         yield self._gauge(
             "waiting_frames", "Frames that wait to be searched.", _of_status(lambda it: it.waiting)
@@ -55,12 +55,12 @@ class CameraCollector(Collector):
             lambda _, it: it.gauge.totals.certified,
         )
         yield self._counter(
-            "pointings",
+            "operator_points",
             "Places that an operator pointed at and the tracker was given, since its start.",
             _of_status(lambda it: it.operator_points),
         )
         yield self._counter(
-            "mended_windows",
+            "corrected_windows",
             "Windows that have changed what was final, by where an operator pointed.",
             lambda _, it: it.gauge.totals.mended,
         )
@@ -72,14 +72,14 @@ class CameraCollector(Collector):
         missed = CounterMetricFamily("myview_camera_missed", "Pulses without a frame.", labels=["camera"])
         shed = CounterMetricFamily("myview_camera_shed", "Frames not searched for people.", labels=["camera"])
         unheard = CounterMetricFamily(
-            "myview_camera_unheard",
+            "myview_camera_without_peers",
             "Frames in which people were followed without what some other camera found.",
             labels=["camera"],
         )
         bad = CounterMetricFamily(
             "myview_camera_bad_messages",
-            "Messages not understood: those that the camera has sent, and those that it has heard.",
-            labels=["camera", "way"],
+            "Messages not understood: those that the camera has sent, and those that it has received.",
+            labels=["camera", "direction"],
         )
         offset = GaugeMetricFamily(
             "myview_camera_clock_offset_seconds",
@@ -95,7 +95,7 @@ class CameraCollector(Collector):
             if state.status is not None:
                 missed.add_metric(labels, state.status.missed)
                 shed.add_metric(labels, state.status.shed)
-                bad.add_metric([camera, "heard"], state.status.bad_messages)
+                bad.add_metric([camera, "received"], state.status.bad_messages)
                 offset.add_metric(labels, state.status.clock_offset)
         return [live, frames, missed, shed, unheard, bad, offset]
 
@@ -112,7 +112,7 @@ class CameraCollector(Collector):
         return family
 
     def _spread(self, what: str, words: str, of: Callable[[CameraState], RecentSeconds | None]) -> Metric:
-        family = GaugeMetricFamily(f"myview_camera_{what}_seconds", words, labels=["camera", "lately"])
+        family = GaugeMetricFamily(f"myview_camera_{what}_seconds", words, labels=["camera", "statistic"])
         for camera, state in self._pipeline.intake.states.items():
             spread = of(state)
             if spread is not None:

@@ -103,7 +103,7 @@ class CameraMetrics:
         self._proven: deque[bool] = deque(maxlen=_WINDOWS)
         self.totals = StageTotals()
         """Since the service began: another run of the camera is added."""
-        self.last_trouble: CameraProblem | None = None
+        self.last_error: CameraProblem | None = None
         """Stays when the camera is well again."""
         self.size: tuple[int, int] | None = None
         """Width and height of the camera's own picture; None: it has not said."""
@@ -134,7 +134,7 @@ class CameraMetrics:
 
     def trouble(self, text: str) -> None:
         """Note what went wrong."""
-        self.last_trouble = CameraProblem(" ".join(text.split()), self._now())
+        self.last_error = CameraProblem(" ".join(text.split()), self._now())
 
     @property
     def sync_error(self) -> RecentSeconds | None:

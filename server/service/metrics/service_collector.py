@@ -76,7 +76,7 @@ class ServiceCollector(Collector):
             "myview_flags_open", "Flags that can be answered now.", value=len(assist.flags.open)
         )
         yield CounterMetricFamily(
-            "myview_pointings", "Places that the operator pointed at.", value=assist.points
+            "myview_operator_points", "Places that the operator pointed at.", value=assist.points
         )
 
     def _recording(self) -> Iterable[Metric]:

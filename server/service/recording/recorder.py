@@ -58,7 +58,7 @@ class Recorder:
         self.folder: RecordingFolder | None = None
         self.writer: WriterThread | None = None
         if record.folder is not None:
-            limits = RetentionLimits(record.keep_s, record.most_mb, record.segment_s, record.trust_clock)
+            limits = RetentionLimits(record.keep_s, record.max_mb, record.segment_s, record.trust_clock)
             self.folder = folder = RecordingFolder(record.folder, limits)
             max_queued = max(4, frames // config.encode.gop)  # no more than the frame buffers hold anyway
             self.writer = WriterThread(

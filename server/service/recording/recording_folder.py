@@ -244,7 +244,7 @@ class RecordingFolder:
         session = self.session
         assert session is not None  # noqa: S101 — a segment belongs to a session
         long_enough = first - segment.first >= self._limits.segment_s * session.info.fps
-        return long_enough or segment.bytes * SEGMENTS_PER_DISK_QUOTA >= self._limits.most_mb * _MEGA
+        return long_enough or segment.bytes * SEGMENTS_PER_DISK_QUOTA >= self._limits.max_mb * _MEGA
 
     def _close_segment(self) -> None:
         """End the open segment, and rewrite the playlists that it has grown, if the disk takes it."""

@@ -1,4 +1,4 @@
-"""Deletes old recordings: segments older than ``record.keep_s``, and the oldest beyond ``record.most_mb``.
+"""Deletes old recordings: segments older than ``record.keep_s``, and the oldest beyond ``record.max_mb``.
 
 Segments that are too old are deleted in several passes, an eighth of them in each, and there is one pass per
 segment: should a clock or a setting be wrong, the log says so while most of them still exist. What exceeds
@@ -18,7 +18,7 @@ from server.service.recording.recording_session import RecordingSegment, Recordi
 log = logging.getLogger(__name__)
 
 SEGMENTS_PER_DISK_QUOTA = 8
-"""A segment takes at most this part of ``record.most_mb``: only whole segments are deleted."""
+"""A segment takes at most this part of ``record.max_mb``: only whole segments are deleted."""
 _MEGA = 1_000_000
 _PASSES = 8
 _MIN_SEGMENTS_PER_PASS = 10
@@ -31,7 +31,7 @@ class RetentionLimits:
     """How much is kept."""
 
     keep_s: float
-    most_mb: float
+    max_mb: float
     segment_s: float
     trust_clock: bool = False
     """Whether the time that the machine was off counts by its own clock, synchronized or not."""
@@ -86,7 +86,7 @@ class RetentionPolicy:
     def expired(self, sessions: Sequence[RecordingSession]) -> ExpiredSegments:
         """Return what must be deleted of sessions that are sorted by age."""
         oldest = self._now() - self._limits.keep_s
-        most = self._limits.most_mb * _MEGA
+        most = self._limits.max_mb * _MEGA
         excess = sum(session.size for session in sessions) - (most - most / SEGMENTS_PER_DISK_QUOTA)
         old = sum(it.written < oldest and not it.is_stuck for session in sessions for it in session.segments)
         quota = self._quota(old)
@@ -119,7 +119,7 @@ class RetentionPolicy:
             f"{count} {reason}"
             for count, reason in (
                 (self._unlogged_old, f"older than record.keep_s ({self._limits.keep_s:.0f} s)"),
-                (self._unlogged_beyond_size, f"beyond record.most_mb ({self._limits.most_mb:.0f} MB)"),
+                (self._unlogged_beyond_size, f"beyond record.max_mb ({self._limits.max_mb:.0f} MB)"),
             )
             if count
         ]

@@ -78,7 +78,7 @@ class Splicer:
         }
         self._decided = {camera: self._stream() for camera in frame_buffers}
         """Each camera, as late as the best views."""
-        self._presence = PresenceLog(round(config.access.unseen_s * site.fps))
+        self._presence = PresenceLog(round(config.access.hide_after_s * site.fps))
         self._has_scoped = config.access.tokens is not None
         self._persons = PersonStreams(self._stream)
         self._scoped = PersonStreams(self._stream, self._presence.presence_of)

@@ -98,9 +98,9 @@ class CrossViewInference:
             frame[there], floor.cameras[camera[each]], told.who[of[each]], quality[each], tested
         )
 
-    def learn(self, unfound: UndetectedViews, frames: int) -> None:
+    def learn(self, undetected: UndetectedViews, frames: int) -> None:
         """Learn from the first frames of an outlook, which are decided now."""
-        tested = unfound.tested
+        tested = undetected.tested
         of = np.flatnonzero(tested.frame < frames)
         if not of.size:  # nothing is forgotten either while nobody is there
             return

@@ -128,7 +128,7 @@ class ViewDecider:
         self.switch_cost = view.switch_cost_s * fps
         self.least_shot = -(-round(view.min_shot_s * fps) // self._config.encode.gop)
         """GOPs that a shot lasts at least."""
-        self._goes_on = view.goes_on_s * fps
+        self._extrapolated_frames = view.extrapolate_s * fps
 
     def step(self, epoch: Epoch) -> list[GopDecision]:
         """Take an epoch in; give the GOPs whose look-ahead it completes.
@@ -175,15 +175,15 @@ class ViewDecider:
             last,
             relative=self._config.view.quality.relative,
             lately=self._lately,
-            lasts=self._config.view.missed_s * self._config.site.fps,
-            elsewhere=self._elsewhere if self._config.view.unfound else None,
-            unfound=self._config.view.unfound,
+            lasts=self._config.view.presence_decay_s * self._config.site.fps,
+            elsewhere=self._elsewhere if self._config.view.undetected_weight else None,
+            undetected_weight=self._config.view.undetected_weight,
         )
 
     def _weight(self, lookahead: int) -> Floats:
         """Return how many frames each frame of the look-ahead stands for: the last one counts for longer."""
         weight, last = np.ones(lookahead), max(1, lookahead // _LAST)
-        weight[-last:] += self._goes_on / last
+        weight[-last:] += self._extrapolated_frames / last
         return weight
 
     def _decide(self, outlook: LookaheadWindow, first: int, frames: int, weight: Floats) -> GopDecision:

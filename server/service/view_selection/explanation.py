@@ -27,9 +27,9 @@ class ViewExplanation:
     """Mean over these; None: there are none."""
     terms: dict[str, float]
     """What the quality is made of: mean of each term that weighs something; empty where there are none."""
-    unfound: float
+    undetected: float
     """Share of the frames in which it does not find the person, who stands before it as others know."""
-    unfound_quality: float | None
+    undetected_quality: float | None
     """What those views are taken to be worth, likewise; None: there are none."""
 
 
@@ -78,8 +78,8 @@ class SelectionReasons:
         """
         views, cameras = self.part.views(number), self.part.outlook.cameras
         columns = self.part.outlook.views.camera[views]
-        unfound = self.part.unfound(number)
-        others = self.part.outlook.unfound.camera[unfound]
+        undetected = self.part.undetected(number)
+        others = self.part.outlook.undetected.camera[undetected]
         each = self.part.cost(number)
         cost, mean = (each * self.weight[:, None]).sum(axis=0), each.mean(axis=0)
         before = int(self.before[self.part.numbers == number][0])
@@ -90,7 +90,7 @@ class SelectionReasons:
         return Explanation(
             frames=self.part.frames,
             views={
-                name: self._view(views[columns == place], unfound[others == place], mean[place])
+                name: self._view(views[columns == place], undetected[others == place], mean[place])
                 for place, name in enumerate(cameras)
             },
             weights={name: self.settings.weights[name] for name in self.settings.terms},
@@ -100,7 +100,7 @@ class SelectionReasons:
             switch_cost=self.switch_cost,
         )
 
-    def _view(self, views: Ints, unfound: Ints, mean: float) -> ViewExplanation:
+    def _view(self, views: Ints, undetected: Ints, mean: float) -> ViewExplanation:
         """Return what one camera had to say of a person: where it finds them, and where it does not."""
         outlook = self.part.outlook
         terms = [outlook.terms(int(view)) for view in views]
@@ -111,8 +111,10 @@ class SelectionReasons:
             terms=dict(zip(self.settings.terms, np.mean(terms, axis=0).tolist(), strict=True))
             if terms
             else {},
-            unfound=len(unfound) / self.part.frames,
-            unfound_quality=float(np.mean(outlook.unfound.quality[unfound])) if unfound.size else None,
+            undetected=len(undetected) / self.part.frames,
+            undetected_quality=float(np.mean(outlook.undetected.quality[undetected]))
+            if undetected.size
+            else None,
         )
 
 

@@ -45,7 +45,7 @@ class LookaheadWindow:
         lately: RecentViews = NOTHING,
         lasts: float = 0.0,
         elsewhere: CrossViewInference | None = None,
-        unfound: float = 0.0,
+        undetected_weight: float = 0.0,
     ) -> None:
         self.cameras, self.first = cameras, first
         self.numbers: Ints = np.array(people.known, dtype=np.int64)
@@ -72,7 +72,7 @@ class LookaheadWindow:
         row, person = row[counts], person[counts]
         frame, worth = line.frame[row], np.minimum(self.quality, 1.0)
         found = (frame * len(cameras) + line.camera[row]) * everybody + person
-        self.unfound = other = self.looked.of(mine, everybody, shown, found, unfound)
+        self.undetected = other = self.looked.of(mine, everybody, shown, found, undetected_weight)
         """This outlook's people's views that are worth something though the camera does not find them."""
         extra = np.minimum(other.quality, 1.0)
         if relative:
@@ -133,13 +133,13 @@ class LookaheadPart:
         """
         return self._rows(self.outlook.views, number)
 
-    def unfound(self, number: int) -> Ints:
+    def undetected(self, number: int) -> Ints:
         """Return one person's views in which they are not found, (V,) indices into the outlook's.
 
         Raises:
             KeyError: this part is not about that person.
         """
-        return self._rows(self.outlook.unfound, number)
+        return self._rows(self.outlook.undetected, number)
 
     def cost(self, number: int) -> Floats:
         """Return one person's c(n, b), (N, C); infinite where a camera cannot be shown.

@@ -62,7 +62,7 @@ def test_the_operator_points_at_what_was_on_the_late_screen_once_they_have_react
     truth = _truth()
     shown = _tracks(truth, [[1] * FRAMES, [2] * FRAMES])
     operator = Operator(Person(reaction_s=0.4, error=0.0, delay_s=1.0), Desk(ALL, FPS), truth, FPS, seed=1)
-    operator.hear(60, [RiskEvent("exchange", (2, 1), 55, 0.1, 5, 0.5)])
+    operator.hear(60, [RiskEvent("id_switch", (2, 1), 55, 0.1, 5, 0.5)])
     said = {newest: operator.look(newest, shown) for newest in range(60, 100)}
     assert all(said[newest] is None for newest in range(60, 70))
     first = said[70]
@@ -76,7 +76,7 @@ def test_who_is_under_the_wrong_box_when_the_operator_looks_is_followed_wrongly(
     truth = _truth()
     shown = _tracks(truth, [[2] * FRAMES, [1] * FRAMES])
     operator = Operator(Person(delay_s=0.0), Desk(ALL, FPS), truth, FPS, seed=1)
-    operator.hear(60, [RiskEvent("exchange", (2, 1), 55, 0.1, 5, 0.5)])
+    operator.hear(60, [RiskEvent("id_switch", (2, 1), 55, 0.1, 5, 0.5)])
     for newest in range(60, 80):
         operator.look(newest, shown)
     assert operator.flags[0].fish == 0
@@ -130,7 +130,7 @@ def test_flags_go_to_the_riskiest_and_once_to_the_same_two() -> None:
 
 
 def _trouble(objects: tuple[int, int], frame: int, risk: float) -> RiskEvent:
-    return RiskEvent("exchange", objects, frame, 0.1, 5, risk)
+    return RiskEvent("id_switch", objects, frame, 0.1, 5, risk)
 
 
 RIGHT = [[1] * FRAMES, [2] * FRAMES]
@@ -173,7 +173,7 @@ def test_a_flag_about_others_than_those_who_fail_was_not_needed() -> None:
     assert dict(cases.flags) == {("alone", "not needed"): 1}
 
 
-@pytest.mark.parametrize("reason", ["alike", "fading"])
+@pytest.mark.parametrize("reason", ["crossing", "track_loss"])
 @pytest.mark.parametrize(("others", "kind"), [([], "alone"), ([100], "2 way"), ([98, 104], "3 way")])
 def test_whether_others_were_in_the_way_is_told_by_where_they_were_and_not_by_the_reason(
     others: list[int], kind: Kind, reason: RiskReason

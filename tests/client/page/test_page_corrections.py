@@ -16,7 +16,7 @@ async def test_whoever_is_watched_stays_when_their_number_is_merged(browser: Bro
     async with visiting(browser, query="?object=2") as visit:
         await visit.playing(2)
         site = visit.server.site
-        site.also = {1: [2]}
+        site.aliases = {1: [2]}
         site.people = {1: True}
         await visit.playing(1)
         assert visit.page.url.endswith("?object=1")
@@ -25,7 +25,7 @@ async def test_whoever_is_watched_stays_when_their_number_is_merged(browser: Bro
 
 
 async def test_a_link_to_a_merged_number_opens_on_who_it_is(browser: Browser) -> None:
-    async with visiting(browser, FakeSite(people={1: True}, also={1: [7]}), "?object=7") as visit:
+    async with visiting(browser, FakeSite(people={1: True}, aliases={1: [7]}), "?object=7") as visit:
         await visit.playing(1)
         assert visit.page.url.endswith("?object=1")
 
@@ -34,7 +34,7 @@ async def test_somebody_else_under_the_watched_number_is_named(browser: Browser)
     async with visiting(browser, query="?object=1") as visit:
         await visit.playing(1)
         await expect(visit.page.locator("#notice")).to_be_empty()
-        visit.server.site.split = [{"kept": 1, "parted": 2, "camera": "c0"}]
+        visit.server.site.split = [{"kept": 1, "new_object": 2, "camera": "c0"}]
         await expect(visit.page.locator("#notice")).to_have_text(
             "c0 took somebody else for person 1: that is person 2."
         )

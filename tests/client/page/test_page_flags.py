@@ -19,7 +19,7 @@ pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 def flag(site: FakeSite, seconds: float = 60.0, **changes: Any) -> dict[str, Any]:
     pulse = site.edge + round(25 * seconds)
-    told = {"objects": [2, 1], "cameras": [CAMERAS[2]], "reason": "alike", "pulse": pulse}
+    told = {"objects": [2, 1], "cameras": [CAMERAS[2]], "reason": "crossing", "pulse": pulse}
     return {"id": 1, "raised": site.edge, "margin": 0.5, "risk": 0.5, "state": "raised", **told, **changes}
 
 
@@ -68,7 +68,7 @@ async def test_the_pointer_is_followed_in_the_picture_of_the_camera_in_doubt(bro
         assert told == sorted(set(told)), "every frame once"
         last = points(site)[-1]
         assert (last["x"], last["y"]) == pytest.approx((x, y), abs=1.0)
-        assert 0 < last["reach"] < WIDTH / 4
+        assert 0 < last["tolerance"] < WIDTH / 4
         await visit.page.mouse.click(there, down)
         assert await visit.get("myview.object") == 2, "a press says where they are, and chooses nobody"
         site.flags.append(flag(site, state="answered"))
@@ -110,7 +110,7 @@ async def test_who_follows_somebody_reads_what_for_though_another_flag_is_more_u
         await visit.page.locator("#flag-point").click()
         words = visit.page.locator("#flag-words")
         await expect(words).to_have_text("Follow 2: 2 and 1, alike, cross")
-        site.flags.append(flag(site, 20.0, id=2, objects=[3], reason="fading"))
+        site.flags.append(flag(site, 20.0, id=2, objects=[3], reason="track_loss"))
         await visit.until("myview.flags.length === 2 && myview.flags[0].id === 2")
         await expect(words).to_have_text("Follow 2: 2 and 1, alike, cross")
         await visit.page.locator("#flag-point").click()
@@ -141,7 +141,7 @@ async def test_by_keyboard_one_can_point_at_whoever_is_watched(browser: Browser)
 
 async def test_who_is_watched_can_be_pointed_at_while_a_flag_is_about_others(browser: Browser) -> None:
     site = FakeSite(operates=True)
-    site.flags.append(flag(site, objects=[2], reason="fading"))
+    site.flags.append(flag(site, objects=[2], reason="track_loss"))
     async with visiting(browser, site) as visit:
         await visit.playing(1)
         await visit.until("!document.querySelector('#point').hidden && myview.flags.length === 1")

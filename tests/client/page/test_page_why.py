@@ -36,11 +36,11 @@ async def test_the_present_view_is_explained_camera_by_camera(browser: Browser) 
 
 
 async def test_where_somebody_is_not_found_that_is_a_column_of_its_own(browser: Browser) -> None:
-    async with visiting(browser, FakeSite(unfound=0.25), query="?object=2") as visit:
+    async with visiting(browser, FakeSite(undetected=0.25), query="?object=2") as visit:
         await visit.playing(2)
         await visit.page.keyboard.press("w")
         why = visit.page.locator("#why")
-        await expect(why.locator("thead")).to_have_text("cameracostseesunfoundsizetruncation")
+        await expect(why.locator("thead")).to_have_text("cameracostseesundetectedsizetruncation")
         await expect(why.locator("tr[aria-current]")).to_have_text("c20.001.000.251.001.00")
 
 

@@ -46,7 +46,7 @@ class FakeSite:
     Args:
         bursts: Send whole GOPs at once instead of frame by frame.
         people: Who is known, and whether they are in view.
-        also: Other numbers that somebody once had.
+        aliases: Other numbers that somebody once had.
         split: What every GOP says about numbers that turned out to be somebody else's.
         first_pulse: Pulse of about the moment at which the site is made.
         skipped: Pulses whose frames are missing from every stream.
@@ -59,7 +59,7 @@ class FakeSite:
         past_comes: Set when more of a past is to be sent than its first frame; None: all comes at once.
         ahead: Seconds that the streams run ahead of the clock: minutes pass in no time.
         blind: Pulses, from GOP to GOP, at which the first camera finds nobody.
-        unfound: Share of the look-ahead in which every camera does not find whom others know to be there.
+        undetected: Share of the look-ahead in which every camera does not find whom others know to be there.
         operates: Whoever looks at the page may operate.
         flags: What an operator is asked to look at.
         pointed: Where the operator pointed, as it was sent.
@@ -69,7 +69,7 @@ class FakeSite:
 
     bursts: bool = False
     people: dict[int, bool] = field(default_factory=lambda: {1: True, 2: True})
-    also: dict[int, list[int]] = field(default_factory=dict)
+    aliases: dict[int, list[int]] = field(default_factory=dict)
     split: list[dict[str, Any]] = field(default_factory=list)
     first_pulse: int = STARTS_AT
     skipped: range = range(0)
@@ -82,7 +82,7 @@ class FakeSite:
     past_comes: asyncio.Event | None = None
     ahead: float = 0.0
     blind: range = range(0)
-    unfound: float = 0.0
+    undetected: float = 0.0
     operates: bool = False
     flags: list[dict[str, Any]] = field(default_factory=list)
     pointed: list[dict[str, Any]] = field(default_factory=list)
@@ -129,7 +129,7 @@ class FakeSite:
     def _object(self, person: int, seen: bool) -> dict[str, Any]:
         return {
             "object": person,
-            "also": self.also.get(person, []),
+            "aliases": self.aliases.get(person, []),
             "first_seen": self.first_pulse,
             "last_seen": self.edge if seen else self.first_pulse,
             "visible": seen,
@@ -186,7 +186,7 @@ class FakeSite:
             "costs": costs | {CAMERAS[shown - 1]: None},
             "seen": {camera: 1.0 - cost for camera, cost in costs.items()},
             "quality": {camera: 1.0 - cost for camera, cost in costs.items()},
-            "unfound": dict.fromkeys(CAMERAS, self.unfound),
+            "undetected": dict.fromkeys(CAMERAS, self.undetected),
             "terms": {camera: {"size": 1.0 - cost, "truncation": 1.0} for camera, cost in costs.items()},
             "weights": {"size": 1.0, "truncation": 0.1},
             "before": CAMERAS[shown],
@@ -302,12 +302,12 @@ class SiteServer:
         )
 
     async def _pointing(self, request: web.Request) -> web.Response:
-        taken = 0
+        accepted = 0
         if request.method == "POST":
             said = await request.json()
             self.site.pointed.append(said)
-            taken = len(said["points"])
-        return web.json_response({"cannot": "", "taken": taken, "left_out": 0, "flags": []})
+            accepted = len(said["points"])
+        return web.json_response({"unavailable": "", "accepted": accepted, "too_old": 0, "flags": []})
 
     async def _choice(self, request: web.Request) -> web.Response:
         k, pulse = int(request.match_info["k"]), int(request.query.get("at", f"p{self.site.edge}")[1:])

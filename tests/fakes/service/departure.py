@@ -27,7 +27,7 @@ EPOCHS, GONE = 24, range(4, 16)
 """Epochs that there are, and those in which object 1 is in no camera."""
 UNSEEN = 2 * GOP
 """Frames after which object 1 is not shown any more."""
-ACCESS = {"unseen_s": UNSEEN / FPS}
+ACCESS = {"hide_after_s": UNSEEN / FPS}
 PATIENT = {"viewer_queue_gops": 100}  # with who reads slowly
 GREY = 128
 ELSEWHERE: Box = (40.0, 10.0, 46.0, 28.0)

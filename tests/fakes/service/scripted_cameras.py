@@ -140,7 +140,7 @@ def status(camera: str, **changes: Any) -> Message:
         fps=25.0,
         missed=0,
         shed=0,
-        in_step=True,
+        synchronized=True,
         clock_offset=0.0,
         round_trip=0.001,
     )

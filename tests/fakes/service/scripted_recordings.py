@@ -25,7 +25,7 @@ from server.service.streaming.frame_buffer import FrameBuffer
 A, B = CAMERAS
 FRAMES = 200
 PULSE0 = 1_763_700_000.0
-AMPLE = RetentionLimits(keep_s=1e6, most_mb=1e6, segment_s=1.0)
+AMPLE = RetentionLimits(keep_s=1e6, max_mb=1e6, segment_s=1.0)
 """Nothing is taken away; five GOPs in a segment."""
 
 Picture = NDArray[np.uint8]

@@ -158,7 +158,7 @@ def test_who_is_settled_must_have_been_told_first() -> None:
         ("encode", {"gop": 0}),
         ("http", {"port": 70000}),
         ("view", {"min_shot_s": 1e9}),
-        ("view", {"goes_on_s": float("inf")}),
+        ("view", {"extrapolate_s": float("inf")}),
     ],
 )
 def test_values_out_of_range_are_refused(section: str, value: dict[str, Any]) -> None:
@@ -184,9 +184,9 @@ def test_environment_for_an_unknown_section_is_refused(monkeypatch: pytest.Monke
 def test_a_list_from_the_environment_is_json_and_who_writes_another_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", '["gap"]')
-    assert build_config(site(), where="", folder=Path()).view.flags.reasons == ["gap"]
-    monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", "gap")
+    monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", '["optimality_gap"]')
+    assert build_config(site(), where="", folder=Path()).view.flags.reasons == ["optimality_gap"]
+    monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", "optimality_gap")
     assert "a list, or a whole section, must be JSON" in complaint(site())
 
 

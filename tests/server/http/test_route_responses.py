@@ -223,6 +223,6 @@ async def test_metrics_count_what_happens(busy: Hall) -> None:
     assert 'myview_camera_frames_total{camera="c0"} 15.0' in lines
     assert 'myview_camera_missed_total{camera="c0"} 3.0' in lines
     assert 'myview_camera_live{camera="c1"} 1.0' in lines
-    assert 'myview_camera_unheard_total{camera="c0"} 2.0' in lines
-    assert 'myview_camera_unheard_total{camera="c1"} 0.0' in lines
+    assert 'myview_camera_without_peers_total{camera="c0"} 2.0' in lines
+    assert 'myview_camera_without_peers_total{camera="c1"} 0.0' in lines
     assert 'myview_camera_clock_offset_seconds{camera="c0"} 0.25' in lines

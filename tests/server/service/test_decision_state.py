@@ -31,7 +31,7 @@ def test_a_decision_is_told_with_its_cuts_and_corrections() -> None:
     assert told.choices == {1: "c1", 2: "c0"}
     assert told.cuts == [ViewCut(object=1, pulse=20, from_camera="c0", to_camera="c1")]
     assert told.merged == [PersonMerge(kept=1, lost=5)]
-    assert told.split == [PersonSplit(kept=2, parted=3, camera="c1")]
+    assert told.split == [PersonSplit(kept=2, new_object=3, camera="c1")]
 
 
 def decided(board: Board, first: int, numbers: tuple[int, ...] = (1, 2)) -> Counted:

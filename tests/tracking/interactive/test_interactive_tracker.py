@@ -77,7 +77,7 @@ def test_two_alike_who_are_about_to_cross_are_foreseen_and_two_others_are_not() 
             (it.last, trouble.frame)
             for it in results
             for trouble in it.risk_events
-            if trouble.reason == "alike"
+            if trouble.reason == "crossing"
         ]
 
     warned = foreseen(ALIKE)
@@ -91,7 +91,7 @@ def test_two_alike_who_are_about_to_cross_are_foreseen_and_two_others_are_not() 
 def test_who_vanishes_with_nobody_near_is_foreseen_to_be_lost() -> None:
     gone = Stroll(200, 50, 1.0, 2, seen=range(40))
     results = follow([seen_at([ALIKE[0], gone], n, 0.5) for n in range(60)], _helped())
-    fading = [trouble for it in results for trouble in it.risk_events if trouble.reason == "fading"]
+    fading = [trouble for it in results for trouble in it.risk_events if trouble.reason == "track_loss"]
     assert fading
     assert {trouble.objects for trouble in fading} == {(2,)}
     assert all(40 <= trouble.frame < 60 for trouble in fading)

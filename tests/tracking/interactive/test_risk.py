@@ -25,7 +25,9 @@ def test_a_risk_is_a_probability_and_no_larger_where_the_tracker_is_surer(reason
 
 
 def test_the_longer_somebody_is_hidden_the_likelier_they_are_lost() -> None:
-    risks = [failure_probability("fading", RiskFeatures(0.0, -hidden, hidden)) for hidden in (5, 10, 20, 40)]
+    risks = [
+        failure_probability("track_loss", RiskFeatures(0.0, -hidden, hidden)) for hidden in (5, 10, 20, 40)
+    ]
     assert all(one < other for one, other in pairwise(risks))
 
 

@@ -51,10 +51,10 @@ export class Flags {
  */
 export function words({ objects, reason }, called) {
   const who = objects.map(called).join(' and ');
-  if (reason === 'fading') return `${who} fades, or is lost from sight`;
-  if (reason === 'gap') return `It is not sure who is ${objects.map(called).join(', and who is ')}`;
+  if (reason === 'track_loss') return `${who} fades, or is lost from sight`;
+  if (reason === 'optimality_gap') return `It is not sure who is ${objects.map(called).join(', and who is ')}`;
   if (objects.length < 2) return `${who} may be taken for somebody else`;
-  return reason === 'alike' ? `${who}, alike, cross` : `${who} may be taken for each other`;
+  return reason === 'crossing' ? `${who}, alike, cross` : `${who} may be taken for each other`;
 }
 
 /**

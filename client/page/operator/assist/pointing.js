@@ -17,7 +17,7 @@ const STEP = 8; // CSS pixels that an arrow moves the cross by; with shift four 
 /** @type {Record<string, [number, number]>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
-/** @typedef {{x: number, y: number, reach: number}} Place CSS pixels from the corner of the stage */
+/** @typedef {{x: number, y: number, tolerance: number}} Place CSS pixels from the corner of the stage */
 
 export class Pointing {
   /** @type {number | null} at whom; null: it is off */
@@ -58,7 +58,7 @@ export class Pointing {
 
   /** Ask whether the server would take it. */
   async look() {
-    this.possible = await ask('pointing').then(({ cannot }) => cannot === '', () => false);
+    this.possible = await ask('pointing').then(({ unavailable }) => unavailable === '', () => false);
     if (!this.possible) this.end();
   }
 
@@ -87,8 +87,8 @@ export class Pointing {
   #move({ clientX, clientY, pointerType }, gone = false) {
     if (this.object === null) return;
     const { left, top } = this.stage.getBoundingClientRect();
-    const reach = pointerType === 'touch' ? REACH.touch : REACH.other;
-    this.#put(gone ? null : { x: clientX - left, y: clientY - top, reach });
+    const tolerance = pointerType === 'touch' ? REACH.touch : REACH.other;
+    this.#put(gone ? null : { x: clientX - left, y: clientY - top, tolerance });
   }
 
   /** @param {PointerEvent} event */
@@ -107,7 +107,7 @@ export class Pointing {
       const [x, y] = ARROWS[key].map((way) => way * STEP * (shiftKey ? 4 : 1));
       const at = this.#at ?? this.#start();
       const { width, height } = this.stage.getBoundingClientRect();
-      this.#put({ x: within(at.x + x, width), y: within(at.y + y, height), reach: REACH.other });
+      this.#put({ x: within(at.x + x, width), y: within(at.y + y, height), tolerance: REACH.other });
     } else if (key === 'Enter' && !pressed && this.#at) this.#sample(this.#at);
     else if (key === 'Escape') this.end();
     else return;
@@ -120,9 +120,9 @@ export class Pointing {
     const { site, now } = this.viewer;
     const { width, height } = this.stage.getBoundingClientRect();
     const box = now.boxes.find(([object]) => object === this.object);
-    if (!site || !box) return { x: width / 2, y: height / 2, reach: REACH.other };
+    if (!site || !box) return { x: width / 2, y: height / 2, tolerance: REACH.other };
     const [, left, top, right, bottom] = box;
-    return { ...this.overlay.onScreen((left + right) / 2, (top + bottom) / 2, site), reach: REACH.other };
+    return { ...this.overlay.onScreen((left + right) / 2, (top + bottom) / 2, site), tolerance: REACH.other };
   }
 
   /** @param {Place | null} at */
@@ -133,13 +133,13 @@ export class Pointing {
   }
 
   /** @param {Place} at in the frame that is shown */
-  #sample({ x, y, reach }) {
+  #sample({ x, y, tolerance }) {
     const { site, probe, now, player } = this.viewer;
     if (this.object === null || !site || !now.mapped || player.landing) return;
     if (probe.pulse === null || probe.camera === null) return;
     const { scale, ...place } = this.overlay.inPicture(x, y, site);
     if (!(place.x >= 0 && place.x <= site.width && place.y >= 0 && place.y <= site.height)) return;
-    this.#samples.add(this.object, probe.camera, { pulse: probe.pulse, ...place, reach: reach / scale });
+    this.#samples.add(this.object, probe.camera, { pulse: probe.pulse, ...place, tolerance: tolerance / scale });
   }
 
   async #send() {
@@ -147,8 +147,8 @@ export class Pointing {
     this.#sending = true;
     try {
       for (let said = this.#samples.take(); said; said = this.#samples.take()) {
-        const { taken } = await ask('pointing', 'POST', said);
-        this.taken += taken;
+        const { accepted } = await ask('pointing', 'POST', said);
+        this.taken += accepted;
         this.tell(null);
       }
     } catch (error) {

@@ -5,7 +5,7 @@
  * @property {number} pulse
  * @property {number} x pixels of the site's picture
  * @property {number} y
- * @property {number} reach how far off it may be
+ * @property {number} tolerance how far off it may be
  *
  * @typedef {object} Said
  * @property {number} object

@@ -31,7 +31,7 @@ test('what was said of a number before it was merged is said of whom it was', ()
   decisions.add({ first: 0, frames: 1, choices: { 4: 'a' }, boxes: /** @type {any} */ (boxes), cuts: [] });
   decisions.add({ first: 1, frames: 1, choices: { 1: 'b' }, boxes: {}, cuts: [] });
   assert.equal(decisions.camera(1, 0), null);
-  decisions.rename([{ object: 1, also: [4, 7] }, { object: 2 }]);
+  decisions.rename([{ object: 1, aliases: [4, 7] }, { object: 2 }]);
   assert.equal(decisions.camera(1, 0), 'a');
   assert.deepEqual(decisions.boxes('a', 0), [[1, 1, 2, 3, 4], [2, 0, 0, 1, 1]]);
   assert.deepEqual(decisions.runs(1, 0).map((it) => it.camera), ['a', 'b']);

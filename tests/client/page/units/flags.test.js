@@ -8,7 +8,7 @@ const FPS = 25;
 /** @param {object} [changes] */
 function flag(changes) {
   return /** @type {any} */ ({
-    id: 1, objects: [7, 9], cameras: ['c0'], reason: 'alike', pulse: 100, raised: 80, margin: 0.4, risk: 0.4, state: 'raised', ...changes,
+    id: 1, objects: [7, 9], cameras: ['c0'], reason: 'crossing', pulse: 100, raised: 80, margin: 0.4, risk: 0.4, state: 'raised', ...changes,
   });
 }
 
@@ -42,10 +42,10 @@ test('of somebody the most urgent flag that they are in is found, whatever other
 test('it is said who, what and when', () => {
   const called = (/** @type {number} */ it) => (it === 7 ? '7 Ann' : String(it));
   assert.equal(words(flag(), called), '7 Ann and 9, alike, cross');
-  assert.equal(words(flag({ reason: 'exchange' }), called), '7 Ann and 9 may be taken for each other');
-  assert.equal(words(flag({ reason: 'exchange', objects: [9] }), called), '9 may be taken for somebody else');
-  assert.equal(words(flag({ reason: 'fading', objects: [7] }), called), '7 Ann fades, or is lost from sight');
-  assert.equal(words(flag({ reason: 'gap' }), called), 'It is not sure who is 7 Ann, and who is 9');
+  assert.equal(words(flag({ reason: 'id_switch' }), called), '7 Ann and 9 may be taken for each other');
+  assert.equal(words(flag({ reason: 'id_switch', objects: [9] }), called), '9 may be taken for somebody else');
+  assert.equal(words(flag({ reason: 'track_loss', objects: [7] }), called), '7 Ann fades, or is lost from sight');
+  assert.equal(words(flag({ reason: 'optimality_gap' }), called), 'It is not sure who is 7 Ann, and who is 9');
 });
 
 test('the time left is that of who looks at a frame that was taken a while ago', () => {

@@ -25,7 +25,7 @@ for (const [seen, shown] of CASES) {
 
 test('who once had another number is seen under it', () => {
   const decisions = new Decisions(25);
-  decisions.rename([{ object: 1, also: [7] }]);
+  decisions.rename([{ object: 1, aliases: [7] }]);
   decisions.add({ first: 0, frames: 1, choices: { 7: 'c1' }, boxes: { c0: [[[7, 1, 1, 9, 9]]] }, cuts: [] });
   assert.equal(decisions.preferring(1, 'c0', 0), 'c0');
 });

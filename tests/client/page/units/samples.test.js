@@ -4,7 +4,7 @@ import test from 'node:test';
 import { Samples } from '../../../../client/page/operator/assist/pointing_samples.js';
 
 /** @param {number} pulse */
-const at = (pulse, x = 10) => ({ pulse, x, y: 20, reach: 5 });
+const at = (pulse, x = 10) => ({ pulse, x, y: 20, tolerance: 5 });
 
 test('what is pointed at in one camera goes together, in order, and is sent once', () => {
   const samples = new Samples();

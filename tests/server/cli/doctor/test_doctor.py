@@ -267,7 +267,7 @@ def test_a_cameras_password_is_not_shown(tmp_path: Path, taken: int) -> None:
 
 
 def test_what_a_recording_takes_is_held_against_the_disk(tmp_path: Path) -> None:
-    record: dict[str, Any] = {"folder": "kept", "keep_s": 3600.0, "most_mb": 1e6}
+    record: dict[str, Any] = {"folder": "kept", "keep_s": 3600.0, "max_mb": 1e6}
     probes = {"c0": CameraProbe(size=(WIDTH, HEIGHT), kbps=1000.0)}
     small = config(tmp_path, record=record)
     assert needed_mb(small, probes) == pytest.approx((1000 + 8 * 100 * 25 / 1000) * 3600 / 8000)
@@ -275,13 +275,13 @@ def test_what_a_recording_takes_is_held_against_the_disk(tmp_path: Path) -> None
     assert not (tmp_path / "kept").exists()
     huge = {"c0": CameraProbe(size=(WIDTH, HEIGHT), kbps=1e12)}
     assert (
-        only(disk_findings(config(tmp_path, record={**record, "most_mb": 1e12}), huge), "disk").level
+        only(disk_findings(config(tmp_path, record={**record, "max_mb": 1e12}), huge), "disk").level
         is Level.BAD
     )
     capped = config(tmp_path, record=record, encode={"max_kbps": 500})
     assert needed_mb(capped, huge) == pytest.approx((500 + 20) * 3600 / 8000)
-    less = disk_findings(config(tmp_path, record={**record, "most_mb": 46.0}), probes)
-    assert "about 6 minutes are kept" in only(less, "record.most_mb").text
+    less = disk_findings(config(tmp_path, record={**record, "max_mb": 46.0}), probes)
+    assert "about 6 minutes are kept" in only(less, "record.max_mb").text
 
 
 def test_what_a_running_site_removes_meanwhile_is_not_counted(

@@ -70,9 +70,9 @@ def test_what_is_known_not_to_fit_is_bad_whatever_else_comes(tmp_path: Path) -> 
     large = CameraProbe(size=(64, 48), kbps=10_000.0)
     findings = disk_findings(site(tmp_path, ("c0", "c1")), {"c0": AWAY, "c1": large})
     assert of(findings, "disk").level is Level.BAD
-    small = site(tmp_path, ("c0", "c1"), record={"folder": "kept", "keep_s": HOUR_S, "most_mb": 46.0})
+    small = site(tmp_path, ("c0", "c1"), record={"folder": "kept", "keep_s": HOUR_S, "max_mb": 46.0})
     findings = disk_findings(small, {"c0": AWAY, "c1": GOOD})
-    assert "at most 6 minutes are kept" in of(findings, "record.most_mb").text
+    assert "at most 6 minutes are kept" in of(findings, "record.max_mb").text
 
 
 def test_a_cap_of_the_encoder_is_what_a_camera_takes_that_was_not_tried(tmp_path: Path) -> None:

@@ -44,14 +44,14 @@ def printed(now: client.SiteNow, rates: Rates = Rates(), notice: str = "") -> st
 
 async def test_a_site_is_shown_as_it_is(busy: Hall) -> None:
     solve = SolverReport(objective=-4.0, bound=-4.0, gap=0.0, integral=True, rounds=1)
-    busy.service.intake.status(status(A, fps=24.5, missed=3, shed=2, waiting=7, in_step=False))
+    busy.service.intake.status(status(A, fps=24.5, missed=3, shed=2, waiting=7, synchronized=False))
     busy.service.intake.tracks(tracks(word(A, 2, {}, solve=solve, solved_at=0.25)))
     busy.service.decider.people.registry.names[1] = "Ann"
     now = await client.status(url(busy))
     assert (now.name, now.ready, now.why, now.pulse) == ("hall", True, "2 of 2 cameras", 14)
     one, two = now.cameras
     assert (one.camera, one.state, one.fps, one.missed, one.shed, one.waiting) == (A, "live", 24.5, 3, 2, 7)
-    assert (one.certified, one.tracking_delay_s, one.in_step) == (1.0, 0.25, False)
+    assert (one.certified, one.tracking_delay_s, one.synchronized) == (1.0, 0.25, False)
     assert (two.camera, two.certified, two.waiting) == (B, None, None)
     ann, other = now.people
     assert (ann.name, ann.camera, ann.cameras, ann.since_s) == ("Ann", B, (A, B), 10 / FPS)

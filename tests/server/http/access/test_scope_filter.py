@@ -104,8 +104,8 @@ async def test_flags_are_of_who_may_be_seen_alone(site: Hall, monkeypatch: pytes
         "server.service.operator_assist.flag_budget._ONE_S", -1.0
     )  # both have a flag, though they are of one
     troubles = [
-        RiskEvent(reason="alike", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
-        RiskEvent(reason="fading", tracks=[2], pulse=19, margin=0.5, risk=0.5),
+        RiskEvent(reason="crossing", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
+        RiskEvent(reason="track_loss", tracks=[2], pulse=19, margin=0.5, risk=0.5),
     ]
     said = word(A, 3, {1: SMALL, 2: SMALL}, risk_events=troubles)
     async with site.session.get("/api/events", headers=bearer("family")) as theirs:

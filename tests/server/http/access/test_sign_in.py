@@ -134,7 +134,7 @@ def test_which_addresses_are_this_machine(address: str, here: bool) -> None:
     assert is_local_request(request.clone(remote=address)) == here
 
 
-@pytest.mark.parametrize("path", [SESSION, "/api/operator/choosing"])
+@pytest.mark.parametrize("path", [SESSION, "/api/operator/view_selection"])
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
 async def test_no_page_of_another_site_learns_or_changes_anything(hall: Hall, site: str, path: str) -> None:
     assert (await asked(hall, path, Sec_Fetch_Site=site))[0] == 403

@@ -66,7 +66,7 @@ async def test_everybody_is_listed_with_who_shows_and_who_sees_them(busy: Hall) 
     assert one == {
         "object": 1,
         "name": None,
-        "also": [],
+        "aliases": [],
         "first_seen": 0,
         "last_seen": 14,
         "visible": True,
@@ -89,7 +89,7 @@ async def test_the_cameras_are_listed_with_how_they_are(busy: Hall) -> None:
         "missed": 3,
         "shed": 2,
         "load_level": 2,
-        "in_step": True,
+        "synchronized": True,
         "message": "",
     }
     assert c1["state"] == "live"
@@ -137,8 +137,8 @@ async def test_a_choice_is_explained(busy: Hall) -> None:
         "camera": B,
         "since": 0,
         "seen": {A: 1.0, B: 1.0},
-        "unfound": {A: 0.0, B: 0.0},
-        "unfound_quality": {A: None, B: None},
+        "undetected": {A: 0.0, B: 0.0},
+        "undetected_quality": {A: None, B: None},
         "before": B,
         "lookahead": 2 * GOP,
         "cut_to": A,

@@ -58,18 +58,18 @@ async def test_a_cameras_stages_are_measured_by_its_own_times(hall: Hall) -> Non
 async def test_what_a_camera_says_of_itself_is_there_once_it_has_said_it(busy: Hall) -> None:
     before = await samples(busy)
     assert ("myview_camera_waiting_frames", A) not in before
-    busy.service.intake.status(status(A, waiting=7, fps=12.5, in_step=False))
+    busy.service.intake.status(status(A, waiting=7, fps=12.5, synchronized=False))
     told = await samples(busy)
     assert told["myview_camera_waiting_frames", A] == 7
     assert told["myview_camera_fps", A] == 12.5
-    assert told["myview_camera_in_step", A] == 0
+    assert told["myview_camera_synchronized", A] == 0
 
 
 async def test_messages_that_were_not_understood_are_counted_whoever_heard_them(hall: Hall) -> None:
     hall.service.intake.tracks(Message(ZenohKeys("hall").camera(A, "tracks"), b"{", b""))
     hall.service.intake.status(status(B, bad_messages=3))
     told = {key[1:]: value for key, value in (await samples(hall)).items() if key[0] == _BAD}
-    assert told == {(A, "sent"): 1, (B, "sent"): 0, (B, "heard"): 3}
+    assert told == {(A, "sent"): 1, (B, "sent"): 0, (B, "received"): 3}
 
 
 def test_the_alert_is_about_both() -> None:

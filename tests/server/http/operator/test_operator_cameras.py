@@ -24,13 +24,13 @@ async def test_every_camera_is_told_with_what_is_measured(busy: Hall) -> None:
     assert (first["clock_offset"], told[1]["clock_offset"]) == (0.25, None)
     assert first["sync_error"] == {"median": 0.0, "worst": 0.0}
     assert first["picture"] == {"width": 64, "height": 48, "scale": 1.0, "left": 0.0, "top": 0.0}
-    assert (first["certified"], first["windows"], first["last_trouble"]) == (None, 0, None)
+    assert (first["certified"], first["windows"], first["last_error"]) == (None, 0, None)
 
 
 async def test_what_went_wrong_last_is_told_until_something_else_does(busy: Hall) -> None:
     async def trouble() -> str:
         camera = (await busy.get_json("/api/operator/cameras"))["cameras"][0]
-        return str(camera["last_trouble"]["text"])
+        return str(camera["last_error"]["text"])
 
     intake = busy.service.intake
     intake.status(Message(ZenohKeys("hall").camera(A, "status"), b"{}", b""))

@@ -51,16 +51,16 @@ def at(pulse: int, x: float = 12.0, y: float = 20.0, **more: float) -> dict[str,
 
 async def test_the_camera_is_told_by_its_own_track(helped: Hall) -> None:
     told = sent(helped)
-    status, answer = await say(helped, at(2), at(7, reach=3.0), object=2)
-    assert (status, answer["taken"], answer["left_out"], answer["flags"]) == (200, 2, 0, [])
+    status, answer = await say(helped, at(2), at(7, tolerance=3.0), object=2)
+    assert (status, answer["accepted"], answer["too_old"], answer["flags"]) == (200, 2, 0, [])
     [(camera, said)] = told
     assert (camera, said.boot) == (A, 1)
     assert [(it.pulse, it.track, it.x, it.y) for it in said.points] == [(2, 2, 12, 20), (7, 2, 12, 20)]
     assert [it.tolerance for it in said.points] == [pytest.approx(0.02 * WIDTH), 3.0]
     status, answer = await say(helped, at(7), camera=B)
-    assert (status, answer["taken"]) == (200, 1)
+    assert (status, answer["accepted"]) == (200, 1)
     assert told[1][0] == B
-    assert (await say(helped, at(7, reach=1e-200)))[0] == 200
+    assert (await say(helped, at(7, tolerance=1e-200)))[0] == 200
     assert told[2][1].points[0].tolerance == 1.0, (
         "nobody points better than a pixel, and squares of this are 0"
     )
@@ -71,7 +71,7 @@ async def test_what_is_too_long_ago_is_left_out_and_said(helped: Hall) -> None:
         helped.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
     told = sent(helped)
     status, answer = await say(helped, at(2), at(30))
-    assert (status, answer["taken"], answer["left_out"]) == (200, 1, 1)
+    assert (status, answer["accepted"], answer["too_old"]) == (200, 1, 1)
     assert [it.pulse for it in told[0][1].points] == [30]
     assert (await say(helped, at(2)))[0] == 409
     assert len(told) == 1
@@ -88,7 +88,7 @@ async def test_what_is_too_long_ago_is_left_out_and_said(helped: Hall) -> None:
         ({"points": [at(1, x=WIDTH + 1)]}, 400, f"is not in a picture of {WIDTH}x{HEIGHT}"),
         ({"points": [at(1, y=-1)]}, 400, "is not in a picture"),
         ({"points": [at(999)]}, 400, "pulse 999 has not come yet"),
-        ({"points": [at(1, reach=0)]}, 400, "> 0"),
+        ({"points": [at(1, tolerance=0)]}, 400, "> 0"),
         ({"points": [{"pulse": -1, "x": 1, "y": 1}]}, 400, ">= 0"),
         ({"who": 1}, 400, "unknown field"),
     ],
@@ -114,14 +114,14 @@ async def test_another_sites_page_cannot_point(helped: Hall) -> None:
 async def test_where_no_camera_takes_it_that_is_said(busy: Hall) -> None:
     status, answer = await say(busy, at(7))
     assert (status, answer["error"]) == (409, "no camera takes a pointing: track.assist.enabled is off")
-    assert (await busy.get_json(POINTING))["cannot"] == answer["error"]
+    assert (await busy.get_json(POINTING))["unavailable"] == answer["error"]
 
 
 async def test_a_flag_is_raised_followed_answered_and_counted(helped: Hall) -> None:
     expected = 4 * STRIDE
-    trouble = RiskEvent(reason="alike", tracks=[1, 2], pulse=expected, margin=0.1, risk=0.5)
-    nobody = [RiskEvent(reason="gap", tracks=[], pulse=17, margin=0.0, risk=0.5)]
-    nobody += [RiskEvent(reason="fading", tracks=[77], pulse=17, margin=0.0, risk=0.5)]
+    trouble = RiskEvent(reason="crossing", tracks=[1, 2], pulse=expected, margin=0.1, risk=0.5)
+    nobody = [RiskEvent(reason="optimality_gap", tracks=[], pulse=17, margin=0.0, risk=0.5)]
+    nobody += [RiskEvent(reason="track_loss", tracks=[77], pulse=17, margin=0.0, risk=0.5)]
     helped.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, risk_events=[*nobody, trouble])))
     helped.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
     helped.service.pulse = 4 * STRIDE - 1
@@ -146,7 +146,7 @@ async def test_a_flag_is_raised_followed_answered_and_counted(helped: Hall) -> N
         'myview_flags_total{state="answered"} 1.0',
         'myview_flags_total{state="expired"} 0.0',
         "myview_flags_open 0.0",
-        "myview_pointings_total 2.0",
+        "myview_operator_points_total 2.0",
     ):
         assert line in lines
 

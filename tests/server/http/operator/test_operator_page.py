@@ -184,7 +184,7 @@ async def test_flags_are_listed_with_what_has_become_of_them(browser: Browser) -
         await expect(page.locator("#flag-none")).to_have_text("None so far.")
         see(hall)
         hall.service.decider.people.registry.set_name(1, "Ann")
-        trouble = RiskEvent(reason="alike", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
+        trouble = RiskEvent(reason="crossing", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
         hall.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, risk_events=[trouble])))
         hall.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
         hall.service.pulse = 19
@@ -342,7 +342,7 @@ async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes
         await expect(page.get_by_role("button", name="Finish")).to_be_disabled()
         await page.get_by_role("button", name="Start the walk").click()
         await expect(state).to_have_text("Walk now. 0:00 minutes so far.")
-        await expect(page.locator("#walk-lacking li")).to_have_count(len(CAMERAS))
+        await expect(page.locator("#walk-uncovered li")).to_have_count(len(CAMERAS))
         for said in words(hall.service.config, curved(500)):
             walking.take(said)
         await expect(state).to_have_text("Walk now. 0:20 minutes so far.")

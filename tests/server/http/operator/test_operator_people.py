@@ -76,7 +76,7 @@ async def test_two_that_are_one_are_one_to_everybody_from_the_next_gop_on(real: 
     assert [(it.kept, it.lost) for gop in told for it in gop.merged] == [(kept, lost)]
     people = await objects(real)
     assert lost not in people
-    assert people[kept]["also"] == [lost]
+    assert people[kept]["aliases"] == [lost]
     assert people[kept]["name"] == "Bob"
     assert (await real.get_json(f"/api/objects/{lost}/choice"))["object"] == kept
     assert (await say(real, object=kept, merge=lost))[0] == 400
@@ -87,12 +87,12 @@ async def test_whom_a_camera_shows_is_somebody_new_to_everybody(real: Hall) -> N
     assert who is not None
     told: list[Any] = []
     real.service.on_decision.append(told.append)
-    status, answer = await say(real, object=who, part=[A])
+    status, answer = await say(real, object=who, split=[A])
     assert status == 200
-    new = answer["parted"]
+    new = answer["new_object"]
     for epoch in range(3, 8):
         feed(real, epoch)
-    splits = [(it.kept, it.parted, it.camera) for gop in told for it in gop.split]
+    splits = [(it.kept, it.new_object, it.camera) for gop in told for it in gop.split]
     assert splits == [(who, new, A)]
     assert A in (await objects(real))[new]["cameras"]
     assert (await real.get_json(f"/api/objects/{new}/choice"))["camera"] is not None
@@ -104,9 +104,9 @@ async def test_whom_a_camera_shows_is_somebody_new_to_everybody(real: Hall) -> N
         ({"object": 9, "name": "Ann"}, 404, "there is no object 9"),
         ({"object": 1, "merge": 9}, 404, "there is no object 9"),
         ({"object": 1, "merge": 1}, 400, "object 1 is object 1 already"),
-        ({"object": 1, "part": ["c9"]}, 404, "there is no camera 'c9'; there are c0, c1"),
-        ({"object": 1}, 400, "say one thing at a time: name, merge or part"),
-        ({"object": 1, "name": "Ann", "merge": 2}, 400, "say one thing at a time: name, merge or part"),
+        ({"object": 1, "split": ["c9"]}, 404, "there is no camera 'c9'; there are c0, c1"),
+        ({"object": 1}, 400, "say one thing at a time: name, merge or split"),
+        ({"object": 1, "name": "Ann", "merge": 2}, 400, "say one thing at a time: name, merge or split"),
         ({"object": 1, "name": 41 * "x"}, 400, "name: at most 40 letters that can be read"),
         ({"object": 1, "name": "a\u202eb"}, 400, "name: at most 40 letters that can be read"),
         ({"object": "1"}, 400, "the request's JSON: "),
@@ -125,4 +125,4 @@ async def test_services_that_share_a_site_agree_who_is_who_by_themselves() -> No
         hall = await anext(halls)
         status, told = await say(hall, object=1, name="Ann")
         assert status == 409
-        assert (await hall.get_json(PEOPLE))["cannot"] == told["error"]
+        assert (await hall.get_json(PEOPLE))["unavailable"] == told["error"]

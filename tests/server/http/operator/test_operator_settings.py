@@ -19,7 +19,7 @@ from server.http.access.csrf import CSRF_HEADER
 from server.http.operator.settings import settings_of
 from server.service.view_selection.decider import ViewDecider
 
-CHOOSING = "/api/operator/choosing"
+CHOOSING = "/api/operator/view_selection"
 MINE = {CSRF_HEADER: "1"}
 WIDE = {"site": {"width": 128, "height": 96}}
 

@@ -51,7 +51,7 @@ def walk(hall: Hall, frames: int, epoch: int = 0, **how: Any) -> None:
 async def test_a_walk_becomes_homographies_that_are_the_scenes(wide: Hall, tmp_path: Path) -> None:
     before = wide.service.config
     assert (await wide.get_json(WALK))["state"] == "none"
-    status, told = await do(wide, do="start")
+    status, told = await do(wide, action="start")
     assert (status, told["state"], told["seconds"]) == (200, "walking", 0.0)
     walk(wide, 500)
     told = await wide.get_json(WALK)
@@ -61,8 +61,8 @@ async def test_a_walk_becomes_homographies_that_are_the_scenes(wide: Hall, tmp_p
     assert 5 < pair["seconds"] <= 20
     for camera in told["cameras"]:
         assert sum(camera["thirds"]) == pytest.approx(1.0)
-        assert camera["feet"] == round(pair["seconds"] * FPS / 5)
-    status, told = await do(wide, do="finish")
+        assert camera["foot_points"] == round(pair["seconds"] * FPS / 5)
+    status, told = await do(wide, action="finish")
     assert (status, told["state"]) == (200, "working")
     told = await finished(wide)
     assert (told["state"], told["error"]) == ("done", "")
@@ -84,34 +84,34 @@ async def test_a_walk_becomes_homographies_that_are_the_scenes(wide: Hall, tmp_p
 
 
 async def test_a_walk_that_says_too_little_says_so_and_can_be_gone_on_with(wide: Hall) -> None:
-    await do(wide, do="start")
+    await do(wide, action="start")
     walk(wide, 50, wide=0.0)
-    await do(wide, do="finish")
+    await do(wide, action="finish")
     told = await finished(wide)
     assert told["state"] == "done"
     assert told["error"].startswith(f"{A} and {B}: ")
     assert (told["lines"], told["configuration"]) == ([], "")
-    _, told = await do(wide, do="go_on")
+    _, told = await do(wide, action="resume")
     assert (told["state"], told["seconds"], told["error"]) == ("walking", 2.0, "")
     walk(wide, 50, epoch=10)
     assert (await wide.get_json(WALK))["seconds"] == 4.0
 
 
 async def test_what_the_walk_lacks_is_said_while_it_goes_on(wide: Hall) -> None:
-    await do(wide, do="start")
-    assert len((await wide.get_json(WALK))["lacking"]) == 2  # nothing of either camera
+    await do(wide, action="start")
+    assert len((await wide.get_json(WALK))["uncovered"]) == 2  # nothing of either camera
     walk(wide, 100, wide=0.01)
-    losses = (await wide.get_json(WALK))["lacking"]
+    losses = (await wide.get_json(WALK))["uncovered"]
     assert f"walk also nearer to camera {A}, and farther from it" in losses
 
 
 @pytest.mark.parametrize(
     ("step", "status", "error"),
     [
-        ({"do": "finish"}, 409, "nobody walks: start the walk first"),
-        ({"do": "go_on"}, 409, "nobody walks: start the walk first"),
-        ({"do": "fly"}, 400, "the request's JSON: "),
-        ({"do": "start", "person": 0}, 400, "the request's JSON: "),
+        ({"action": "finish"}, 409, "nobody walks: start the walk first"),
+        ({"action": "resume"}, 409, "nobody walks: start the walk first"),
+        ({"action": "fly"}, 400, "the request's JSON: "),
+        ({"action": "start", "person": 0}, 400, "the request's JSON: "),
         ({}, 400, "the request's JSON: "),
     ],
 )
@@ -214,9 +214,9 @@ async def test_whose_process_dies_learns_of_it_in_one_line(monkeypatch: pytest.M
 
 
 async def test_who_forgets_the_walk_ends_its_calculation(wide: Hall) -> None:
-    await do(wide, do="start")
+    await do(wide, action="start")
     walk(wide, 20 * STRIDE)
-    await do(wide, do="finish")
+    await do(wide, action="finish")
     task = wide.service.walking._task
     async with wide.session.delete(WALK, headers=MINE) as answer:
         assert json.loads(await answer.read())["state"] == "none"

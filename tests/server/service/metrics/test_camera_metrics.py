@@ -56,5 +56,5 @@ def test_another_run_is_measured_anew_but_what_went_wrong_is_remembered() -> Non
     gauge.trouble("it went\nwrong")
     gauge.begin()
     assert gauge.sync_error is None
-    assert gauge.last_trouble is not None
-    assert (gauge.last_trouble.text, gauge.last_trouble.at) == ("it went wrong", 7.0)
+    assert gauge.last_error is not None
+    assert (gauge.last_error.text, gauge.last_error.at) == ("it went wrong", 7.0)

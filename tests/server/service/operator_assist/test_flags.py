@@ -16,7 +16,7 @@ STRIDE = 5
 
 
 def foreseen(*objects: int, pulse: int, camera: str = "c0", risk: float = 0.5) -> RiskEvent:
-    return RiskEvent(camera, objects, "alike", pulse, margin=0.5, risk=risk)
+    return RiskEvent(camera, objects, "crossing", pulse, margin=0.5, risk=risk)
 
 
 class Asked:
@@ -60,11 +60,11 @@ def test_of_too_many_the_riskiest_are_raised() -> None:
 
 
 def test_what_nobody_is_to_be_asked_about_is_not_raised() -> None:
-    flags = FlagQueue(FlagSettings(reasons=["exchange"]), FPS)
+    flags = FlagQueue(FlagSettings(reasons=["id_switch"]), FPS)
     flags.step(10, [foreseen(7, 9, pulse=40)], int)
     assert flags.open == []
-    flags.step(15, [RiskEvent("c0", (7, 9), "exchange", 40, 0.5, 0.5)], int)
-    assert [flag.reason for flag in flags.open] == ["exchange"]
+    flags.step(15, [RiskEvent("c0", (7, 9), "id_switch", 40, 0.5, 0.5)], int)
+    assert [flag.reason for flag in flags.open] == ["id_switch"]
 
 
 def test_a_flag_that_is_followed_through_is_answered_at_once() -> None:

@@ -16,7 +16,7 @@ from server.service.recording.retention import RetentionLimits
 from server.service.recording.session_files import InitSegments
 
 KEEP_S = 20.0
-BOUNDS = RetentionLimits(keep_s=KEEP_S, most_mb=1e6, segment_s=0.2)
+BOUNDS = RetentionLimits(keep_s=KEEP_S, max_mb=1e6, segment_s=0.2)
 """A segment for each GOP."""
 STEP_S = GOP / FPS
 TRIAL_S = 600.0
@@ -75,7 +75,7 @@ def test_a_clock_that_is_set_while_it_records_takes_nothing_away_and_keeps_nothi
 def test_a_clock_that_jumps_while_it_records_is_not_believed_later_either(
     tmp_path: Path, clocks: ClocksByHand
 ) -> None:
-    bounds = RetentionLimits(keep_s=3.5 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    bounds = RetentionLimits(keep_s=3.5 * TRIAL_S, max_mb=1e6, segment_s=0.2)
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(2))
     clocks.wall += YEAR_S  # and whoever keeps it says that it is right
@@ -124,7 +124,7 @@ def test_a_clock_that_somebody_sets_right_in_time_takes_nothing_away(
 ) -> None:
     recorded(tmp_path, clocks)
     clocks.off(5.0, wrong_by=YEAR_S)
-    bounds = RetentionLimits(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    bounds = RetentionLimits(keep_s=2 * TRIAL_S, max_mb=1e6, segment_s=0.2)
     store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S / 2
     records(store, clocks, range(10, 11))
@@ -143,7 +143,7 @@ def test_after_a_week_off_what_is_too_old_goes_soon_after_the_start_if_the_clock
     tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture, trusted: bool
 ) -> None:
     caplog.set_level(logging.INFO)
-    bounds = RetentionLimits(keep_s=86_400.0, most_mb=1e6, segment_s=0.2, trust_clock=trusted)
+    bounds = RetentionLimits(keep_s=86_400.0, max_mb=1e6, segment_s=0.2, trust_clock=trusted)
     clocks.is_kept = not trusted
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(30))
@@ -167,7 +167,7 @@ def test_after_a_week_off_what_is_too_old_goes_soon_after_the_start_if_the_clock
 
 
 def test_days_off_add_up(tmp_path: Path, clocks: ClocksByHand) -> None:
-    bounds = RetentionLimits(keep_s=2.5 * 86_400.0, most_mb=1e6, segment_s=0.2)
+    bounds = RetentionLimits(keep_s=2.5 * 86_400.0, max_mb=1e6, segment_s=0.2)
     for day in range(4):
         store = opened(tmp_path, clocks, bounds)
         clocks.now += TRIAL_S
@@ -216,7 +216,7 @@ def test_a_machine_without_a_clock_of_its_own_counts_when_the_network_has_told_i
     assert kept(tmp_path) == list(range(11))
     clocks.jump(7 * 86_400.0)
     clocks.is_kept = True
-    bounds = RetentionLimits(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    bounds = RetentionLimits(keep_s=2 * TRIAL_S, max_mb=1e6, segment_s=0.2)
     store.close()
     store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S
@@ -231,7 +231,7 @@ def test_a_machine_without_a_clock_of_its_own_counts_when_the_network_has_told_i
 def test_what_was_recorded_before_the_clock_was_believed_is_no_older_for_it(
     tmp_path: Path, clocks: ClocksByHand, restarts: bool
 ) -> None:
-    bounds = RetentionLimits(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    bounds = RetentionLimits(keep_s=2 * TRIAL_S, max_mb=1e6, segment_s=0.2)
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(8))
     store.close()

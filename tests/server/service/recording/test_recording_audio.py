@@ -203,7 +203,7 @@ async def test_the_sound_of_an_earlier_run_is_heard_after_a_restart(recording: P
 
 async def test_sound_goes_with_the_segments_it_is_of(tmp_path: Path) -> None:
     clocks = ClocksByHand()
-    store = RecordingFolder(tmp_path, RetentionLimits(keep_s=2.0, most_mb=1e6, segment_s=0.4), clocks.machine)
+    store = RecordingFolder(tmp_path, RetentionLimits(keep_s=2.0, max_mb=1e6, segment_s=0.4), clocks.machine)
     store.open()
     for gop in range(GOPS):
         clocks.now = PULSE0 + gop * GOP / FPS

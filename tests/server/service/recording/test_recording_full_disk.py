@@ -15,7 +15,7 @@ from server.service.recording.retention import RetentionLimits
 from server.service.recording.segment_index import IndexEntry
 from server.service.recording.session_files import InitSegments
 
-BOUNDS = RetentionLimits(keep_s=3.0, most_mb=1e6, segment_s=1.0)
+BOUNDS = RetentionLimits(keep_s=3.0, max_mb=1e6, segment_s=1.0)
 SEGMENT = 25  # pulses
 
 

@@ -159,7 +159,7 @@ def test_two_processes_do_not_record_into_one_folder(tmp_path: Path) -> None:
 
 def test_what_is_too_old_goes_in_whole_segments_with_what_refers_to_it(tmp_path: Path) -> None:
     clocks = ClocksByHand()
-    store = RecordingFolder(tmp_path, RetentionLimits(keep_s=3.0, most_mb=1e6, segment_s=1.0), clocks.machine)
+    store = RecordingFolder(tmp_path, RetentionLimits(keep_s=3.0, max_mb=1e6, segment_s=1.0), clocks.machine)
     store.open()
     for gop in range(40):
         clocks.now = PULSE0 + gop * GOP / FPS
@@ -183,14 +183,14 @@ def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_
     tmp_path_factory: pytest.TempPathFactory, shown: list[dict[int, str]], data: st.DataObject
 ) -> None:
     folder = tmp_path_factory.mktemp("bounded")
-    most_mb = data.draw(st.sampled_from([0.05, 0.1, 1.0]))
-    store = RecordingFolder(folder, RetentionLimits(keep_s=1e6, most_mb=most_mb, segment_s=0.4))
+    max_mb = data.draw(st.sampled_from([0.05, 0.1, 1.0]))
+    store = RecordingFolder(folder, RetentionLimits(keep_s=1e6, max_mb=max_mb, segment_s=0.4))
     store.open()
     slack = 2 * 8_000  # bytes: a GOP of both cameras, its line, its references
     for gop, choices in enumerate(shown):
         store.write(piece(gop, choices), head(), InitSegments(filled()[1]))
         on_disk = sum(it.stat().st_size for it in folder.rglob("*") if it.is_file())
-        assert on_disk <= most_mb * 1e6 + slack
+        assert on_disk <= max_mb * 1e6 + slack
     store.close()
     again = RecordingFolder(folder, AMPLE)
     again.open()

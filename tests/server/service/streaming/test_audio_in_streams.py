@@ -200,8 +200,8 @@ async def test_the_site_says_what_sound_it_has_and_passes_over_what_is_none(loud
         loud.service.intake.sound(type(good)(good.key, good.payload, bad))
     state = loud.service.intake.states[A]
     assert state.bad_messages == 5, "of the camera whose process sends it"
-    assert state.gauge.last_trouble is not None
-    assert state.gauge.last_trouble.text.startswith("a message that cannot be used: sound: ")
+    assert state.gauge.last_error is not None
+    assert state.gauge.last_error.text.startswith("a message that cannot be used: sound: ")
 
 
 async def test_where_boxes_are_burnt_in_a_beep_is_with_its_flash(loud: Hall, recording: Path) -> None:

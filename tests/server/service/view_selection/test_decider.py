@@ -272,15 +272,17 @@ def test_how_far_away_everybody_is_makes_no_difference() -> None:
     assert shown(decide(papers, story)) == [A] * 5, "the paper's cost of a cut is of a picture full of them"
 
 
-@pytest.mark.parametrize(("missed_s", "expected"), [(0.0, [A, B, A, A]), (1.0, [A, A, A, A])])
-def test_who_is_missed_for_a_moment_is_not_worth_two_cuts(missed_s: float, expected: list[str]) -> None:
+@pytest.mark.parametrize(("presence_decay_s", "expected"), [(0.0, [A, B, A, A]), (1.0, [A, A, A, A])])
+def test_who_is_missed_for_a_moment_is_not_worth_two_cuts(
+    presence_decay_s: float, expected: list[str]
+) -> None:
     here, missed = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
-    it = decider(view={"missed_s": missed_s})
+    it = decider(view={"presence_decay_s": presence_decay_s})
     assert shown(decide(it, [here, missed, here, here, here])) == expected
 
 
 def test_who_is_not_found_again_is_left_in_the_end() -> None:
     here, gone = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
-    views = shown(decide(decider(view={"missed_s": 1.0}), [here, *[gone] * 8]))
+    views = shown(decide(decider(view={"presence_decay_s": 1.0}), [here, *[gone] * 8]))
     assert (views[0], views[-1]) == (A, B)
     assert [a != b for a, b in itertools.pairwise(views)].count(True) == 1

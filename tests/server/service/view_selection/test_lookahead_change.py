@@ -129,7 +129,7 @@ async def test_a_look_ahead_that_cannot_be_is_refused_with_what_can(
     busy: Hall, frames: float, error: str
 ) -> None:
     asked = {"lookahead": frames}
-    async with busy.session.put("/api/operator/choosing", headers=MINE, json=asked) as answer:
+    async with busy.session.put("/api/operator/view_selection", headers=MINE, json=asked) as answer:
         assert answer.status == 400
         said = (await answer.json())["error"]
     assert said.startswith(error)
@@ -138,10 +138,10 @@ async def test_a_look_ahead_that_cannot_be_is_refused_with_what_can(
 
 
 async def test_the_site_says_the_look_ahead_that_is_in_force(busy: Hall) -> None:
-    most = (await busy.get_json("/api/operator/choosing"))["most_lookahead"]
+    most = (await busy.get_json("/api/operator/view_selection"))["max_lookahead"]
     for frames in (most, 5):
         asked: dict[str, Any] = {"lookahead": frames}
-        async with busy.session.put("/api/operator/choosing", headers=MINE, json=asked) as answer:
+        async with busy.session.put("/api/operator/view_selection", headers=MINE, json=asked) as answer:
             told = await answer.json()
         assert told["values"]["lookahead"] == frames
         assert f"lookahead: {frames}\n" in told["lines"]

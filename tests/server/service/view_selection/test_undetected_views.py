@@ -62,7 +62,7 @@ GONE: Told = {A: FOUND[A], B: {1: None}}
 
 def test_who_is_lost_beside_somebody_is_still_shown_where_they_are_larger() -> None:
     story = [FOUND] * 20 + [COVERED] * 12
-    assert shown(decide(decider(unfound=0.0), story))[-1] == A, "missed for longer than a moment"
+    assert shown(decide(decider(undetected_weight=0.0), story))[-1] == A, "missed for longer than a moment"
     assert shown(decide(decider(), story)) == [B] * 31
     assert shown(decide(decider(NOWHERE), story))[-1] == A, "nobody knows where the other camera looks"
 
@@ -75,15 +75,15 @@ def test_where_no_box_is_at_all_they_are_taken_to_be_behind_something() -> None:
 
 def test_whom_a_camera_does_not_find_that_misses_nobody_is_hidden() -> None:
     story = [{A: {1: at(*PLACE)}, B: said[B]} for said in [FOUND] * 100 + [COVERED] * 4]
-    views = shown(decide(decider(missed_s=0.0), story))
+    views = shown(decide(decider(presence_decay_s=0.0), story))
     assert views[98] == B
     assert views[-1] == A
 
 
 def test_a_camera_that_never_finds_anybody_at_a_place_shows_nobody_there() -> None:
     learned = [COVERED] * 60
-    assert shown(decide(decider(missed_s=0.0), [FOUND, *learned]))[-1] == A
-    assert shown(decide(decider(missed_s=0.0), [FOUND] * 60 + learned[:12]))[-1] == B
+    assert shown(decide(decider(presence_decay_s=0.0), [FOUND, *learned]))[-1] == A
+    assert shown(decide(decider(presence_decay_s=0.0), [FOUND] * 60 + learned[:12]))[-1] == B
 
 
 @pytest.mark.parametrize("speaks", [False, True], ids=["is silent", "sees nothing"])
@@ -102,17 +102,17 @@ def test_who_stands_outside_the_picture_is_not_expected_in_it() -> None:
     there = {A: {1: at(*PLACE), 2: at(60.0, 40.0)}, B: {1: at(*PLACE, B)}}
     decisions = decide(decider(), [there] * 20)
     assert shown(decisions, 2) == [A] * 19
-    assert decisions[-1].why.of(2).views[B].unfound == 0.0
+    assert decisions[-1].why.of(2).views[B].undetected == 0.0
 
 
 def test_why_says_who_does_not_find_them_and_what_that_view_is_worth() -> None:
     decisions = decide(decider(), [FOUND] * 20 + [COVERED] * 6)
     why = decisions[-1].why.of(1)
-    assert (why.views[A].seen, why.views[A].unfound) == (1.0, 0.0)
-    assert (why.views[B].seen, why.views[B].unfound) == (0.0, 1.0)
+    assert (why.views[A].seen, why.views[A].undetected) == (1.0, 0.0)
+    assert (why.views[B].seen, why.views[B].undetected) == (0.0, 1.0)
     assert why.views[B].quality is None
     alone = why.views[A].quality
-    worth = why.views[B].unfound_quality
+    worth = why.views[B].undetected_quality
     assert alone is not None
     assert worth is not None
     assert worth == pytest.approx(2.0 * alone), "twice as large, and people are always found there"
@@ -134,8 +134,8 @@ def test_a_look_stands_for_the_frames_to_the_next_one_and_for_none_that_are_deci
 
 def test_the_factor_is_what_such_views_are_worth() -> None:
     story = [FOUND] * 20 + [COVERED] * 6
-    whole, half = (decide(decider(unfound=it), story)[-1].why.of(1).views[B] for it in (1.0, 0.5))
-    assert half.unfound_quality == pytest.approx(0.5 * (whole.unfound_quality or 0.0))
+    whole, half = (decide(decider(undetected_weight=it), story)[-1].why.of(1).views[B] for it in (1.0, 0.5))
+    assert half.undetected_quality == pytest.approx(0.5 * (whole.undetected_quality or 0.0))
 
 
 PLACES = st.sampled_from([(10.0, 15.0), (14.0, 18.0), (26.0, 22.0), (40.0, 30.0)])
