@@ -210,7 +210,7 @@ async def test_every_metric_is_described(by_hand: Any) -> None:
 def test_every_test_that_a_document_names_is_there() -> None:
     named = [
         (path.name, file, test)
-        for path in PAGES
+        for path in (*PAGES, ROOT / "CONTRIBUTING.md")
         for file, test in _TEST.findall(path.read_text(encoding="utf-8"))
     ]
     for document, file, test in named:
