@@ -13,7 +13,6 @@ from client.session import Report, Session
 from client.sidecar import write_sidecars
 from client.spool import Spool
 from client.stream_events import Commentary, following
-from client.webm_recording import WebmRecording
 
 _DEFAULT = HttpSettings()
 
@@ -51,10 +50,10 @@ async def watch(
     them the stream begins now, and does not end.
 
     The pictures are the server's own, unchanged; whole fragments only. With ``out`` they are recorded in
-    ``out.part``, of which a plain MP4 file is made at the end, and the boxes beside it: WebVTT and ASS. A
-    file that is called ``.webm`` is one: of a site whose codec is VP8, and of no other. Cancelling keeps what
-    is there. When the server goes away it is sought again; if it does not come back, what was recorded is
-    kept and ``complete`` is False.
+    ``out.part``, which is remuxed into a progressive MP4 at the end, with the boxes beside it: WebVTT and
+    ASS. A name that ends in ``.webm`` makes a WebM; the site's codec must then be VP8. Cancelling keeps what
+    was recorded. A server that goes away is tried again; if it does not come back, what was recorded is kept
+    and ``complete`` is False.
 
     Raises:
         ValueError: ``url`` is no address.
@@ -66,7 +65,7 @@ async def watch(
     """
     server = server_url(url)
     container = await _container(url, out, settings)
-    record: Recording | WebmRecording | None = None
+    record: Recording | None = None
     with closing(Spool(Path() if out is None else out.parent)) as spool:
         commentary = Commentary(number, keep=None if out is None else spool)
         try:
@@ -107,7 +106,7 @@ async def _container(url: str, out: Path | None, settings: HttpSettings) -> str:
         return "mp4"  # whatever is wrong will be said of the stream
 
 
-def _write_beside(out: Path | None, record: Recording | WebmRecording, commentary: Commentary) -> None:
+def _write_beside(out: Path | None, record: Recording, commentary: Commentary) -> None:
     site = commentary.site
     if out is None or site is None or record.begin is None or record.media_time is None:
         return

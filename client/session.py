@@ -8,12 +8,10 @@ from dataclasses import dataclass
 
 from yarl import URL
 
-from client.fmp4 import BoxReader, Mp4Error
 from client.http import AwayError, ContractError, HttpSettings, NotFoundError, RefusedError, get
-from client.recording import Recording, StreamChangedError
+from client.media_stream import FormatChangedError, MediaStreamError
+from client.recording import Recording
 from client.stream_events import Commentary
-from client.webm import ElementReader, WebmError
-from client.webm_recording import WebmChangedError, WebmRecording
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +37,7 @@ class Session:
 
     def __init__(
         self,
-        record: Recording | WebmRecording,
+        record: Recording,
         commentary: Commentary,
         report: Report | None,
         start: str | None,
@@ -64,7 +62,7 @@ class Session:
                 if self._end is not None and self._record.fragments:
                     return True
                 problem = AwayError(f"{address.origin()}: the stream has ended")
-            except (StreamChangedError, WebmChangedError):
+            except FormatChangedError:
                 return False
             except (AwayError, NotFoundError, RefusedError) as error:
                 # A server that has just been restarted does not know its objects yet, nor their past.
@@ -91,26 +89,24 @@ class Session:
 
     async def _connection(self, address: URL, settings: HttpSettings) -> bool:
         """Stream over one connection; True when full, False when it has ended."""
-        is_webm = isinstance(self._record, WebmRecording)
-        taken = _taker(self._record)
-        self._record.reconnected()
-        async with get(address, settings, "video/webm" if is_webm else "video/mp4") as answer:
+        take = self._record.connection()
+        async with get(address, settings, f"video/{self._record.container}") as answer:
             async for data in answer.content.iter_any():
                 try:
-                    if not self._take(taken(data)):
+                    if not self._take(take(data)):
                         return True
-                except (StreamChangedError, WebmChangedError):
+                except FormatChangedError:
                     raise
-                except (Mp4Error, WebmError) as error:
-                    what = "WebM" if is_webm else "fragmented MP4"
+                except MediaStreamError as error:
+                    what = "WebM" if self._record.container == "webm" else "fragmented MP4"
                     where = f"{address.origin()}: its {address.name}"
                     raise ContractError(f"{where} is not a {what}: {error}") from error
         return False
 
-    def _take(self, taken: Iterator[bool]) -> bool:
+    def _take(self, parts: Iterator[bool]) -> bool:
         before = noted = self._record.fragments
         more = True
-        for more in taken:
+        for more in parts:
             if not more:
                 break
             if self._record.fragments > noted:
@@ -133,12 +129,3 @@ class Session:
                     self._record.seconds, self._record.bytes, self._camera, self.cuts, self.reconnections
                 )
             )
-
-
-def _taker(record: Recording | WebmRecording) -> Callable[[bytes], Iterator[bool]]:
-    """Return what takes a connection's bytes; it tells of each part whether there is room for more."""
-    if isinstance(record, WebmRecording):
-        elements = ElementReader()
-        return lambda data: map(record.take, elements.feed(data))
-    boxes = BoxReader()
-    return lambda data: map(record.take, boxes.feed(data))

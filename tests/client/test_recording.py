@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import client
-from client.fmp4 import BoxReader, Mp4Error
+from client.fmp4 import BoxReader
+from client.media_stream import MediaStreamError
 from fakes.http.handmade_server import (
     FPS,
     GOP,
@@ -206,6 +207,6 @@ def test_boxes_are_the_same_however_the_bytes_arrive(contents: list[bytes], step
 def test_any_bytes_are_boxes_or_an_error(data: bytes) -> None:
     try:
         boxes = list(BoxReader().feed(data))
-    except Mp4Error:
+    except MediaStreamError:
         return
     assert sum(len(one.data) for one in boxes) <= len(data)

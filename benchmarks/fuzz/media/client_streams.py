@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Iterable
-from io import BufferedWriter
+from collections import deque
 from pathlib import Path
 from random import Random
 from typing import ClassVar, Literal
@@ -12,19 +10,17 @@ from typing import ClassVar, Literal
 from benchmarks.fuzz.engine.mutations import damaged
 from benchmarks.fuzz.engine.target import Target, folder, refused
 from benchmarks.fuzz.media.damaged_media import stream, wrong
-from client.fmp4 import BoxReader, Mp4Error
-from client.mp4_writer import write_plain
+from client.media_stream import MediaStreamError
 from client.recording import Recording
+from client.remux import remux
 from client.sse_parser import EventStreamError, SseParser
-from client.webm import ElementReader, WebmError
-from client.webm_recording import WebmRecording, write_indexed
 
 
 class _Film(Target):
     """A stream that a client reads in pieces, and makes a file of."""
 
     codec: ClassVar[Literal["h264", "vp8"]]
-    error: ClassVar[type[Exception]]
+    container: ClassVar[Literal["mp4", "webm"]]
 
     def __init__(self) -> None:
         self._stream = stream(self.codec)
@@ -36,29 +32,23 @@ class _Film(Target):
         return wrong(rng, self._stream)
 
     def feed(self, data: bytes) -> bool:
-        """Read it in pieces, and record it."""
+        """Read it in pieces, record it, and remux the recording."""
         part = self._path / "film.part"
         try:
             with part.open("wb") as file:
-                self.record((data[at : at + 1500] for at in range(0, len(data), 1500)), file)
-        except self.error as error:
+                take = Recording(file, 10.0, self.container).connection()
+                for at in range(0, len(data), 1500):
+                    deque(take(data[at : at + 1500]), maxlen=0)
+        except MediaStreamError as error:
             refused(error)
         try:
-            self.finish(part)
-        except self.error as error:
+            remux(part, self._path / f"film.{self.container}", self.container)
+        except MediaStreamError as error:
             return refused(error)
         return True
 
-    @abstractmethod
-    def record(self, pieces: Iterable[bytes], file: BufferedWriter) -> None:
-        """Write what comes as it comes."""
-
-    @abstractmethod
-    def finish(self, part: Path) -> None:
-        """Make the file that plays everywhere of it."""
-
     def close(self) -> None:
-        """Take the folder away."""
+        """Remove the folder."""
         self._folder.cleanup()
 
 
@@ -67,18 +57,7 @@ class ClientMp4(_Film):
 
     name = "media-mp4"
     codec = "h264"
-    error = Mp4Error
-
-    def record(self, pieces: Iterable[bytes], file: BufferedWriter) -> None:
-        """Write what comes as it comes."""
-        reader, taken = BoxReader(), Recording(file, 10.0)
-        for piece in pieces:
-            for box in reader.feed(piece):
-                taken.take(box)
-
-    def finish(self, part: Path) -> None:
-        """Make the file that plays everywhere of it."""
-        write_plain(part, part.with_suffix(".mp4"))
+    container = "mp4"
 
 
 class ClientWebm(_Film):
@@ -86,18 +65,7 @@ class ClientWebm(_Film):
 
     name = "media-webm"
     codec = "vp8"
-    error = WebmError
-
-    def record(self, pieces: Iterable[bytes], file: BufferedWriter) -> None:
-        """Write what comes as it comes."""
-        reader, taken = ElementReader(), WebmRecording(file, 10.0)
-        for piece in pieces:
-            for element in reader.feed(piece):
-                taken.take(element)
-
-    def finish(self, part: Path) -> None:
-        """Make the file that can be looked through of it."""
-        write_indexed(part, part.with_suffix(".webm"))
+    container = "webm"
 
 
 class Events(Target):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import resource
+import sys
 from collections.abc import Iterator
 
 
@@ -11,8 +13,13 @@ from collections.abc import Iterator
 def files_of_at_most(size: int) -> Iterator[None]:
     """Let this process write no file beyond so many bytes: it fails half written, as on a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    dont_write_bytecode = sys.dont_write_bytecode
+    # Python 3.11 keeps a .pyc that was cut short, and fails at every later import of it.
+    sys.dont_write_bytecode, os.environ["PYTHONDONTWRITEBYTECODE"] = True, "1"
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        sys.dont_write_bytecode = dont_write_bytecode
+        del os.environ["PYTHONDONTWRITEBYTECODE"]

@@ -1,0 +1,103 @@
+"""From a recorded stream to a film: the same pictures and sound, from time 0, whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import av
+import pytest
+
+from client.media_stream import MediaStreamError
+from client.remux import remux
+from fakes.media.audio import flashing, heard, packets, write_flashes
+from fakes.system.full_disk import files_of_at_most
+from server.media.audio.aac import SAMPLES
+from server.media.audio.audio_format import AudioFormat
+from server.media.containers.mp4_audio import audio_fragment
+from server.media.stream_format import StreamFormat
+
+FPS, RATE = 25, 48_000
+START = 8000
+"""The pulse of the first picture; a frame of sound begins with it."""
+FIRST_SOUND = START * RATE // FPS // SAMPLES
+PICTURES = 40
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_flashes(tmp_path_factory.mktemp("remux") / "flashes.mp4", PICTURES)
+
+
+def write_stream(part: Path, source: Path, lost: range = range(0), early: int = 0, late: int = 0) -> Path:
+    """Write a stream whose sound begins so many frames before the pictures, and ends so many after them."""
+    stream_format, sound = StreamFormat(), AudioFormat(RATE, 2)
+    units = flashing(source)
+    stream_format.accept(units[0].data)
+    frames = packets(source.read_bytes())
+    count = PICTURES * RATE // FPS // SAMPLES
+    frames = [frames[number % len(frames)] for number in range(early + count + late)]
+    head = stream_format.head((64, 48), FPS, sound)
+    assert head is not None
+    pictures = [stream_format.pack(it.data, START + it.pulse, FPS, key=it.key) for it in units]
+    kept = [picture for number, picture in enumerate(pictures) if number not in lost]
+    part.write_bytes(head + audio_fragment(sound, frames, FIRST_SOUND - early) + b"".join(kept))
+    return part
+
+
+def test_a_gap_prolongs_the_picture_before_it(source: Path, tmp_path: Path) -> None:
+    part, out = write_stream(tmp_path / "part", source, lost=range(10, 20)), tmp_path / "film.mp4"
+    remux(part, out, "mp4")
+    with av.open(str(out)) as film:
+        shown = [(it.pts, it.duration) for it in film.demux(video=0) if it.pts is not None]
+        ticks = round(1 / FPS / film.streams.video[0].time_base)
+        assert film.duration == PICTURES * av.time_base // FPS
+    times = [number * ticks for number in range(PICTURES) if number not in range(10, 20)]
+    assert shown == [(time, ticks * (11 if time == 9 * ticks else 1)) for time in times]
+
+
+def test_pictures_and_sound_are_copied_byte_for_byte(source: Path, tmp_path: Path) -> None:
+    part, out = write_stream(tmp_path / "part", source), tmp_path / "film.mp4"
+    remux(part, out, "mp4")
+    with av.open(str(part)) as stream, av.open(str(out)) as film:
+        before, after = ([bytes(it) for it in file.demux(video=0)] for file in (stream, film))
+    assert after == before
+    assert packets(out.read_bytes()) == packets(part.read_bytes())
+
+
+@pytest.mark.parametrize(("early", "late"), [(0, 0), (5, 0), (-5, 0), (0, 30)])
+def test_sound_stays_with_its_pictures(source: Path, tmp_path: Path, early: int, late: int) -> None:
+    out = tmp_path / "film.mp4"
+    remux(write_stream(tmp_path / "part", source, early=early, late=late), out, "mp4")
+    with av.open(str(out)) as film:
+        assert film.streams.video[0].start_time == 0
+        assert film.duration == PICTURES * av.time_base // FPS, "sound after the last picture is left out"
+    times, _ = heard(out.read_bytes())
+    assert times[0] == pytest.approx(max(0, -early) * SAMPLES / RATE, abs=0.001)
+    assert times[-1] <= PICTURES / FPS + SAMPLES / RATE
+
+
+def test_a_sound_track_without_sound_is_left_out(source: Path, tmp_path: Path) -> None:
+    out = tmp_path / "film.mp4"
+    remux(write_stream(tmp_path / "part", source, early=-1000, late=1000), out, "mp4")
+    with av.open(str(out)) as film:
+        assert [it.type for it in film.streams] == ["video"]
+
+
+def test_a_disk_without_room_for_all_of_it_is_always_reported(source: Path, tmp_path: Path) -> None:
+    part, out = write_stream(tmp_path / "part", source), tmp_path / "film.mp4"
+    remux(part, out, "mp4")
+    size = out.stat().st_size
+    for limit in (0, 1, *range(100, size, 997), size - 1):
+        with files_of_at_most(limit), pytest.raises(OSError, match="File too large"):
+            remux(part, out, "mp4")
+    with files_of_at_most(size):
+        remux(part, out, "mp4")
+
+
+@pytest.mark.parametrize("content", [b"", b"#EXTM3U\n#EXTINF:1,\nother.mp4\n", bytes(1000)])
+def test_what_is_no_stream_is_refused(tmp_path: Path, content: bytes) -> None:
+    part = tmp_path / "part"
+    part.write_bytes(content)
+    for container in ("mp4", "webm"):
+        with pytest.raises(MediaStreamError):
+            remux(part, tmp_path / "film", container)
