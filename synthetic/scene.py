@@ -21,7 +21,7 @@ class Scene:
     Args:
         name: one of `scene_names()`.
         cameras: how many cameras look, at most as many as the scene has places for; None: as many as suit it.
-        objects: how many people or fish there are; their ids count from 1; None: as many as suit the scene.
+        objects: how many people or fish there are; their ids count from 1; None: the scene's default.
         seed: of everything random, not negative.
         width: of a picture, pixels.
         height: of a picture, pixels.

@@ -65,7 +65,7 @@ def _rate_line(fps: float, there: float) -> str:
     if fps != demo_fps(there):
         return line
     have = f"{there:.3g} processor{'s' if there > 1 else ''}"
-    return f"{line}, which {have} can do (MYVIEW_SITE__FPS takes another rate)"
+    return f"{line}, which {have} can do (MYVIEW_SITE__FPS sets another rate)"
 
 
 async def _invite(url: str, *, open_browser: bool) -> None:
@@ -73,7 +73,7 @@ async def _invite(url: str, *, open_browser: bool) -> None:
     async with aiohttp.ClientSession() as session:
         while not await _first_picture(session, url):  # noqa: ASYNC110 — another process: there is no event
             await asyncio.sleep(_POLL_S)
-    typer.echo(f"MyView is ready: {url}   (Ctrl-C ends it)")
+    typer.echo(f"MyView is ready: {url}   (Ctrl-C stops it)")
     if open_browser:
         await asyncio.to_thread(webbrowser.open, url)
 

@@ -18,7 +18,7 @@ OutFolder = Annotated[Path, typer.Option("--out", help="A new folder to write in
 
 
 def render(
-    videos: Annotated[list[Path], typer.Argument(metavar="VIDEO…", help="One recorded view each.")],
+    videos: Annotated[list[Path], typer.Argument(metavar="VIDEO…", help="Recorded views, one each.")],
     out: OutFolder,
     config: Annotated[Path | None, typer.Option("--config", help="Settings, and cameras by name.")] = None,
     det: Annotated[
@@ -58,14 +58,12 @@ def track(
     out: Annotated[Path, typer.Option("--out", help="The file to write: MOTChallenge text.")],
     video: Annotated[Path | None, typer.Argument(metavar="[VIDEO]", help="Not needed with --det.")] = None,
     det: Annotated[Path | None, typer.Option("--det", help="Detections, MOTChallenge text.")] = None,
-    tracker: Annotated[
-        str | None, typer.Option(help="Which tracker; lp is MyView's, the network program.")
-    ] = None,
-    solver: Annotated[str | None, typer.Option(help="Which solver of the network program.")] = None,
+    tracker: Annotated[str | None, typer.Option(help="Tracker; lp is MyView's network flow program.")] = None,
+    solver: Annotated[str | None, typer.Option(help="Solver of the network flow program.")] = None,
     config: Annotated[Path | None, typer.Option("--config", help="Settings of detector and tracker.")] = None,
     template: Annotated[
         list[str] | None,
-        typer.Option(metavar="LEFT,TOP,WIDTH,HEIGHT", help="A box in the first picture: follow that."),
+        typer.Option(metavar="LEFT,TOP,WIDTH,HEIGHT", help="Follow this box of the first picture."),
     ] = None,
 ) -> None:
     """Track everybody in one video, or in its detections alone, or what is shown with --template."""
@@ -130,15 +128,15 @@ def evaluate(
     fps: Annotated[float | None, typer.Option(min=0.01, max=1000.0, help="Frames per second.")] = None,
     switch_cost: Annotated[
         float | None,
-        typer.Option(min=0.0, max=3600.0, help="Seconds of not seeing somebody that a cut must save."),
+        typer.Option(min=0.0, max=3600.0, help="Seconds of not seeing a person that a cut is worth."),
     ] = None,
     visible: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="Share of somebody that shows where they are visible.")
+        float, typer.Option(min=0.0, max=1.0, help="Visible share from which a view shows a person.")
     ] = 0.25,
     iou: Annotated[
-        float, typer.Option(min=0.01, max=1.0, help="Overlap from which a box is at a person.")
+        float, typer.Option(min=0.01, max=1.0, help="Overlap (IoU) from which a box matches a person.")
     ] = 0.5,
-    json_file: Annotated[Path | None, typer.Option("--json", help="A file for the numbers, too.")] = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="A JSON file for the scores.")] = None,
     plots: Annotated[
         Path | None, typer.Option("--plots", help="A new folder for plots of the choices.")
     ] = None,
@@ -156,10 +154,10 @@ def scene(
     name: Annotated[str, typer.Argument(metavar="NAME", help="room, gallery, overhead, court or fish.")],
     out: OutFolder,
     cameras: Annotated[
-        int | None, typer.Option(min=1, show_default="as many as suit the scene", help="How many look.")
+        int | None, typer.Option(min=1, show_default="the scene's default", help="Number of cameras.")
     ] = None,
     objects: Annotated[
-        int | None, typer.Option(min=1, show_default="as many as suit the scene", help="People, or fish.")
+        int | None, typer.Option(min=1, show_default="the scene's default", help="Number of people, or fish.")
     ] = None,
     seconds: Annotated[float, typer.Option(min=0.04, max=86400.0)] = 20.0,
     seed: Annotated[int, typer.Option(min=0)] = 1,

@@ -40,7 +40,7 @@ def _say_version(wanted: bool) -> None:
 def _myview(
     version: Annotated[
         bool,
-        typer.Option("--version", help="Say which version this is.", callback=_say_version, is_eager=True),
+        typer.Option("--version", help="Print the version.", callback=_say_version, is_eager=True),
     ] = False,
 ) -> None:
     """Accept the options that precede a command."""

@@ -17,8 +17,8 @@ from server.supervisor.shutdown import run_until_signal
 
 def doctor(
     config: Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")],
-    seconds: Annotated[float, typer.Option(min=1, max=60, help="How long each camera is tried.")] = 10.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print an object of JSON instead.")] = False,
+    seconds: Annotated[float, typer.Option(min=1, max=60, help="Seconds to try each camera.")] = 10.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Check a configuration against reality: cameras, ports, clock, disk, certificates, machine."""
     from server.cli.doctor.command import run_doctor
@@ -32,14 +32,12 @@ def status(
         str, typer.Argument(metavar="[URL]", help="The server.", show_default=True)
     ] = "http://localhost:8080",
     once: Annotated[
-        bool, typer.Option("--once", help="Print it once; exit code 1 where the site is not ready.")
+        bool, typer.Option("--once", help="Print once; exit code 1 if the site is not ready.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print objects of JSON, one a line.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")] = False,
     token: Annotated[
         str | None,
-        typer.Option(
-            envvar="MYVIEW_TOKEN", show_envvar=True, help="What lets in, if the server asks for it."
-        ),
+        typer.Option(envvar="MYVIEW_TOKEN", show_envvar=True, help="Access token, if the server needs one."),
     ] = None,
 ) -> None:
     """Show a site in the terminal, live: cameras, people, viewers, recording, load; elsewhere, once."""

@@ -107,7 +107,7 @@ def up(
 
 def demo(
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="HTTP port; 8080 if it is free.")] = None,
-    seconds: Annotated[float | None, typer.Option(min=0, help="End by itself after this long.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0, help="Stop after this many seconds.")] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
 ) -> None:
     """Show the system at work on an embedded synthetic scene."""

@@ -14,12 +14,12 @@ _BYTES = 32
 
 
 def token(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Whose it is: for people, and not secret.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of its owner; not secret.")],
     operate: Annotated[
-        bool, typer.Option("--operate", help="They may operate, too, not only watch.")
+        bool, typer.Option("--operate", help="Allow operating, too, not only watching.")
     ] = False,
-    number: Annotated[int | None, typer.Option("--object", min=1, help="They see this person alone.")] = None,
-    camera: Annotated[str | None, typer.Option("--camera", help="They see this camera alone.")] = None,
+    number: Annotated[int | None, typer.Option("--object", min=1, help="Limit it to this person.")] = None,
+    camera: Annotated[str | None, typer.Option("--camera", help="Limit it to this camera.")] = None,
 ) -> None:
     """Print a new token, once, and the line that lets it in."""
     import yaml
@@ -42,6 +42,6 @@ def token(
     written = yaml.safe_dump(
         content, default_flow_style=True, sort_keys=False, width=1000, allow_unicode=True
     )
-    typer.echo(f"the token, which is not kept anywhere:\n  {given}\n")
-    typer.echo("the line that lets it in, for the file that access.tokens names, below 'tokens:'")
+    typer.echo(f"the token, which is stored nowhere:\n  {given}\n")
+    typer.echo("its line for the token file (access.tokens), below 'tokens:'")
     typer.echo(f"  - {written.strip()}")

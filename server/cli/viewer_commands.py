@@ -17,22 +17,18 @@ from server.supervisor.shutdown import run_until_signal
 def watch(
     url: Annotated[str, typer.Argument(metavar="URL", help="The server, e.g. http://localhost:8080")],
     number: Annotated[
-        int | None, typer.Option("--object", help="Whom to watch; else all are listed.")
+        int | None, typer.Option("--object", help="Whose best view to watch; without it, people are listed.")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="The file to record into.")] = None,
     seconds: Annotated[float | None, typer.Option(min=0, help="Stop recording after this long.")] = None,
     start: Annotated[
         str | None,
-        typer.Option(
-            "--from", help="From when on: -60 (seconds back), p1250 (a pulse) or a time (ISO 8601)."
-        ),
+        typer.Option("--from", help="Start: -60 (seconds back), p1250 (a pulse) or a time (ISO 8601)."),
     ] = None,
-    end: Annotated[str | None, typer.Option("--to", help="Until when, likewise.")] = None,
+    end: Annotated[str | None, typer.Option("--to", help="End, likewise.")] = None,
     token: Annotated[
         str | None,
-        typer.Option(
-            envvar="MYVIEW_TOKEN", show_envvar=True, help="What lets in, if the server asks for it."
-        ),
+        typer.Option(envvar="MYVIEW_TOKEN", show_envvar=True, help="Access token, if the server needs one."),
     ] = None,
 ) -> None:
     """List who is there, or watch or record somebody's best view."""

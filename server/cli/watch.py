@@ -34,7 +34,7 @@ async def run_watch(
         UserError: it does not know them, or the file cannot be written.
     """
     if number is None and (out or seconds is not None or start or end):
-        raise UserError("watch: --out, --seconds, --from and --to are about somebody: say whom by --object")
+        raise UserError("watch: --out, --seconds, --from and --to need --object")
     if out is not None:
         check_new_file(out)
     settings, before = HttpSettings(token=token), _file_at(out)
@@ -48,12 +48,12 @@ async def run_watch(
     except (ClientError, ValueError) as error:
         raise UserError(f"watch: {error}") from error
     except OSError as error:
-        kept = "; what was recorded before that is kept" if _file_at(out) != before else ""
+        kept = "; the recording up to then is kept" if _file_at(out) != before else ""
         raise UserError(f"{out}: cannot write there: {error.strerror}{kept}") from error
     where = f" in {out}" if out else ""
     typer.echo(f"object {number}: {watched.seconds:.1f} s, {watched.cuts} cuts{where}")
     if not watched.complete:
-        raise UnavailableError("watch: the server went away before the end")
+        raise UnavailableError("watch: the server disconnected before the end")
 
 
 def _file_at(out: Path | None) -> int | None:

@@ -27,15 +27,15 @@ def fill_in_password(config: Config, camera_id: str) -> Config:
 
 
 def _quoted(camera: CameraSettings) -> str:
-    """Read the password, written as it may stand in an address."""
-    assert camera.password is not None  # noqa: S101 — it was asked for
+    """Read the password, percent-encoded for an address."""
+    assert camera.password is not None  # noqa: S101 — the caller has checked
     where = f"cameras.{camera.id}.password: the file"  # not by its name: some write the password there
     try:
         text = camera.password.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is no text"
-        raise UserError(f"{where} that it names cannot be read: {reason}") from None
+        reason = getattr(error, "strerror", None) or "it is not text"
+        raise UserError(f"{where} cannot be read: {reason}") from None
     password = text.removesuffix("\n").removesuffix("\r")
     if not password or not password.isprintable():
-        raise UserError(f"{where} that it names has to be one line, the password")
+        raise UserError(f"{where} must be one line, the password")
     return quote(password, safe="")

@@ -1,6 +1,6 @@
 """Refusal of duplicate keys in YAML and JSON: parsers would silently keep the last one.
 
-Two sections ``access:``, pasted from two documents, would so lose the tokens, and let everybody in.
+Two sections ``access:``, pasted from two documents, would lose the tokens and open the site.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from server.config.values import abbreviate
 from server.system.address_redaction import redact_address
 
 _NO_VALUES = frozenset({"tag:yaml.org,2002:merge", "tag:yaml.org,2002:value"})
-"""Keys ``<<`` and ``=``, which stand for nothing but themselves."""
+"""Tags of the keys ``<<`` and ``=``, which have no value."""
 _JSON_TOKEN = re.compile(r'("(?:[^"\\]|\\.)*")(\s*:)?|[{}]', re.DOTALL)
 """In valid JSON quotes are of strings alone: each string is found as a whole. Group 2: it is a key."""
 
@@ -27,19 +27,19 @@ class DuplicateKeyError(ValueError):
     def __init__(self, key: str, first: int, second: int) -> None:
         lines = f"lines {first} and {second}" if first != second else f"line {first}"
         super().__init__(
-            f"{abbreviate(redact_address(key))!a} occurs twice, in {lines}; only the last one would "
-            "count: keep one, with everything that belongs to it"
+            f"{abbreviate(redact_address(key))!a} occurs twice, in {lines}; only the last would "
+            "count: merge them"
         )
 
 
 def check_yaml_keys(root: yaml.Node, value_of: Callable[[yaml.Node], Any]) -> None:
-    """Check that no mapping has a key twice; what merges (``<<``) bring may be said anew.
+    """Check that no mapping has a key twice; keys from merges (``<<``) may be overridden.
 
-    Keys are the same if they are written the same, or stand for the same: ``1``, ``"1"`` and ``0x1``.
-    ``value_of`` gives what a scalar stands for.
+    Keys are equal if their text or their value is: ``1``, ``"1"`` and ``0x1``. ``value_of`` returns the
+    value of a scalar.
 
     Raises:
-        DuplicateKeyError: one has.
+        DuplicateKeyError: a mapping has.
     """
     left, seen = [root], set[int]()
     while left:
@@ -58,7 +58,7 @@ def _check_yaml_mapping(node: yaml.MappingNode, value_of: Callable[[yaml.Node], 
     lines: dict[Hashable, int] = {}
     for key, _ in node.value:
         if not isinstance(key, yaml.ScalarNode):
-            continue  # who reads it refuses such a key
+            continue  # the loader refuses such a key
         value = key.value if key.tag in _NO_VALUES else value_of(key)
         line = key.start_mark.line + 1
         forms: set[Hashable] = {key.value, str(value), value}
@@ -72,7 +72,7 @@ def parse_json(text: str) -> Any:
 
     Raises:
         DuplicateKeyError: one has.
-        ValueError, RecursionError: it is no JSON that can be read, as :func:`json.loads` says it.
+        ValueError, RecursionError: it is not valid JSON, as of :func:`json.loads`.
     """
     content = json.loads(text)
     open_objects: list[dict[str, int]] = []

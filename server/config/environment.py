@@ -1,6 +1,6 @@
 """Check environment variables ``MYVIEW_SECTION__KEY`` before pydantic-settings reads them.
 
-It takes names in capitals and in small letters alike, keeps one of two, and drops what it does not know.
+pydantic-settings ignores case, keeps one of two equal names, and drops unknown ones.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ _DELIMITER = "__"
 
 
 def check_environment(where: str) -> None:
-    """Check that the environment's words on settings are understood, and no two of them are on one setting.
+    """Check that all environment variables name known settings, and no two name the same one.
 
     Raises:
-        UserError: they are not, as in ``MYVIEW_HTP__PORT``, or two are; the text begins with ``where``.
+        UserError: one is unknown, as ``MYVIEW_HTP__PORT``, or two are equal; the text begins with ``where``.
     """
     variables: dict[tuple[str, ...], str] = {}
     for name in sorted(os.environ):
@@ -44,7 +44,7 @@ def check_environment(where: str) -> None:
 
 
 def _place(name: str) -> tuple[str, ...] | None:
-    """Return the way to the setting that a variable is for; None: it is for none, as MYVIEW_LOG."""
+    """Return the path of a variable's setting; None: it has none, as MYVIEW_LOG."""
     if not name.upper().startswith(PREFIX):
         return None
     place = tuple(name[len(PREFIX) :].lower().split(_DELIMITER))
@@ -52,11 +52,11 @@ def _place(name: str) -> tuple[str, ...] | None:
 
 
 def _both(one: str, other: str, place: Sequence[str]) -> str:
-    return f"{one} and {other} both say {'.'.join(place)}: leave one out"
+    return f"{one} and {other} both set {'.'.join(place)}: remove one"
 
 
 def _parsed(text: str) -> Any:
-    """Parse a variable's value where it is JSON; else give it as it is.
+    """Parse a variable's value if it is JSON; else return it unchanged.
 
     Raises:
         DuplicateKeyError: an object in it has a key twice.
@@ -70,7 +70,7 @@ def _parsed(text: str) -> Any:
 
 
 def _says(content: Any, place: Sequence[str]) -> bool:
-    """Return whether a section's content has something at a place, or has no places at all."""
+    """Return whether a section's content sets what is at a path, or is no mapping."""
     for key in place:
         if not isinstance(content, dict):
             return True

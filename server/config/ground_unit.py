@@ -1,30 +1,30 @@
-"""The unit of the floor that cameras share: a word, of which three say how long something is."""
+"""The unit of the floor that cameras share: any word; m, cm and mm are understood as lengths."""
 
 from __future__ import annotations
 
 import difflib
 
 UNITS_PER_METER = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
-"""So many of each are a metre."""
+"""How many of each are a meter."""
 _MEANT = {
     "m": ("meter", "meters", "metre", "metres"),
     "cm": ("centimeter", "centimeters", "centimetre", "centimetres"),
     "mm": ("millimeter", "millimeters", "millimetre", "millimetres"),
 }
 _SHOWN = 40
-"""Characters of what is no unit that an error repeats."""
+"""Characters of an invalid unit that an error repeats."""
 _CLOSE = 0.8
-"""How like one of these a word is that was meant for it (difflib's ratio)."""
+"""Similarity (difflib's ratio) from which a word counts as a misspelled unit."""
 
 
 def check_unit(unit: object) -> str:
     """Return the unit; any word is accepted, except a misspelling of a metric one.
 
     Raises:
-        ValueError: in one line: it is no word, or another way to write m, cm or mm.
+        ValueError: it is not a word, or a misspelling of m, cm or mm; one line.
     """
     if not isinstance(unit, str) or not unit.strip() or not unit.isprintable():
-        raise ValueError(f'{repr(unit)[:_SHOWN]} is no unit; it is a word, such as "m"')
+        raise ValueError(f'{repr(unit)[:_SHOWN]} is not a unit; it is a word, such as "m"')
     if unit in UNITS_PER_METER:
         return unit
     word = unit.strip(" .").lower()

@@ -56,7 +56,7 @@ def read_content(path: Path) -> dict[str, Any]:
 
 
 def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Config:
-    """Check a configuration's content, the environment's words on it, and what it refers to.
+    """Check a configuration's content, the environment's overrides, and the files that it names.
 
     Raises:
         UserError: something is wrong; the text begins with ``where``.
@@ -66,7 +66,7 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     try:
         config = Config(**content)
     except ValidationError as error:
-        raise UserError(_one_line(where, error)) from None  # its own words repeat keys as they are
+        raise UserError(_one_line(where, error)) from None  # its own text repeats keys unredacted
     except SettingsError as error:
         raise UserError(f"{where}: environment: {error}; a list, or a whole section, must be JSON") from error
     check_numbers(config.model_dump(), where)

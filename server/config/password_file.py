@@ -16,14 +16,14 @@ def read_users(path: Path, setting: str) -> dict[str, str]:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is no text"
+        reason = getattr(error, "strerror", None) or "it is not text"
         raise UserError(f"{setting}: cannot read {path}: {reason}") from error
     users: dict[str, str] = {}
     numbers: dict[str, int] = {}
     for number, line in enumerate(lines, start=1):
         name, colon, password = line.partition(":")
         if not (name and colon and password) or line != line.strip():
-            raise UserError(f"{setting}: {path}: line {number} is no name:password")
+            raise UserError(f"{setting}: {path}: line {number} is not name:password")
         if name in users:
             raise UserError(
                 f"{setting}: {path}: lines {numbers[name]} and {number} are for the same name: keep one"
@@ -40,5 +40,5 @@ def password_of(path: Path, name: str, setting: str) -> str:
     """
     password = read_users(path, setting).get(name)
     if password is None:
-        raise UserError(f"{setting}: {path} has no line for {name!r}, as which this process comes")
+        raise UserError(f"{setting}: {path} has no line for {name!r}, the name of this process")
     return password

@@ -68,7 +68,7 @@ def pulse_server_tls(config: Config) -> ssl.SSLContext | None:
     try:
         context.load_cert_chain(tls.certificate, tls.key, password="")
     except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
-        reason = getattr(error, "strerror", None) or "they are no certificate and its key"
+        reason = getattr(error, "strerror", None) or "they are not a certificate and its key"
         raise UserError(f"sync.tls: cannot use {tls.certificate} and {tls.key}: {reason}") from error
     return context
 

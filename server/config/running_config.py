@@ -28,13 +28,13 @@ class ConfigFileState:
 
     error: str
     """Why it cannot be in force; empty: it can."""
-    waiting: tuple[str, ...]
+    pending_restart: tuple[str, ...]
     """The settings in which it differs."""
 
     @property
     def differs(self) -> bool:
         """Whether the file differs from the active configuration."""
-        return bool(self.error or self.waiting)
+        return bool(self.error or self.pending_restart)
 
 
 class ActiveConfig:

@@ -83,11 +83,9 @@ class Config(BaseSettings):
         ids = [camera.id for camera in self.cameras]
         for camera_id in ids:
             if _SERVICE.fullmatch(camera_id):
-                raise ValueError(
-                    f"cameras: {camera_id!r} is what a best-view service is called; take another id"
-                )
+                raise ValueError(f"cameras: {camera_id!r} is the name of a best-view service; use another id")
             if ids.count(camera_id) > 1:
-                raise ValueError(f"cameras: two cameras are called {camera_id!r}; every id must be its own")
+                raise ValueError(f"cameras: two cameras are called {camera_id!r}; ids must be unique")
         return self
 
     @model_validator(mode="after")
@@ -123,8 +121,8 @@ class Config(BaseSettings):
         if identity.settle_after < least:
             raise ValueError(
                 f"view.identity.settle_after: is {identity.settle_after} frames but must be "
-                f"at least {least} (told_after + 2 * regroup), "
-                "so that whoever is settled has been told to be somebody"
+                f"at least {least} (publish_after + 2 * clustering_interval), "
+                "so that a settled person has been published"
             )
         return self
 
@@ -132,7 +130,7 @@ class Config(BaseSettings):
     def _streams_can_be_of_this_codec(self) -> Self:
         for place, wanted in (("record.folder", self.record.folder), ("sound.source", self.sound.source)):
             if self.encode.codec == "vp8" and wanted is not None:
-                raise ValueError(f"{place}: a site whose encode.codec is vp8 has none; take h264 for it")
+                raise ValueError(f"{place}: a site whose encode.codec is vp8 has none; use h264")
         for camera in self.cameras:
             if self.encode.codec == "vp8" and camera.h264 != "encode":
                 raise ValueError(f"cameras: {camera.id}: h264: {camera.h264}: encode.codec is vp8")

@@ -1,7 +1,7 @@
 """The token file: access rights of viewers and operators.
 
-It knows a token by its SHA-256. A token is 256 random bits: there is nothing to guess, and no need for a slow
-hash. Every request is checked, and by a slow one strangers could keep the server busy.
+It holds the SHA-256 of each token. A token is 256 random bits, so it needs no slow hash; and every request is
+checked, so a slow one would let strangers keep the server busy.
 """
 
 from __future__ import annotations
@@ -25,33 +25,33 @@ class Token(Section):
     """One token and its access rights."""
 
     name: Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f]*$")]
-    """Whose it is, for people: it is not secret."""
+    """The owner's name; not secret."""
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
     role: Role
     object: Annotated[int, Field(ge=1, le=999_999_999)] | None = None
-    """Nobody but this person's views."""
+    """Limits the token to this person's views."""
     camera: Identifier | None = None
-    """Nothing but this camera."""
+    """Limits the token to this camera."""
     made: AwareDatetime | None = None
-    """When it was made. Where people have been numbered anew since, its object is void."""
+    """When it was made. If person numbers have restarted since, its object is void."""
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:
         if self.object is not None and self.camera is not None:
-            raise ValueError("object, camera: a token is for one of them; make two")
+            raise ValueError("object, camera: a token is limited to one of them; make two tokens")
         if self.role == "operate" and (self.object is not None or self.camera is not None):
-            raise ValueError("role: who operates sees everything: leave object and camera out, or say watch")
+            raise ValueError("role: an operator sees everything: remove object and camera, or set watch")
         if self.object is not None and self.made is None:
             raise ValueError(
-                "made: is missing, and a number is somebody's for one run of the service alone; "
+                "made: is missing, and object numbers hold for one run of the service; "
                 "`myview token` writes it"
             )
         return self
 
 
 def token_digest(token: str) -> str:
-    """Return what the file knows of a token: its SHA-256, in hex."""
-    return hashlib.sha256(token.encode(errors="surrogatepass")).hexdigest()  # heads may hold any bytes
+    """Return a token's SHA-256 in hex, as in the file."""
+    return hashlib.sha256(token.encode(errors="surrogatepass")).hexdigest()  # HTTP headers may hold any bytes
 
 
 def read_tokens(path: Path) -> tuple[Token, ...]:
@@ -64,9 +64,7 @@ def read_tokens(path: Path) -> tuple[Token, ...]:
     check_values(content, str(path))
     listed = content.get("tokens") if isinstance(content, dict) and len(content) == 1 else None
     if not isinstance(listed, list):
-        raise UserError(
-            f"{path}: is no list of tokens: it begins with 'tokens:', and each has a line of its own"
-        )
+        raise UserError(f"{path}: is not a list of tokens: it begins with 'tokens:', one token per line")
     tokens = tuple(_token(path, number, one) for number, one in enumerate(listed))
     for what in ("name", "sha256"):
         given = Counter(getattr(it, what) for it in tokens)
@@ -74,7 +72,7 @@ def read_tokens(path: Path) -> tuple[Token, ...]:
         if twice is not None:
             numbers = [number for number, it in enumerate(tokens) if getattr(it, what) == twice]
             places = " and ".join(f"tokens.{number}" for number in numbers[:2])
-            raise UserError(f"{path}: {places}: have the same {what}, {twice}; each has its own")
+            raise UserError(f"{path}: {places}: have the same {what}, {twice}; each needs its own")
     return tokens
 
 
@@ -84,6 +82,6 @@ def _token(path: Path, number: int, content: Any) -> Token:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(["tokens", str(number), *(abbreviate(str(it)) for it in first["loc"])])
-        said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
-        line = f"{path}: {place}: {said.removeprefix('Value error, ')}"
+        reason = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
+        line = f"{path}: {place}: {reason.removeprefix('Value error, ')}"
         raise UserError(" ".join(line.split())) from None

@@ -18,21 +18,21 @@ except ImportError:  # PyYAML was built without it
     from yaml import SafeDumper, SafeLoader  # type: ignore[assignment]
 
 _SHOWN = 300
-"""Characters of what a library says that a line of ours repeats."""
+"""Characters of a library's message that an error repeats."""
 _MOST_MERGED = 100_000
-"""Keys that merges (``<<``) bring into mappings; each may refer to all of one before."""
+"""Keys that merges (``<<``) may add to mappings: nested merges multiply them."""
 _DEEPEST = 200
-"""Lists in lists: libyaml's loader calls itself for each, and with many the process would die."""
+"""Nesting depth: libyaml's loader recurses, and would overflow the stack."""
 
 _QUOTED = re.compile(r" '[^'<>]{2,}'")
-"""A name from the file in a library's words, such as a tag's; ``'<block end>'`` and ``']'`` are none."""
+"""A quoted name from the file in a library's message; not ``'<block end>'`` and ``']'``."""
 
 _WIDTH = 1000
-"""Characters after which what is written is folded."""
+"""Line width of written YAML."""
 
 
 class _Loader(SafeLoader):
-    """The safe loader, in which a few lines cannot stand for keys without end."""
+    """The safe loader with a limit on merged keys."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -43,14 +43,14 @@ class _Loader(SafeLoader):
         super().flatten_mapping(node)
         self._merged += len(node.value)
         if self._merged > _MOST_MERGED:
-            raise yaml.YAMLError("merges (<<) that stand for more keys than any file of ours has")
+            raise yaml.YAMLError("merges (<<) that expand to too many keys")
 
 
 def read_yaml(path: Path, what: str) -> Any:
     """Read a file's content; ``what`` names it for people.
 
     Raises:
-        UserError: it cannot be read, or is no YAML.
+        UserError: it cannot be read, or is not valid YAML.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -64,17 +64,17 @@ def read_yaml(path: Path, what: str) -> Any:
         raise UserError(f"{path}: {error}") from error
     except yaml.YAMLError as error:
         raise UserError(f"{path}: is not valid YAML: {_words(error)[:_SHOWN]}") from None
-    except (ValueError, LookupError, TypeError, AttributeError):  # how PyYAML says `!!int x` is none
-        raise UserError(f"{path}: is not valid YAML: a date, a number or a tag that cannot be one") from None
+    except (ValueError, LookupError, TypeError, AttributeError):  # raised by PyYAML for `!!int x`
+        raise UserError(f"{path}: is not valid YAML: an invalid date, number or tag") from None
 
 
 def _loaded(text: str) -> Any:
-    """Return what a text stands for.
+    """Load a YAML text.
 
     Raises:
         DuplicateKeyError: a mapping in it has a key twice.
-        yaml.YAMLError: it is no YAML.
-        ValueError, LookupError, TypeError, AttributeError: a value is not of the kind that it says it is.
+        yaml.YAMLError: it is not valid YAML.
+        ValueError, LookupError, TypeError, AttributeError: a value does not fit its tag.
     """
     loader = _Loader(text)
     try:
@@ -100,25 +100,25 @@ def _words(error: yaml.YAMLError) -> str:
 
 
 def dump_yaml_inline(value: Any) -> str:
-    """Write a value as it may stand behind its key."""
+    """Dump a value in flow style, for one line after its key."""
     written: str = yaml.dump(value, Dumper=SafeDumper, default_flow_style=True, width=_WIDTH)
     return written.removesuffix("\n...\n").strip()
 
 
 def dump_yaml(content: Any) -> str:
-    """Write what a file holds, a line each, in its own order."""
+    """Dump a mapping in block style, in its own order."""
     written: str = yaml.dump(content, Dumper=SafeDumper, sort_keys=False)
     return written
 
 
 def _check_depth(text: str) -> None:
-    """Check that lists in lists end somewhere, before anything is made of them.
+    """Check the nesting depth before anything is constructed.
 
     Raises:
-        yaml.YAMLError: they do not, or the text is no YAML.
+        yaml.YAMLError: it is too deep, or not valid YAML.
     """
     depth = 0
     for event in yaml.parse(text, Loader=SafeLoader):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > _DEEPEST:
-            raise yaml.YAMLError("brackets within brackets without end")
+            raise yaml.YAMLError("brackets nested too deeply")

@@ -49,7 +49,7 @@ from server.system.errors import UserError
 log = logging.getLogger(__name__)
 
 _BODY_MOST = 65_536
-"""Bytes of a request's body: it is JSON, of which anybody could otherwise have much kept in memory."""
+"""Bytes of a request's body: it is JSON; larger bodies would let clients fill the memory."""
 _SHUTDOWN_S = 1.0
 """How long viewers have to take what was sent before the server ends."""
 _ROUTES = (
@@ -152,7 +152,7 @@ def _limits(config: Config) -> ConnectionLimits:
     most = connection_limit(config, descriptors)
     if most < http.connections:
         log.warning(
-            "%d files may be open (ulimit -n): %d connections are taken, not %d (http.connections_max)",
+            "%d files may be open (ulimit -n): %d connections are accepted, not %d (http.connections_max)",
             descriptors,
             most,
             http.connections,

@@ -56,7 +56,7 @@ async def answer_errors(
             log.exception("answering %s %s failed%s", request.method, request.path, more)
         begun: web.StreamResponse | None = request.get(_BEGUN)
         if begun is None:
-            return error_response(500, "the server made a mistake; its log says more")
+            return error_response(500, "internal server error; the server's log says more")
         break_off(request)
         return begun
 

@@ -23,7 +23,7 @@ class Problem(msgspec.Struct, frozen=True):
 
 
 def json_response(content: Any, status: int = 200) -> web.Response:
-    """Return content as a JSON answer that any origin may read and nobody may cache."""
+    """Return content as a JSON answer that any origin may read and that is not cached."""
     return web.Response(
         body=msgspec.json.encode(content),
         status=status,
@@ -60,7 +60,7 @@ async def read_json(request: web.Request, kind: type[Body]) -> Body:
 
 @runtime_checkable
 class TracksBody(Protocol):
-    """A connection's protocol that is told while a body is still being received."""
+    """A connection's protocol that tracks whether a body is still being received."""
 
     def body_pending(self) -> None:
         """Note that the request is not complete yet."""

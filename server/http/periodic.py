@@ -13,8 +13,8 @@ log = logging.getLogger(__name__)
 async def run_periodically(every_s: float, step: Callable[[], Awaitable[None]], what: str) -> NoReturn:
     """Run a step every so many seconds; ``what`` it does is logged where it fails.
 
-    Nobody awaits the task that runs this: were it to end with the first error, nobody would see. So the next
-    step is run all the same; one that fails as the one before it is not logged again.
+    An error does not end the loop: no one awaits its task, so the end would go unnoticed. Equal errors in a
+    row are logged once.
     """
     failed = ""
     while True:
@@ -23,7 +23,7 @@ async def run_periodically(every_s: float, step: Callable[[], Awaitable[None]], 
             await step()
         except Exception as error:
             if repr(error) != failed:
-                log.exception("%s failed; it is tried again", what)
+                log.exception("%s failed; retrying", what)
             failed = repr(error)
         else:
             failed = ""

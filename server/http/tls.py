@@ -55,11 +55,11 @@ class Certificate:
             self._newest = self._load()
         except UserError as error:  # read again at the next check: it may be half of a renewal
             if str(error) != self._error:
-                log.warning("%s; the certificate as it was stays in force", error)
+                log.warning("%s; the previous certificate stays in force", error)
             self._error = str(error)
         else:
             self._seen, self._error = now, ""
-            log.info("%s: is in force for new connections", self._certificate)
+            log.info("%s: used for new connections", self._certificate)
 
     async def run(self) -> None:
         """Check for changed files again and again."""
@@ -83,7 +83,7 @@ class Certificate:
         except (OSError, ValueError) as error:  # of ssl, or one of them has gone this very moment
             reason = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
             raise UserError(
-                f"http.tls: {self._certificate} and {self._key} are no certificate and its key: {reason}"
+                f"http.tls: {self._certificate} and {self._key} are not a certificate and its key: {reason}"
             ) from error
         return context
 
@@ -92,4 +92,4 @@ class Certificate:
 
 
 def _no_password() -> str:
-    raise ValueError("the key has a password; write it without one")
+    raise ValueError("the key has a password; save it without one")

@@ -53,9 +53,9 @@ async def _follow(running: ActiveConfig, pipeline: BestViewPipeline) -> None:
         try:
             pipeline.go_by(reload.now)
         except UserError as error:
-            log.warning("%s: %s; the configuration as it was stays in force", running.path, error)
+            log.warning("%s: %s; the previous configuration stays in force", running.path, error)
         except Exception:
-            log.exception("%s: going by it failed; the next one that is read is tried again", running.path)
+            log.exception("%s: applying it failed; the next reload tries again", running.path)
         else:
             running.now = reload.now
             log.info("%s", reload.line)

@@ -63,7 +63,7 @@ async def _made(running: ActiveConfig, camera_id: str, anew: asyncio.Event, *, b
             camera = await asyncio.to_thread(_opened, running.now, camera_id)
         except UnavailableError as error:
             if (more := away.record(str(error))) is not None:
-                log.warning("%s%s; it is tried again", error, more)
+                log.warning("%s%s; retrying", error, more)
             begun = True
         except UserError as error:
             if not begun:
@@ -71,7 +71,7 @@ async def _made(running: ActiveConfig, camera_id: str, anew: asyncio.Event, *, b
             raise UnavailableError(str(error)) from error  # whoever looks after this process starts it again
         else:
             if ended := away.end():
-                log.info("camera %s: it answers, after %.0f s", camera_id, ended.seconds)
+                log.info("camera %s answers, after %.0f s", camera_id, ended.seconds)
             return camera
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(anew.wait(), backoff.next())
@@ -104,7 +104,7 @@ async def _follow(running: ActiveConfig, camera_id: str, anew: asyncio.Event) ->
     async for reload in reloads(running, check):
         running.now = reload.now
         if camera_id in reload.cameras:
-            log.info("the configuration was read again, and changes this camera: it begins anew")
+            log.info("configuration reloaded: this camera restarts")
             anew.set()
         else:
-            log.info("the configuration was read again: nothing in it changes this camera while it runs")
+            log.info("configuration reloaded: this camera is unchanged")

@@ -23,8 +23,9 @@ def check_viewers(config: Config) -> None:
         read_tokens(config.access.tokens)
     elif not (is_loopback(config.http.host) or config.access.open_to_all):
         raise UserError(
-            f"http.host: {config.http.host} lets other machines watch, and there are no tokens: name a file "
-            "of them in access.tokens (`myview token NAME` makes one), or say access.open_to_all: true"
+            f"http.host: {config.http.host} lets other machines watch, and there are no tokens: "
+            "set access.tokens to a file of them (`myview token NAME` makes a line), or "
+            "access.open_to_all: true"
         )
 
 
@@ -37,7 +38,7 @@ def check_pulses(config: Config) -> None:
     sync = config.sync
     if (sync.users is None or sync.tls.key is None) and not is_loopback(sync.bind):
         what = f"sync.bind: {sync.bind} lets other machines listen to the pulses"
-        _check_network(config, what, "name a file of passwords in sync.users, and a certificate in sync.tls")
+        _check_network(config, what, "set sync.users and sync.tls")
 
 
 def check_bus(config: Config) -> None:
@@ -49,10 +50,10 @@ def check_bus(config: Config) -> None:
     zenoh = config.zenoh
     if zenoh.users is not None and zenoh.listen.startswith("tls/"):
         return
-    found = _AUTHORITY.match(zenoh.listen)
-    if found is None or not is_loopback(found["host"].strip("[]")):
+    match = _AUTHORITY.match(zenoh.listen)
+    if match is None or not is_loopback(match["host"].strip("[]")):
         what = f"zenoh.listen: {redact_endpoint(zenoh.listen)} lets other machines send frames and tracks"
-        _check_network(config, what, "let it be tls/ and name zenoh.users")
+        _check_network(config, what, "use tls/ and set zenoh.users")
 
 
 def is_loopback(host: str) -> bool:
@@ -66,6 +67,6 @@ def is_loopback(host: str) -> bool:
 def _check_network(config: Config, what: str, remedy: str) -> None:
     if not config.access.trusted_network:
         raise UserError(
-            f"{what}, and whoever does is believed: bind it to 127.0.0.1, {remedy}, or, where nobody else "
-            "reaches it, say access.trusted_network: true"
+            f"{what} without authentication: bind it to 127.0.0.1, {remedy}, or, on a trusted "
+            "network, set access.trusted_network: true"
         )

@@ -46,7 +46,7 @@ def check_pulses() -> None:
             tls.check_hostname = False  # the certificate names the host at which other machines connect
             server = opened.enter_context(tls.wrap_socket(server))
         if not server.recv(64).startswith((b"MYVIEW-SYNC", b"LOGIN-REQUIRED")):
-            raise UnhealthyError("what answers is no pulse server")
+            raise UnhealthyError("the answer is not a pulse server's")
 
 
 def check_service() -> None:
@@ -55,7 +55,7 @@ def check_service() -> None:
     Raises:
         OSError: it does not.
     """
-    _asked("/healthz")
+    _get("/healthz")
 
 
 def check_camera(camera: str) -> None:
@@ -65,7 +65,7 @@ def check_camera(camera: str) -> None:
         UnhealthyError: it does not.
         OSError: the best view is away.
     """
-    known = {it["camera"]: it for it in json.loads(_asked("/api/cameras"))["cameras"]}
+    known = {it["camera"]: it for it in json.loads(_get("/api/cameras"))["cameras"]}
     if camera not in known:
         raise UnhealthyError(f"the best view knows no camera {camera}, or the token is for another one")
     if known[camera]["state"] != "live" or not known[camera]["fps"] > 0:
@@ -74,19 +74,19 @@ def check_camera(camera: str) -> None:
         )
 
 
-def _asked(path: str) -> bytes:
+def _get(path: str) -> bytes:
     url = os.environ.get("MYVIEW_HEALTH_URL") or _URL
-    asked = urllib.request.Request(url.rstrip("/") + path)  # noqa: S310 — the compose files say where
+    request = urllib.request.Request(url.rstrip("/") + path)  # noqa: S310 — the compose files say where
     token = _token()
     if token:
-        asked.add_header("Authorization", f"Bearer {token}")
+        request.add_header("Authorization", f"Bearer {token}")
     # No proxy, though an engine may hand one to all containers: it knows none of a site's own names.
     opener = urllib.request.build_opener(
         urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=_trust())
     )
-    with opener.open(asked, timeout=_TIMEOUT_S) as answer:
-        found: bytes = answer.read()
-    return found
+    with opener.open(request, timeout=_TIMEOUT_S) as response:
+        body: bytes = response.read()
+    return body
 
 
 def _token() -> str:
@@ -119,7 +119,7 @@ def check(words: Sequence[str]) -> None:
         case ["camera", camera]:
             check_camera(camera)
         case _:
-            raise UnhealthyError("what is to be checked is sync, bestview or camera ID")
+            raise UnhealthyError("name what to check: sync, bestview or camera ID")
 
 
 def main(words: Sequence[str]) -> int:

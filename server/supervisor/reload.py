@@ -46,12 +46,12 @@ class ReloadPlan:
         """All of it in one line."""
         parts = {
             "in force now": self.live,
-            "these cameras begin anew": self.cameras,
+            "these cameras restart": self.cameras,
             "waits for a restart of the best view, which ends streams": self.best_view,
             "waits for a restart of all processes": self.site,
         }
-        told = "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names)
-        return f"the configuration was read again: {told or 'nothing in it has changed'}"
+        effects = "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names)
+        return f"configuration reloaded: {effects or 'no changes'}"
 
 
 def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
@@ -64,27 +64,33 @@ def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
     except ValueError:  # what makes a shorter one possible waits itself
         view = view.model_copy(update={"lookahead": running.view.lookahead})
         live = tuple(key for key in live if key != "view.lookahead")
-    kept = _kept(running, wanted, keys)
-    shared = tuple(key for key in _of(keys, _OF_CAMERAS) if not _of((key,), [f"track.{it}" for it in kept]))
+    unchanged = _deferred_track_settings(running, wanted, keys)
+    shared = tuple(
+        key for key in _of(keys, _OF_CAMERAS) if not _of((key,), [f"track.{it}" for it in unchanged])
+    )
     # Whose H.264 can pass depends on the site's codec: with another one, that waits, too.
     names_of_own = tuple(it for it in _OF_A_CAMERA if not (it == "h264" and "encode.codec" in keys))
-    own = {it: _of(keys, [f"cameras.{it}.{name}" for name in names_of_own]) for it in running.camera_ids}
-    sharp = (running.view.quality.sharpness > 0) != (
+    own_changes = {
+        it: _of(keys, [f"cameras.{it}.{name}" for name in names_of_own]) for it in running.camera_ids
+    }
+    sharpness_toggled = (running.view.quality.sharpness > 0) != (
         view.quality.sharpness > 0
     )  # cameras measure it, or do not
-    anew = tuple(camera for camera in running.camera_ids if shared or sharp or own[camera])
-    done = {*live, *shared, *(key for names in own.values() for key in names)}
-    waiting = tuple(key for key in keys if key not in done)
+    restarted = tuple(
+        camera for camera in running.camera_ids if shared or sharpness_toggled or own_changes[camera]
+    )
+    applied = {*live, *shared, *(key for names in own_changes.values() for key in names)}
+    waiting = tuple(key for key in keys if key not in applied)
     best_view = _of(waiting, _OF_THE_BEST_VIEW)
     now = running.model_copy(
         update={
             "view": view,
             "detect": wanted.detect,
-            "track": _track(running, wanted, kept),
+            "track": _track(running, wanted, unchanged),
             "cameras": [_camera(running, wanted, it, names_of_own) for it in running.camera_ids],
         }
     )
-    return ReloadPlan(now, live, anew, best_view, tuple(key for key in waiting if key not in best_view))
+    return ReloadPlan(now, live, restarted, best_view, tuple(key for key in waiting if key not in best_view))
 
 
 def _of(keys: Sequence[str], sections: Sequence[str]) -> tuple[str, ...]:
@@ -92,7 +98,7 @@ def _of(keys: Sequence[str], sections: Sequence[str]) -> tuple[str, ...]:
     return tuple(key for key in keys if any(f"{key}.".startswith(f"{section}.") for section in sections))
 
 
-def _kept(running: Config, wanted: Config, keys: Sequence[str]) -> tuple[str, ...]:
+def _deferred_track_settings(running: Config, wanted: Config, keys: Sequence[str]) -> tuple[str, ...]:
     """Name what of `track` has to stay as it is, since it changes when windows end or frames are final."""
     fps = running.site.fps
     apart = running.track.model_copy(update={name: getattr(wanted.track, name) for name in _BY_LAG})
@@ -100,9 +106,9 @@ def _kept(running: Config, wanted: Config, keys: Sequence[str]) -> tuple[str, ..
     return (*late, "window") if any(key in _EPOCHS for key in keys) else late
 
 
-def _track(running: Config, wanted: Config, kept: Sequence[str]) -> TrackSettings:
+def _track(running: Config, wanted: Config, unchanged: Sequence[str]) -> TrackSettings:
     """Take over how people are followed, but not when windows end and frames are final."""
-    names = [name for name in _TRACK if name not in kept]
+    names = [name for name in _TRACK if name not in unchanged]
     return running.track.model_copy(update={name: getattr(wanted.track, name) for name in names})
 
 

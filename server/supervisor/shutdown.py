@@ -26,7 +26,7 @@ _LET_GO_S = 1.2
 
 async def run_until_signal(
     main: Callable[[], Coroutine[Any, Any, None]],
-    told: Callable[[], None] = lambda: None,
+    on_signal: Callable[[], None] = lambda: None,
     *,
     hang_up: bool = True,
 ) -> bool:
@@ -42,7 +42,7 @@ async def run_until_signal(
     loop.set_exception_handler(AcceptErrors())
 
     def end() -> None:
-        told()
+        on_signal()
         task.cancel()
 
     for number in (*TERMINATION_SIGNALS, signal.SIGHUP) if hang_up else TERMINATION_SIGNALS:

@@ -62,9 +62,9 @@ async def reloads(running: ActiveConfig, check: Check = lambda *_: None) -> Asyn
         try:
             reload = await asyncio.to_thread(_read, running, check)
         except UserError as error:
-            log.warning("%s; the configuration as it was stays in force", error)
+            log.warning("%s; the previous configuration stays in force", error)
         except Exception:
-            log.exception("reading the configuration again failed; as it was, it stays in force")
+            log.exception("reloading the configuration failed; the previous one stays in force")
         else:
             yield reload
 

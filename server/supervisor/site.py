@@ -37,17 +37,18 @@ async def run_up(running: ActiveConfig, environment: Mapping[str, str], out: Pat
         UserError: a process refused its input.
     """
     with _folder() as folder:
-        kept, failing = Path(folder) / "site.yaml", LogThrottle()
+        active_file, write_failures = Path(folder) / "site.yaml", LogThrottle()
         # Anew each time: what is old and temporary may be tidied away, and sites run for months.
         supervisor = Supervisor(
             running.path,
             running.now,
-            {**environment, ACTIVE_CONFIG_VARIABLE: str(kept)},
+            {**environment, ACTIVE_CONFIG_VARIABLE: str(active_file)},
             out,
-            before_start=lambda: _keep(running, kept, failing),
+            before_start=lambda: _write_active_config(running, active_file, write_failures),
         )
         following = asyncio.create_task(
-            _follow(running, supervisor, lambda: _keep(running, kept, failing)), name="reload"
+            _follow(running, supervisor, lambda: _write_active_config(running, active_file, write_failures)),
+            name="reload",
         )
         try:
             await supervisor.run()
@@ -66,12 +67,12 @@ def check_exposure(config: Config) -> None:
         check(config)
 
 
-async def _follow(running: ActiveConfig, supervisor: Supervisor, keep: Callable[[], None]) -> None:
+async def _follow(running: ActiveConfig, supervisor: Supervisor, write_config: Callable[[], None]) -> None:
     """Send SIGHUP to the processes whose settings have changed, at each reload."""
     async for reload in reloads(running, _check):
         log.info("%s", reload.line)
         running.now = reload.now
-        keep()
+        write_config()
         supervisor.reload("bestview")
         for number, camera in enumerate(reload.cameras):
             if number:
@@ -98,15 +99,15 @@ def _check(wanted: Config, reload: ReloadPlan) -> None:
         check_recording(reload.now, camera)
 
 
-def _keep(running: ActiveConfig, kept: Path, failing: LogThrottle) -> None:
+def _write_active_config(running: ActiveConfig, path: Path, failures: LogThrottle) -> None:
     """Write down what the site runs by, for processes that begin: all of it or nothing."""
-    new = kept.with_suffix(".new")
+    new = path.with_suffix(".new")
     try:
-        kept.parent.mkdir(mode=0o700, exist_ok=True)
-        if not is_owned_by_this_user(kept.parent):  # it was tidied away, and somebody else took the name
-            raise PermissionError(errno.EACCES, "its folder is somebody else's")
+        path.parent.mkdir(mode=0o700, exist_ok=True)
+        if not is_owned_by_this_user(path.parent):  # it was tidied away, and somebody else took the name
+            raise PermissionError(errno.EACCES, "its folder belongs to another user")
         new.write_text(serialize_config(running.now, running.path.parent), encoding="utf-8")
-        new.replace(kept)
+        new.replace(path)
     except OSError as error:
-        if (more := failing.record(str(error.strerror))) is not None:
-            log.warning("%s: cannot write what is in force: %s%s", kept, error.strerror, more)
+        if (more := failures.record(str(error.strerror))) is not None:
+            log.warning("%s: cannot write the running configuration: %s%s", path, error.strerror, more)

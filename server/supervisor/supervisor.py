@@ -172,5 +172,5 @@ class Supervisor:
 
 def _cause(code: int) -> str:
     if code == 0:
-        return "was told to end by somebody else"
+        return "was terminated from outside"
     return f"died (killed by signal {-code})" if code < 0 else f"died (exit code {code})"

@@ -49,12 +49,12 @@ def redact_address(source: str) -> str:
     """
     if source.startswith("scene:"):
         return source
-    if source.startswith("/") and (found := _IN_PATH.search(source)) is not None:
-        return f"{source[: found.start()]}{_MORE}"
-    if (found := _SCHEME.match(source)) is not None:
-        return f"{found[0]}://{_shown_place(source[found.end() + 3 :])}"
-    if (found := _OPENED.match(source)) is not None:
-        return f"{found[0][:-1]}:{_MORE}"
+    if source.startswith("/") and (match := _IN_PATH.search(source)) is not None:
+        return f"{source[: match.start()]}{_MORE}"
+    if (match := _SCHEME.match(source)) is not None:
+        return f"{match[0]}://{_shown_place(source[match.end() + 3 :])}"
+    if (match := _OPENED.match(source)) is not None:
+        return f"{match[0][:-1]}:{_MORE}"
     return HIDDEN if "://" in source or is_login(source) else source
 
 
@@ -70,10 +70,10 @@ def _shown_place(rest: str) -> str:
 
 def redact_endpoint(endpoint: str) -> str:
     """Return zenoh's ``protocol/host:port`` without the settings that may stand behind it: keys, for one."""
-    found = _ENDPOINT.match(endpoint)
-    if found is None:
+    match = _ENDPOINT.match(endpoint)
+    if match is None:
         return HIDDEN
-    return found[0] if found.end() == len(endpoint) else f"{found[0]} {_MORE}"
+    return match[0] if match.end() == len(endpoint) else f"{match[0]} {_MORE}"
 
 
 def redact_addresses(text: str) -> str:
@@ -82,11 +82,11 @@ def redact_addresses(text: str) -> str:
 
 
 def _cut(line: str) -> str:
-    found = _ANYWHERE.search(line)
-    if found is None:
+    match = _ANYWHERE.search(line)
+    if match is None:
         return line
     end = "\n" if line.endswith("\n") else ""
-    return f"{line[: found.start()]}{_MORE}{end}"
+    return f"{line[: match.start()]}{_MORE}{end}"
 
 
 def ffmpeg_reason(error: Exception) -> str:

@@ -23,7 +23,7 @@ def check_new_folder(out: Path) -> None:
         UserError: it is not.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise UserError(f"{out}: is there already and is not an empty folder; name another, or remove it")
+        raise UserError(f"{out}: exists and is not an empty folder; name another, or remove it")
 
 
 def check_new_file(out: Path, *read: Path | None) -> None:
@@ -37,9 +37,9 @@ def check_new_file(out: Path, *read: Path | None) -> None:
     if not out.exists():
         return
     if not out.is_file():
-        raise UserError(f"{out}: is no ordinary file, and would be replaced by one; name another")
+        raise UserError(f"{out}: is not a regular file, and would be replaced by one; name another")
     if any(it is not None and it.exists() and out.samefile(it) for it in read):
-        raise UserError(f"{out}: is read, and would be replaced; name another")
+        raise UserError(f"{out}: is an input, and would be replaced; name another")
 
 
 @contextmanager

@@ -50,7 +50,7 @@ def _logs_json() -> bool:
 
 def _uncaught(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
     if not issubclass(kind, KeyboardInterrupt):
-        log.critical("a mistake in MyView", exc_info=(kind, error, trace))
+        log.critical("a bug in MyView", exc_info=(kind, error, trace))
 
 
 def _uncaught_in_thread(failed: threading.ExceptHookArgs) -> None:

@@ -60,8 +60,8 @@ async def test_a_bad_file_changes_nothing_and_a_good_one_breaks_no_stream(
         cameras = [dict(it) for it in site.config["cameras"]]
         cameras[1]["offset"] = 5
         await read_again(site, config, cameras=cameras, view={"switch_cost_s": 0.7}, encode={"crf": 30})
-        await said(site, "bestview: the configuration was read again: in force now: view.switch_cost_s")
-        await said(site, "c1: the configuration was read again, and changes this camera")
+        await said(site, "bestview: configuration reloaded: in force now: view.switch_cost_s")
+        await said(site, "c1: configuration reloaded, and changes this camera")
         assert (await ask("api/operator/view_selection"))["values"]["switch_cost_s"] == 0.7
         assert (await ask("api/operator/config"))["pending_restart"] == ["encode.crf"]
         await bounded(viewer)

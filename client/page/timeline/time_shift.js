@@ -99,7 +99,7 @@ export class Travel {
   #lose() {
     // Who was paused after somebody had left has lost nothing: there is no picture of them since.
     const left = this.#resumed && !this.viewer.chosen?.visible;
-    if (!left) this.viewer.notice.say('Nothing is kept of that: this is live.');
+    if (!left) this.viewer.notice.say('Nothing is recorded of that time: this is live.');
     this.live();
   }
 }

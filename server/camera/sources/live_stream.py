@@ -137,7 +137,7 @@ class LiveStream:
     def _lost(self, why: str, *, mistake: bool = False) -> None:
         """Log that the camera is away, throttled for one that comes and goes."""
         if (more := self._away.record(why)) is not None:
-            log.warning("%s%s; it is tried again", why, more, exc_info=mistake)
+            log.warning("%s%s; retrying", why, more, exc_info=mistake)
 
     def _back(self) -> None:
         if ended := self._away.end():

@@ -13,7 +13,7 @@ from server.system.errors import UserError
 from synthetic import Scene
 
 _WHOLE = re.compile(r"[0-9]{1,18}")
-_DEFAULTS = {"camera": 0, "cameras": None, "objects": None, "seed": 1}  # None: as many as suit the scene
+_DEFAULTS = {"camera": 0, "cameras": None, "objects": None, "seed": 1}  # None: the scene's default
 
 
 class SyntheticSource:

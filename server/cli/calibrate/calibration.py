@@ -51,7 +51,7 @@ def calibrate_from_walks(
         outcome = calibrate_walk(walked, settings, person)
     if outcome.too_little and not force:
         raise UserError(
-            f"calibrate: the walk covered too little: {outcome.too_little} (--force writes it all the same)"
+            f"calibrate: the walk covered too little: {outcome.too_little} (--force writes it anyway)"
         )
     plot_floor_plan(floor_plan_cameras(outcome.found), "m", plan)
     out.write_text(outcome.ground, encoding="utf-8")
@@ -82,7 +82,7 @@ def _rounded(fit: PointFit) -> list[float]:
 def _line(points: MarkedPoints, fit: PointFit, unit: str) -> str:
     count = len(points.image)
     if count == 4:  # noqa: PLR2004 — as many as a homography takes
-        return f"{points.camera}: 4 pairs, which fit exactly whatever they are; a fifth would show errors"
+        return f"{points.camera}: 4 pairs always fit exactly; a fifth would show errors"
     worst = int(np.argmax(fit.image_error))
     return (
         f"{points.camera}: {count} pairs, off by {np.median(fit.floor_error):.3g} {unit} (median), "

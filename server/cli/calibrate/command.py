@@ -30,12 +30,15 @@ def calibrate(
         float | None, typer.Option("--fps", min=1.0, max=1000.0, help="Frames a second; 25 of tracks.")
     ] = None,
     shift: Annotated[
-        float, typer.Option("--shift", min=0.0, max=60.0, help="Seconds that cameras may be out of step.")
+        float,
+        typer.Option("--shift", min=0.0, max=60.0, help="Largest time offset between cameras, seconds."),
     ] = 3.0,
     person: Annotated[
-        float, typer.Option("--person", min=0.1, max=1000.0, help="How tall people are, metres.")
+        float, typer.Option("--person", min=0.1, max=1000.0, help="People's height, meters.")
     ] = 1.75,
-    force: Annotated[bool, typer.Option("--force", help="Write even if the walk covered little.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Write even if the walk covered too little.")
+    ] = False,
 ) -> None:
     """Find each camera's homography to the floor: from marked points, or from people who walk about."""
     from server.cli.calibrate.calibration import calibrate_from_walks, calibrate_points

@@ -102,7 +102,7 @@ def _json(text: str, name: str) -> dict[str, Any]:
     except DuplicateKeyError as error:
         raise UserError(f"{name}: {error}") from error
     except (ValueError, RecursionError) as error:  # a number of thousands of digits, brackets in brackets
-        raise UserError(f"{name}: is not JSON that can be read: {error}") from error
+        raise UserError(f"{name}: is not readable JSON: {error}") from error
     if not isinstance(content, dict) or not isinstance(content.get("cameras"), dict):
         raise UserError(
             f'{name}: has no {{"cameras": {{camera: [{{"image": [x, y], "floor": [x, y]}}, …]}}}}'

@@ -109,8 +109,8 @@ def _rate(rates: Mapping[str, float]) -> float:
     for name, fps in rates.items():
         if abs(fps / rates[first] - 1.0) > _SAME_RATE:
             raise UserError(
-                f"calibrate: {name} has {fps:g} frames a second and {first} {rates[first]:g}: bring them "
-                "to one rate, or say with --fps what it really is"
+                f"calibrate: {name} has {fps:g} frames a second and {first} {rates[first]:g}: "
+                "convert them to one rate, or set --fps"
             )
     return rates[first]
 
@@ -152,4 +152,4 @@ def _size_of(rows: Sequence[MotRow]) -> Size:
 def _check_names(names: Sequence[str]) -> None:
     for name in names:
         if names.count(name) > 1:
-            raise UserError(f"calibrate: two cameras are called {name!r}; every file's name must be its own")
+            raise UserError(f"calibrate: two cameras are called {name!r}; file names must be unique")

@@ -84,7 +84,7 @@ def _tried(config: Config, pipeline: CameraPipeline, sent: StreamStats | None, u
     decoding = sent.cpu_s if sent is not None else 0.0
     each = 1 / max(1, frames)
     return CameraProbe(
-        problem="" if frames else "no picture came in the time that it was given",
+        problem="" if frames else "no picture arrived in time",
         sent=sent,
         size=size,
         passes=pipeline.passes,

@@ -25,15 +25,15 @@ _SAME_RATE = 0.1
 
 def probe_cameras(config: Config, seconds: float) -> dict[str, CameraProbe]:
     """Try all cameras in parallel; one that has not answered in time says so."""
-    found: dict[str, CameraProbe] = {}
+    probes: dict[str, CameraProbe] = {}
 
     def run(camera: str) -> None:
         try:
-            found[camera] = probe_camera(config, camera, seconds)
+            probes[camera] = probe_camera(config, camera, seconds)
         except OSError as error:
-            found[camera] = CameraProbe(reason_of(error))
+            probes[camera] = CameraProbe(reason_of(error))
         except Exception as error:  # noqa: BLE001 — of one camera; the others are still to be told of
-            found[camera] = CameraProbe(describe_bug(error))
+            probes[camera] = CameraProbe(describe_bug(error))
 
     # Daemons: what hangs in a driver must not keep the doctor from ending.
     threads = [threading.Thread(target=run, args=(it,), daemon=True) for it in config.camera_ids]
@@ -43,13 +43,13 @@ def probe_cameras(config: Config, seconds: float) -> dict[str, CameraProbe]:
     for thread in threads:
         thread.join(max(0.0, until - time.monotonic()))
     late = CameraProbe(f"no answer within {2 * seconds + _GRACE_S:.0f} s{_while_busy()}")
-    return {camera: found.get(camera, late) for camera in config.camera_ids}
+    return {camera: probes.get(camera, late) for camera in config.camera_ids}
 
 
 def _while_busy() -> str:
     """Return a remark if the machine is overloaded, since that may be the cause; else an empty text."""
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
-    return f", while the machine is busy with other things (load {load:.0f})" if load > 2 * cores else ""
+    return f", while the machine is overloaded (load {load:.0f})" if load > 2 * cores else ""
 
 
 def sound_findings(config: Config) -> list[Finding]:
@@ -59,7 +59,9 @@ def sound_findings(config: Config) -> list[Finding]:
     try:
         open_audio(config, config.sounding)
     except UserError as error:
-        return [bad("sound", str(error).removeprefix("sound: "), "another file, or a camera that has sound")]
+        return [
+            bad("sound", str(error).removeprefix("sound: "), "use another file, or a camera that has sound")
+        ]
     return [
         ok(
             "sound",
@@ -70,71 +72,73 @@ def sound_findings(config: Config) -> list[Finding]:
 
 def camera_findings(config: Config, probes: Mapping[str, CameraProbe], *, runs: bool) -> list[Finding]:
     """Report on each camera; ``runs``: the site is running, and may hold a device exclusively."""
-    found = [it for camera, probed in probes.items() for it in _of(config, camera, probed, runs=runs)]
-    return found + _shared(config)
+    findings = [
+        it for camera, probed in probes.items() for it in _findings_of(config, camera, probed, runs=runs)
+    ]
+    return findings + _shared_devices(config)
 
 
-def _shared(config: Config) -> list[Finding]:
+def _shared_devices(config: Config) -> list[Finding]:
     """Report devices that two cameras share."""
-    found, whose = [], dict[str, str]()
+    findings, owners = [], dict[str, str]()
     for it in config.cameras:
         if is_device(it.source):
-            first = whose.setdefault(os.path.realpath(it.source), it.id)  # it has other names in /dev/v4l
+            first = owners.setdefault(os.path.realpath(it.source), it.id)  # it has other names in /dev/v4l
             if first != it.id:
-                text = f"{it.source} is camera {first}'s, too, and only one can have it"
-                found.append(bad(f"camera {it.id}", text, "a device of its own, or one camera less"))
-    return found
+                text = f"{it.source} is also used by camera {first}, and only one can open it"
+                findings.append(bad(f"camera {it.id}", text, "give each camera its own device"))
+    return findings
 
 
-def _of(config: Config, camera: str, found: CameraProbe, *, runs: bool) -> list[Finding]:
+def _findings_of(config: Config, camera: str, probe: CameraProbe, *, runs: bool) -> list[Finding]:
     check = f"camera {camera}"
-    if found.problem or found.size is None:
+    if probe.problem or probe.size is None:
         if runs:
-            do = "the site runs, and may have it to itself: see /api/cameras"
-            return [warning(check, found.problem, do)]
-        return [bad(check, found.problem, _remedy(config.camera(camera).source))]
-    parts = [f"{_size(found.size)} pixels"]
-    rate = found.recorded_fps if found.sent is None else found.sent.fps
+            do = "the site is running and may hold the device: see /api/cameras"
+            return [warning(check, probe.problem, do)]
+        return [bad(check, probe.problem, _remedy(config.camera(camera).source))]
+    parts = [f"{_size(probe.size)} pixels"]
+    rate = probe.recorded_fps if probe.sent is None else probe.sent.fps
     if rate is not None:
         parts.append(f"{rate:.1f} pictures a second")
-    how = "its own H.264 passes" if found.passes else f"{found.kbps:.0f} kbit/s"
-    parts += [how, f"{found.cores:.2f} of a core"]
-    return [ok(check, ", ".join(parts)), *_doubts(config, check, found)]
+    how = "its own H.264 passes" if probe.passes else f"{probe.kbps:.0f} kbit/s"
+    parts += [how, f"{probe.cores:.2f} of a core"]
+    return [ok(check, ", ".join(parts)), *_quality_findings(config, check, probe)]
 
 
 def _remedy(source: str) -> str:
     if is_device(source):
-        return "plug it in, let this user have it (group video), and end what else has it"
+        return "plug it in, add this user to the group video, end other programs that use it"
     if source_kind(source) is SourceKind.STREAM:
-        return "try its source in ffplay; address, password, cable"
-    return "mend what the configuration says of it, or the file, which this user has to be able to read"
+        return "try its source in ffplay; check address, password and cable"
+    return "fix its source in the configuration, or make the file readable for this user"
 
 
-def _doubts(config: Config, check: str, found: CameraProbe) -> list[Finding]:
-    site, doubts = config.site, []
-    wide, high = found.size or (site.width, site.height)
+def _quality_findings(config: Config, check: str, probe: CameraProbe) -> list[Finding]:
+    site, findings = config.site, []
+    wide, high = probe.size or (site.width, site.height)
     if wide < site.width and high < site.height:
-        doubts.append(
+        findings.append(
             warning(
                 check,
                 f"its pictures ({_size((wide, high))}) are smaller than the site's "
-                f"({_size((site.width, site.height))}), and are enlarged",
+                f"({_size((site.width, site.height))}), and are upscaled",
                 "lower site.width and site.height, or set the camera to a larger size",
             )
         )
-    rate = found.sent.fps if found.sent is not None else None
+    rate = probe.sent.fps if probe.sent is not None else None
     if rate is not None and rate < (1 - _SAME_RATE) * site.fps:
-        doubts.append(
+        findings.append(
             warning(
                 check,
                 f"it sends {rate:.1f} pictures a second, the site takes {site.fps:g}: some are shown twice",
                 "set the camera to that rate, or lower site.fps",
             )
         )
-    recorded = found.recorded_fps
+    recorded = probe.recorded_fps
     if recorded is not None and abs(recorded / site.fps - 1) > _SAME_SPEED:
         some = "left out" if recorded > site.fps else "shown twice"
-        doubts.append(
+        findings.append(
             warning(
                 check,
                 f"was recorded at {recorded:g} pictures a second, the site takes {site.fps:g}: "
@@ -142,19 +146,19 @@ def _doubts(config: Config, check: str, found: CameraProbe) -> list[Finding]:
                 "set site.fps to that of most of the recordings",
             )
         )
-    if found.sent is not None and found.sent.damaged:
-        doubts.append(
+    if probe.sent is not None and probe.sent.damaged:
+        findings.append(
             warning(
                 check,
-                f"{found.sent.damaged} packets could not be decoded, {found.sent.pictures} pictures could",
+                f"{probe.sent.damaged} packets could not be decoded, {probe.sent.pictures} pictures could",
                 "options: {rtsp_transport: tcp}, or a better network",
             )
         )
-    if found.why_encoded:
-        doubts.append(
-            warning(check, f"is encoded anew: {found.why_encoded}", "set the camera so, or h264: encode")
+    if probe.why_encoded:
+        findings.append(
+            warning(check, f"is encoded anew: {probe.why_encoded}", "set the camera so, or h264: encode")
         )
-    return doubts
+    return findings
 
 
 def _size(size: tuple[int, int]) -> str:

@@ -11,8 +11,8 @@ from server.cli.doctor.findings import Finding, bad, ok, warning
 
 _SOON_DAYS = 14
 _DAY_S = 86_400
-_NEW_ONE = "have a new one made; the running site takes it without a restart"
-_READABLE = "name another, or let this user read it"
+_NEW_ONE = "renew it; the running site loads it without a restart"
+_READABLE = "name another file, or let this user read it"
 
 
 def certificate_finding(check: str, certificate: Path, key: Path) -> Finding:
@@ -26,10 +26,14 @@ def certificate_finding(check: str, certificate: Path, key: Path) -> Finding:
         return bad(check, f"{certificate}: {error.verify_message}", _NEW_ONE)
     except (ssl.SSLError, OSError, ValueError) as error:
         reason = getattr(error, "reason", None) or str(error)
-        return bad(check, f"{certificate} and {key} are no certificate and its key: {reason}", "both as PEM")
+        return bad(
+            check,
+            f"{certificate} and {key} are not a certificate and its key: {reason}",
+            "both must be PEM files",
+        )
     days = (ssl.cert_time_to_seconds(str(seen.get("notAfter"))) - time.time()) / _DAY_S
     names = ", ".join(name for _, name in seen.get("subjectAltName", ()))
-    text = f"{certificate} is good for {days:.0f} days, for {names or 'no host: it has no subjectAltName'}"
+    text = f"{certificate} is valid for {days:.0f} days, for {names or 'no host: it has no subjectAltName'}"
     return ok(check, text) if days >= _SOON_DAYS and names else warning(check, text, _NEW_ONE)
 
 
@@ -38,8 +42,9 @@ def router_finding(check: str, certificate: Path, key: Path, authority: Path, ho
     try:
         handshake(certificate, key, authority, host)
     except ssl.SSLCertVerificationError as error:
-        text = f"{certificate}: who connects to {host} by {authority} refuses it: {error.verify_message}"
-        return bad(check, text, "one that this authority has signed for this host: docs/how-to/secure.md")
+        why = error.verify_message
+        text = f"{certificate}: clients that connect to {host} and trust {authority} refuse it: {why}"
+        return bad(check, text, "use one that this authority has signed for this host: docs/how-to/secure.md")
     except (ssl.SSLError, OSError, ValueError):
         pass  # which is said of the files
     return None
@@ -53,7 +58,7 @@ def authority_finding(check: str, authority: Path) -> Finding:
         ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_verify_locations(authority)
     except (ssl.SSLError, OSError) as error:
         reason = getattr(error, "reason", None) or error
-        return bad(check, f"{authority}: is no certificate: {reason}", "as PEM")
+        return bad(check, f"{authority}: is no certificate: {reason}", "it must be a PEM file")
     return ok(check, f"{authority} can be read")
 
 
@@ -62,7 +67,7 @@ def handshake(certificate: Path, key: Path, trusted: Path, host: str | None = No
 
     Raises:
         ssl.SSLCertVerificationError: it does not go on.
-        ssl.SSLError, OSError, ValueError: the files are no certificate and its key.
+        ssl.SSLError, OSError, ValueError: the files are not a certificate and its key.
     """
     server = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     server.load_cert_chain(certificate, key, password=_no_password)
@@ -90,4 +95,4 @@ def _unreadable(path: Path) -> str:
 
 
 def _no_password() -> str:
-    raise ValueError("the key has a password; write it without one")
+    raise ValueError("the key has a password; save it without one")

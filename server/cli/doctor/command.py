@@ -41,76 +41,76 @@ T = TypeVar("T")
 
 _LONGEST = "record.max_mb"
 """The longest name of a check, but for those that have a camera's in it."""
-_MEND = "mend it there; configs/demo.yaml explains every setting"
+_MEND = "fix the configuration; configs/demo.yaml explains every setting"
 
 
 def run_doctor(path: Path, seconds: float, *, as_json: bool) -> bool:
     """Check a configuration, print what is found as it is found; return whether nothing is bad."""
-    return asyncio.run(_told(path, seconds, as_json=as_json)).well
+    return asyncio.run(_check_and_report(path, seconds, as_json=as_json)).well
 
 
-async def _told(path: Path, seconds: float, *, as_json: bool) -> Findings:
-    found: list[Finding] = []
-    config = _read(path, found)
+async def _check_and_report(path: Path, seconds: float, *, as_json: bool) -> Findings:
+    findings: list[Finding] = []
+    config = _read(path, findings)
     names = [] if config is None else [f"camera {it}" for it in config.camera_ids]
     width, console = max(map(len, [_LONGEST, *names])), Console()
 
-    def tell(it: Finding) -> None:
+    def report(it: Finding) -> None:
         if not as_json:
             show(it, width, console)
 
-    for it in found:
-        tell(it)
+    for it in findings:
+        report(it)
     if config is not None:
         async for it in run_checks(config, seconds):
-            found.append(it)
-            tell(it)
-    findings = collect_findings(found)
+            findings.append(it)
+            report(it)
+    summary = collect_findings(findings)
     if as_json:
-        typer.echo(msgspec.json.format(msgspec.json.encode(findings)).decode())
+        typer.echo(msgspec.json.format(msgspec.json.encode(summary)).decode())
     else:
-        show_counts(findings, console)
-    return findings
+        show_counts(summary, console)
+    return summary
 
 
-def _read(path: Path, found: list[Finding]) -> Config | None:
-    with report_failure("configuration", found):
+def _read(path: Path, findings: list[Finding]) -> Config | None:
+    with report_failure("configuration", findings):
         try:
             config = load_config(path)
         except UserError as error:
-            found.append(bad("configuration", str(error), _MEND))
+            findings.append(bad("configuration", str(error), _MEND))
             return None
         site = config.site
         what = f"{len(config.cameras)} cameras, {site.width}x{site.height} at {site.fps:g} a second"
-        found.append(ok("configuration", f"{path}: {what}"))
+        findings.append(ok("configuration", f"{path}: {what}"))
         return config
     return None
 
 
 async def run_checks(config: Config, seconds: float) -> AsyncIterator[Finding]:
     """Return all findings about a configuration, as they are found."""
-    found: list[Finding] = []
-    runs, probes = False, {it: CameraProbe("it was not tried") for it in config.camera_ids}
-    with report_failure("ports", found):
+    findings: list[Finding] = []
+    runs, probes = False, {it: CameraProbe("not tried") for it in config.camera_ids}
+    with report_failure("ports", findings):
         ports, runs = await port_findings(config)
-        found += ports
-    with report_failure("zenoh.connect", found):
-        found += await reachability_findings(config)
-    for it in [*found, *file_findings(_placed(config))]:
+        findings += ports
+    with report_failure("zenoh.connect", findings):
+        findings += await reachability_findings(config)
+    for it in [*findings, *file_findings(_with_scene_ground(config))]:
         yield it
-    found = []
-    with report_failure("clock", found):
-        found += await clock_findings(config)
-    for it in found:
+    findings = []
+    with report_failure("clock", findings):
+        findings += await clock_findings(config)
+    for it in findings:
         yield it
-    found = []
-    with report_failure("cameras", found):
-        probes = await _let_go_of(lambda: probe_cameras(config, seconds))
-    for it in found + _last(config, probes, runs=runs):
+    findings = []
+    with report_failure("cameras", findings):
+        probes = await _run_detached(lambda: probe_cameras(config, seconds))
+    for it in findings + _camera_dependent_findings(config, probes, runs=runs):
         yield it
 
 
-async def _let_go_of(work: Callable[[], T]) -> T:
+async def _run_detached(work: Callable[[], T]) -> T:
     """Run in a thread that nobody waits for where the doctor is told to end: it may hang in a driver."""
     loop = asyncio.get_running_loop()
     result: asyncio.Future[T] = loop.create_future()
@@ -129,7 +129,9 @@ async def _let_go_of(work: Callable[[], T]) -> T:
     return await result
 
 
-def _last(config: Config, probes: dict[str, CameraProbe], *, runs: bool) -> list[Finding]:
+def _camera_dependent_findings(
+    config: Config, probes: dict[str, CameraProbe], *, runs: bool
+) -> list[Finding]:
     """Return the findings that are known once the cameras were tried."""
     checks: Sequence[tuple[str, Callable[[], list[Finding]]]] = (
         ("cameras", lambda: camera_findings(config, probes, runs=runs)),
@@ -138,14 +140,14 @@ def _last(config: Config, probes: dict[str, CameraProbe], *, runs: bool) -> list
         ("machine", lambda: machine_findings(config, probes)),
         ("open files", lambda: descriptor_findings(config, descriptor_limit())),
     )
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for check, find in checks:
-        with report_failure(check, found):
-            found += find()
-    return found
+        with report_failure(check, findings):
+            findings += find()
+    return findings
 
 
-def _placed(config: Config) -> Config:
+def _with_scene_ground(config: Config) -> Config:
     """Return the configuration with its scenes' floors; where there is no such scene, the camera says so."""
     try:
         return add_scene_ground(config)

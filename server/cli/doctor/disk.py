@@ -16,7 +16,7 @@ from server.system.private_files import rights_of_others
 
 _INDEX_BYTES = 100
 """A frame of a camera, beside its picture: docs/how-to/record.md."""
-_TRY_AGAIN = "try again when it answers; where encode.max_kbps is set, that is taken for its rate"
+_TRY_AGAIN = "try again when it answers; encode.max_kbps, where set, counts as its rate"
 
 
 def disk_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[Finding]:
@@ -25,17 +25,19 @@ def disk_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[Fin
     if folder is None:
         return [ok("record", "nothing is recorded")]
     try:
-        there = _nearest(folder)
+        there = _nearest_existing(folder)
         with tempfile.TemporaryFile(dir=there):
             pass  # it has no name, so that nothing is left whatever happens
     except OSError as error:
         text = f"{_place(folder, error)}: cannot write there: {error.strerror}"
-        return [bad("record.folder", text, "another folder, or let this user write there")]
-    found = [_writable(folder)]
-    return found + _sizes(config, probes, shutil.disk_usage(there).free / 1e6, _held_bytes(folder) / 1e6)
+        return [bad("record.folder", text, "use another folder, or let this user write there")]
+    findings = [_writable_finding(folder)]
+    return findings + _size_findings(
+        config, probes, shutil.disk_usage(there).free / 1e6, _folder_bytes(folder) / 1e6
+    )
 
 
-def _writable(folder: Path) -> Finding:
+def _writable_finding(folder: Path) -> Finding:
     """Report that a folder can be written, and whether other users can list it."""
     text = f"{folder} can be written"
     with suppress(OSError):  # it is not there yet, and is made for one user alone
@@ -45,31 +47,33 @@ def _writable(folder: Path) -> Finding:
     return ok("record.folder", text)
 
 
-def _sizes(config: Config, probes: Mapping[str, CameraProbe], free: float, held: float) -> list[Finding]:
-    record, found = config.record, []
+def _size_findings(
+    config: Config, probes: Mapping[str, CameraProbe], free: float, recorded: float
+) -> list[Finding]:
+    record, findings = config.record, []
     unknown = [camera for camera, it in probes.items() if _kbps(config, camera, it) is None]
     guessed = [camera for camera, it in probes.items() if it.problem and camera not in unknown]
-    wanted = needed_mb(config, probes)
+    needed = needed_mb(config, probes)
     hours = _hours(record.keep_s)
-    kept = f"{hours} of these cameras take about {wanted:.0f} MB"
+    needs = f"{hours} of these cameras take about {needed:.0f} MB"
     if unknown:
         who = ", ".join(unknown)
-        kept = f"without {who}, whose rate is not known, {hours} of the cameras take about {wanted:.0f} MB"
+        needs = f"without {who}, whose rate is not known, {hours} of the cameras take about {needed:.0f} MB"
         if len(unknown) == len(probes):
-            kept = f"what {hours} of {who} take is not known"
+            needs = f"what {hours} of {who} take is not known"
     if guessed:
-        kept += f", with {', '.join(guessed)} as encode.max_kbps allows"
-    if wanted > record.max_mb:
-        fits = f"{'at most' if unknown else 'about'} {_hours(record.keep_s * record.max_mb / wanted)}"
-        text = f"{kept}, but record.max_mb is {record.max_mb:.0f}: {fits} are kept"
-        found.append(warning("record.max_mb", text, "raise it, or lower record.keep_s"))
-    text = f"{kept}; {free:.0f} MB are free, and {held:.0f} MB are recorded already"
-    if min(wanted, record.max_mb) > free + held:
-        do = "lower record.keep_s or record.max_mb, or take a larger disk"
-        found.append(bad("disk", text, do))
+        needs += f", with {', '.join(guessed)} as encode.max_kbps allows"
+    if needed > record.max_mb:
+        fits = f"{'at most' if unknown else 'about'} {_hours(record.keep_s * record.max_mb / needed)}"
+        text = f"{needs}, but record.max_mb is {record.max_mb:.0f}: {fits} are kept"
+        findings.append(warning("record.max_mb", text, "raise it, or lower record.keep_s"))
+    text = f"{needs}; {free:.0f} MB are free, and {recorded:.0f} MB are recorded already"
+    if min(needed, record.max_mb) > free + recorded:
+        do = "lower record.keep_s or record.max_mb, or use a larger disk"
+        findings.append(bad("disk", text, do))
     else:
-        found.append(warning("disk", text, _TRY_AGAIN) if unknown else ok("disk", text))
-    return found
+        findings.append(warning("disk", text, _TRY_AGAIN) if unknown else ok("disk", text))
+    return findings
 
 
 def needed_mb(config: Config, probes: Mapping[str, CameraProbe]) -> float:
@@ -95,7 +99,7 @@ def _hours(seconds: float) -> str:
     return f"{seconds / 3600:.1f} hours" if seconds >= 3600 else f"{seconds / 60:.0f} minutes"  # noqa: PLR2004
 
 
-def _nearest(folder: Path) -> Path:
+def _nearest_existing(folder: Path) -> Path:
     """Return a folder, or where it will be made: the first above it that is there.
 
     Raises:
@@ -115,15 +119,15 @@ def _place(folder: Path, error: OSError) -> Path:
             if not os.access(it, os.X_OK):
                 return it
     with suppress(OSError):
-        return _nearest(folder)
+        return _nearest_existing(folder)
     return folder
 
 
-def _held_bytes(folder: Path) -> int:
+def _folder_bytes(folder: Path) -> int:
     """Add up all files in a folder, but those that a running site removes meanwhile."""
-    held = 0
+    total = 0
     for inside, _, names in os.walk(folder):
         for name in names:
             with suppress(OSError):
-                held += Path(inside, name).stat().st_size
-    return held
+                total += Path(inside, name).stat().st_size
+    return total

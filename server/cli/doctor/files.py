@@ -19,16 +19,16 @@ from server.config.tokens_file import read_tokens
 from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers
 from server.system.errors import UserError
 
-_LINES = "name:password, one a line, in a file that this user can read: docs/how-to/secure.md"
+_LINES = "write name:password, one a line, in a file that this user can read: docs/how-to/secure.md"
 
 
 def file_findings(config: Config) -> list[Finding]:
     """Check that each file can be used, and that other users cannot read secrets or write access files."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for check, find in _checks(config):
-        with report_failure(check, found):
-            found += find()
-    return found
+        with report_failure(check, findings):
+            findings += find()
+    return findings
 
 
 def _checks(config: Config) -> Iterator[tuple[str, Callable[[], list[Finding]]]]:
@@ -55,18 +55,18 @@ def _pair(check: str, certificate: Path | None, key: Path | None) -> list[Findin
 
 
 def _process_tls(check: str, tls: ProcessTlsSettings, host: str | None) -> list[Finding]:
-    found = _pair(check, tls.certificate, tls.key)
+    findings = _pair(check, tls.certificate, tls.key)
     if tls.authority is None:
-        return found
-    found.append(authority_finding(check, tls.authority))
+        return findings
+    findings.append(authority_finding(check, tls.authority))
     if tls.certificate is not None and tls.key is not None and host is not None:
         refused = router_finding(check, tls.certificate, tls.key, tls.authority, host)
-        found += [] if refused is None else [refused]
-    return found
+        findings += [] if refused is None else [refused]
+    return findings
 
 
 def _exposed(config: Config) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     checks = [check_pulses, check_bus]
     if config.access.tokens is None:  # else it is a matter of their file, of which its own line tells
         checks.insert(0, check_viewers)
@@ -74,8 +74,8 @@ def _exposed(config: Config) -> list[Finding]:
         try:
             check(config)
         except UserError as error:
-            found.append(bad("access", str(error)))
-    return found or [ok("access", "nobody is let in by accident")]
+            findings.append(bad("access", str(error)))
+    return findings or [ok("access", "not open by accident")]
 
 
 def _tokens(config: Config) -> list[Finding]:
@@ -87,14 +87,16 @@ def _tokens(config: Config) -> list[Finding]:
     except UserError as error:
         return [bad("access.tokens", str(error), "`myview token NAME` prints a line for it")]
     operators = sum(it.role == "operate" for it in tokens)
-    found = [ok("access.tokens", f"{path}: {len(tokens)} tokens, {operators} of them operate")]
+    findings = [ok("access.tokens", f"{path}: {len(tokens)} tokens, {operators} of them for operators")]
     if not tokens:
-        found = [warning("access.tokens", f"{path} lets nobody in", "`myview token NAME` makes one")]
+        findings = [warning("access.tokens", f"{path} lets no one in", "`myview token NAME` makes one")]
     if path.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        found.append(
-            warning("access.tokens", f"others may write {path}: let themselves in", f"chmod 644 {path}")
+        findings.append(
+            warning(
+                "access.tokens", f"others may write {path} and give themselves access", f"chmod 644 {path}"
+            )
         )
-    return found
+    return findings
 
 
 def _users(check: str, path: Path, names: Sequence[str]) -> list[Finding]:
@@ -103,15 +105,15 @@ def _users(check: str, path: Path, names: Sequence[str]) -> list[Finding]:
     except UserError as error:
         return [bad(check, str(error).removeprefix(f"{check}: "), _LINES)]
     missing = [it for it in names if it not in users]
-    found = [ok(check, f"{path}: {len(users)} users")]
+    findings = [ok(check, f"{path}: {len(users)} users")]
     if missing:
-        do = "a line for each, where the server runs; a camera's machine needs its own alone"
-        found = [warning(check, f"{path} has no line for {', '.join(missing)}", do)]
+        do = "add a line for each on the server's machine; a camera's machine needs only its own"
+        findings = [warning(check, f"{path} has no line for {', '.join(missing)}", do)]
     wrong = [name for name, password in users.items() if check == SETTING and not is_password(password)]
     if wrong:
         text = f"{path}: the passwords of {', '.join(wrong)} have spaces, or more than 128 characters"
-        found = [bad(check, text, "`openssl rand -hex 32` makes one")]
-    return found + _private(check, path)
+        findings = [bad(check, text, "`openssl rand -hex 32` makes one")]
+    return findings + _private(check, path)
 
 
 def _private(check: str, path: Path) -> list[Finding]:
@@ -127,8 +129,10 @@ def _private(check: str, path: Path) -> list[Finding]:
 def _ground(config: Config) -> Finding:
     without = [it.id for it in config.cameras if it.ground is None]
     if not without:
-        return ok("ground", "all cameras know where they stand")
+        return ok("ground", "all cameras have a homography")
     if len(without) == len(config.cameras):
-        return ok("ground", "no camera knows where it stands: people are told apart by looks alone")
+        return ok("ground", "no camera has a homography: people are matched by appearance alone")
     do = "`myview calibrate`, or the operator's page"
-    return warning("ground", f"{', '.join(without)}: not in the file: known by looks alone", do)
+    return warning(
+        "ground", f"{', '.join(without)}: no homography: people are matched by appearance alone there", do
+    )

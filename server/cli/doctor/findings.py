@@ -64,14 +64,14 @@ def collect_findings(findings: Sequence[Finding]) -> Findings:
 
 
 @contextmanager
-def report_failure(check: str, found: list[Finding]) -> Iterator[None]:
+def report_failure(check: str, findings: list[Finding]) -> Iterator[None]:
     """Turn an exception of a check into a finding, so that the other checks still report."""
     try:
         yield
     except (OSError, UserError) as error:
-        found.append(bad(check, reason_of(error), "mend that, and try again"))
+        findings.append(bad(check, reason_of(error), "fix that, then try again"))
     except Exception as error:  # noqa: BLE001 — a mistake in one check is no reason to say nothing of the others
-        found.append(bad(check, describe_bug(error), "tell of it"))
+        findings.append(bad(check, describe_bug(error), "please report it"))
 
 
 def reason_of(error: Exception) -> str:
@@ -85,7 +85,7 @@ def reason_of(error: Exception) -> str:
 
 def describe_bug(error: Exception) -> str:
     """Describe an unexpected exception, with addresses redacted."""
-    return f"a mistake in MyView: {type(error).__name__}: {redact_addresses(str(error))}"
+    return f"a bug in MyView: {type(error).__name__}: {redact_addresses(str(error))}"
 
 
 _COLOURS = {Level.OK: "green", Level.WARNING: "yellow", Level.BAD: "red"}

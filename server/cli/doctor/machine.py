@@ -30,18 +30,20 @@ _PROCESS_MB = 250
 
 async def clock_findings(config: Config) -> list[Finding]:
     """Check that NTP synchronizes this machine's clock, and compare it with the pulse server's."""
-    found = [_kept(config)]
-    offset = await _offset(config.sync.host, config.sync.port, pulse_client_tls(config))
+    findings = [_ntp_finding(config)]
+    offset = await _clock_offset(config.sync.host, config.sync.port, pulse_client_tls(config))
     if offset is None:
-        found.append(ok("pulse server", "is not running: its clock cannot be compared"))
+        findings.append(ok("pulse server", "is not running: its clock cannot be compared"))
     elif abs(offset) > _FAR_S:
         text = f"its clock is {offset:+.1f} s off this machine's"
-        found.append(
-            warning("pulse server", text, "frames do not mind; logs and times of the past do: use NTP")
+        findings.append(
+            warning(
+                "pulse server", text, "use NTP: frames do not depend on the clock, logs and recorded times do"
+            )
         )
     else:
-        found.append(ok("pulse server", f"its clock is {1000 * offset:+.0f} ms off this machine's"))
-    return found
+        findings.append(ok("pulse server", f"its clock is {1000 * offset:+.0f} ms off this machine's"))
+    return findings
 
 
 def machine_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[Finding]:
@@ -51,7 +53,7 @@ def machine_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[
     takes = sum(it.cores for it in probes.values()) + _SERVICE_CORES
     who = "all cameras" if not untried else f"without {', '.join(untried)}, the cameras"
     text = f"{who} and the best view take about {takes:.1f} of {cores:.3g} cores"
-    found = [
+    findings = [
         ok("processor", text)
         if takes <= _FULL * cores
         else warning(
@@ -64,26 +66,26 @@ def machine_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[
         pictures = 3 * site.width * site.height * config.track.backlog_s * site.fps / 1e6
         needs = len(config.cameras) * (_PROCESS_MB + pictures) + 2 * _PROCESS_MB
         text = f"takes up to {needs:.0f} MB while it is busy; {free:.0f} MB are free"
-        found.append(
+        findings.append(
             ok("memory", text)
             if needs <= free
-            else warning("memory", text, "a lower track.backlog_s, fewer cameras, or more memory")
+            else warning("memory", text, "lower track.backlog_s, use fewer cameras, or add memory")
         )
-    return found
+    return findings
 
 
 def descriptor_findings(config: Config, descriptors: int) -> list[Finding]:
     """Check that the limit of open files allows the configured connections and viewers."""
     wanted, most = config.http.connections, connection_limit(config, descriptors)
     viewers = min(config.http.viewers_max, most)
-    has = f"{descriptors} may be open in a process that is started from here: {most} connections"
+    has = f"{descriptors} files may be open: {most} connections"
     if viewers < config.http.viewers_max:
         text = f"{has}, and so {viewers} viewers; http.viewers_max says {config.http.viewers_max}"
     elif most < wanted:
         text = f"{has}, {viewers} viewers among them; http.connections_max says {wanted}"
     else:
         return [ok("open files", f"{has} and {viewers} viewers fit")]
-    do = "a higher hard limit: ulimit -Hn, LimitNOFILE= of systemd, ulimits of compose; or lower settings"
+    do = "raise the hard limit: ulimit -Hn, LimitNOFILE= of systemd, ulimits of compose; or lower settings"
     return [warning("open files", text, do)]
 
 
@@ -97,29 +99,29 @@ def available_mb() -> float | None:
     return None if kilobytes is None else int(kilobytes) * 1024 / 1e6
 
 
-def _kept(config: Config) -> Finding:
-    kept = is_clock_synchronized()
-    if kept is None:
-        return ok("clock", "the system does not say whether it is kept by NTP")
-    if kept:
-        return ok("clock", "is kept right (NTP)")
-    text, do = "nobody keeps it right (NTP)", "timedatectl set-ntp true, or chrony; frames do not mind"
+def _ntp_finding(config: Config) -> Finding:
+    synchronized = is_clock_synchronized()
+    if synchronized is None:
+        return ok("clock", "the system does not report whether NTP synchronizes it")
+    if synchronized:
+        return ok("clock", "is synchronized by NTP")
+    text, do = "is not synchronized by NTP", "timedatectl set-ntp true, or chrony; frames do not depend on it"
     if config.record.folder is not None and not config.record.trust_clock:
-        text += ": what is recorded does not get older while this machine is off"
+        text += ": recordings do not age while this machine is off"
         do += ". Where the clock goes on by itself: record.trust_clock: true"
     return warning("clock", text, do)
 
 
-async def _offset(host: str, port: int, tls: ssl.SSLContext | None) -> float | None:
+async def _clock_offset(host: str, port: int, tls: ssl.SSLContext | None) -> float | None:
     """Return the pulse server's clock minus ours, in seconds, by its first line; None where none comes."""
     try:
         async with asyncio.timeout(_ANSWER_S):
-            asked = time.time()
+            sent = time.time()
             reader, writer = await asyncio.open_connection(host, port, ssl=tls)
             try:
-                said = parse_server_line((await reader.readline()).rstrip(b"\r\n"))
+                greeting = parse_server_line((await reader.readline()).rstrip(b"\r\n"))
             finally:
                 writer.close()
     except (OSError, TimeoutError, ProtocolError, ValueError):
         return None
-    return said.now - (asked + time.time()) / 2 if isinstance(said, Greeting | LoginRequest) else None
+    return greeting.now - (sent + time.time()) / 2 if isinstance(greeting, Greeting | LoginRequest) else None

@@ -13,7 +13,7 @@ from server.config.site_config import Config
 from server.supervisor.startup_checks import check_port_free
 from server.system.errors import UserError
 
-_END_IT = "end it, or take another port; if it is this site, set MYVIEW_TOKEN to a token of it"
+_END_IT = "stop it, or use another port; if it is this site, set MYVIEW_TOKEN to one of its tokens"
 
 
 _ALL = frozenset({"0.0.0.0", "::"})  # noqa: S104 — it is not listened on
@@ -25,7 +25,7 @@ async def port_findings(config: Config) -> tuple[list[Finding], bool]:
     protocol, _, address = zenoh.listen.partition("/")
     bus, _, bus_port = address.rpartition(":")
     runs = False
-    found: list[Finding] = []
+    findings: list[Finding] = []
     places: dict[str, tuple[str, int]] = {}
     for check, host, port in (
         ("http.port", http.host, http.port),
@@ -34,30 +34,32 @@ async def port_findings(config: Config) -> tuple[list[Finding], bool]:
     ):
         where = f"{host}:{port}"
         if check == "zenoh.listen" and protocol not in {"tcp", "tls"}:
-            found.append(ok(check, f"{zenoh.listen} is tried when the site starts"))
+            findings.append(ok(check, f"{zenoh.listen} is not checked before the site starts"))
             continue
-        twice = [it for it, place in places.items() if _overlap(place, (host, port))]
+        clashing = [it for it, place in places.items() if _overlap(place, (host, port))]
         places[check] = (host, port)
-        if twice:
-            found.append(bad(check, f"{where} is what {twice[0]} says, too", "a port for each"))
+        if clashing:
+            findings.append(
+                bad(check, f"{where} is also the address of {clashing[0]}", "give each its own port")
+            )
             continue
-        with report_failure(check, found):
+        with report_failure(check, findings):
             taken = _taken(host, port, check)
             if taken is None:
-                found.append(ok(check, f"{where} is free"))
+                findings.append(ok(check, f"{where} is free"))
             elif isinstance(taken, str):
-                do = "an address of this machine, and a port that this user may have"
-                found.append(bad(check, taken, do))
+                do = "use an address of this machine, and a port that this user may bind"
+                findings.append(bad(check, taken, do))
             else:
-                whose = runs if check == "zenoh.listen" else await _is_ours(config, check)
-                runs = runs or whose
-                here = f"{where} is taken"
-                found.append(
-                    ok(check, f"{here} by this very site, which runs")
-                    if whose
-                    else bad(check, f"{here} by something else", _END_IT)
+                is_own = runs if check == "zenoh.listen" else await _is_this_site(config, check)
+                runs = runs or is_own
+                here = f"{where} is used"
+                findings.append(
+                    ok(check, f"{here} by this site, which is running")
+                    if is_own
+                    else bad(check, f"{here} by another program", _END_IT)
                 )
-    return found, runs
+    return findings, runs
 
 
 def _overlap(one: tuple[str, int], other: tuple[str, int]) -> bool:
@@ -76,10 +78,10 @@ def _taken(host: str, port: int, check: str) -> bool | str | None:
     return None
 
 
-async def _is_ours(config: Config, check: str) -> bool:
+async def _is_this_site(config: Config, check: str) -> bool:
     """Ask whoever has a port whether it is this site."""
     if check == "sync.port":
-        host, credentials = _reached(config.sync.bind), _credentials(config)
+        host, credentials = _connect_host(config.sync.bind), _credentials(config)
         try:
             tls = pulse_client_tls(config)
             if tls is not None:
@@ -90,7 +92,7 @@ async def _is_ours(config: Config, check: str) -> bool:
         clients = {client.name for client in listed}
         return not clients.isdisjoint(pulse_clients(config))
     scheme = "http" if config.http.tls.key is None else "https"
-    host = _reached(config.http.host)
+    host = _connect_host(config.http.host)
     url = f"{scheme}://[{host}]" if ":" in host else f"{scheme}://{host}"
     token = os.environ.get("MYVIEW_TOKEN") or None
     patience = client.HttpSettings(connect_timeout=2.0, read_timeout=3.0, retries=0, token=token)
@@ -111,6 +113,6 @@ def _credentials(config: Config) -> Credentials | None:
     return None
 
 
-def _reached(host: str) -> str:
+def _connect_host(host: str) -> str:
     """Return where somebody who listens on all addresses is reached from here."""
     return {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 — it is not listened on

@@ -18,15 +18,15 @@ Place = tuple[str, int]
 
 async def reachability_findings(config: Config) -> list[Finding]:
     """Check that each address leads to a listener of this site, or to another machine that answers."""
-    sync, found = config.sync, list[Finding]()
-    ways = [("sync.host", (sync.host, sync.port), "sync.bind", (sync.bind, sync.port))]
+    sync, findings = config.sync, list[Finding]()
+    routes = [("sync.host", (sync.host, sync.port), "sync.bind", (sync.bind, sync.port))]
     connect, listen = host_and_port(config.zenoh.connect), host_and_port(config.zenoh.listen)
     if connect is not None and listen is not None:
-        ways.append(("zenoh.connect", connect, "zenoh.listen", listen))
-    for check, there, setting, listens in ways:
-        with report_failure(check, found):
-            found.append(await _way(check, there, setting, listens))
-    return found
+        routes.append(("zenoh.connect", connect, "zenoh.listen", listen))
+    for check, there, setting, listens in routes:
+        with report_failure(check, findings):
+            findings.append(await _check_route(check, there, setting, listens))
+    return findings
 
 
 def host_and_port(endpoint: str) -> Place | None:
@@ -36,14 +36,16 @@ def host_and_port(endpoint: str) -> Place | None:
     return (host.strip("[]"), int(port)) if protocol in {"tcp", "tls"} and port.isdecimal() else None
 
 
-async def _way(check: str, there: Place, setting: str, listens: Place) -> Finding:
+async def _check_route(check: str, there: Place, setting: str, listens: Place) -> Finding:
     where = f"{there[0]}:{there[1]}"
     try:
         addresses = await _addresses(there[0])
     except (socket.gaierror, TimeoutError, UnicodeError) as error:
-        reason = getattr(error, "strerror", None) or "no answer of who knows names"
+        reason = getattr(error, "strerror", None) or "no answer from DNS"
         return bad(
-            check, f"{where} cannot be found: {reason}", "the server's name or address, as seen from here"
+            check,
+            f"{where} cannot be resolved: {reason}",
+            "use the server's name or address, as seen from this machine",
         )
     here = any(map(_is_of_this_machine, addresses))
     if here and there[1] == listens[1] and await _covers(listens[0], addresses):
@@ -52,17 +54,15 @@ async def _way(check: str, there: Place, setting: str, listens: Place) -> Findin
     if not away:
         return ok(check, f"{where} answers")
     if here:
-        text = f"nobody is at {where}, where cameras look, and {setting} is {listens[0]}:{listens[1]}"
-        return bad(check, text, f"let it lead to {setting}, or {setting} be reached by it")
-    return warning(
-        check, f"{where} does not answer: {away}", "start the site there; or a firewall is between"
-    )
+        text = f"nothing listens at {where}, where cameras connect; {setting} is {listens[0]}:{listens[1]}"
+        return bad(check, text, f"make {check} and {setting} agree")
+    return warning(check, f"{where} does not answer: {away}", "start the site there, or open the firewall")
 
 
 async def _addresses(host: str) -> set[str]:
     async with asyncio.timeout(_ANSWER_S):
-        found = await asyncio.get_running_loop().getaddrinfo(host, None, type=socket.SOCK_STREAM)
-    return {str(it[4][0]) for it in found}
+        resolved = await asyncio.get_running_loop().getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    return {str(it[4][0]) for it in resolved}
 
 
 def _is_of_this_machine(address: str) -> bool:

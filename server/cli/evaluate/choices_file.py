@@ -36,7 +36,7 @@ def read_choices(path: Path) -> list[Choice]:
         with path.open(encoding="ascii", newline="") as file:
             lines = csv.reader(file)
             if next(lines, []) != _HEAD:
-                raise UserError(f"{path}: is no file of choices: its first line is not {','.join(_HEAD)}")
+                raise UserError(f"{path}: is not a choices file: its first line is not {','.join(_HEAD)}")
             choices: dict[tuple[int, int], Choice] = {}
             for number, fields in enumerate(lines, start=2):
                 choice = _choice(fields, f"{path}:{number}")
@@ -46,7 +46,7 @@ def read_choices(path: Path) -> list[Choice]:
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
     except (UnicodeDecodeError, csv.Error) as error:
-        raise UserError(f"{path}: is no file of choices: {error}") from error
+        raise UserError(f"{path}: is not a choices file: {error}") from error
     return list(choices.values())
 
 

@@ -41,64 +41,64 @@ class EvaluateOptions:
     plots: Path | None
 
 
-def evaluate(asked: EvaluateOptions) -> None:
+def evaluate(options: EvaluateOptions) -> None:
     """Score tracks, choices of views, or both; print, and write what is asked for.
 
     Raises:
         UserError: something is missing or malformed; nothing is written then.
     """
-    _check(asked)
-    read = (*asked.tracks, *asked.truth, asked.views, *asked.videos)
-    content: dict[str, Any] = {"iou": asked.least_iou}
+    _check(options)
+    read = (*options.tracks, *options.truth, options.views, *options.videos)
+    content: dict[str, Any] = {"iou": options.least_iou}
     with ExitStack() as outputs:  # all of them, or none
-        numbers = outputs.enter_context(atomic_file(asked.json_file, *read)) if asked.json_file else None
-        plots = outputs.enter_context(atomic_folder(asked.plots)) if asked.plots else None
-        if asked.tracks:
-            recordings = read_recordings(asked.tracks, asked.truth)
-            scores = evaluate_recordings(recordings, asked.least_iou)
+        numbers = outputs.enter_context(atomic_file(options.json_file, *read)) if options.json_file else None
+        plots = outputs.enter_context(atomic_folder(options.plots)) if options.plots else None
+        if options.tracks:
+            recordings = read_recordings(options.tracks, options.truth)
+            scores = evaluate_recordings(recordings, options.least_iou)
             content |= content_of(scores)
         else:
-            files = files_by_camera("--gt", asked.truth, "gt")
+            files = files_by_camera("--gt", options.truth, "gt")
             recordings = {camera: TruthAndTracks(rows_of(path), []) for camera, path in files.items()}
-        judged = None
-        if asked.views is not None:
-            judged, content["views"] = _judge(asked, asked.views, recordings, plots)
+        evaluation = None
+        if options.views is not None:
+            evaluation, content["views"] = _evaluate_views(options, options.views, recordings, plots)
         if numbers is not None:
             numbers.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-    if asked.tracks:
+    if options.tracks:
         print_table(scores)
-    if judged is not None:
-        print_views(judged)
+    if evaluation is not None:
+        print_views(evaluation)
 
 
-def _check(asked: EvaluateOptions) -> None:
-    if not asked.tracks and asked.views is None:
+def _check(options: EvaluateOptions) -> None:
+    if not options.tracks and options.views is None:
         raise UserError("evaluate: name what is to be scored: --tracks, or --views, or both")
-    if asked.views is None and (asked.plots is not None or asked.videos):
+    if options.views is None and (options.plots is not None or options.videos):
         raise UserError("evaluate: --plots and --videos are about choices: name them with --views")
 
 
-def _judge(
-    asked: EvaluateOptions, choices_file: Path, recordings: dict[str, TruthAndTracks], plots: Path | None
+def _evaluate_views(
+    options: EvaluateOptions, choices_file: Path, recordings: dict[str, TruthAndTracks], plots: Path | None
 ) -> tuple[ViewEvaluation, dict[str, Any]]:
     cameras = tuple(recordings)
     choices = read_choices(choices_file)
-    videos = videos_by_camera(asked.videos, cameras) if asked.videos else {}
-    facts = collect_site_info(choices_file, cameras, videos, asked.site)
+    videos = videos_by_camera(options.videos, cameras) if options.videos else {}
+    facts = collect_site_info(choices_file, cameras, videos, options.site)
     rows = {camera: it.truth for camera, it in recordings.items()}
-    truth = build_truth(rows, facts.sizes, asked.least_shown)
+    truth = build_truth(rows, facts.sizes, options.least_shown)
     if not truth.views.evaluated.any():
-        raise UserError("--gt: nobody is ever visible in it")
-    if asked.tracks:
-        person_of = people_of_objects(truth.people, recordings, asked.least_iou)
+        raise UserError("--gt: no person is ever visible in it")
+    if options.tracks:
+        person_of = people_of_objects(truth.people, recordings, options.least_iou)
     else:
         person_of = {person: person for person in truth.people}
         if choices and not {choice.object for choice in choices} & set(person_of):
             raise UserError(
                 f"--views: {choices_file}: none of its objects has the number of a person in the "
-                "ground truth; say who is who with --tracks"
+                "ground truth; match them with --tracks"
             )
-    judged = evaluate_views(truth, choices, person_of, facts)
+    evaluation = evaluate_views(truth, choices, person_of, facts)
     if plots is not None:
-        plot_views(plots, truth, judged, facts, videos)
-    return judged, content_of_views(judged, facts)
+        plot_views(plots, truth, evaluation, facts, videos)
+    return evaluation, content_of_views(evaluation, facts)

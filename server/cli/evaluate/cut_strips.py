@@ -56,15 +56,15 @@ def plot_strips(
         UserError: a video cannot be read.
     """
     strips = {row: _strips(views, facts.fps) for row, views in enumerate(judged.views)}
-    wanted = {shown for found in strips.values() for strip in found for shown in strip.frames}
+    wanted = {shown for cuts in strips.values() for strip in cuts for shown in strip.frames}
     images: dict[_BestViewFrame, Image] = {}
     for index, camera in enumerate(truth.cameras):
         numbers = sorted(shown.frame for shown in wanted if shown.camera == index)
         read = _read(videos[camera], facts, camera, numbers)
         images |= {_BestViewFrame(index, number): image for number, image in read.items()}
-    for row, found in strips.items():
-        if found:
-            _plot(folder, row, found, truth, judged, images)
+    for row, cuts in strips.items():
+        if cuts:
+            _plot(folder, row, cuts, truth, judged, images)
 
 
 def _strips(views: NDArray[np.int64], fps: float) -> list[_Strip]:
@@ -79,18 +79,18 @@ def _strips(views: NDArray[np.int64], fps: float) -> list[_Strip]:
 
 def _read(video: Path, facts: SiteInfo, camera: str, numbers: Sequence[int]) -> dict[int, Image]:
     """Return frames of a camera's recording by number, in its own size."""
-    found: dict[int, Image] = {}
+    images: dict[int, Image] = {}
     if not numbers:
-        return found
+        return images
     source = open_source(CameraSettings(id=camera, source=str(video.absolute())), SiteSettings(fps=facts.fps))
     wanted = set(numbers)
     for number, image in read_frames(source):
         if number in wanted and image is not None:
-            found[number] = np.asarray(cv2.resize(image, facts.sizes[camera]), dtype=np.uint8)
+            images[number] = np.asarray(cv2.resize(image, facts.sizes[camera]), dtype=np.uint8)
         if number >= numbers[-1]:
             break
     source.close()
-    return found
+    return images
 
 
 def _plot(

@@ -37,8 +37,8 @@ class _OptionFiles:
         return [_camera(path) for path in self.files]
 
     @property
-    def told(self) -> str:
-        """Some of the names, for a message."""
+    def some_names(self) -> str:
+        """The first names, for a message."""
         some = [path.name for path in self.files[:_FEW]]
         return ", ".join(some) + (", …" if len(self.files) > _FEW else "")
 
@@ -54,21 +54,22 @@ def pair_files(tracks: Sequence[Path], truth: Sequence[Path]) -> list[FilePair]:
     Raises:
         UserError: something is not there, there are no pairs, or a file has no partner.
     """
-    found, there = _given("--tracks", tracks, "tracks"), _given("--gt", truth, "gt")
-    if set(found.names) & set(there.names) or found.folder or there.folder:
-        return _by_name(found, there)
-    if len(found.files) != len(there.files):
+    tracked, labeled = _given("--tracks", tracks, "tracks"), _given("--gt", truth, "gt")
+    if set(tracked.names) & set(labeled.names) or tracked.folder or labeled.folder:
+        return _by_name(tracked, labeled)
+    if len(tracked.files) != len(labeled.files):
         raise UserError(
-            f"--tracks and --gt: {len(found.files)} files of tracks ({found.told}) for {len(there.files)} of "
-            f"ground truth ({there.told}), and no two with one name; give one for each, in one order"
+            f"--tracks and --gt: {len(tracked.files)} files of tracks ({tracked.some_names}) for "
+            f"{len(labeled.files)} of ground truth ({labeled.some_names}), and no two with one name; "
+            "give one for each, in the same order"
         )
-    names = next((it for it in (found.names, there.names) if len(set(it)) == len(it)), None)
+    names = next((it for it in (tracked.names, labeled.names) if len(set(it)) == len(it)), None)
     if names is None:
         raise UserError(
             f"--tracks and --gt: cannot tell the cameras apart: several files of each are called "
-            f"{found.told} and {there.told}"
+            f"{tracked.some_names} and {labeled.some_names}"
         )
-    return [FilePair(*pair) for pair in zip(names, found.files, there.files, strict=True)]
+    return [FilePair(*pair) for pair in zip(names, tracked.files, labeled.files, strict=True)]
 
 
 def files_by_camera(option: str, paths: Sequence[Path], inner: str) -> dict[str, Path]:
@@ -82,20 +83,20 @@ def files_by_camera(option: str, paths: Sequence[Path], inner: str) -> dict[str,
     return dict(zip(given.names, given.files, strict=True))
 
 
-def _by_name(found: _OptionFiles, there: _OptionFiles) -> list[FilePair]:
-    for given in (found, there):
+def _by_name(tracked: _OptionFiles, labeled: _OptionFiles) -> list[FilePair]:
+    for given in (tracked, labeled):
         _check_names(given)
-    tracks, truth = (dict(zip(it.names, it.files, strict=True)) for it in (found, there))
+    tracks, truth = (dict(zip(it.names, it.files, strict=True)) for it in (tracked, labeled))
     common = [camera for camera in tracks if camera in truth]
     if not common:
         raise UserError(
             f"--tracks and --gt: no file of the one is called like one of the other "
-            f"({found.told} here, {there.told} there)"
+            f"({tracked.some_names} here, {labeled.some_names} there)"
         )
-    for given, other in ((found, truth), (there, tracks)):
+    for given, other in ((tracked, truth), (labeled, tracks)):
         alone = [path for path in given.files if _camera(path) not in other]
         if alone and not given.folder:
-            missing = "is no ground truth" if given is found else "are no tracks"
+            missing = "is no ground truth" if given is tracked else "are no tracks"
             raise UserError(f"{given.option}: {alone[0]}: there {missing} of that name beside it")
     return [FilePair(camera, tracks[camera], truth[camera]) for camera in common]
 

@@ -47,14 +47,16 @@ def build_truth(
     Raises:
         UserError: somebody is twice in one frame of a camera.
     """
-    counted = {camera: [row for row in found if row.confidence != 0.0] for camera, found in rows.items()}
-    people = sorted({row.id for found in counted.values() for row in found})
-    last = max((row.frame for found in counted.values() for row in found), default=0)
+    counted = {
+        camera: [row for row in camera_rows if row.confidence != 0.0] for camera, camera_rows in rows.items()
+    }
+    people = sorted({row.id for camera_rows in counted.values() for row in camera_rows})
+    last = max((row.frame for camera_rows in counted.values() for row in camera_rows), default=0)
     place = {number: index for index, number in enumerate(people)}
     boxes = np.full((len(people), last, len(counted), 4), np.nan)
     shown = np.full(boxes.shape[:3], -1.0)
-    for camera, (name, found) in enumerate(counted.items()):
-        for row in found:
+    for camera, (name, camera_rows) in enumerate(counted.items()):
+        for row in camera_rows:
             if not np.isnan(boxes[place[row.id], row.frame - 1, camera, 0]):
                 raise UserError(f"--gt: camera {name}: person {row.id} is twice in frame {row.frame}")
             boxes[place[row.id], row.frame - 1, camera] = row.box

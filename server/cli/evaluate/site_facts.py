@@ -51,12 +51,12 @@ def collect_site_info(
         UserError: the rate or a size is not known, or makes no sense.
     """
     beside = choices.with_name(SITE_FILE)
-    told = read_site(beside) if beside.exists() else None
-    sizes: dict[str, Size] = dict(told.sizes) if told else {}
-    fps = told.fps if told else None
+    rendering = read_site(beside) if beside.exists() else None
+    sizes: dict[str, Size] = dict(rendering.sizes) if rendering else {}
+    fps = rendering.fps if rendering else None
     for camera, path in videos.items():
-        seen = read_video_info(path)
-        sizes[camera], fps = seen.size, fps or seen.fps
+        info = read_video_info(path)
+        sizes[camera], fps = info.size, fps or info.fps
     if options.size is not None:
         sizes = dict.fromkeys(cameras, parse_size(options.size))
     fps = options.fps or fps
@@ -70,5 +70,5 @@ def collect_site_info(
     if options.switch_cost_s is not None:
         switch_cost_s = options.switch_cost_s
     else:
-        switch_cost_s = told.switch_cost_s if told else ViewSettings().switch_cost_s
+        switch_cost_s = rendering.switch_cost_s if rendering else ViewSettings().switch_cost_s
     return SiteInfo(fps, switch_cost_s, {camera: sizes[camera] for camera in cameras})

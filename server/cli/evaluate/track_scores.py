@@ -48,8 +48,8 @@ def print_table(scores: MultiCameraScores) -> None:
     table = Table("camera", box=None, padding=(0, 1, 0, 0))
     for heading in HEADINGS.values():
         table.add_column(heading, justify="right", no_wrap=True)
-    for camera, found in scores.cameras.items():
-        table.add_row(camera, *format_scores(found, HEADINGS))
+    for camera, camera_scores in scores.cameras.items():
+        table.add_row(camera, *format_scores(camera_scores, HEADINGS))
     if len(scores.cameras) > 1:
         table.add_row("mean, total", *format_scores(scores.mean, HEADINGS))
         table.add_row("joint", *format_scores(scores.joint, HEADINGS))
@@ -60,7 +60,7 @@ def print_table(scores: MultiCameraScores) -> None:
 def content_of(scores: MultiCameraScores) -> dict[str, Any]:
     """Return all scores for a file; shares are in [0, 1]."""
     return {
-        "cameras": {camera: asdict(found) for camera, found in scores.cameras.items()},
+        "cameras": {camera: asdict(camera_scores) for camera, camera_scores in scores.cameras.items()},
         "mean": asdict(scores.mean),
         "joint": asdict(scores.joint),
     }
@@ -82,12 +82,12 @@ def rows_of(path: Path) -> list[MotRow]:
 
 def _check(recording: TruthAndTracks, tracks: Path, truth: Path) -> None:
     """Refuse truth that says nothing, and files of different frames."""
-    there = {row.frame for row in recording.truth if row.confidence != 0.0}
-    found = {row.frame for row in recording.tracks}
-    if not there:
-        raise UserError(f"{truth}: nobody is in it who counts (confidence, the seventh field, not 0)")
-    if found and not there & found:
+    truth_frames = {row.frame for row in recording.truth if row.confidence != 0.0}
+    track_frames = {row.frame for row in recording.tracks}
+    if not truth_frames:
+        raise UserError(f"{truth}: no person in it counts (confidence, the seventh field, is 0)")
+    if track_frames and not truth_frames & track_frames:
         raise UserError(
-            f"{tracks}: has no frame in common with {truth}: frames {min(found)} to {max(found)} here, "
-            f"{min(there)} to {max(there)} there (both count from 1)"
+            f"{tracks}: has no frame in common with {truth}: frames {min(track_frames)} to "
+            f"{max(track_frames)} here, {min(truth_frames)} to {max(truth_frames)} there (both count from 1)"
         )

@@ -24,10 +24,10 @@ class ViewEvaluation:
     Attributes:
         objects: by person, the object that stands for them.
         views: (K, N) the camera chosen for each person at each frame, an index; -1: none.
-        best: (K, N) the optimum's; -1 where nobody sees the person.
+        best: (K, N) the optimum's; -1 where no camera sees the person.
         people: scores of each person who is ever visible, by number.
         total: the scores of all.
-        strangers: objects that stand for nobody.
+        unmatched: objects that match no person.
     """
 
     objects: Mapping[int, int]
@@ -35,7 +35,7 @@ class ViewEvaluation:
     best: NDArray[np.int64]
     people: Mapping[int, ViewScore]
     total: ViewScore
-    strangers: int
+    unmatched: int
 
 
 def evaluate_views(
@@ -63,7 +63,7 @@ def evaluate_views(
             if truth.views.evaluated[row].any()
         },
         total=score(slice(None)),
-        strangers=len({choice.object for choice in choices} - set(person_of)),
+        unmatched=len({choice.object for choice in choices} - set(person_of)),
     )
 
 
@@ -118,5 +118,5 @@ def content_of_views(judged: ViewEvaluation, facts: SiteInfo) -> dict[str, Any]:
             for person, score in judged.people.items()
         },
         "all": content(judged.total),
-        "objects_of_nobody": judged.strangers,
+        "unmatched_objects": judged.unmatched,
     }

@@ -184,5 +184,5 @@ class CameraRun:
         tracks = self._pipeline.finish(self._pulse)
         self._pipeline.close()
         if self._pulse <= max(0, self._pipeline.begins):
-            raise UserError(f"camera {self._camera}: there is not one picture in its recording")
+            raise UserError(f"camera {self._camera}: its recording has no pictures")
         return EpochBatch(self._camera, self._units, tracks, ended=True)

@@ -19,7 +19,7 @@ _DECODER = msgspec.json.Decoder(FrameDetections)
 class PeerLink(Protocol):
     """The link of one camera to its peers, in lockstep."""
 
-    def exchange(self, word: FrameDetections) -> Sequence[FrameDetections]:
+    def exchange(self, detections: FrameDetections) -> Sequence[FrameDetections]:
         """Send this camera's detections in a frame; return those of its peers."""
         ...
 
@@ -35,17 +35,17 @@ class PeerPipes:
     tell: dict[str, Connection] = field(default_factory=dict)
     hear: dict[str, Connection] = field(default_factory=dict)
 
-    def exchange(self, word: FrameDetections) -> Sequence[FrameDetections]:
+    def exchange(self, detections: FrameDetections) -> Sequence[FrameDetections]:
         """Send this camera's detections in a frame; return those of the peers that have not ended."""
-        data = msgspec.json.encode(word)
+        data = msgspec.json.encode(detections)
         for camera, connection in list(self.tell.items()):
             try:
                 connection.send_bytes(data)
             except OSError:  # it has ended, and closed its pipes
                 del self.tell[camera]
-        if word.ended:
+        if detections.ended:
             return ()
-        return [said for camera in list(self.hear) if (said := self._hear(camera)) is not None]
+        return [received for camera in list(self.hear) if (received := self._hear(camera)) is not None]
 
     def _hear(self, camera: str) -> FrameDetections | None:
         try:
@@ -75,9 +75,9 @@ class PeerPipeFactory:
         own = self._laid[camera]
         for other in self._others[camera]:
             if other not in self._given:
-                theirs = self._laid[other]
-                own.hear[other], theirs.tell[camera] = multiprocessing.Pipe(duplex=False)
-                theirs.hear[camera], own.tell[other] = multiprocessing.Pipe(duplex=False)
+                peer = self._laid[other]
+                own.hear[other], peer.tell[camera] = multiprocessing.Pipe(duplex=False)
+                peer.hear[camera], own.tell[other] = multiprocessing.Pipe(duplex=False)
         try:
             yield own
         finally:

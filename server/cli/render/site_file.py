@@ -64,5 +64,5 @@ def read_site(path: Path) -> SiteInfo:
         raise UserError(f"{path}: is not what `myview render` writes: {error}") from error
     sensible = 0 < facts.fps < math.inf and 0 <= facts.switch_cost_s < math.inf
     if not sensible or any(side <= 0 for size in sizes.values() for side in size):
-        raise UserError(f"{path}: a rate, a size or a cost in it makes no sense")
+        raise UserError(f"{path}: it has an invalid rate, size or cost")
     return facts

@@ -92,7 +92,7 @@ def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
             "-" if it.waiting is None else str(it.waiting),
             "-" if it.certified is None else f"{100 * it.certified:.0f} %",
         )
-        step = "" if it.synchronized or it.state != "live" else "counts by itself"
+        step = "" if it.synchronized or it.state != "live" else "not synchronized"
         words += [
             Text(printable(f"{it.camera}: {said}"), style="yellow") for said in (it.message, step) if said
         ]
@@ -101,7 +101,7 @@ def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
 
 def _people(people: tuple[PersonNow, ...]) -> RenderableType:
     if not people:
-        return Text("nobody is known", style="dim")
+        return Text("no people yet", style="dim")
     table = Table("person", "shown by", "for", "seen by", box=None, header_style="dim", pad_edge=False)
     for person in people:
         who = f"{person.object} {person.name}" if person.name else str(person.object)

@@ -14,10 +14,10 @@ class AccessSettings(Section):
     """Access to the page, the streams and the API."""
 
     tokens: Path | None = None
-    """The file of tokens; none: whoever reaches `http.host` may watch, and only this machine may operate."""
+    """The token file; none: everyone who reaches `http.host` may watch, only this machine may operate."""
     open_to_all: bool = False
     """Without tokens, `http.host` may be reached from other machines."""
     hide_after_s: Annotated[float, Field(ge=0.0, le=86_400.0)] = 3.0
-    """Seconds for which somebody was seen by no camera: then a token for them alone shows no live picture."""
+    """Seconds unseen by all cameras after which a token for one person shows no live picture of them."""
     trusted_network: bool = False
-    """`sync.bind` and `zenoh.listen` may be reached from other machines: whoever does is believed."""
+    """`sync.bind` and `zenoh.listen` may be reached from other machines, without authentication."""

@@ -20,13 +20,13 @@ class SoundSettings(Section):
     at_end: Literal["stop", "loop"] = "stop"
     """What a file does after its end; a camera has its own."""
     codec: Coding = "aac"
-    """What all streams have, but transport streams no Opus. A source that is that already, of this rate and
-    so many channels, is passed on as it is; anything else is encoded."""
+    """Codec in all streams; transport streams have no Opus. A source of this codec, rate and channels is
+    passed through; any other is encoded."""
     rate: Literal[48_000, 44_100, 32_000, 24_000] = 48_000
     """Samples a second."""
     channels: Literal[1, 2] = 2
     kbps: Annotated[int, Field(ge=16, le=320)] = 96
-    """Of what has to be encoded."""
+    """Bit rate where the sound is encoded."""
 
     @model_validator(mode="after")
     def _opus_has_its_rate(self) -> Self:

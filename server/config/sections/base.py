@@ -21,8 +21,8 @@ def _even(value: int) -> int:
 
 
 def _endpoint(value: str) -> str:
-    found = _ENDPOINT.fullmatch(value)
-    if found is None or not 0 < int(found["port"]) <= _PORT_MOST:
+    match = _ENDPOINT.fullmatch(value)
+    if match is None or not 0 < int(match["port"]) <= _PORT_MOST:
         raise ValueError("is not an address such as tcp/127.0.0.1:7447")
     return value
 

@@ -24,7 +24,7 @@ class CameraSettings(Section):
     source: str
     """A file, a folder of images, a URL that FFmpeg opens, /dev/video0, or scene:NAME?camera=0&…"""
     password: Path | None = None
-    """A file whose one line, the camera's password, goes where `source` says `{password}`."""
+    """A file whose one line, the camera's password, replaces `{password}` in `source`."""
     kind: Literal["upright", "overhead"] = "upright"
     """People stand upright in its picture, or it looks straight down on them."""
     offset: int = 0
@@ -32,23 +32,23 @@ class CameraSettings(Section):
     at_end: Literal["stop", "loop"] = "stop"
     """What a recording does after its last frame."""
     h264: Literal["encode", "auto", "pass"] = "encode"
-    """The source's own: its pictures are encoded anew; it passes where it fits; it passes or is refused."""
+    """The source's own H.264: re-encode it, pass it through if it fits, or refuse what does not fit."""
     options: dict[str, str] = {}
     """Options for FFmpeg's opener, e.g. rtsp_transport: tcp."""
     ignore: list[Polygon] = []
-    """Parts of the picture where nobody is looked for, in pixels of the camera's own picture."""
+    """Regions without detection, in pixels of the camera's own picture."""
     ground: list[list[float]] | None = None
     """3x3 homography from the camera's own picture (pixels) to the ground plane."""
     ground_unit: Annotated[str, AfterValidator(check_unit)] | None = None
-    """The ground plane's unit: by m, cm or mm it is known how tall people are in the picture."""
+    """The ground plane's unit; m, cm or mm also tell how tall people are in the picture."""
     detections: Path | None = None
-    """A MOTChallenge detection file to use instead of looking for people in the picture."""
+    """A MOTChallenge detection file to use instead of a detector."""
 
     @field_validator("password")
     @classmethod
     def _password_has_its_place(cls, password: Path | None, info: ValidationInfo) -> Path | None:
         if password is not None and "{password}" not in info.data.get("source", ""):
-            raise ValueError("names a file, but source does not say where it goes: rtsp://name:{password}@…")
+            raise ValueError("names a file, but source has no place for it: rtsp://name:{password}@…")
         return password
 
     @field_validator("ground")
@@ -62,25 +62,25 @@ class CameraSettings(Section):
 
 
 class TrackSettings(Section):
-    """Following people in one camera: the network LP over a moving window (paper, II)."""
+    """Tracking in one camera: the network LP over a moving window (paper, II)."""
 
     tracker: str = DEFAULT_TRACKER
-    """MyView's own, or one of those that it is measured beside."""
+    """MyView's own tracker, or a baseline."""
     solver: str = DEFAULT_SOLVER
     backlog_s: PositiveFloat = 2.0
-    """Seconds of frames that may wait on a busy machine; a camera's older ones are left out, and said so."""
+    """Seconds of frames that may wait on a busy machine; older ones are skipped and reported."""
     shed_load: bool = True
-    """On a machine with too much to do search every 2nd frame, every 3rd and so on, before much is late."""
+    """On an overloaded machine, search only every 2nd frame, every 3rd and so on."""
     window: Annotated[WindowSettings, no_unknown_keys(WindowSettings)] = WindowSettings()
     costs: Annotated[CostSettings, no_unknown_keys(CostSettings)] = CostSettings()
     temporal: Annotated[TemporalSettings, no_unknown_keys(TemporalSettings)] = TemporalSettings()
-    """The tracker of that name: person-to-blob matching over some seconds."""
+    """The tracker `temporal`: person-to-blob matching over some seconds."""
     assist: Annotated[InteractiveSettings, no_unknown_keys(InteractiveSettings)] = InteractiveSettings()
-    """What is foreseen for an operator to look at, and what their pointing weighs."""
+    """Prediction of failures for an operator, and the weight of their corrections."""
     cross_view: Annotated[CrossViewSettings, no_unknown_keys(CrossViewSettings)] = CrossViewSettings()
-    """How a camera goes by what others find that look at the same ground."""
+    """How a camera uses the detections of others that see the same ground."""
     cross_view_wait_s: NonNegativeFloat = 0.3
-    """Seconds after a frame was taken until which it waits for what the others found in it."""
+    """Seconds after its capture that a frame waits for the other cameras' detections."""
 
     def lag(self, fps: float) -> int:
         """Return the frames that follow a final frame at most when a window ends."""

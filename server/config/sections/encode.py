@@ -20,9 +20,9 @@ class EncodeSettings(Section):
     """x264's constant quality: smaller is better and larger; 18 to 28 is sensible."""
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium"] = "ultrafast"
     max_kbps: Annotated[int, Field(ge=16)] | None = None
-    """Kilobits that a camera's pictures take in any second at most; None: as many as the quality wants."""
+    """Kilobits of a camera's pictures in any second at most; None: as many as the quality needs."""
     parameters: Literal["equal", "own"] = "equal"
-    """Those of H.264 (SPS, PPS): the same in all cameras; or cameras that pass theirs on have their own."""
+    """H.264 parameter sets (SPS, PPS): equal in all cameras, or own ones where a camera passes through."""
     quantizer: Annotated[int, Field(ge=0, le=63)] = 16
     """VP8's constant quality, instead of crf: smaller is better and larger; 8 to 32 is sensible."""
     speed: Annotated[int, Field(ge=1, le=16)] = 10
@@ -31,5 +31,5 @@ class EncodeSettings(Section):
     @model_validator(mode="after")
     def _can_be_capped(self) -> Self:
         if self.codec == "vp8" and self.max_kbps is not None:
-            raise ValueError("max_kbps: VP8's encoder keeps no cap in every second; take codec: h264")
+            raise ValueError("max_kbps: VP8's encoder cannot cap every second; use codec: h264")
         return self

@@ -21,7 +21,7 @@ class TlsSettings(Section):
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
         if (self.certificate is None) != (self.key is None):
-            raise ValueError("certificate, key: HTTPS takes both files; one of them is not named")
+            raise ValueError("certificate, key: HTTPS needs both files; one is missing")
         return self
 
 
@@ -36,7 +36,7 @@ class HttpSettings(Section):
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8080
     viewers_max: PositiveInt = 1000
-    """Streams served at once, and as many readers of events; one more gets 503, or another's place."""
+    """Streams served at once, and as many event listeners; one more gets 503, or another viewer's slot."""
     viewers_per_object: PositiveInt = 1000
     """The same of one object, or of one camera."""
     connections_max: PositiveInt | None = None
@@ -44,23 +44,23 @@ class HttpSettings(Section):
     connections_per_address: PositiveInt | None = None
     """The same of one address, this machine's own excepted; none: half of them."""
     request_timeout_s: PositiveFloat = 10.0
-    """Seconds in which what a connection asks for must have come."""
+    """Seconds in which a connection's request must be complete."""
     keepalive_timeout_s: PositiveFloat = 150.0
-    """Seconds after which a connection is closed that has nothing more to ask for."""
+    """Seconds after which an idle connection is closed."""
     viewer_queue_gops: PositiveInt = 8
     """A viewer that falls behind by more loses whole GOPs."""
     hls_segment_s: PositiveFloat = 1.0
-    """As many whole GOPs as fit are a segment of HLS, at least one."""
+    """Length of an HLS segment: as many whole GOPs as fit, at least one."""
     hls_window_s: PositiveFloat = 6.0
-    """Segments that a playlist of HLS lists; twice as many are kept."""
+    """Length of an HLS playlist; twice as much is kept."""
     pictures_max: PositiveInt = 8
-    """People and cameras whose pictures are decoded at once: JPEG, and boxes burnt in. One more gets 503."""
+    """Streams rendered at once (JPEG, burnt-in boxes), one per person or camera; one more gets 503."""
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 80
     tls: TlsSettings = TlsSettings()
 
     @property
     def connections(self) -> int:
-        """How many connections are taken at once, where the system lets that many be open."""
+        """Connections accepted at once, if the limit of open files allows it."""
         return self.connections_max or max(_CONNECTIONS_LEAST, _CONNECTIONS_PER_VIEWER * self.viewers_max)
 
 
@@ -70,10 +70,10 @@ class RecordSettings(Section):
     folder: Path | None = None
     """Where; none: nothing is recorded."""
     keep_s: PositiveFloat = 86_400.0
-    """Seconds after which it is taken away."""
+    """Seconds after which recordings are deleted."""
     trust_clock: bool = False
-    """The time that the machine was off counts by its clock also where nobody keeps that right (NTP)."""
+    """Recordings age by the clock while the machine is off, even if NTP does not synchronize it."""
     max_mb: PositiveFloat = 10_000.0
-    """Megabytes that it takes on the disk at most; the oldest goes first."""
+    """Megabytes on the disk at most; the oldest segments are deleted first."""
     segment_s: PositiveFloat = 60.0
-    """Seconds in a file: only whole files are taken away."""
+    """Seconds in a file: only whole files are deleted."""

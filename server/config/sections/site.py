@@ -18,7 +18,7 @@ class SiteSettings(Section):
     width: PictureSide = 640
     height: PictureSide = 360
     niceness: Annotated[int, Field(ge=0, le=19)] = 10
-    """How much nicer a camera's process is than who starts it, as in nice(1): a busy machine serves first."""
+    """Niceness added to camera processes (nice(1)): a busy machine serves streams first."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -46,10 +46,10 @@ class SyncSettings(Section):
     """The address the server listens on."""
     port: Port = 7400
     users: Path | None = None
-    """A file of `name:password`, one a line; none: no login, whoever reaches the server gets the pulses.
+    """A file of `name:password`, one a line; none: no login, every client gets the pulses.
 
     A camera logs in as its id, services as bestview, bestview-1, … The server needs all lines, each client
-    its own. Needs `tls`, but on the loopback interface.
+    its own. Needs `tls` except on the loopback interface.
     """
     tls: ProcessTlsSettings = ProcessTlsSettings()
     """Encryption of the pulses: `certificate` and `key` on the server, `authority` on its clients."""
@@ -65,11 +65,12 @@ class ZenohSettings(Section):
     listen: Endpoint = "tcp/127.0.0.1:7447"
     """Where the best-view service's router listens."""
     lease_s: PositiveFloat = 1.0
-    """A process that is silent this long counts as gone."""
+    """Seconds of silence after which a process counts as gone."""
     users: Path | None = None
-    """A file of `name:password`, one a line; none: whoever reaches the router is believed.
+    """A file of `name:password`, one a line; none: no login.
 
-    A camera comes as its id, and sends under its own key alone. The router needs all lines, others their own.
+    A camera logs in as its id, and may publish only its own keys. The router needs all lines, others
+    their own.
     """
     tls: ProcessTlsSettings = ProcessTlsSettings()
     """Encryption of the bus, where its addresses begin with tls/."""

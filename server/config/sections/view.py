@@ -21,20 +21,20 @@ LIVE_VIEW_SETTINGS = (
     "min_shot_s",
     "quality",
 )
-"""Settings of the choice that can be changed while it runs."""
+"""View-selection settings that can be changed while the service runs."""
 
 Seconds = Annotated[float, Field(ge=0, le=3600)]
 
 
 class ShareSettings(Section):
-    """Several best-view services of one site: each decides for the objects whose number leaves its index."""
+    """Sharding: several best-view services of one site, each for the objects of its index."""
 
     of: PositiveInt = 1
-    """How many there are: an object's number modulo this is the index of its service."""
+    """Number of services: an object's number modulo this is the index of its service."""
     index: NonNegativeInt = 0
-    """Which of them this is; 0 is the router, which the others and the cameras connect to."""
+    """Index of this service; 0 is the router, which the others and the cameras connect to."""
     servers: list[str] = []
-    """Base URLs of all, by index: where whoever asks for another's object is sent."""
+    """Base URLs of all services, by index: requests for another's objects are redirected there."""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -49,14 +49,14 @@ class ShareSettings(Section):
 
 
 class FlagSettings(Section):
-    """Flags: where an operator is asked to look."""
+    """Flags: predicted identity failures that an operator is asked to look at."""
 
     per_minute: Annotated[int, Field(ge=0, le=600)] = 2
     """Flags raised a minute at most, where identities are likeliest to fail; those of 3 minutes are saved."""
     risk: Annotated[float, Field(ge=0, le=1)] = 0.1
-    """How likely a failure is at least for which one is raised, as far as the trackers can tell."""
+    """Least predicted probability of a failure for which a flag is raised."""
     reasons: list[RiskReason] = ["crossing", "id_switch", "track_loss", "optimality_gap"]
-    """For which of the troubles that are foreseen one is raised."""
+    """The kinds of predicted failures for which flags are raised."""
     answer_s: Annotated[float, Field(gt=0, le=600)] = 8.0
     """Seconds after the expected moment in which a flag can be answered; see `track.assist.memory_frames`."""
 
@@ -65,19 +65,19 @@ class ViewSettings(Section):
     """The best-view service."""
 
     lookahead: PositiveInt = 25
-    """Frames the choice of a view looks ahead: N of the paper's section III; all of it is delay."""
+    """Frames that view selection looks ahead: N of the paper's section III; all of it is delay."""
     switch_cost_s: Seconds = 0.3
-    """λ: how many seconds of not seeing the person, while another camera does, are worth a cut; of a view
-    that is worth half the best one it takes twice as many."""
+    """λ: a cut costs as much as so many seconds of not seeing the person while another camera does; or twice
+    as many of a view worth half the best one."""
     extrapolate_s: Seconds = 0.5
-    """For how long the views at the end of the look-ahead are taken to go on as they are."""
+    """Seconds after the look-ahead for which its last views are assumed to stay as they are."""
     presence_decay_s: Seconds = 1.0
-    """Who is not found any more is taken to be still there, less and less, for so long; 0: not at all."""
+    """Seconds over which a view decays to nothing after the last detection of the person; 0: at once."""
     undetected_weight: Annotated[float, Field(ge=0, le=1)] = 1.0
-    """What a view of somebody counts for whom the camera does not find, though they stand before it as others
-    know: this share of what it is worth by how surely people show there; 0: nothing."""
+    """Weight of a view in which the camera does not detect the person, where other cameras see that they
+    stand before it; 0: such views count for nothing."""
     min_shot_s: Annotated[float, Field(ge=0, le=600)] = 0.0
-    """A camera is shown for so long at least, in whole GOPs; one that sees nobody may be left sooner."""
+    """Minimum shot length, in whole GOPs; a camera that does not see the person may be left sooner."""
     late_after_s: PositiveFloat = 0.5
     """How long to wait for a camera's tracks before going on without that camera."""
     buffer_s: PositiveFloat = 10.0
@@ -86,6 +86,6 @@ class ViewSettings(Section):
     """What makes a view good."""
     identity: Annotated[IdentitySettings, no_unknown_keys(IdentitySettings)] = IdentitySettings()
     flags: FlagSettings = FlagSettings()
-    """Where a camera's tracker may go wrong, of what `track.assist` foresees."""
+    """Which of the failures that `track.assist` predicts are flagged."""
     share: ShareSettings = ShareSettings()
-    """With other best-view services of the site."""
+    """Sharding over several best-view services."""

@@ -1,7 +1,7 @@
 """Authentication: which token or session a request comes with, and whether that is valid now.
 
 A token arrives as ``Authorization: Bearer``, as ``?token=``, or by a session, which is a cookie. Unknown,
-revoked and expired ones are refused here, and so is whoever sends too many wrong ones.
+revoked and expired ones are refused here, and so are addresses that send too many wrong ones.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Authenticator:
         self._rate_limit = LoginRateLimit(now)
         self._valid: OrderedDict[tuple[str, str], None] = OrderedDict()
         self.wrong_tokens = 0
-        """Since the start. They are counted and not logged: anybody could fill a disk with them."""
+        """Since the start. They are counted and not logged: clients could fill a disk with them."""
 
     def credential_of(self, request: web.Request) -> Credential | web.Response | None:
         """Return what a request authenticates by; None: nothing. A token that it names precedes a session.
@@ -96,7 +96,7 @@ class Authenticator:
         self._valid.pop((address, digest), None)
         self._rate_limit.add(address)
         self.wrong_tokens += 1
-        return challenge("there is no such token, or not any more")
+        return challenge("unknown or revoked token")
 
     def session_of(self, request: web.Request) -> str:
         """Return the SHA-256 of a request's session identifier; there need not be such a session."""
@@ -116,8 +116,8 @@ class Authenticator:
         if token.object is None or token.made is None or token.made.timestamp() >= self._numbered_since():
             return None
         return (
-            f"people have been numbered anew since the token {token.name!r} was made, and object "
-            f"{token.object} may be somebody else now: make a new one"
+            f"person numbers have restarted since the token {token.name!r} was made, and object "
+            f"{token.object} may be another person: make a new one"
         )
 
 

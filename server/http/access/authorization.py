@@ -98,7 +98,7 @@ class AccessControl:
         if isinstance(current, str):
             return error_response(403, current)
         if not current.allows(permission, request, self._resolve):
-            return error_response(403, f"the token {current.name!r} is for {current}, and for nothing else")
+            return error_response(403, f"the token {current.name!r} is only for {current}")
         self._open_requests[id(request)] = _OpenRequest(request, permission, credential, current)
         try:
             return await handler(request)

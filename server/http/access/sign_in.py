@@ -14,18 +14,18 @@ routes = web.RouteTableDef()
 
 
 class SessionInfo(msgspec.Struct, frozen=True):
-    """What somebody may."""
+    """Permissions of the caller."""
 
     by_token: bool
-    """By a token; else anybody may watch, and who is at the server's own machine may operate."""
+    """Whether tokens are configured; else everyone may watch, and the server's own machine may operate."""
     name: str | None
-    """Of the token; null: there are none."""
+    """The token's name; null without tokens."""
     role: str
     """watch or operate."""
     object: int | None
-    """This person's views alone; null: everybody's."""
+    """Limited to this person; null: not limited."""
     camera: str | None
-    """This camera alone; null: all."""
+    """Limited to this camera; null: not limited."""
 
 
 class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -47,14 +47,14 @@ async def post_session(request: web.Request) -> web.StreamResponse:
     access = request.app[ACCESS]
     authenticator = access.authenticator
     if not access.needs_token:
-        return error_response(400, "there are no tokens (access.tokens): there is nothing to sign in to")
+        return error_response(400, "there are no tokens (access.tokens): no one has to sign in")
     sign_in = await read_json(request, SignIn)
     credential = authenticator.check_token(request, sign_in.token.strip())
     if isinstance(credential, web.Response):
         return credential
     grant = authenticator.grant_of(credential)
     if not isinstance(grant, Grant):
-        return error_response(403, grant or "there is no such token any more")
+        return error_response(403, grant or "the token was revoked")
     authenticator.sessions.close(authenticator.session_of(request))
     response = json_response(_session_info(access, grant))
     encrypted = "https" in (request.scheme, request.headers.get("X-Forwarded-Proto"))

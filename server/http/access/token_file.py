@@ -35,7 +35,7 @@ class TokenFile:
         try:
             self._tokens = _by_digest(self._path)
         except UserError as error:
-            log.warning("%s; the %d tokens as they were stay in force", error, len(self._tokens))
+            log.warning("%s; the previous %d tokens stay in force", error, len(self._tokens))
         else:
             log.info("%s: %d tokens are in force", self._path, len(self._tokens))
 

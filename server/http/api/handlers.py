@@ -26,9 +26,7 @@ async def get_choice(request: web.Request) -> web.Response:
         return error_response(400, f"at: {error}")
     selection = service.people.view_selection_of(number, pulse)
     if selection is None:
-        return error_response(
-            404, f"nothing is kept of why object {number} was shown as it was at pulse {pulse}"
-        )
+        return error_response(404, f"no reasons are stored for object {number} at pulse {pulse}")
     return json_response(selection)
 
 

@@ -77,13 +77,13 @@ _SCHEMAS: dict[str, Any] = {
     "camera": {"type": "string"},
     "segment": {"type": "integer", "minimum": 0},
     "part": {"type": "integer", "minimum": 0},
-    "_HLS_msn": {"type": "integer", "minimum": 0, "description": "Waits until this segment is there."},
-    "_HLS_part": {"type": "integer", "minimum": 0, "description": "Waits until this part of it is there."},
+    "_HLS_msn": {"type": "integer", "minimum": 0, "description": "Waits for this segment."},
+    "_HLS_part": {"type": "integer", "minimum": 0, "description": "Waits for this part of the segment."},
     "overlay": {"enum": [0, 1], "default": 0, "description": "1: boxes are burnt in."},
     "from": {**_MOMENT, "description": "Begins there: seconds back, a pulse, or a time."},
     "to": {**_MOMENT, "description": "Ends there, likewise; HLS also live: it goes on."},
-    "at": {**_MOMENT, "description": "Of the last minute; what was before the first question is not kept."},
-    "camera_query": {"type": "string", "description": "Shows this camera, not the best: held by hand."},
+    "at": {**_MOMENT, "description": "Within the last minute, after the first request for this object."},
+    "camera_query": {"type": "string", "description": "Shows this camera instead of the best."},
     "prefer": {"type": "string", "description": "Shows this camera while it sees the person, else the best."},
     "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Pictures a second; the site's at most."},
 }
@@ -139,20 +139,20 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     responses: dict[str, Any] = {"200": {"description": "OK", "content": content}}
     names = re.findall(r"\{(\w+)\}", path)
     if names or path in OPERATOR_RESULTS:
-        responses["404"] = {"description": "There is none of this name.", "content": error}
+        responses["404"] = {"description": "No object, camera or file of this name.", "content": error}
     if path in OVERLAY | TIME_SHIFT | CAMERA_QUERY | _SPANS or path.endswith("/choice"):
-        responses["400"] = {"description": "The query asks for what there is not.", "content": error}
+        responses["400"] = {"description": "Invalid query.", "content": error}
     if path in OPERATOR.keys() | OPERATOR_FILES.keys() | OPERATOR_RESULTS.keys():
-        responses["400"] = {"description": "It asks for what there is not.", "content": error}
+        responses["400"] = {"description": "Invalid request.", "content": error}
     if permission_for("GET", path) is not Permission.PUBLIC:
         responses["401"] = {
-            "description": "Where there are tokens: none was given, or a wrong one.",
+            "description": "No valid token, where the site has tokens.",
             "content": error,
         }
-        responses["403"] = {"description": "The token is not for this.", "content": error}
+        responses["403"] = {"description": "Outside the token's scope.", "content": error}
         responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
     if path in TIME_SHIFT | OPERATOR_FILES.keys():
-        responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
+        responses["416"] = {"description": "Nothing is recorded of that time.", "content": error}
     if path in _UNAVAILABLE | _OF_PEOPLE | _SPANS or "object" in names:
         responses["503"] = {"description": "Not now; try again later."}
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]

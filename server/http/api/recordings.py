@@ -1,4 +1,4 @@
-"""``/api/…/past``: what is kept of people and cameras, and the recorded decisions."""
+"""``/api/…/past``: recorded spans of people and cameras, and recorded decisions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ async def get_person_past(request: web.Request) -> web.Response:
     if (unreadable := await refuse_unreadable(recorded, 0)) is not None:
         return unreadable
     if recorded.available_from(0) is None:
-        return error_response(404, f"nothing is kept of object {number}")
+        return error_response(404, f"nothing is recorded of object {number}")
     return await _past(request, recorded)
 
 

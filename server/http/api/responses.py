@@ -28,7 +28,7 @@ def site_info(service: BestViewService) -> SiteInfo:
 
 
 def objects_info(service: BestViewService) -> Objects:
-    """List everybody who has a stream, in the order of their numbers."""
+    """List all people who have a stream, by number."""
     objects = [
         ObjectInfo(
             object=it.number,

@@ -1,4 +1,4 @@
-"""What the API answers. ``/api/openapi.json`` is made from these."""
+"""Answers of the API; ``/api/openapi.json`` is built from them."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class SiteInfo(msgspec.Struct, frozen=True):
     codec: str | None
     """RFC 6381 codec string of every stream; null before the first key frame."""
     container: str
-    """What streams are in: mp4, or webm where the codec is vp8; best.mp4 or best.webm by that."""
+    """Container of the streams: mp4, or webm if the codec is vp8."""
     sound: str | None
-    """The same of the sound beside the pictures; null: this site has none."""
+    """RFC 6381 codec string of the sound; null: the site has none."""
     pulse0: float | None
     """When pulse 0 was due: unix seconds by the server's clock."""
     now: float
@@ -35,9 +35,9 @@ class ObjectInfo(msgspec.Struct, frozen=True):
 
     object: int
     name: str | None
-    """What the operator calls them."""
+    """Given by the operator."""
     aliases: list[int]
-    """Other numbers that this person once had; they go on to work."""
+    """Former numbers of this person, which remain valid."""
     first_seen: int
     """Pulse."""
     last_seen: int
@@ -49,23 +49,23 @@ class ObjectInfo(msgspec.Struct, frozen=True):
     cameras: list[str]
     """The cameras that see the person now."""
     thumbnail: str | None
-    """Where a small picture is; the address changes with the picture."""
+    """Address of a thumbnail; it changes with the picture."""
 
 
 class Elsewhere(msgspec.Struct, frozen=True):
-    """One person whom another best-view service of the site decides for."""
+    """A person served by another best-view service of the site."""
 
     object: int
     server: str | None
-    """Its base URL; null where the configuration does not say."""
+    """Its base URL; null if not configured."""
 
 
 class Objects(msgspec.Struct, frozen=True):
-    """Everybody who is known."""
+    """All known people."""
 
     objects: list[ObjectInfo]
     elsewhere: list[Elsewhere]
-    """Whom other services of the site show; empty where there are none."""
+    """People of the site's other services."""
 
 
 class Cameras(msgspec.Struct, frozen=True):
@@ -75,13 +75,13 @@ class Cameras(msgspec.Struct, frozen=True):
 
 
 class PastSpan(msgspec.Struct, frozen=True):
-    """Frames without a hole."""
+    """Consecutive recorded frames."""
 
     first: int
     """Pulse."""
     frames: int
     begins: str | None
-    """When that was: UTC, ISO 8601; null before the first pulse."""
+    """UTC, ISO 8601; null before the first pulse."""
     ends: str | None
 
 
@@ -95,15 +95,15 @@ class PastView(msgspec.Struct, frozen=True):
 
 
 class Past(msgspec.Struct, frozen=True):
-    """What can be seen again."""
+    """What is recorded."""
 
     spans: list[PastSpan]
     views: list[PastView]
-    """By which camera, in order."""
+    """The cameras shown, in order of time."""
 
 
 class FlagList(msgspec.Struct, frozen=True):
-    """What an operator is asked to look at."""
+    """Flags: predicted identity failures."""
 
     flags: list[Flag]
-    """Those that can be answered, the most urgent first, and then those that are over, the newest first."""
+    """Open ones first, the most urgent first; then ended ones, the newest first."""

@@ -26,21 +26,21 @@ async def get_site(request: web.Request) -> web.Response:
 
 @routes.get("/api/objects")
 async def get_objects(request: web.Request) -> web.Response:
-    """List everybody who is known."""
+    """List all known people."""
     service, scope = request.app[SERVICE], request.app[ACCESS].grant(request).scope
     return json_response(filter_objects(objects_info(service), scope, service.people.current_number))
 
 
 @routes.get("/api/cameras")
 async def get_cameras(request: web.Request) -> web.Response:
-    """List the cameras and how they are."""
+    """List the cameras and their states."""
     scope = request.app[ACCESS].grant(request).scope
     return json_response(filter_cameras(cameras_info(request.app[SERVICE]), scope))
 
 
 @routes.get("/api/flags")
 async def get_flags(request: web.Request) -> web.Response:
-    """List what an operator is asked to look at, and what they were asked lately."""
+    """List open flags and recently ended ones."""
     service, scope = request.app[SERVICE], request.app[ACCESS].grant(request).scope
     flags = [*service.assist.open_flags, *service.assist.ended_flags]
     visible = (filter_flag(flag, scope, service.people.current_number) for flag in flags)

@@ -1,1 +1,1 @@
-"""The connections that are taken: how many, of whom, and for how long they may ask for nothing."""
+"""HTTP connections: limits on their number, per network and in time."""

@@ -5,20 +5,20 @@ from __future__ import annotations
 from server.config.site_config import Config
 
 FOR_OPERATORS = 32
-"""Connections beyond all others' places: an operator gets in when these are taken."""
+"""Connections reserved for operators, beyond the limit for all."""
 _KEPT = 128
-"""What is open besides: libraries, logs, the bus and its strangers, the tokens' file, child processes."""
+"""Descriptors for libraries, logs, the bus, the token file and child processes."""
 _KEPT_PER_CAMERA = 8
 """Its links over the bus, its recording, the pages' requests about it."""
 _KEPT_PER_DRAWING = 4
-"""The pipes of a process that decodes, and its number."""
+"""The pipes of a render worker, and its pidfd."""
 
 
 def connection_limit(config: Config, descriptors: int) -> int:
-    """Compute how many connections are taken at once where a process may have so many descriptors open.
+    """Compute how many connections are accepted at once, within a limit of open descriptors.
 
-    Recording, bus, drawing and operators have theirs whatever viewers do. Who watches the past may have a
-    file open besides the connection.
+    Recording, bus, rendering and operators have reserved ones. A viewer of the past may need a file
+    besides the connection.
     """
     http = config.http
     kept = _KEPT + _KEPT_PER_CAMERA * len(config.cameras) + _KEPT_PER_DRAWING * http.pictures_max

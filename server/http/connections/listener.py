@@ -188,8 +188,8 @@ class Listener:
     def _log_full(self) -> None:
         if (more := self._full.record()) is not None:
             log.warning(
-                "all connections that are taken (http.connections_max %d, http.connections_per_address %d) "
-                "are busy: operators alone are admitted%s",
+                "all connections (http.connections_max %d, http.connections_per_address %d) are busy: "
+                "only operators are admitted%s",
                 self._pool.limits.most,
                 self._pool.limits.per_address,
                 more,

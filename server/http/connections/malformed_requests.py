@@ -1,4 +1,4 @@
-"""Malformed requests: answered by status, and kept out of the log, which anybody could fill with them."""
+"""Malformed requests: answered by status, and kept out of the log, which clients could fill with them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def refuse_expectations(handler: Handler) -> Handler:
     async def handle(request: web.BaseRequest) -> web.StreamResponse:
         expected = request.headers.get("Expect", "").lower()
         if expected and request.version == HttpVersion11 and expected != "100-continue":
-            return error_response(417, "Expect: nothing but 100-continue can be expected")
+            return error_response(417, "Expect: only 100-continue is supported")
         return await handler(request)
 
     return handle

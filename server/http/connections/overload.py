@@ -32,6 +32,6 @@ async def limit_connections(
     if permission is Permission.PUBLIC or request.app[ACCESS].is_operator(request):
         response = await handler(request)
     else:
-        response = unavailable("as many connections as this server takes (http.connections_max) are busy")
+        response = unavailable("all connections of this server (http.connections_max) are busy")
     response.force_close()
     return response

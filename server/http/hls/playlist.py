@@ -106,6 +106,6 @@ def _part_line(segment: int, index: int, part: ListedPart, fps: float) -> str:
 
 
 def playlist_response(text: str) -> web.Response:
-    """Return a playlist as an answer that any origin may read and nobody may cache."""
+    """Return a playlist as an answer that any origin may read and that is not cached."""
     headers = {"Access-Control-Allow-Origin": "*", "Cache-Control": "no-cache"}
     return web.Response(text=text, content_type=TYPE, charset="utf-8", headers=headers)

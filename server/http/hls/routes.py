@@ -33,7 +33,7 @@ _StreamHandler = Callable[[web.Request, HlsStream], Awaitable[web.Response]]
 
 
 def _counted(awaits: str | None = None) -> Callable[[_StreamHandler], _Handler]:
-    """Count whoever fetches as a viewer, if there is a slot; ``awaits`` is the kind of what may block."""
+    """Count the player as a viewer, if there is a slot; ``awaits`` is the kind of data it may block on."""
 
     def counted(handler: _StreamHandler) -> _Handler:
         @wraps(handler)
@@ -88,7 +88,7 @@ async def get_segment(request: web.Request, stream: HlsStream) -> web.Response:
     if segment is None:
         segment = await time_shift_segment(request, stream, number)
     if segment is None:
-        return error_response(404, f"there is no segment {number} here, or not any more")
+        return error_response(404, f"no segment {number}: expired, or not there yet")
     return _media(request, segment.data)
 
 
@@ -102,7 +102,7 @@ async def get_part(request: web.Request, stream: HlsStream) -> web.Response:
     number, index = int(request.match_info["segment"]), int(request.match_info["part"])
     part = await wait_for_part(stream.live, number, index)
     if part is None:
-        return error_response(404, f"there is no part {number}.{index} here, or not any more")
+        return error_response(404, f"no part {number}.{index}: expired, or not there yet")
     return _media(request, part.data)
 
 

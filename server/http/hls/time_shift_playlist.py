@@ -1,4 +1,4 @@
-"""Time-shift playlists: HLS of what is kept, of segments at the addresses that they had when new."""
+"""Time-shift playlists: HLS of recorded segments, at the addresses that they had when live."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _EXPLICIT_END = re.compile(f"{_PULSE.pattern}|{_LIVE}")
 
 @dataclass(frozen=True, slots=True)
 class HlsStream:
-    """A stream as HLS has it: its newest segments, if it is live, and all that is kept of it."""
+    """A stream's HLS segments: the newest ones, if it is live, and all recorded ones."""
 
     live: HlsSegmenter | None
     recorded: RecordedStream
@@ -74,7 +74,7 @@ async def time_shift_playlist(request: web.Request, stream: HlsStream) -> web.Re
 
 
 async def time_shift_segment(request: web.Request, stream: HlsStream, number: int) -> HlsSegment | None:
-    """Return a segment that is not in the live playlist any more; None where it is not kept."""
+    """Return a segment that has left the live playlist; None if it is not recorded."""
     recorded, frames = stream.recorded, request.app[SERVICE].streams.segment_plan.segment_frames
     rewound = recorded.time_shift(over=stream.is_over)
     with suppress(OSError):  # what cannot be read is a gap

@@ -41,12 +41,12 @@ class HttpCollector(Collector):
         yield from self._viewers()
         yield CounterMetricFamily(
             "myview_wrong_tokens",
-            "Tokens that there is not, or not any more.",
+            "Requests with an unknown or revoked token.",
             value=app[ACCESS].authenticator.wrong_tokens,
         )
         yield GaugeMetricFamily(
             "myview_config_differs",
-            "The configuration's file is not what runs: wrong, not read again, or waiting for a restart.",
+            "1: the configuration file is not what runs: invalid, not reloaded, or waiting for a restart.",
             value=float(app[ON_DISK]().differs),
         )
         yield from self._lag.histogram.collect()
@@ -73,7 +73,7 @@ class HttpCollector(Collector):
             "pictures": service.rendering.viewers,
             "events": self._app[EVENTS].viewers,
         }
-        family = GaugeMetricFamily("myview_viewers_by_kind", "Who is connected, by kind.", labels=["kind"])
+        family = GaugeMetricFamily("myview_viewers_by_kind", "Connected viewers by kind.", labels=["kind"])
         for kind, count in kinds.items():
             family.add_metric([kind], count)
         yield family

@@ -21,9 +21,9 @@ class PersonEdit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     object: int
     name: str | None = None
     merge: int | None = None
-    """The number that is theirs, too."""
+    """The number to merge into this person."""
     split: list[str] | None = None
-    """Cameras that show somebody else as them; none: all do."""
+    """Cameras whose view of this number is another person; empty: all cameras."""
 
 
 @routes.get(f"{OPERATOR_PATH}/people")
@@ -40,7 +40,7 @@ async def post_people(request: web.Request) -> web.Response:
     edit = await read_json(request, PersonEdit)
     people.check_editable(edit.object)
     if sum(getattr(edit, it) is not None for it in ("name", "merge", "split")) != 1:
-        return error_response(400, "say one thing at a time: name, merge or split")
+        return error_response(400, "set exactly one of name, merge and split")
     new = None
     if edit.name is not None:
         people.rename_person(RenamePerson(edit.object, edit.name))

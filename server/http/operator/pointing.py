@@ -25,7 +25,7 @@ class PointBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     x: float
     y: float
     tolerance: Annotated[float, msgspec.Meta(gt=0)] | None = None
-    """How far off it may be; null: a little."""
+    """Tolerance in pixels; null: a default."""
 
 
 class PointingBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

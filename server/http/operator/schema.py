@@ -1,4 +1,4 @@
-"""What the operator's addresses answer. ``/api/openapi.json`` is made from these, too."""
+"""Answers of the operator's API; ``/api/openapi.json`` is built from them, too."""
 
 from __future__ import annotations
 
@@ -34,51 +34,51 @@ class Settings(msgspec.Struct, frozen=True):
     error: str
     """Why the file, as it is on the disk now, cannot be in force; empty: it can."""
     pending_restart: list[str]
-    """Keys in which the file differs from what is in force."""
+    """Keys in which the file differs from the configuration in force."""
 
 
 class SelectionSettings(msgspec.Struct, frozen=True):
-    """What views are chosen by; keys such as switch_cost_s and quality.size."""
+    """View-selection settings by key, such as switch_cost_s and quality.size."""
 
     values: dict[str, float | bool]
     """In force now."""
     file: dict[str, float | bool]
-    """What the configuration says."""
+    """In the configuration file."""
     lines: str
-    """Of the configuration, for what is in force and is not its default or not what the file says."""
+    """Configuration lines (YAML) for values that differ from their default or from the file."""
     min_lookahead: int
-    """Frames, as few as tracks allow."""
+    """Frames; the tracking window needs as many."""
     max_lookahead: int
-    """Frames, as many as what the service keeps allows."""
+    """Frames; the service's buffers allow no more."""
 
 
 class PeopleByHand(msgspec.Struct, frozen=True):
-    """What was said of people by hand."""
+    """Manual overrides of people's identities."""
 
     names: dict[int, str]
     merged: dict[int, int]
-    """By number that was merged by hand: whose it is said to be."""
+    """By merged number: the number that it was merged into."""
     new_object: int | None
-    """The number of somebody who was just said to be new."""
+    """The number of the person who was just split off."""
     unavailable: str
-    """Why nothing can be said here; empty: it can."""
+    """Why people cannot be edited here; empty: they can."""
 
 
 class Pointing(msgspec.Struct, frozen=True):
-    """What becomes of it where the operator points."""
+    """Corrections of position: whether they are accepted, and the result of the last request."""
 
     memory_frames: int
-    """How many frames back somebody can be pointed at."""
+    """How many frames back a person can be pointed at."""
     max_points: int
-    """Places in one request at most."""
+    """Points in one request at most."""
     unavailable: str
-    """Why nobody can be pointed at here; empty: they can."""
+    """Why corrections are not possible here; empty: they are."""
     accepted: int
-    """Of the places that were just sent, those that the camera is told."""
+    """Points of this request that were sent to the camera's tracker."""
     too_old: int
-    """Those that it is not told: too far back."""
+    """Points of this request that are too far back."""
     flags: list[int]
-    """The flags that are followed by them."""
+    """Ids of the flags that these points follow."""
 
 
 OPERATOR: dict[str, type[msgspec.Struct]] = {
@@ -91,13 +91,13 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/config": Settings,
     "/api/operator/view_selection": SelectionSettings,
 }
-"""What GET of each address answers; what changes something answers with the same, as it is then."""
+"""The answer to GET of each path; POST, PUT and DELETE answer with the new state."""
 
 OPERATOR_FILES = {"/api/operator/tracks.csv": "text/csv", "/api/operator/choices.csv": "text/csv"}
-"""What is given of a time span, from= and to=."""
+"""Downloads of a time range, from= and to=."""
 
 OPERATOR_RESULTS = {
     "/api/operator/walk/ground.json": "application/octet-stream",
     "/api/operator/walk/plan.png": "image/png",
 }
-"""What has come of a walk."""
+"""Results of the calibration walk."""

@@ -1,4 +1,4 @@
-"""The configuration in force, and what of the choice can be changed to try it out."""
+"""``/api/operator/config`` and ``view_selection``: the configuration in force, and settings to try out."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ routes = web.RouteTableDef()
 
 _ENDPOINTS = frozenset({"zenoh.connect", "zenoh.listen"})
 _PASSWORD = re.compile(r"cameras[.][^.]+[.]password")
-"""The name of a file; but who misunderstands that writes the password itself there."""
+"""The name of a file, hidden since some write the password itself there."""
 
 
 @routes.get(f"{OPERATOR_PATH}/config")
 async def get_config(request: web.Request) -> web.Response:
     """Return the configuration in force and how it differs from the defaults; passwords are hidden."""
-    found = request.app[ON_DISK]()
+    on_disk = request.app[ON_DISK]()
     settings = list(settings_of(request.app[SERVICE].config))
-    return json_response(Settings(settings, found.error, list(found.waiting)))
+    return json_response(Settings(settings, on_disk.error, list(on_disk.pending_restart)))
 
 
 @routes.get(f"{OPERATOR_PATH}/view_selection")
@@ -46,16 +46,14 @@ async def get_view_selection(request: web.Request) -> web.Response:
 
 @routes.put(f"{OPERATOR_PATH}/view_selection")
 async def put_view_selection(request: web.Request) -> web.Response:
-    """Choose views by other settings, to try them out: until they are changed again or the service ends."""
+    """Try out view-selection settings, until they are changed again or the service ends."""
     service = request.app[SERVICE]
     operations = service.operations
     changes = await read_json(request, dict[str, float | bool])
     current = _flat(operations.view_settings)
     for key in changes:
         if key not in current:
-            return error_response(
-                400, f"view.{key}: cannot be changed here; what can is {', '.join(current)}"
-            )
+            return error_response(400, f"view.{key}: cannot be changed here; these can: {', '.join(current)}")
     try:
         operations.change_view_settings(
             change_view_settings(operations.view_settings, _nested(changes), "to try out")
@@ -67,7 +65,7 @@ async def put_view_selection(request: web.Request) -> web.Response:
 
 @routes.delete(f"{OPERATOR_PATH}/view_selection")
 async def delete_view_selection(request: web.Request) -> web.Response:
-    """Choose views by what the configuration says again."""
+    """Restore the configured view-selection settings."""
     service = request.app[SERVICE]
     service.operations.reset_view_settings()
     return json_response(_selection_settings(service))
@@ -108,7 +106,7 @@ def _names(section: Any) -> list[str]:
 
 
 def _written(key: str, value: Any) -> str:
-    """Write a value as a configuration does, without what may be secret."""
+    """Return a value as YAML, with secrets hidden."""
     if key in _ENDPOINTS:
         return dump_yaml_inline(redact_endpoint(value))
     if value is not None and _PASSWORD.fullmatch(key):
@@ -117,7 +115,7 @@ def _written(key: str, value: Any) -> str:
 
 
 def _shown(value: Any) -> Any:
-    """Return a value as YAML; of URLs only the host, of FFmpeg options only the names."""
+    """Return a value with secrets hidden: of URLs only the host, of FFmpeg options only the names."""
     match value:
         case Mapping():
             return {redact_address(it): HIDDEN for it in value}
@@ -130,15 +128,17 @@ def _shown(value: Any) -> Any:
 
 
 def _selection_settings(service: BestViewService) -> SelectionSettings:
-    now, file, usual = (
+    current, file, defaults = (
         _flat(service.operations.view_settings),
         _flat(service.config.view),
         _flat(ViewSettings()),
     )
-    lines = {key: value for key, value in now.items() if value != usual[key] or value != file[key]}
+    lines = {key: value for key, value in current.items() if value != defaults[key] or value != file[key]}
     written = "" if not lines else dump_yaml({"view": _nested(lines)})
     least, most = service.config.least_lookahead, service.operations.most_lookahead
-    return SelectionSettings(values=now, file=file, lines=written, min_lookahead=least, max_lookahead=most)
+    return SelectionSettings(
+        values=current, file=file, lines=written, min_lookahead=least, max_lookahead=most
+    )
 
 
 def _flat(view: ViewSettings) -> dict[str, float | bool]:

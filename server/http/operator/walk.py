@@ -15,11 +15,11 @@ routes = web.RouteTableDef()
 
 
 class WalkCommand(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What is to be done with the walk."""
+    """A command to the calibration walk."""
 
     action: Literal["start", "resume", "finish"]
     person: Annotated[float, msgspec.Meta(ge=0.1, le=1000)] = 1.75
-    """To finish: how tall people are, metres."""
+    """For finish: the person's height, meters."""
 
 
 @routes.get(f"{OPERATOR_PATH}/walk")
@@ -30,7 +30,7 @@ async def get_walk(request: web.Request) -> web.Response:
 
 @routes.post(f"{OPERATOR_PATH}/walk")
 async def post_walk(request: web.Request) -> web.Response:
-    """Start a walk, go on with it, or finish it: then it is calibrated from."""
+    """Start or resume a walk, or finish it and calibrate from it."""
     calibration = request.app[SERVICE].calibration
     command = await read_json(request, WalkCommand)
     match command.action:
@@ -45,7 +45,7 @@ async def post_walk(request: web.Request) -> web.Response:
 
 @routes.delete(f"{OPERATOR_PATH}/walk")
 async def delete_walk(request: web.Request) -> web.Response:
-    """Forget the walk and what came of it."""
+    """Discard the walk and its result."""
     calibration = request.app[SERVICE].calibration
     calibration.discard()
     return json_response(calibration.status())
@@ -65,7 +65,7 @@ async def get_plan(request: web.Request) -> web.Response:
 
 def _file(body: bytes | None, content_type: str, name: str) -> web.Response:
     if body is None:
-        return error_response(404, "nothing has come of a walk yet")
+        return error_response(404, "there is no calibration result yet")
     disposition = f'{"inline" if content_type == "image/png" else "attachment"}; filename="{name}"'
     headers = {"Content-Disposition": disposition, "Cache-Control": "no-store"}
     return web.Response(body=body, content_type=content_type, headers=headers)

@@ -53,7 +53,7 @@ def _rendering(handler: Handler) -> Handler:
         except _AnsweredError as answered:
             return answered.response
         except RenderPoolFullError:
-            return unavailable("as many pictures as this server makes (http.pictures_max) are being made")
+            return unavailable("the server renders as many streams as allowed (http.pictures_max)")
         except PictureTimeoutError:
             return unavailable("no picture came in time")
 

@@ -1,4 +1,4 @@
-"""``from=`` and ``to=``: the range of pulses that a request is about, and whether anything is kept of it."""
+"""``from=`` and ``to=``: the range of pulses that a request is about, and whether it is recorded."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def parse_time_range(
                 raise TimeReferenceError(f"{name}: {error}") from error
     start, end = moments.get("from", start), moments.get("to")
     if start is None:
-        raise TimeReferenceError("from: is missing; it says from when on, such as ?from=-60")
+        raise TimeReferenceError("from: is missing; it is the start, such as ?from=-60")
     if end is not None and end <= start:
         raise TimeReferenceError(f"to: p{end} is not after from, which is p{start}")
     return PlaybackRange(start, end)
@@ -60,7 +60,7 @@ async def refuse_unreadable(
 
 
 async def refuse_unrecorded(stream: RecordedStream, playback: PlaybackRange) -> web.Response | None:
-    """Return 416 with what is kept where nothing is kept of a range; None: something is."""
+    """Return 416 with the recorded ranges if none of this range is recorded; None: some is."""
     if (unreadable := await refuse_unreadable(stream, playback.start, playback.end)) is not None:
         return unreadable
     first = stream.available_from(playback.start)
@@ -72,25 +72,27 @@ async def refuse_unrecorded(stream: RecordedStream, playback: PlaybackRange) -> 
         return disk_error(error)
     spans = stream.spans(0, sys.maxsize)
     kept = ", ".join(f"p{it.first} to p{it.end - 1}" for it in spans) or "nothing"
-    return error_response(416, f"of {stream.name} nothing is kept from p{playback.start} on; there is {kept}")
+    return error_response(
+        416, f"nothing of {stream.name} is recorded from p{playback.start} on; there is {kept}"
+    )
 
 
 async def decisions_in(
     service: BestViewService, playback: PlaybackRange
 ) -> AsyncIterator[bytes] | web.Response:
-    """Return the recorded decisions of a range as lines of JSON; 416 where none are kept of it."""
+    """Return the recorded decisions of a range as lines of JSON; 416 if none are recorded."""
     end = service.recordings.end if playback.end is None else playback.end
     lines = service.recordings.decisions(playback.start, end)
     first = await anext(lines, None)
     if first is None and playback.start < service.recordings.end:
         until = "on" if playback.end is None else f"to p{playback.end - 1}"
-        return error_response(416, f"nothing is kept of what was said from p{playback.start} {until}")
+        return error_response(416, f"no decisions are recorded from p{playback.start} {until}")
     return _led_by(first, lines)
 
 
 def disk_error(error: OSError) -> web.Response:
     """Return 503 for a recording that cannot be read."""
-    return unavailable(f"what is recorded cannot be read: {error.strerror or error}")
+    return unavailable(f"cannot read the recording: {error.strerror or error}")
 
 
 async def _led_by(first: bytes | None, lines: AsyncIterator[bytes]) -> AsyncIterator[bytes]:

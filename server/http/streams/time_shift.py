@@ -64,9 +64,7 @@ async def _stream(
     if head is None:
         return unavailable("no camera has delivered a picture yet")
     if request.query.get("overlay", "0") != "0":
-        return error_response(
-            400, "overlay: boxes are not burnt into the past; /api/past tells where they are"
-        )
+        return error_response(400, "overlay: not available in the past; /api/past has the boxes")
     try:
         playback = parse_time_range(request, service, recorded.end)
     except TimeReferenceError as error:

@@ -1,7 +1,7 @@
 """Fair share: where no slot is left, a client with fewer gets one of the client with the most.
 
 A client is a token, however many sessions, addresses and players it has; where there are no tokens, an
-address. As long as slots are free nobody's share is limited: behind a proxy all clients have one address.
+address. As long as slots are free no share is limited: behind a proxy all clients have one address.
 """
 
 from __future__ import annotations

@@ -35,9 +35,9 @@ def refuse_viewer(
     if viewers - slots.ending(streams) >= limits.viewers_per_object:
         if _evict(request, slots, streams):
             return None  # one less of all, too
-        return unavailable("as many viewers as one stream takes (http.viewers_per_object) are watching")
+        return unavailable("the stream has as many viewers as allowed (http.viewers_per_object)")
     if total - slots.ending() >= limits.viewers_max and not _evict(request, slots):
-        return unavailable("as many viewers as this server takes (http.viewers_max) are watching")
+        return unavailable("the server has as many viewers as allowed (http.viewers_max)")
     return None
 
 
@@ -53,7 +53,7 @@ def refuse_event_listener(request: web.Request) -> web.Response | None:
     slots, most = request.app[EVENT_SLOTS], request.app[SERVICE].config.http.viewers_max
     if slots.all < most or _evict(request, slots):
         return None
-    return unavailable("as many as this server takes (http.viewers_max) are told what happens")
+    return unavailable("the server has as many event streams as allowed (http.viewers_max)")
 
 
 @contextmanager
@@ -64,7 +64,7 @@ def event_slot(request: web.Request) -> Iterator[None]:
 
 
 def _evict(request: web.Request, slots: FairShare, streams: tuple[str, ...] | None = None) -> bool:
-    """Evict whoever holds more than a fair share; HEAD takes no slot and evicts nobody."""
+    """Evict a client that holds more than its fair share; HEAD takes no slot and evicts no one."""
     return request.method != "HEAD" and slots.evict_for(request.app[ACCESS].client_of(request), streams)
 
 

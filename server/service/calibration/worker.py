@@ -30,9 +30,9 @@ class CalibrationTask(msgspec.Struct, frozen=True):
     seen: list[CameraBoxes]
     fps: float
     shift: float
-    """Seconds that cameras may be out of step."""
+    """Largest time offset between cameras, seconds."""
     person: float
-    """How tall people are, metres."""
+    """People's height, meters."""
     offsets: dict[str, int]
     """By camera: what the frames have in them already; of those that it can be set of."""
 

@@ -125,4 +125,4 @@ class CalibrationService:
 
     def _check_started(self) -> None:
         if self._walking.state is WalkState.NONE:
-            raise ConflictError("nobody walks: start the walk first")
+            raise ConflictError("there is no walk: start one first")

@@ -79,7 +79,7 @@ class CameraState:
         if self.refused:
             return self.refused
         if self.alive and self.away:
-            return "its source gives no pictures; it is tried again"
+            return "its source gives no pictures; retrying"
         return self.status.load if self.alive and self.status is not None else ""
 
     def bad(self, why: Exception | str) -> None:

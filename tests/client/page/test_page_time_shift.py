@@ -212,7 +212,7 @@ async def test_what_is_not_kept_is_said_and_live_goes_on(browser: Browser) -> No
         await visit.playing(1)
         await seconds_of_playing(visit, 3)
         await visit.page.keyboard.press(",")
-        await expect(visit.page.locator("#notice")).to_contain_text("Nothing is kept of that")
+        await expect(visit.page.locator("#notice")).to_contain_text("Nothing is recorded of that time")
         seen = await visit.get("myview.pulse")
         await visit.until(f"myview.pulse > {seen + GOP} && {LIVE}")
 

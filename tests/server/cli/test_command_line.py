@@ -69,7 +69,7 @@ COMMANDS = ["sync", "bestview", "up"]
         ({"cameras": [{"id": "a", "source": "x"}] * 2}, "two cameras are called 'a'"),
         ({"cameras": [{"id": "a", "source": "x", "ground": [[0] * 3] * 3}]}, "not invertible"),
         ({"cameras": []}, "cameras"),
-        ({"cameras": [{"id": "bestview-1", "source": "x"}]}, "is what a best-view service is called"),
+        ({"cameras": [{"id": "bestview-1", "source": "x"}]}, "is the name of a best-view service"),
         ({"zenoh": {"listen": "nonsense"}}, "zenoh.listen"),
         ({"sync": {"port": 70000}}, "sync.port"),
         ({"site": {"fps": float("inf")}}, "site.fps"),
@@ -109,17 +109,17 @@ DETECTIONS = "".join(f"{n},-1,{n},10,20,40,0.9,-1,-1,-1\n" for n in range(1, 200
 @pytest.mark.parametrize(
     ("words", "why"),
     [
-        (["track", "--det", "det.txt", "--out", "det.txt"], "is read, and would be replaced"),
-        (["track", "--det", "det.txt", "--out", "sub/../det.txt"], "is read, and would be replaced"),
-        (["calibrate", "points.json", "--out", "points.json"], "is read, and would be replaced"),
+        (["track", "--det", "det.txt", "--out", "det.txt"], "is an input, and would be replaced"),
+        (["track", "--det", "det.txt", "--out", "sub/../det.txt"], "is an input, and would be replaced"),
+        (["calibrate", "points.json", "--out", "points.json"], "is an input, and would be replaced"),
         (["calibrate", "points.json", "--out", "g.json", "--plan", "points.json"], "would be replaced"),
         (["calibrate", "points.json", "--out", "g.json", "--unit", "metres"], "did you mean 'm'?"),
         (["evaluate", "--gt", "det.txt", "--tracks", "det.txt", "--json", "det.txt"], "would be replaced"),
-        (["track", "--det", "det.txt", "--out", "pipe"], "is no ordinary file"),
+        (["track", "--det", "det.txt", "--out", "pipe"], "is not a regular file"),
         (["track", "det.txt", "--out", "t.txt"], "this is text, and no video"),
         (["render", "det.txt", "--out", "r"], "this is text, and no video"),
         (["track", "--det", "det.txt", "--out", "t" * 300], "File name too long"),
-        (["watch", "http://127.0.0.1:1", "--out", "x.mp4"], "say whom by --object"),
+        (["watch", "http://127.0.0.1:1", "--out", "x.mp4"], "need --object"),
         (["watch", "http://127.0.0.1:1", "--object", "1", "--out", "sub"], "is a folder"),
     ],
     ids=lambda it: " ".join(it)[:40] if isinstance(it, list) else "",
@@ -202,7 +202,7 @@ def test_an_output_folder_with_something_in_it_is_refused(run: Run, tmp_path: Pa
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine.txt").write_text("mine")
     line = refusal(run(command, site(tmp_path), "--out", "out"))
-    assert "out: is there already and is not an empty folder" in line
+    assert "out: exists and is not an empty folder" in line
 
 
 def test_scene_says_which_there_are_and_how_many_look_where_nobody_says(run: Run, tmp_path: Path) -> None:

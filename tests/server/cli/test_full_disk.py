@@ -74,7 +74,7 @@ async def test_a_disk_that_fills_up_keeps_whole_pictures_and_nothing_else(
     out.parent.mkdir()
     with (
         files_of_at_most(round(part * size)),
-        pytest.raises(UserError, match=r"File too large; what was recorded before that is kept$"),
+        pytest.raises(UserError, match=r"File too large; the recording up to then is kept$"),
     ):
         await recorded(hall, out)
     assert all(it.stat().st_size for it in out.parent.iterdir()), "none is empty"

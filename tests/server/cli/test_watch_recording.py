@@ -164,7 +164,7 @@ async def test_a_moment_that_is_none_leaves_no_file(hall: Hall, tmp_path: Path) 
     with pytest.raises(client.RefusedError, match="'soon' is not a time"):
         await client.watch(url, 1, tmp_path / "one.mp4", start="soon")
     with pytest.raises(
-        client.RefusedError, match="of object 1 nothing is kept from p99 on; there is p0 to p29"
+        client.RefusedError, match="nothing of object 1 is recorded from p99 on; there is p0 to p29"
     ):
         await client.watch(url, 1, tmp_path / "one.mp4", start="p99")
     assert not list(tmp_path.iterdir())
@@ -175,7 +175,7 @@ async def test_the_past_is_listed_and_told_again(hall: Hall) -> None:
     (span,) = await client.spans(url, 1)
     assert (span.first, span.frames) == (0, 30)
     assert [gop.first async for gop in client.past(url, "p7", "p16")] == [5, 10, 15]
-    with pytest.raises(client.NotFoundError, match="nothing is kept of object 9"):
+    with pytest.raises(client.NotFoundError, match="nothing is recorded of object 9"):
         await client.spans(url, 9)
 
 

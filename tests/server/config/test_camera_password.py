@@ -45,7 +45,7 @@ def test_other_processes_need_no_file(tmp_path: Path) -> None:
 def test_what_is_no_password_is_refused_in_one_line(tmp_path: Path, content: bytes | None) -> None:
     if content is not None:
         (tmp_path / "door.password").write_bytes(content)
-    with pytest.raises(UserError, match=r"^cameras\.door\.password: the file that it names ") as refused:
+    with pytest.raises(UserError, match=r"^cameras\.door\.password: the file ") as refused:
         fill_in_password(config_of(tmp_path), "door")
     assert "\n" not in str(refused.value)
 

@@ -98,7 +98,7 @@ def test_a_unit_that_was_meant_for_metres_is_refused_with_what_was_meant(
 @pytest.mark.parametrize("unit", [1, "", ["m"]])
 def test_a_unit_that_is_no_word_is_refused(unit: Any, tmp_path: Path) -> None:
     (tmp_path / "ground.json").write_text(json.dumps({"unit": unit, "homography": {}}))
-    assert f"unit: {unit!r} is no unit" in complaint(site(ground="ground.json"), tmp_path)
+    assert f"unit: {unit!r} is not a unit" in complaint(site(ground="ground.json"), tmp_path)
 
 
 @pytest.mark.parametrize("unit", ["m", "cm", "mm", "ft", "grid (of 358 x 360)", "person"])

@@ -145,21 +145,21 @@ def test_two_lists_of_tokens_are_refused_with_both_lines(tmp_path: Path) -> None
     [
         (
             {"MYVIEW_ACCESS__TOKENS": "a.yaml", "MYVIEW_access__tokens": ""},
-            "MYVIEW_ACCESS__TOKENS and MYVIEW_access__tokens both say access.tokens",
+            "MYVIEW_ACCESS__TOKENS and MYVIEW_access__tokens both set access.tokens",
         ),
         (
             {"MYVIEW_ACCESS__TOKENS": "a.yaml", "myview_Access__Tokens": "b.yaml"},
-            "MYVIEW_ACCESS__TOKENS and myview_Access__Tokens both say access.tokens",
+            "MYVIEW_ACCESS__TOKENS and myview_Access__Tokens both set access.tokens",
         ),
         (
             {"MYVIEW_ACCESS": '{"tokens": null}', "MYVIEW_ACCESS__TOKENS": "a.yaml"},
-            "MYVIEW_ACCESS and MYVIEW_ACCESS__TOKENS both say access.tokens",
+            "MYVIEW_ACCESS and MYVIEW_ACCESS__TOKENS both set access.tokens",
         ),
         (
             {"MYVIEW_VIEW": '{"flags": {"risk": 1}}', "MYVIEW_VIEW__FLAGS__RISK": "0"},
-            "MYVIEW_VIEW and MYVIEW_VIEW__FLAGS__RISK both say view.flags.risk",
+            "MYVIEW_VIEW and MYVIEW_VIEW__FLAGS__RISK both set view.flags.risk",
         ),
-        ({"MYVIEW_GROUND": "a", "MYVIEW_ground": "b"}, "MYVIEW_GROUND and MYVIEW_ground both say ground"),
+        ({"MYVIEW_GROUND": "a", "MYVIEW_ground": "b"}, "MYVIEW_GROUND and MYVIEW_ground both set ground"),
         ({"MYVIEW_ACCESS": '{"tokens": "a", "tokens": null}'}, "MYVIEW_ACCESS: 'tokens' occurs twice"),
         ({"myview_htp__port": "1"}, "myview_htp__port: there is no section 'htp'"),
     ],

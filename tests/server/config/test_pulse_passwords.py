@@ -53,7 +53,7 @@ def test_without_a_file_nobody_is_asked(tmp_path: Path) -> None:
 def test_a_process_needs_no_line_but_its_own(tmp_path: Path) -> None:
     config = load_config(site(tmp_path, f"c0:{LONG}\n"))
     assert pulse_credentials(config, "c0") == Credentials("c0", LONG)
-    with pytest.raises(UserError, match="has no line for 'bestview', as which this process comes"):
+    with pytest.raises(UserError, match="has no line for 'bestview', the name of this process"):
         pulse_credentials(config, "bestview")
 
 
@@ -68,7 +68,7 @@ def test_every_service_of_a_site_has_its_line(tmp_path: Path) -> None:
     ("users", "words"),
     [
         (None, r"sync\.users: cannot read .*sync\.users: No such file"),
-        ("c0\n", "line 1 is no name:password"),
+        ("c0\n", "line 1 is not name:password"),
         (f"c0:{LONG}\nc0:{LONG}\n", "lines 1 and 2 are for the same name"),
         (f"c0:{LONG}\nbestview:secret word\n", "the password of 'bestview' must have 1 to 128 printable"),
         (f"c0:{LONG}\n", "has no line for bestview"),

@@ -48,11 +48,11 @@ def test_a_file_without_tokens_lets_nobody_in(tmp_path: Path) -> None:
         ([{"name": "a", "sha256": SUM, "role": "watch", "object": 3}], "tokens.0: made: is missing"),
         (
             [{"name": "a", "sha256": SUM, "role": "operate", "camera": "c0"}],
-            "tokens.0: role: who operates sees",
+            "tokens.0: role: an operator sees",
         ),
         (
             [{"name": "a", "sha256": SUM, "role": "watch", "object": 3, "camera": "c0", "made": LATER}],
-            "tokens.0: object, camera: a token is for one",
+            "tokens.0: object, camera: a token is limited to one",
         ),
         ([{"name": "a", "sha256": SUM, "role": "watch"}] * 2, "tokens.0 and tokens.1: have the same name, a"),
         (["a"], "tokens.0: Input should be a valid dictionary"),
@@ -61,7 +61,7 @@ def test_a_file_without_tokens_lets_nobody_in(tmp_path: Path) -> None:
             "tokens.0.made: Input should",
         ),
         ([{"name": "a\tb", "sha256": SUM, "role": "watch"}], "tokens.0.name: String should match pattern"),
-        ([{"name": "a\nb", "sha256": SUM, "role": "watch"}], "tokens.0.name: is more than a line"),
+        ([{"name": "a\nb", "sha256": SUM, "role": "watch"}], "tokens.0.name: has more than one line"),
     ],
 )
 def test_what_is_wrong_in_the_file_is_said_in_one_line(tmp_path: Path, lines: list[Any], error: str) -> None:

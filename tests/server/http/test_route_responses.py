@@ -112,7 +112,10 @@ async def test_a_mistake_of_the_servers_own_is_500_without_a_traceback(
     hall: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(hall.service, "frame_buffers", {})
-    assert await hall.get("/api/cameras") == (500, {"error": "the server made a mistake; its log says more"})
+    assert await hall.get("/api/cameras") == (
+        500,
+        {"error": "internal server error; the server's log says more"},
+    )
 
 
 @pytest.mark.parametrize("version", ["1.0", "1.1"])

@@ -173,12 +173,12 @@ def test_a_key_with_a_password_is_refused_and_not_waited_for(
         str(locked),
     ]
     subprocess.run(command, check=True, capture_output=True)
-    with pytest.raises(UserError, match=r"http\.tls: .*: the key has a password; write it without one"):
+    with pytest.raises(UserError, match=r"http\.tls: .*: the key has a password; save it without one"):
         Certificate.of(TlsSettings(certificate=made[0].certificate, key=locked))
 
 
 def test_one_file_without_the_other_is_refused() -> None:
-    with pytest.raises(ValidationError, match="HTTPS takes both files"):
+    with pytest.raises(ValidationError, match="HTTPS needs both files"):
         TlsSettings(certificate=Path("a.pem"))
 
 

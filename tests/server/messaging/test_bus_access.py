@@ -250,7 +250,7 @@ def _users(folder: Path, text: str) -> Path:
 
 @pytest.mark.parametrize("text", ["c0\n", "c0:\n", ":p\n", " c0:a\n", "c0:a\n\nc1:b\n"])
 def test_a_file_of_users_that_is_none_is_said_in_one_line(tmp_path: Path, text: str) -> None:
-    with pytest.raises(UserError, match=r"zenoh\.users: .*: line \d is no name:password"):
+    with pytest.raises(UserError, match=r"zenoh\.users: .*: line \d is not name:password"):
         read_users(_users(tmp_path, text), SETTING)
 
 
@@ -261,7 +261,7 @@ def test_a_user_with_two_lines_is_refused_with_both(tmp_path: Path) -> None:
 
 
 def test_who_has_no_line_is_told_so(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="has no line for 'c1', as which this process comes"):
+    with pytest.raises(UserError, match="has no line for 'c1', the name of this process"):
         password_of(_users(tmp_path, "c0:a\n"), "c1", SETTING)
     with pytest.raises(UserError, match=r"zenoh\.users: cannot read .*none"):
         password_of(tmp_path / "none", "c0", SETTING)

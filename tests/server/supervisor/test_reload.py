@@ -145,9 +145,9 @@ def test_what_runs_is_known_to_differ_from_a_file_that_is_wrong_changed_or_mende
     with pytest.raises(UserError, match=r"view\.lookahead"):
         running.wanted()
     write(path, view={"lookahead": 40}, site={"fps": 12.5})
-    assert running.on_disk().waiting == ("site.fps", "view.lookahead")
+    assert running.on_disk().pending_restart == ("site.fps", "view.lookahead")
     running.now = plan_reload(running.now, running.wanted()).now
-    assert running.on_disk().waiting == ("site.fps",)
+    assert running.on_disk().pending_restart == ("site.fps",)
     write(path, view={"lookahead": 40})
     assert not running.on_disk().differs
 
@@ -161,7 +161,7 @@ def test_a_ground_file_that_has_changed_is_no_longer_what_runs(tmp_path: Path) -
     ground.write_text('{"homography": {"c0": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "c1": [[1]]}}')
     assert "ground.json" in running.on_disk().error
     ground.write_text('{"homography": {"c0": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}}')
-    assert running.on_disk().waiting == ("cameras.c0.ground",)
+    assert running.on_disk().pending_restart == ("cameras.c0.ground",)
 
 
 def test_what_a_supervisor_keeps_is_what_its_processes_run_by(
@@ -208,7 +208,7 @@ async def test_the_operator_and_prometheus_are_told(found: ConfigFileState) -> N
         told = await (await session.get("/api/operator/config")).json()
         metrics = await (await session.get("/metrics")).text()
     service.close()
-    assert (told["error"], told["waiting"]) == (found.error, list(found.waiting))
+    assert (told["error"], told["pending_restart"]) == (found.error, list(found.pending_restart))
     assert f"myview_config_differs {float(found.differs)}" in metrics
 
 
@@ -241,7 +241,10 @@ async def test_a_process_says_what_waits_and_what_is_wrong_and_ends_with_its_ter
     path = tmp_path / "site.yaml"
     async with asyncio.timeout(PATIENCE), sync_at_a_terminal(path) as (process, terminal):
         content = yaml.safe_load(path.read_text())
-        for fps, said in ((12.5, b"restart of all processes: site.fps"), (-1, b"as it was stays in force")):
+        for fps, said in (
+            (12.5, b"restart of all processes: site.fps"),
+            (-1, b"the previous configuration stays in force"),
+        ):
             path.write_text(yaml.safe_dump({**content, "site": {"fps": fps}}))
             process.send_signal(signal.SIGHUP)
             await until_said(terminal, said)

@@ -95,9 +95,9 @@ async def test_it_is_said_once_that_a_camera_does_not_answer_and_when_it_does_it
     begin: Callable[..., Site],
 ) -> None:
     site = begin()
-    await site.told.until(lambda line: "Connection refused; it is tried again" in line)
+    await site.told.until(lambda line: "Connection refused; retrying" in line)
     await site.answer()
-    await site.told.until(lambda line: line.startswith("camera c0: it answers, after"))
+    await site.told.until(lambda line: line.startswith("camera c0 answers, after"))
     await site.told.until(lambda line: "no best-view service" in line)  # it runs
     assert sum("Connection refused" in line for line in site.told.lines) == 1
 
@@ -108,7 +108,7 @@ async def test_what_is_wrong_with_a_camera_that_was_waited_for_ends_no_others(
 ) -> None:
     """A mistake at the start ends the site, but the others have begun long ago."""
     site = begin(128, "pass")
-    await site.told.until(lambda line: "Connection refused; it is tried again" in line)
+    await site.told.until(lambda line: "Connection refused; retrying" in line)
     await site.answer()
     with pytest.raises(UnavailableError, match=r"^camera c0: h264: pass: its pictures are 64x48"):
         await asyncio.wait_for(site.process, PATIENCE)

@@ -32,7 +32,7 @@ from server.service.rendering.decided_boxes import NO_OVERLAY
 from server.service.rendering.worker import stream_renderer
 from server.service.rendering.worker_process import WorkerDiedError
 from server.service.streaming.broadcaster import Broadcaster
-from server.supervisor.site import _keep
+from server.supervisor.site import _write_active_config
 
 KEYS = ZenohKeys("hall")
 
@@ -208,6 +208,6 @@ def test_a_folder_that_cannot_be_written_is_told_of_once_however_often_something
     spell = LogThrottle()
     running: Any = SimpleNamespace(path=tmp_path / "site.yaml", now=small_config())
     for _ in range(5):
-        _keep(running, tmp_path / "file" / "folder" / "site.yaml", spell)
+        _write_active_config(running, tmp_path / "file" / "folder" / "site.yaml", spell)
     assert len(caplog.messages) == 1
-    assert "cannot write what is in force" in caplog.messages[0]
+    assert "cannot write the running configuration" in caplog.messages[0]

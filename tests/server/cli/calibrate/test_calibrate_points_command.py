@@ -39,7 +39,7 @@ def test_json_becomes_a_ground_file_that_a_configuration_takes(run: Run, tmp_pat
     code, out, err = run(points, "--out", "ground.json")
     assert (code, err) == (0, "")
     assert "c0: 7 pairs" in out
-    assert "c1: 4 pairs, which fit exactly" in out
+    assert "c1: 4 pairs always fit exactly" in out
     assert (tmp_path / "ground.png").read_bytes().startswith(b"\x89PNG")
     cameras = [{"id": "c0", "source": "scene:room"}, {"id": "c1", "source": "scene:room"}]
     config = build_config({"cameras": cameras, "ground": "ground.json"}, where="test", folder=tmp_path)
@@ -65,7 +65,7 @@ def test_csv_and_json_say_the_same(run: Run, tmp_path: Path) -> None:
         ("p.json", "[1]", 'p.json: has no {"cameras"'),
         ("p.json", "{", "p.json:1: is not JSON"),
         ("p.json", '{"cameras": {}}', "p.json: has no pairs"),
-        ("p.json", "[" * 100_000, "p.json: is not JSON that can be read"),
+        ("p.json", "[" * 100_000, "p.json: is not readable JSON"),
         ("p.json", '{"cameras": {"c0": [{"image": [1, 2]}]}}', "p.json: camera c0: pair 1: is not {"),
         ("p.json", '{"cameras": {"c0": [{"image": [1, 2], "floor": [1, "x"]}]}}', "are not four numbers"),
         ("p.csv", "a,b\n1,2\n", "p.csv:1: has no column 'camera'"),

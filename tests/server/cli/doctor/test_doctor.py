@@ -81,7 +81,7 @@ def test_a_missing_camera_is_one_line_with_what_to_do_and_an_exit_code(myview: R
     (line,) = [it for it in ended.out.splitlines() if "camera c0" in it]
     assert line.startswith("bad ")
     assert "c0.mp4: no such file or folder" in line
-    assert "→ mend what the configuration says of it, or the file" in line
+    assert "→ fix its source in the configuration, or make the file readable" in line
     assert ended.out.splitlines()[-1].endswith("1 bad")
 
 
@@ -104,7 +104,7 @@ def taken() -> Iterator[int]:
 async def test_a_port_that_something_else_has_is_bad(tmp_path: Path, taken: int) -> None:
     found, runs = await port_findings(config(tmp_path, sync={"port": taken}))
     assert not runs
-    assert only(found, "sync.port") == (Level.BAD, f"127.0.0.1:{taken} is taken by something else")
+    assert only(found, "sync.port") == (Level.BAD, f"127.0.0.1:{taken} is used by another program")
     assert {only(found, it).level for it in ("http.port", "zenoh.listen")} == {Level.OK}
 
 
@@ -123,7 +123,7 @@ async def test_ports_of_the_very_site_are_no_reason_to_worry(hall: Hall, tmp_pat
     }
     found, runs = await port_findings(config(tmp_path, **changes))
     assert runs
-    assert only(found, "http.port").text.endswith("by this very site, which runs")
+    assert only(found, "http.port").text.endswith("by this site, which is running")
     assert only(found, "zenoh.listen").level is Level.OK
     found, runs = await port_findings(config(tmp_path, **changes, site={"name": "another", **SIZE}))
     assert (runs, only(found, "http.port").level) == (False, Level.BAD)
@@ -235,7 +235,7 @@ def test_a_password_from_a_file_is_used_and_others_should_not_read_it(tmp_path: 
     ]
     there = config(tmp_path, cameras=cameras)
     missing = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
-    assert "the file that it names cannot be read: No such file or directory" in missing
+    assert "the file cannot be read: No such file or directory" in missing
     (tmp_path / "secret").write_text("open sesame\n")
     (tmp_path / "secret").chmod(0o644)
     assert "others may read" in only(file_findings(there), "camera gate").text
@@ -320,7 +320,7 @@ def test_files_that_others_can_read_or_write_are_told_of(tmp_path: Path) -> None
     bus = {**dict.fromkeys(("connect", "listen"), "tcp/127.0.0.1:7447"), "users": "users"}
     found = file_findings(config(tmp_path, **changes, zenoh=bus))
     words = " ".join(it.text for it in found if it.level is Level.WARNING)
-    assert "lets nobody in" in words
+    assert "lets no one in" in words
     assert f"others may write {tokens}" in words
     assert f"others may read {users}" in words
     assert "no line for c0" in words
@@ -344,7 +344,7 @@ def test_a_camera_without_a_place_among_those_that_have_one_is_told_of(tmp_path:
     ground = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
     cameras = [{"id": "c0", "source": "x", "ground": ground}, {"id": "c1", "source": "y"}]
     said = only(file_findings(config(tmp_path, cameras=cameras)), "ground")
-    assert said == (Level.WARNING, "c1: not in the file: known by looks alone")
+    assert said == (Level.WARNING, "c1: no homography: people are matched by appearance alone there")
 
 
 def test_the_processors_are_those_that_this_process_may_use(
@@ -414,11 +414,11 @@ def test_a_certificate_is_good_for_as_long_as_it_says(tmp_path: Path) -> None:
 
     (certificate, key), (other, _) = made("long", "-days", "100"), made("short", "-days", "3")
     good = certificate_finding("http.tls", certificate, key)
-    assert (good.level, good.text) == (Level.OK, f"{certificate} is good for 100 days, for hall")
+    assert (good.level, good.text) == (Level.OK, f"{certificate} is valid for 100 days, for hall")
     assert certificate_finding("http.tls", *made("soon", "-days", "3")).level is Level.WARNING
     over = certificate_finding("http.tls", *expired(tmp_path))
     assert (over.level, over.text) == (Level.BAD, f"{tmp_path / 'over.pem'}: certificate has expired")
     wrong = certificate_finding("http.tls", other, key)
     assert wrong.level is Level.BAD
-    assert "no certificate and its key" in wrong.text
+    assert "not a certificate and its key" in wrong.text
     assert certificate_finding("http.tls", tmp_path / "none.pem", key).level is Level.BAD

@@ -62,7 +62,7 @@ async def test_nor_does_one_of_several_ports_or_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     there = config(tmp_path)
-    monkeypatch.setattr(ports, "_is_ours", broken)
+    monkeypatch.setattr(ports, "_is_this_site", broken)
     with socket.create_server(("127.0.0.1", there.http.port)):
         found, _ = await port_findings(there)
     assert of(found, "http.port") == BROKEN
@@ -78,7 +78,7 @@ async def test_a_mistake_is_told_without_a_password(tmp_path: Path, monkeypatch:
 
     monkeypatch.setattr(command, "sound_findings", wrong)
     found = [it async for it in command.run_checks(config(tmp_path), 1.0)]
-    text = "a mistake in MyView: RuntimeError: cannot be: ..."
+    text = "a bug in MyView: RuntimeError: cannot be: ..."
     assert of(found, "sound") == [(Level.BAD, text)]
     assert of(found, "memory")
 
@@ -93,7 +93,7 @@ async def test_findings_are_told_as_they_are_found(
         return {"c0": CameraProbe("away")}
 
     monkeypatch.setattr(command, "probe_cameras", probe_all)
-    await command._told(site(tmp_path), 1.0, as_json=False)
+    await command._check_and_report(site(tmp_path), 1.0, as_json=False)
     (before,) = told
     after = capsys.readouterr().out
     assert " http.port " in before
@@ -112,7 +112,9 @@ async def test_a_server_that_nobody_knows_is_bad(tmp_path: Path, monkeypatch: py
 
     monkeypatch.setattr(socket, "getaddrinfo", unknown)
     found = await reachability_findings(there)
-    assert of(found, "sync.host") == [(Level.BAD, "pulses:7400 cannot be found: Name or service not known")]
+    assert of(found, "sync.host") == [
+        (Level.BAD, "pulses:7400 cannot be resolved: Name or service not known")
+    ]
     assert of(found, "zenoh.connect")[0][0] is Level.BAD
 
 
@@ -121,7 +123,7 @@ async def test_a_way_on_this_machine_leads_to_who_listens(tmp_path: Path) -> Non
     fine = config(tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{port}", "listen": f"tcp/0.0.0.0:{port}"})
     assert {it.level for it in await reachability_findings(fine)} == {Level.OK}
     astray = config(tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{other}", "listen": f"tcp/127.0.0.1:{port}"})
-    text = f"nobody is at 127.0.0.1:{other}, where cameras look, and zenoh.listen is 127.0.0.1:{port}"
+    text = f"nothing listens at 127.0.0.1:{other}, where cameras connect; zenoh.listen is 127.0.0.1:{port}"
     assert of(await reachability_findings(astray), "zenoh.connect") == [(Level.BAD, text)]
     with socket.create_server(("127.0.0.1", other)):
         answered = [(Level.OK, f"127.0.0.1:{other} answers")]  # something may pass it on
@@ -133,7 +135,7 @@ async def test_a_way_on_this_machine_leads_to_who_listens(tmp_path: Path) -> Non
 async def test_two_ports_that_are_one_are_bad(tmp_path: Path) -> None:
     port = free()
     found, _ = await port_findings(config(tmp_path, http={"port": port}, sync={"port": port}))
-    assert of(found, "sync.port") == [(Level.BAD, f"127.0.0.1:{port} is what http.port says, too")]
+    assert of(found, "sync.port") == [(Level.BAD, f"127.0.0.1:{port} is also the address of http.port")]
     assert of(found, "zenoh.listen")[0][0] is Level.OK
 
 
@@ -141,7 +143,7 @@ def test_a_device_is_one_camera_s(tmp_path: Path) -> None:
     sources = {"c0": "/dev/video9", "c1": "/dev/video9", "c2": "c.mp4", "c3": "c.mp4"}
     there = config(tmp_path, cameras=[{"id": it, "source": source} for it, source in sources.items()])
     found = camera_findings(there, {}, runs=False)
-    text = "/dev/video9 is camera c0's, too, and only one can have it"
+    text = "/dev/video9 is also used by camera c0, and only one can open it"
     assert [(it.check, it.level, it.text) for it in found] == [("camera c1", Level.BAD, text)]
 
 
@@ -151,7 +153,7 @@ def test_a_wrong_configuration_is_named_with_what_to_do(myview: Run, tmp_path: P
     assert (ended.code, ended.err) == (1, "")
     line = ended.out.splitlines()[0]
     why = f"{path}: ground: cannot read {tmp_path / 'none.json'}: No such file or directory"
-    assert f"{why} → mend it there" in line
+    assert f"{why} → fix the configuration" in line
 
 
 def test_a_missing_file_of_tokens_is_said_once(tmp_path: Path) -> None:
@@ -178,7 +180,7 @@ def test_the_router_s_certificate_is_for_the_host_that_cameras_look_for(tmp_path
 
     assert bad("elsewhere") == []
     (other,) = bad("10.0.0.5")
-    assert "who connects to 10.0.0.5 by" in other
+    assert "clients that connect to 10.0.0.5 and" in other
     assert "certificate is not valid for '10.0.0.5'" in other
     assert bad("elsewhere", authority="none.pem") == [
         f"{tmp_path / 'none.pem'}: cannot be read: No such file or directory"

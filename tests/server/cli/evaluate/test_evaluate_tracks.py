@@ -165,7 +165,7 @@ def test_frames_that_never_meet_are_refused(refused: Printed, tmp_path: Path) ->
 def test_truth_of_nobody_is_refused(refused: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "c0.txt", people((1,)))
     truth = write(tmp_path / "gt.txt", people((1,)).replace(",1.00,-1,", ",0,-1,"))
-    assert "nobody is in it who counts" in refused("--tracks", tracks, "--gt", truth)
+    assert "no person in it counts" in refused("--tracks", tracks, "--gt", truth)
 
 
 def test_a_malformed_row_is_named(refused: Printed, tmp_path: Path) -> None:

@@ -192,9 +192,9 @@ def test_options_that_make_no_sense_are_refused(evaluate: Run, hall: Path) -> No
         ('{"fps": 3}', "is not what `myview render` writes"),
         ('{"fps": 3, "switch_cost_s": 1, "sizes": {"c0": [1e999, 9]}}', "is not what `myview render` writes"),
         ("[" * 100_000, "is not what `myview render` writes"),
-        ('{"fps": 3, "switch_cost_s": NaN, "sizes": {"c0": [9, 9]}}', "makes no sense"),
-        ('{"fps": 3, "switch_cost_s": 1, "sizes": {"c0": [9, 0]}}', "makes no sense"),
-        ('{"fps": 0, "switch_cost_s": 1, "sizes": {"c0": [9, 9]}}', "makes no sense"),
+        ('{"fps": 3, "switch_cost_s": NaN, "sizes": {"c0": [9, 9]}}', "invalid rate, size or cost"),
+        ('{"fps": 3, "switch_cost_s": 1, "sizes": {"c0": [9, 0]}}', "invalid rate, size or cost"),
+        ('{"fps": 0, "switch_cost_s": 1, "sizes": {"c0": [9, 9]}}', "invalid rate, size or cost"),
     ],
 )
 def test_a_site_that_makes_no_sense_is_refused(evaluate: Run, hall: Path, text: str, why: str) -> None:

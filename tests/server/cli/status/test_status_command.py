@@ -63,7 +63,7 @@ async def test_a_site_is_shown_as_it_is(busy: Hall) -> None:
     assert "hall  " in text
     assert "ready" in text
     assert next(it for it in text.splitlines() if it.startswith(A)).split()[:3] == [A, "live", "24.5"]
-    assert "counts by itself" in text
+    assert "not synchronized" in text
     assert "1 Ann" in text
     assert "not recording" in text
 
@@ -75,7 +75,7 @@ async def test_a_site_that_is_not_ready_says_why_and_is_a_failure(
     said = capsys.readouterr().out
     assert "not ready: " in said
     assert "no camera delivers frames" in said
-    assert "nobody is known" in said
+    assert "no people yet" in said
     see(hall)
     assert await status_once(url(hall), None, as_json=True)
     told = json.loads(capsys.readouterr().out)

@@ -173,7 +173,7 @@ async def test_a_token_is_told_what_it_is_for(site: Hall) -> None:
             "camera": None,
         }
     status, error = await asked(site, CAMERAS, **bearer("desk"))
-    assert (status, error) == (403, "the token 'desk' is for watching, and for nothing else")
+    assert (status, error) == (403, "the token 'desk' is only for watching")
 
 
 async def test_players_name_the_token_in_the_address(site: Hall) -> None:

@@ -194,7 +194,7 @@ async def test_a_person_s_token_is_void_when_people_were_numbered_anew_since(
             assert answer.status == then
             if then == 403:
                 error = (await answer.json())["error"]
-                assert error.startswith("people have been numbered anew since the token 'family' was made")
+                assert error.startswith("person numbers have restarted since the token 'family' was made")
 
 
 class Looked:
@@ -226,7 +226,7 @@ def test_a_file_that_makes_no_sense_leaves_the_old_one_in_force_and_says_so_once
         looked.file.reload_if_changed()
         assert looked.has("desk")
     [line] = caplog.messages
-    assert line.endswith("the 1 tokens as they were stay in force")
+    assert line.endswith("the previous 1 tokens stay in force")
     assert "\n" not in line
     write_tokens(looked.path, line_of("lead"))
     for _ in range(2):

@@ -111,8 +111,8 @@ async def test_a_choice_of_the_last_minute_is_explained_from_the_first_question_
     for at in (f"p{newest['first']}", f"p{newest['first'] + GOP - 1}", f"-{GOP / FPS}"):
         assert await busy.get_json(f"/api/objects/1/choice?at={at}") == newest
     for asked, expected, words in (
-        ("1/choice?at=p0", 404, "nothing is kept"),
-        ("1/choice?at=p999999", 404, "nothing is kept"),
+        ("1/choice?at=p0", 404, "no reasons are stored"),
+        ("1/choice?at=p999999", 404, "no reasons are stored"),
         ("9/choice?at=-1", 404, "object 9"),
         ("1/choice?at=soon", 400, "at: 'soon' is not a time"),
     ):

@@ -35,7 +35,7 @@ from fakes.service.scripted_cameras import CAMERAS, FPS, GOP
 from fakes.service.scripted_recordings import Picture, own_pictures
 from fakes.timeouts import PATIENCE
 
-NOTHING = "of camera c0 nothing is kept from p999 on; there is p0 to p104"
+NOTHING = "nothing of camera c0 is recorded from p999 on; there is p0 to p104"
 
 
 @pytest.fixture
@@ -176,8 +176,8 @@ async def test_what_was_somebodys_can_be_fetched_when_they_are_forgotten(hall: H
         ("/cameras/c0/hls/index.m3u8?from=p999", 416, NOTHING),
         ("/objects/1/hls/index.m3u8?from=p9&to=p9", 400, "to: p9 is not after from, which is p9"),
         ("/objects/1/hls/index.m3u8?from=p100", 503, "the first segment is not whole yet"),
-        ("/objects/1/hls/10.m4s", 404, "there is no segment 10 here, or not any more"),
-        ("/objects/1/hls/999999999999.m4s", 404, "there is no segment 999999999999 here, or not any more"),
+        ("/objects/1/hls/10.m4s", 404, "no segment 10: expired, or not there yet"),
+        ("/objects/1/hls/999999999999.m4s", 404, "no segment 999999999999: expired, or not there yet"),
     ],
 )  # fmt: skip
 async def test_what_cannot_be_had_is_told_in_one_line(hall: Hall, path: str, status: int, error: str) -> None:

@@ -36,9 +36,9 @@ async def test_what_went_wrong_last_is_told_until_something_else_does(busy: Hall
     intake.status(Message(ZenohKeys("hall").camera(A, "status"), b"{}", b""))
     assert "a message that cannot be used: " in await trouble()
     intake.status(status(A, state="away"))
-    assert await trouble() == "its source gives no pictures; it is tried again"
+    assert await trouble() == "its source gives no pictures; retrying"
     intake.status(status(A, state="live"))
-    assert await trouble() == "its source gives no pictures; it is tried again"
+    assert await trouble() == "its source gives no pictures; retrying"
     intake.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
     assert await trouble() == "its process was gone"
 

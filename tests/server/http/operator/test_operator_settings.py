@@ -105,7 +105,7 @@ async def test_what_is_tried_out_is_in_force_at_once_with_its_lines(busy: Hall) 
         ({"switch_cost_s": 1e308}, "to try out: view.switch_cost_s: Input should be less than or equal to"),
         ({"min_shot_s": 1e6}, "to try out: view.min_shot_s: Input should be less than or equal to 600"),
         ({"quality.size": 2}, "to try out: view.quality: the weight size"),
-        ({"buffer_s": 30}, "view.buffer_s: cannot be changed here; what can is lookahead, switch_cost_s, "),
+        ({"buffer_s": 30}, "view.buffer_s: cannot be changed here; these can: lookahead, switch_cost_s, "),
         ({"switch_cost": 1}, "view.switch_cost: cannot be changed here"),
         ({"switch_cost_s": "1"}, "the request's JSON: "),
         ([], "the request's JSON: "),

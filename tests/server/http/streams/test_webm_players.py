@@ -153,7 +153,7 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(free: H
         await page.wait_for_function("myview.state === 'playing' && myview.camera === 'c1'")
         await page.keyboard.press(",")
         said = await page.locator("#notice").text_content()
-        assert said == "Nothing is kept of that: this is live."
+        assert said == "Nothing is recorded of that time: this is live."
         going_on.cancel()
     assert errors == []
 

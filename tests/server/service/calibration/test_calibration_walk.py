@@ -80,7 +80,7 @@ async def test_a_walk_becomes_homographies_that_are_the_scenes(wide: Hall, tmp_p
     assert wide.service.config == before  # nothing in force has changed
     async with wide.session.delete(WALK, headers=MINE) as answer:
         assert (await answer.json())["state"] == "none"
-    assert await wide.get(f"{WALK}/ground.json") == (404, {"error": "nothing has come of a walk yet"})
+    assert await wide.get(f"{WALK}/ground.json") == (404, {"error": "there is no calibration result yet"})
 
 
 async def test_a_walk_that_says_too_little_says_so_and_can_be_gone_on_with(wide: Hall) -> None:
@@ -108,8 +108,8 @@ async def test_what_the_walk_lacks_is_said_while_it_goes_on(wide: Hall) -> None:
 @pytest.mark.parametrize(
     ("step", "status", "error"),
     [
-        ({"action": "finish"}, 409, "nobody walks: start the walk first"),
-        ({"action": "resume"}, 409, "nobody walks: start the walk first"),
+        ({"action": "finish"}, 409, "there is no walk: start one first"),
+        ({"action": "resume"}, 409, "there is no walk: start one first"),
         ({"action": "fly"}, 400, "the request's JSON: "),
         ({"action": "start", "person": 0}, 400, "the request's JSON: "),
         ({}, 400, "the request's JSON: "),

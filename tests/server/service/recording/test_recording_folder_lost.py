@@ -20,7 +20,7 @@ from server.service.recording.recording_session import RecordingSession
 from server.service.recording.retention import RetentionLimits
 from server.service.recording.session_files import InitSegments
 
-NOTHING = "of object 1 nothing is kept from p0 on; there is nothing"
+NOTHING = "nothing of object 1 is recorded from p0 on; there is nothing"
 Harm = Callable[[Path, Path], None]
 """What somebody does to a folder, and the run in it."""
 
@@ -351,7 +351,7 @@ async def test_nobody_is_promised_what_is_gone(hall: Hall, harm: Harm) -> None:
     ):
         status, body = await asked(hall, path)
         assert status == 416, path
-        assert b"nothing is kept" in body
+        assert b"recorded from" in body
         assert body.count(b"\n") == 0
     for path in ("/api/objects/1/past", "/api/cameras/c0/past"):
         spans = (await hall.get_json(path))["spans"]
@@ -362,10 +362,10 @@ async def test_nobody_is_promised_what_is_gone(hall: Hall, harm: Harm) -> None:
 @pytest.mark.parametrize(
     ("path", "status", "error"),
     [
-        ("/api/objects/1/past", 404, "nothing is kept of object 1"),
+        ("/api/objects/1/past", 404, "nothing is recorded of object 1"),
         ("/objects/1/best.mp4?from=p0&to=p10", 404, "there is no object 1"),
         ("/objects/1/hls/index.m3u8?from=p0&to=p10", 416, NOTHING),
-        ("/objects/1/hls/0.m4s", 404, "there is no segment 0 here, or not any more"),
+        ("/objects/1/hls/0.m4s", 404, "no segment 0: expired, or not there yet"),
     ],
 )  # fmt: skip
 async def test_who_is_nowhere_else_is_gone_with_what_was_recorded(
@@ -404,7 +404,7 @@ async def test_what_may_not_be_read_is_told_in_one_line() -> None:
             assert store is not None
             assert store.session is not None
             (store.session.folder / "cameras" / "c0").chmod(0)
-            error = {"error": "what is recorded cannot be read: Permission denied"}
+            error = {"error": "cannot read the recording: Permission denied"}
             assert await hall.get("/cameras/c0/live.mp4?from=p0&to=p10") == (503, error)
             assert await hall.get("/api/cameras/c0/past") == (503, error)
             (store.session.folder / "cameras" / "c0").chmod(0o700)

@@ -164,11 +164,15 @@ async def test_without_a_recording_the_memory_is_the_past(busy: Hall) -> None:
     [
         ("/objects/9/best.mp4?from=-60", 404, "there is no object 9"),
         ("/cameras/c9/live.mp4?from=-60", 404, "there is no camera 'c9'; there are c0, c1"),
-        ("/objects/1/best.mp4?from=p99", 416, "of object 1 nothing is kept from p99 on; there is p0 to p29"),
+        (
+            "/objects/1/best.mp4?from=p99",
+            416,
+            "nothing of object 1 is recorded from p99 on; there is p0 to p29",
+        ),
         (
             "/cameras/c0/live.mp4?from=p99",
             416,
-            "of camera c0 nothing is kept from p99 on; there is p0 to p34",
+            "nothing of camera c0 is recorded from p99 on; there is p0 to p34",
         ),
         (
             "/objects/1/best.mp4?from=yesterday",
@@ -176,13 +180,13 @@ async def test_without_a_recording_the_memory_is_the_past(busy: Hall) -> None:
             f"from: 'yesterday' is not a time; {MOMENT}",
         ),
         ("/objects/1/best.mp4?from=p9&to=p9", 400, "to: p9 is not after from, which is p9"),
-        ("/objects/1/best.mp4?to=p9", 400, "from: is missing; it says from when on, such as ?from=-60"),
+        ("/objects/1/best.mp4?to=p9", 400, "from: is missing; it is the start, such as ?from=-60"),
         (
             "/objects/1/best.mp4?from=2025-11-21",
             400,
             "from: no pulse has been received yet; use seconds ago (-60) or a pulse (p1250)",
         ),
-        ("/api/objects/9/past", 404, "nothing is kept of object 9"),
+        ("/api/objects/9/past", 404, "nothing is recorded of object 9"),
         ("/api/objects/1/past?from=p9&to=p9", 400, "to: p9 is not after from, which is p9"),
         ("/api/cameras/c0/past?to=yesterday", 400, f"to: 'yesterday' is not a time; {MOMENT}"),
     ],
