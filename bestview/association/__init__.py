@@ -1,1 +1,24 @@
-"""From the cameras' tracks to one id per person: tracklets, affinity, clustering, registry."""
+"""Association across cameras: tracklets, their affinity, clustering, and one id per person.
+
+`IdentityRegistry` is the entry point. `TrackletSplitter` splits the cameras' tracks where a tracker may have
+confused people, `affinity` and `appearance` add up evidence about pairs of tracklets, `cluster` groups them
+into persons, and `registry` assigns, corrects and remembers person ids.
+"""
+
+from bestview.association.registry.corrections import Merge, Split
+from bestview.association.registry.identity_registry import IdentityRegistry, IdentityUpdate
+from bestview.association.settings import IdentitySettings
+from bestview.association.sightings import AppearanceSample, TrackUpdate
+from bestview.association.tracklet import TrackKey, TrackletKey
+
+__all__ = [
+    "AppearanceSample",
+    "IdentityRegistry",
+    "IdentitySettings",
+    "IdentityUpdate",
+    "Merge",
+    "Split",
+    "TrackKey",
+    "TrackUpdate",
+    "TrackletKey",
+]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.tracklet_groups import TrackletCluster
+from bestview.association.tracklet_clusters import TrackletCluster
 from bestview.geometry.ground_plane import person_heights, to_ground
 
 Floats = NDArray[np.float64]

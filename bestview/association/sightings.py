@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.keys import TrackKey
+from bestview.association.tracklet import TrackKey
 from bestview.geometry.ground_plane import (
     feet_cut_off,
     foot_covariance,

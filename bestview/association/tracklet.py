@@ -1,16 +1,39 @@
-"""Tracklets: parts of a camera's track that are certainly one person."""
+"""Tracklets, the parts of a camera's track that are certainly one person, and their keys."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.appearance.mean_histograms import PersonAppearance
-from bestview.association.keys import TrackletKey
+from bestview.association.appearance.histograms import PersonAppearance
 
 Floats = NDArray[np.float64]
+
+
+class TrackKey(NamedTuple):
+    """A track of one camera.
+
+    A named tuple, since thousands are hashed and compared in every update.
+    """
+
+    camera: str
+    local_id: int
+
+
+class TrackletKey(NamedTuple):
+    """The tracklet of a camera's track that starts with `first_frame`."""
+
+    camera: str
+    local_id: int
+    first_frame: int
+
+    @property
+    def track(self) -> TrackKey:
+        """The key of the whole track."""
+        return TrackKey(self.camera, self.local_id)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,21 +6,19 @@ or that reappears after a gap starts a new tracklet, whose person is determined 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.appearance.mean_histograms import MeanHistogram
-from bestview.association.keys import TrackKey, TrackletKey
-from bestview.association.runs import observation_runs
+from bestview.association.appearance.histograms import MeanHistogram
 from bestview.association.settings import IdentitySettings
 from bestview.association.sightings import AppearanceSample, TrackObservations
-from bestview.association.tracklet import Tracklet, TrackletEndpoint
+from bestview.association.tracklet import TrackKey, Tracklet, TrackletEndpoint, TrackletKey
 
 Floats = NDArray[np.float64]
-
 _MINIMUM_UNCROWDED_FRAMES = 4
 """Frames outside crowds that a tracklet needs before the next crowd can end it."""
 _STABLE_CLUSTERINGS = 2
@@ -209,3 +207,31 @@ def _endpoint(seen: TrackObservations, track: int, column: int) -> TrackletEndpo
     return TrackletEndpoint(
         seen.first_frame + column, seen.boxes[track, column].copy(), seen.ground_point[track, column].copy()
     )
+
+
+class ObservationRun(NamedTuple):
+    """Consecutive observations of a track from column `start` on, all crowded or all uncrowded."""
+
+    track: int
+    start: int
+    stop: int
+    crowded: bool
+
+
+def observation_runs(
+    visible: NDArray[np.bool_], crowded: NDArray[np.bool_], *, whole: bool
+) -> Iterator[ObservationRun]:
+    """Yield runs of observations, (T, W) visible and crowded: only the first frame can start a tracklet.
+
+    `whole`: runs are as long as possible; else each is one frame.
+    """
+    kind = np.where(visible, 1 + crowded, 0)
+    kind = np.pad(kind, ((0, 0), (1, 1)))
+    change = (kind[:, 1:] != kind[:, :-1]) | (not whole)
+    track, start = np.nonzero(change[:, :-1] & visible)
+    # As many end as begin, in the same order.
+    _, stop = np.nonzero(change[:, 1:] & visible)
+    for run in zip(
+        track.tolist(), start.tolist(), (stop + 1).tolist(), crowded[track, start].tolist(), strict=True
+    ):
+        yield ObservationRun(*run)

@@ -1,4 +1,4 @@
-"""Bundle adjustment: poses and time offsets of all cameras at once, by robust least squares."""
+"""Bundle adjustment: poses and time offsets of all cameras at once, and standard errors of the offsets."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import scipy
 from bestview.calibration.floor_agreement import FloorPositions, project_to_floor, whitened_differences
 from bestview.calibration.homography import Floats
 from bestview.calibration.pinhole import PARAMETERS, POSE, Pinhole
-from bestview.calibration.priors import height_errors, prior_errors, robust
 from bestview.calibration.samples import Indices, WalkSamples, select_moving_samples
+from bestview.calibration.single_camera import height_errors, prior_errors, robust
 from bestview.calibration.walk_settings import WalkSettings
 from bestview.geometry.ground_plane import foot_points
 
@@ -26,6 +26,8 @@ _SHARPEST = 0.2
 _OFFSET_SPREAD = 100.0
 """Frames; a weak prior that keeps offsets in place for cameras that nothing constrains."""
 _EVALUATIONS = 12
+_PARTS = 8
+_TINY = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,3 +162,44 @@ def estimate_sharpness(residuals: Floats) -> float:
     """Return how much more precise foot points are than the settings say, from whitened distances, (M, 2)."""
     typical = float(np.median(np.hypot(*residuals.T))) / 1.18 if len(residuals) else 1.0  # Rayleigh's median
     return 1.0 / min(max(typical, _SHARPEST), 1.0)
+
+
+def offset_standard_errors(
+    rig: CameraRig, samples: Sequence[WalkSamples], matches: Sequence[Correspondences], settings: WalkSettings
+) -> Floats:
+    """Return the standard error of each camera's offset, (C,) frames; 0 of the first, which is the reference.
+
+    The walk is cut into parts. In each the offsets are fitted to its own foot points, with the cameras fixed;
+    the spread between the parts gives the error of the whole. Foot points that are tracked late, or shadows
+    to one side, make parts differ in which people walk another way.
+    """
+    count = len(rig.cameras)
+    start = min((float(it.times.min()) for it in samples if len(it.times)), default=0.0)
+    end = max((float(it.times.max()) for it in samples if len(it.times)), default=0.0) + 1.0
+    normal = np.zeros((_PARTS, count, count))
+    right_hand_side = np.zeros((_PARTS, count))
+    for it in matches:
+        no_shift = np.zeros(count)
+        residuals = floor_residuals(rig.cameras, no_shift, samples, it, settings)
+        slope = np.zeros((len(residuals), 2, count))
+        for camera in (it.one, it.other):
+            later = no_shift.copy()
+            later[camera] = 1.0
+            slope[:, :, camera] = floor_residuals(rig.cameras, later, samples, it, settings) - residuals
+        weight = it.weight / (1.0 + (residuals**2).sum(axis=1))
+        weight = np.where(
+            np.isfinite(residuals).all(axis=1) & np.isfinite(slope).all(axis=(1, 2)), weight, 0.0
+        )
+        part = (_PARTS * (samples[it.one].times[it.here] - start) / (end - start)).astype(int)
+        residuals, slope = np.nan_to_num(residuals), np.nan_to_num(slope)
+        np.add.at(normal, part, np.einsum("m,mki,mkj->mij", weight, slope, slope))
+        np.add.at(right_hand_side, part, -np.einsum("m,mki,mk->mi", weight, slope, residuals))
+    # The first camera stays; parts weigh as much as they know.
+    part_offsets = [
+        np.linalg.solve(it[1:, 1:] + _TINY * np.eye(count - 1), goal[1:])
+        for it, goal in zip(normal, right_hand_side, strict=True)
+    ]
+    information = np.array([np.diag(it)[1:] for it in normal])
+    share = information / np.maximum(information.sum(axis=0), _TINY)
+    spread = (share**2 * np.array(part_offsets) ** 2).sum(axis=0)
+    return np.concatenate([[0.0], np.sqrt(spread)])

@@ -13,9 +13,8 @@ from bestview.calibration.bundle_adjustment import (
     adjust_bundle,
     estimate_sharpness,
 )
-from bestview.calibration.chance_agreement import halves_swapped, time_reversed
-from bestview.calibration.covisibility import covisible_agreement
 from bestview.calibration.floor_agreement import (
+    covisible_agreement,
     mutual_matches,
     pair_agreement,
     project_to_floor,
@@ -27,7 +26,7 @@ from bestview.calibration.homography import Floats
 from bestview.calibration.pair_hypotheses import RelativePose, propose_relative_poses
 from bestview.calibration.pinhole import EAST, NORTH, PAN, Pinhole
 from bestview.calibration.samples import CandidateMatches, WalkSamples, candidate_matches, sample_walk
-from bestview.calibration.walk import Walk
+from bestview.calibration.walk import Walk, halves_swapped, time_reversed
 from bestview.calibration.walk_settings import WalkSettings
 
 _GUESSES = 60

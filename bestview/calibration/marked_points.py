@@ -1,10 +1,21 @@
-"""Marked points of a camera, and the tolerance for contradictions between them."""
+"""Marked points of a camera, and the detection of points that contradict the others."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
+from math import comb
 
-from bestview.calibration.homography import Floats
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview.calibration.homography import LEAST_POINTS, Floats, apply_homography, fit_homography
+
+_LEAST_TO_BLAME = 6
+"""With five pairs any four of them agree: who of them is wrong cannot be told."""
+_MOST_TRIALS = 500
+"""Fours that are tried; up to eleven pairs have fewer."""
+_SEED = 1
 
 
 class CalibrationError(ValueError):
@@ -43,3 +54,67 @@ class MarkedPoints:
     camera: str
     image: Floats
     floor: Floats
+
+
+def image_errors(backwards: Floats, points: MarkedPoints) -> Floats:
+    """Compute the distance of each floor point from its image, (N,); infinite: beyond the horizon."""
+    off = apply_homography(backwards, points.floor) - points.image
+    return np.asarray(np.nan_to_num(np.hypot(*off.T), nan=np.inf))
+
+
+def describe_inconsistency(
+    points: MarkedPoints, errors: Floats, allowed: float, settings: PointSettings
+) -> str:
+    """Return an error message that names the inconsistent pairs, if they can be told."""
+    count = len(points.image)
+    fits = _consensus(points, allowed) if count >= _LEAST_TO_BLAME else np.ones(count, dtype=bool)
+    wrong = np.flatnonzero(~fits)
+    if (
+        not 0 < len(wrong) <= settings.maximum_inconsistent_share * count
+        or count - len(wrong) <= LEAST_POINTS
+    ):
+        return (
+            f"camera {points.camera}: the pairs contradict each other, by up to {errors.max():.0f} pixels; "
+            f"check them all, or add more ({_LEAST_TO_BLAME} at least), so that the wrong ones can be told"
+        )
+    backwards = fit_homography(points.floor[fits], points.image[fits])
+    off = image_errors(backwards, points)
+    named = ", ".join(
+        f"{number + 1} (image {_point_text(points.image[number])}, floor {_point_text(points.floor[number])})"
+        for number in wrong
+    )
+    one = len(wrong) == 1
+    far = f"{off[wrong].min():.0f} pixels" if np.isfinite(off[wrong]).all() else "beyond the horizon"
+    return (
+        f"camera {points.camera}: {'pair' if one else 'pairs'} {named} "
+        f"{'contradicts' if one else 'contradict'} the others: {far} off, where the others are within "
+        f"{off[fits].max():.1f}; mend or remove {'it' if one else 'them'}"
+    )
+
+
+def _consensus(points: MarkedPoints, allowed: float) -> NDArray[np.bool_]:
+    """Return which pairs the best homography through four of them agrees with, (N,)."""
+    count = len(points.image)
+    best, best_score = np.ones(count, dtype=bool), (0, 0.0)
+    for four in _point_quadruples(count):
+        try:
+            errors = image_errors(fit_homography(points.floor[four], points.image[four]), points)
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+        near = errors <= allowed
+        score = (int(near.sum()), -float(errors[near].sum()))
+        if score > best_score:
+            best, best_score = near, score
+    return np.asarray(best)
+
+
+def _point_quadruples(count: int) -> list[list[int]]:
+    """Return all quadruples of so many points, or a random sample of them."""
+    if comb(count, LEAST_POINTS) <= _MOST_TRIALS:
+        return [list(four) for four in combinations(range(count), LEAST_POINTS)]
+    random = np.random.default_rng(_SEED)
+    return [random.choice(count, LEAST_POINTS, replace=False).tolist() for _ in range(_MOST_TRIALS)]
+
+
+def _point_text(point: Floats) -> str:
+    return f"{point[0]:g} {point[1]:g}"

@@ -8,8 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from bestview.calibration.homography import LEAST_POINTS, Floats, fit_homography
-from bestview.calibration.inconsistent_points import describe_inconsistency, image_errors
-from bestview.calibration.marked_points import CalibrationError, MarkedPoints, PointSettings
+from bestview.calibration.marked_points import (
+    CalibrationError,
+    MarkedPoints,
+    PointSettings,
+    describe_inconsistency,
+    image_errors,
+)
 from bestview.geometry.ground_plane import to_ground, validate_homography
 
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bestview.calibration.bundle_adjustment import Correspondences
+from bestview.calibration.bundle_adjustment import Correspondences, offset_standard_errors
 from bestview.calibration.camera_groups import CameraGroup, CameraPair, align_camera_pairs, group_cameras
 from bestview.calibration.homography import Floats
 from bestview.calibration.marked_points import CalibrationError
-from bestview.calibration.time_offsets import offset_standard_errors
 from bestview.calibration.walk import Walk
 from bestview.calibration.walk_settings import WalkSettings
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.evaluation.true_views import ViewGroundTruth, optimal_views
-from bestview.view_selection.selection import NO_CAMERA, NO_VIEW_COST
+from bestview.evaluation.ground_truth import ViewGroundTruth, optimal_views
+from bestview.view_selection import NO_CAMERA, NO_VIEW_COST
 
 _SECONDS_PER_MINUTE = 60.0
 _ROUNDING = 1e-9

@@ -8,13 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.quality.boxes import Floats
-from bestview.quality.centering import centering_score
 from bestview.quality.facing import NEUTRAL, facing_score
+from bestview.quality.framing import Floats, centering_score, size_quality, visible_share
 from bestview.quality.occlusion import unoccluded_share
 from bestview.quality.settings import QualitySettings
-from bestview.quality.size import size_quality
-from bestview.quality.truncation import visible_share
 
 _SIDES = 4
 

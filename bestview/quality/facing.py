@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bestview.geometry.ground_plane import foot_points, person_heights, to_ground
-from bestview.quality.boxes import Floats
+from bestview.quality.framing import Floats
 
 _HALF_CONFIDENCE_SPEED = 0.15
 """Heights a second (about 0.25 m/s): at this speed the walking direction counts half."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.quality.boxes import Floats, area_shares
+from bestview.quality.framing import Floats, area_shares
 
 Ints = NDArray[np.int64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.quality.boxes import Floats
+from bestview.quality.framing import Floats
 
 HIDDEN_COST = 1.0
 """View cost of a camera that runs but does not show the object."""

@@ -8,10 +8,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.view_selection.dynamic_program import NO_CAMERA, NO_VIEW_COST, GopCosts, solve_dynamic_program
-from bestview.view_selection.minimum_shot import solve_with_minimum_shot
-
-__all__ = ["NO_CAMERA", "NO_VIEW_COST", "ViewSelection", "select_views", "select_views_by_gop"]
+from bestview.view_selection.dynamic_program import (
+    NO_CAMERA,
+    NO_VIEW_COST,
+    GopCosts,
+    solve_dynamic_program,
+    solve_with_minimum_shot,
+)
 
 
 @dataclass(frozen=True, slots=True)

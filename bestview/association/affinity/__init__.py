@@ -1,1 +1,1 @@
-"""How likely two tracklets are one person: the evidence, weighed and added up."""
+"""Affinity: the log-likelihood ratio of two tracklets being one person, from all evidence about them."""

@@ -11,8 +11,8 @@ from bestview.association.affinity.affinity_matrix import AffinityMatrix
 from bestview.association.affinity.candidate_links import CandidateLinks, split_into_batches
 from bestview.association.affinity.evidence import PairEvidence
 from bestview.association.appearance.distance_scales import DistanceScales
+from bestview.association.appearance.histograms import MeanHistogram
 from bestview.association.appearance.likelihood import AppearanceWeights, CameraAppearances
-from bestview.association.appearance.mean_histograms import MeanHistogram
 from bestview.association.clustering import cluster
 from bestview.association.registry.person import Person
 from bestview.association.settings import IdentitySettings

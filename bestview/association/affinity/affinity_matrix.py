@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.association.affinity.pair_table import SparsePairTable, unique_pairs
+from bestview.association.affinity.presence import PresenceBitmap
 from bestview.association.co_occurrence import MINIMUM_FRAME_SCORE
 from bestview.association.index_ranges import expand_counts
-from bestview.association.keys import TrackletKey
-from bestview.association.presence import PresenceBitmap
 from bestview.association.settings import IdentitySettings
+from bestview.association.tracklet import TrackletKey
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

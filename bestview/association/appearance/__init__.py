@@ -1,1 +1,1 @@
-"""Appearance compared within a camera and between cameras."""
+"""Appearance of people: mean color histograms, compared within a camera and between cameras."""

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.association.affinity.affinity_matrix import AffinityMatrix
+from bestview.association.appearance.histograms import MeanHistogram
 from bestview.association.appearance.likelihood import DistanceScale, bhattacharyya_distances
-from bestview.association.appearance.mean_histograms import MeanHistogram
 from bestview.association.tracklet import Tracklet
 
 Floats = NDArray[np.float64]

@@ -13,16 +13,14 @@ from bestview.association.affinity.affinity_matrix import AffinityMatrix
 from bestview.association.appearance.cross_camera import CrossCameraAppearance
 from bestview.association.co_occurrence import GroundTrajectories, score_ground_proximity, simultaneous_pairs
 from bestview.association.ghost_check import GhostCheck
-from bestview.association.keys import TrackKey, TrackletKey
-from bestview.association.registry.corrections import IdCorrections, Merge, Split
+from bestview.association.registry.corrections import IdCorrections, Merge, Split, swap_tracks
 from bestview.association.registry.people import PersonStore
-from bestview.association.registry.track_swaps import swap_tracks
 from bestview.association.settings import IdentitySettings
 from bestview.association.sightings import FootPointError, TrackObservations, TrackUpdate, align_tracks
-from bestview.association.tracklet_groups import TrackletCluster, collect_clusters
+from bestview.association.tracklet import TrackKey, TrackletKey
+from bestview.association.tracklet_clusters import TrackletCluster, collect_clusters
 from bestview.association.tracklet_splitter import TrackletSplitter
-from bestview.geometry.ground_plane import validate_homography
-from bestview.geometry.person_height import PersonHeightEstimate
+from bestview.geometry.ground_plane import PersonHeightEstimate, validate_homography
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
+import scipy
 
 from bestview.association.affinity.affinity_matrix import AffinityMatrix
 from bestview.association.appearance.cross_camera import CrossCameraAppearance
 from bestview.association.registry.corrections import Merge
-from bestview.association.registry.id_assignment import assign_ids
-from bestview.association.registry.new_people import LostPerson, Reidentifier
 from bestview.association.registry.person import Person
+from bestview.association.registry.reidentification import LostPerson, Reidentifier
 from bestview.association.settings import IdentitySettings
 from bestview.association.tracklet import Tracklet
-from bestview.association.tracklet_groups import TrackletCluster
+from bestview.association.tracklet_clusters import TrackletCluster
 
 
 class PersonStore:
@@ -214,3 +216,27 @@ def _successors(groups: Sequence[TrackletCluster]) -> dict[int, int]:
                 best[number] = (frames, group.person_id)
     assigned = {group.person_id for group in groups}
     return {number: successor for number, (_, successor) in best.items() if number not in assigned}
+
+
+def assign_ids(published: Sequence[Mapping[int, int]]) -> list[int]:
+    """Assign an id to each of G clusters, 0 where none is left.
+
+    The assignment maximizes the total number of frames that keep their published id.
+
+    Args:
+        published: for each cluster, frames by published id.
+    """
+    person_ids = sorted({person_id for frames in published for person_id in frames})
+    assigned = [0] * len(published)
+    if not person_ids:
+        return assigned
+    column = {person_id: i for i, person_id in enumerate(person_ids)}
+    frames_kept = np.zeros((len(published), len(person_ids)))
+    for group, frames in enumerate(published):
+        for person_id, count in frames.items():
+            frames_kept[group, column[person_id]] = count
+    rows, columns = scipy.optimize.linear_sum_assignment(frames_kept, maximize=True)
+    for group, at in zip(rows.tolist(), columns.tolist(), strict=True):
+        if frames_kept[group, at] > 0:
+            assigned[group] = person_ids[at]
+    return assigned

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from bestview.association.affinity.travel_times import CameraSighting
-from bestview.association.appearance.mean_histograms import PersonAppearance
+from bestview.association.appearance.histograms import PersonAppearance
 
 
 @dataclass(slots=True, eq=False)

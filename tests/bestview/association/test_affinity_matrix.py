@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from bestview import IdentitySettings
 from bestview.association.affinity.affinity_matrix import AffinityMatrix, RowKey
+from bestview.association.affinity.presence import PresenceBitmap
 from bestview.association.co_occurrence import GroundTrajectories, score_ground_proximity, simultaneous_pairs
-from bestview.association.keys import TrackKey, TrackletKey
-from bestview.association.presence import PresenceBitmap
 from bestview.association.sightings import TrackObservations
+from bestview.association.tracklet import TrackKey, TrackletKey
 
 FRAMES = 4
 SETTINGS = IdentitySettings(maximum_ground_evidence=5.0, ground_correlation_frames=2.0, comparable_frames=100)

@@ -12,6 +12,7 @@ from bestview import IdentitySettings
 from bestview.association.affinity.affinity_matrix import AffinityMatrix
 from bestview.association.affinity.candidate_links import CandidateLinks, split_into_batches
 from bestview.association.affinity.evidence import PairEvidence
+from bestview.association.appearance.histograms import MeanHistogram, PersonAppearance
 from bestview.association.appearance.likelihood import (
     AppearanceWeights,
     CameraAppearances,
@@ -19,11 +20,9 @@ from bestview.association.appearance.likelihood import (
     appearance_evidence,
     bhattacharyya_distances,
 )
-from bestview.association.appearance.mean_histograms import MeanHistogram, PersonAppearance
 from bestview.association.clustering import cluster
-from bestview.association.keys import TrackletKey
 from bestview.association.registry.person import Person
-from bestview.association.tracklet import Tracklet, TrackletEndpoint
+from bestview.association.tracklet import Tracklet, TrackletEndpoint, TrackletKey
 
 CAMERAS = {"c0": True, "c1": True, "c2": False}
 SETTINGS = IdentitySettings(crowd_frames=1)

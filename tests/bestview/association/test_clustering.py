@@ -18,7 +18,7 @@ from bestview.association.appearance.likelihood import (
     bhattacharyya_distances,
 )
 from bestview.association.clustering import cluster
-from bestview.association.registry.id_assignment import assign_ids
+from bestview.association.registry.people import assign_ids
 
 WEIGHTS = AppearanceWeights(typical=3.0, maximum=4.0, full_weight_frames=8)
 JOIN = 0.5

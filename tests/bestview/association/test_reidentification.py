@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview.association.affinity.affinity_fusion import comparable_histograms
-from bestview.association.appearance.equalized_histograms import HistogramEqualizer
+from bestview.association.appearance.histograms import HistogramEqualizer, MeanHistogram, PersonAppearance
 from bestview.association.appearance.likelihood import AppearanceWeights, DistanceScale, appearance_evidence
-from bestview.association.appearance.mean_histograms import MeanHistogram, PersonAppearance
 from bestview.association.registry.reidentification import (
     appearance_distances,
     match_by_appearance,

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from bestview import foot_covariance, to_ground
 from bestview.calibration import Walk, WalkSettings, WalkTrack, build_walk
-from bestview.calibration.bundle_adjustment import CameraRig, Correspondences
+from bestview.calibration.bundle_adjustment import CameraRig, Correspondences, offset_standard_errors
 from bestview.calibration.camera_pairs import walk_breadth
-from bestview.calibration.chance_agreement import halves_swapped, time_reversed
 from bestview.calibration.floor_agreement import (
     mutual_matches,
     pair_agreement,
@@ -22,7 +21,7 @@ from bestview.calibration.floor_agreement import (
 from bestview.calibration.pair_hypotheses import propose_relative_poses
 from bestview.calibration.pinhole import Pinhole
 from bestview.calibration.samples import candidate_matches, sample_walk
-from bestview.calibration.time_offsets import offset_standard_errors
+from bestview.calibration.walk import halves_swapped, time_reversed
 from bestview.geometry.ground_plane import foot_points
 from fakes.bestview.walkers import SIZE, Noise, camera_at, seen, stroll
 

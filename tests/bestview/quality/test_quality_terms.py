@@ -17,10 +17,9 @@ from bestview.quality import (
     relative_view_quality,
     view_cost,
 )
-from bestview.quality.centering import centering_score
 from bestview.quality.facing import facing_score
+from bestview.quality.framing import centering_score, visible_share
 from bestview.quality.occlusion import unoccluded_share
-from bestview.quality.truncation import visible_share
 
 WIDTH, HEIGHT, FPS = 100.0, 80.0, 25.0
 PICTURE = np.array([0.0, 0.0, WIDTH, HEIGHT])

@@ -1,14 +1,17 @@
-"""Ground truth of view quality, from ground-truth boxes."""
+"""Ground truth of view quality, and the matching of published objects with ground-truth people."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from bestview.quality import relative_quality, size_quality, view_cost
-from bestview.view_selection.selection import NO_CAMERA, select_views
+from bestview.view_selection import NO_CAMERA, select_views
+
+NO_PERSON = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,3 +85,27 @@ def optimal_views(truth: ViewGroundTruth, switch_cost: float) -> NDArray[np.int6
 
 
 _UNKNOWN = np.array([NO_CAMERA])
+
+
+def match_objects_to_people(matches: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Assign each object to one person and each person to one object, with the largest total of matches.
+
+    As for IDF1 (Ristani et al., 2016), over all cameras together.
+
+    Args:
+        matches: (K, O) number of frames of all cameras in which each of K people was at each of O objects'
+            boxes.
+
+    Returns:
+        (O,) the index of each object's person; -1: none.
+
+    Raises:
+        ValueError: matches that are no table.
+    """
+    if matches.ndim != 2:  # noqa: PLR2004 — people, objects
+        raise ValueError(f"matches have shape {matches.shape}, not (people, objects)")
+    people = np.full(matches.shape[1], NO_PERSON, dtype=np.int64)
+    rows, columns = scipy.optimize.linear_sum_assignment(matches, maximize=True)
+    matched = matches[rows, columns] > 0
+    people[columns[matched]] = rows[matched]
+    return people

@@ -8,9 +8,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bestview.association.co_occurrence import overlapping
 from bestview.association.index_ranges import expand_counts, pairs_of_equal_label, sorted_unique
-from bestview.association.runs import observation_runs
-from bestview.geometry.rectangle_overlap import overlapping
+from bestview.association.tracklet_splitter import observation_runs
 
 
 @settings(deadline=None, max_examples=100)

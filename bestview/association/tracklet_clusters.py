@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.appearance.mean_histograms import PersonAppearance
+from bestview.association.appearance.histograms import PersonAppearance
 from bestview.association.registry.person import Person
 from bestview.association.tracklet import Tracklet
 
