@@ -1,4 +1,8 @@
-"""Frame pulses over TCP: every camera takes frame n when pulse n comes."""
+"""Frame pulses over TCP: every camera takes frame n when pulse n arrives.
+
+`PulseServer` sends the pulses, `PulseClient` iterates over them, and `query_clients` lists a server's
+clients. The wire format is in `camsync.protocol`.
+"""
 
 from camsync.client import PulseClient
 from camsync.client_connection import ClientInfo

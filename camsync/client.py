@@ -1,4 +1,4 @@
-"""The pulse client: an asynchronous iterator of pulses that never stops for a missing server."""
+"""The pulse client: an asynchronous iterator of pulses that continues while the server is away."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from camsync.messages import (
     ServerLine,
     WaitMessage,
 )
+from camsync.persistent_connection import PersistentConnection
 from camsync.protocol import VERSION, is_name
 from camsync.pulse import (
     AxisLostError,
@@ -34,11 +35,10 @@ from camsync.pulse import (
     VersionError,
 )
 from camsync.pulse_counter import PulseCounter
-from camsync.server_connection import ServerConnection
 from logthrottle import LogThrottle
 
 _log = logging.getLogger(__name__)
-_STALLED = 0.02  # seconds that a timer may be late in a process that runs
+_STALLED = 0.02  # seconds; a timer that is later than this means that the process was stalled
 
 
 class PulseClient:
@@ -50,20 +50,21 @@ class PulseClient:
             async for pulse in pulses:
                 ...
 
-    Connecting says HELLO, that is: ready for frame 0. Open the source first. Until the server has sent a
-    pulse there are none (see ``ClientSettings.free_run_after``); from then on, when the server is away or
-    silent, the client counts on at the server's rate by its own clock (``Pulse.own``), reconnects by itself,
-    and falls back into step. A consumer that is slow loses the oldest pulses and is told how many.
+    Connecting sends HELLO, which means: ready for frame 0. Open the source first. Before the server's first
+    pulse there are none (see ``ClientSettings.free_run_after``). Afterwards, while the server is away or
+    silent, the client makes pulses at the server's rate by its own clock (``Pulse.own``), reconnects, and
+    takes up the server's count again. A slow consumer loses the oldest pulses; ``Pulse.missed`` counts them.
 
-    With ``credentials``, whose user is ``name``, it logs in to a server that asks for it; with ``tls`` the
-    server has to prove itself by its certificate.
+    With ``credentials``, whose user is ``name``, it logs in to a server that requires it; with ``tls`` it
+    checks the server's certificate.
 
     ``name`` is 1 to 64 letters, digits, ``.``, ``_``, ``-``; ``fps_hint`` is the rate (pulses per second)
-    for counting alone before any server was heard. Not thread-safe: one event loop, one consumer.
+    of a client that has not reached a server yet. Not thread-safe: one event loop, one consumer.
 
     Raises:
         ValueError: a name that the protocol cannot carry or that is not the user's, or a rate not above zero.
-        ReplacedError, VersionError, LoginError, AxisLostError: while iterating; only a new client can go on.
+        SyncError: while iterating, for a reason that reconnecting cannot solve: ReplacedError, VersionError,
+            LoginError, AxisLostError, or a malformed host name.
     """
 
     def __init__(
@@ -82,28 +83,34 @@ class PulseClient:
             raise ValueError(f"{name!r} cannot be a client's name: letters, digits, '.', '_', '-'")
         if not fps_hint > 0.0:
             raise ValueError(f"fps_hint must be above zero, not {fps_hint}")
-        self._host = host
-        self._port = port
         self._name = name
-        self._credentials = credentials
-        self._tls = tls
         self._fps = fps_hint
         self._settings = settings or ClientSettings()
         self._clock = clock or steady_unix_clock()
-        self._follower = PulseCounter(fps_hint, self._settings.catch_up)
+        self._counter = PulseCounter(fps_hint, self._settings.catch_up)
         self._offset = ClockOffset()
         self._queue: deque[Pulse] = deque(maxlen=max(1, self._settings.queue))
         self._wake = asyncio.Event()
-        self._link: ServerConnection | None = None
+        self._server = PersistentConnection(
+            host,
+            port,
+            self._hello,
+            self._receive,
+            self._schedule,
+            self._settings,
+            self._clock,
+            credentials,
+            tls,
+        )
         self._task: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._failure: SyncError | None = None
         self._closed = False
-        self._given: int | None = None
-        self._started_at = self._connected_at = self._clock()
-        self._missed = self._own = self._connections = 0
+        self._last_number: int | None = None
+        self._started_at = self._greeted_at = self._clock()
+        self._missed = self._own = 0
         self._waiting_for: tuple[str, ...] = ()
-        self._away, self._refused = LogThrottle(self._clock, quiet_s=0.0), LogThrottle(self._clock)
+        self._server_errors = LogThrottle(self._clock)
 
     @property
     def missed(self) -> int:
@@ -117,23 +124,23 @@ class PulseClient:
     def status(self) -> SyncStatus:
         """Return the client's connection status."""
         return SyncStatus(
-            connected=self._connected,
-            pulse=self._follower.last,
+            connected=self._server.connected,
+            pulse=self._counter.last,
             fps=self._fps,
             offset=self._offset.offset,
             round_trip=self._offset.round_trip,
             missed=self._missed,
             own=self._own,
-            connections=self._connections,
+            connections=self._server.greetings,
             waiting_for=self._waiting_for,
         )
 
     def start(self) -> None:
-        """Begin to connect, in the running event loop; iterating does so too."""
+        """Start connecting, in the running event loop; iterating does so too."""
         if self._task is None and not self._closed:
             self._started_at = self._clock()
-            self._task = asyncio.create_task(self._stay_connected(), name=f"pulses of {self._name}")
-            self._task.add_done_callback(self._connecting_ended)
+            self._task = asyncio.create_task(self._server.run(), name=f"pulses of {self._name}")
+            self._task.add_done_callback(self._on_connecting_ended)
             self._schedule()
 
     async def close(self) -> None:
@@ -141,8 +148,7 @@ class PulseClient:
         self._closed = True
         self._cancel_timer()
         self._wake.set()
-        if self._link is not None:
-            self._link.end("closed")
+        self._server.stop("closed")
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
@@ -170,118 +176,78 @@ class PulseClient:
             self._wake.clear()
             await self._wake.wait()
         pulse = self._queue.popleft()
-        missed = 0 if self._given is None else pulse.number - self._given - 1
-        self._given = pulse.number
+        missed = 0 if self._last_number is None else pulse.number - self._last_number - 1
+        self._last_number = pulse.number
         self._missed += missed
         return Pulse(pulse.number, pulse.due, pulse.received, missed, pulse.own)
 
-    @property
-    def _connected(self) -> bool:
-        return self._link is not None and self._link.greeted
-
-    async def _stay_connected(self) -> None:
-        backoff = self._settings.backoff_first
-        while self._failure is None:
-            greeted, why = await self._connection()
-            if greeted:
-                backoff = self._settings.backoff_first
-            if self._failure is None and (more := self._away.record(why)) is not None:
-                _log.warning("pulse server %s:%d is away: %s%s", self._host, self._port, why, more)
-            self._schedule()
-            await asyncio.sleep(backoff)
-            backoff = min(2.0 * backoff, self._settings.backoff_most)
-
-    async def _connection(self) -> tuple[bool, str]:
-        """Connect once and stay; give whether it was a pulse server, and why it ended."""
-        settings = self._settings
-        pings = settings.ping_interval
-        link = ServerConnection(
-            self._receive, self._hello, self._clock, pings, settings.silence, self._credentials
-        )
-        loop = asyncio.get_running_loop()
-        try:
-            async with asyncio.timeout(settings.connect_timeout):
-                await loop.create_connection(lambda: link, self._host, self._port, ssl=self._tls)
-            self._link = link
-            why = await link.lost
-        except (OSError, TimeoutError) as error:
-            why = str(error) or "no answer"
-        finally:
-            link.end("closed")
-            self._link = None
-        return link.greeted, why
-
     def _hello(self) -> Hello:
-        return Hello(self._name, self._follower.known(self._clock()))
+        return Hello(self._name, self._counter.known(self._clock()))
 
     def _receive(self, message: ServerLine, now: float) -> None:
         match message:
             case PulseMessage(number, due):
-                self._beat(number, due - (self._offset.offset or 0.0), now)
+                self._accept_pulse(number, due - (self._offset.offset or 0.0), now)
             case Pong(sent, server):
                 self._offset.ponged(sent, server, now)
             case Greeting():
-                self._greeted(message, now)
+                self._accept_greeting(message, now)
             case LoginRequest():
                 self._fail(LoginError("the pulse server needs a login, and this client has none"))
             case WaitMessage(names):
                 self._waiting_for = names
             case ErrorMessage(code, text):
-                if (more := self._refused.record(text)) is not None:
+                if (more := self._server_errors.record(text)) is not None:
                     _log.warning("pulse server: %s%s", text, more)
                 if code == "replaced":
                     self._fail(ReplacedError(f"{self._name} has given way: {text}"))
                 elif code == "version":
                     self._fail(VersionError(text))
 
-    def _greeted(self, greeting: Greeting, now: float) -> None:
+    def _accept_greeting(self, greeting: Greeting, now: float) -> None:
         if greeting.version != VERSION:
             self._fail(VersionError(f"the pulse server speaks version {greeting.version}, not {VERSION}"))
             return
-        self._connections += 1
-        self._connected_at = now
+        self._greeted_at = now
         self._waiting_for = ()
         self._offset.restart()
         self._offset.greeted(greeting.now, now)
         self._fps = greeting.fps
-        self._follower.set_rate(greeting.fps)
-        if (ended := self._away.end()) or self._connections == 1:
-            rate = f"{greeting.fps:g} pulses per second" + (f", after {ended.seconds:.0f} s" if ended else "")
-            _log.info("pulse server %s:%d: %s", self._host, self._port, rate)
+        self._counter.set_rate(greeting.fps)
+        self._server.accept_greeting(greeting.fps)
 
-    def _beat(self, number: int, due: float, now: float) -> None:
+    def _accept_pulse(self, number: int, due: float, now: float) -> None:
         self._waiting_for = ()
-        for missing, was_due in self._follower.gap(number, due):
+        for missing, was_due in self._counter.fill_gap(number, due):
             self._put(missing, was_due, now, own=True)
-        if self._follower.heard(number, due):
+        if self._counter.accept(number, due):
             self._put(number, due, now, own=False)
-        elif self._lost(now):
+        elif self._axis_lost(now):
             self._fail(
-                AxisLostError(f"the server is at pulse {number}, {self._name} at {self._follower.last}")
+                AxisLostError(f"the server is at pulse {number}, {self._name} at {self._counter.last}")
             )
         self._schedule()
 
-    def _lost(self, now: float) -> bool:
-        settled = now - self._connected_at > self._settings.settle
-        return settled and self._follower.ahead(now) > self._settings.ahead_most
+    def _axis_lost(self, now: float) -> bool:
+        settled = now - self._greeted_at > self._settings.settle
+        return settled and self._counter.ahead(now) > self._settings.ahead_most
 
     def _put(self, number: int, due: float, now: float, *, own: bool) -> None:
         self._queue.append(Pulse(number, due, now, 0, own))
         self._own += own
         self._wake.set()
 
-    def _connecting_ended(self, task: asyncio.Task[None]) -> None:
+    def _on_connecting_ended(self, task: asyncio.Task[None]) -> None:
         """Raise in the consumer an error that reconnecting cannot solve (a malformed host name)."""
         error = None if task.cancelled() else task.exception()
         if error is not None:
-            self._fail(SyncError(f"cannot connect to {self._host}:{self._port}: {error}"))
+            self._fail(SyncError(f"cannot connect to {self._server.address}: {error}"))
 
     def _fail(self, failure: SyncError) -> None:
         self._failure = failure
         self._cancel_timer()
         self._wake.set()
-        if self._link is not None:
-            self._link.end(str(failure))
+        self._server.stop(str(failure))
 
     def _cancel_timer(self) -> None:
         if self._timer is not None:
@@ -289,29 +255,29 @@ class PulseClient:
             self._timer = None
 
     def _schedule(self) -> None:
-        """Set the timer for the next own pulse, which the server's next pulse will put off."""
+        """Set the timer for the next own pulse; each pulse from the server sets it anew."""
         self._cancel_timer()
         if self._closed or self._failure is not None:
             return
         now = self._clock()
-        due = self._follower.next_due()
+        due = self._counter.next_due()
         if due is not None:
-            due += self._settings.own_after if self._connected else 0.0
-        elif self._settings.free_run_after is not None and not self._connected:
+            due += self._settings.own_after if self._server.connected else 0.0
+        elif self._settings.free_run_after is not None and not self._server.connected:
             due = self._started_at + self._settings.free_run_after
         if due is not None:
             wait = max(0.0, due - now)
-            self._timer = asyncio.get_running_loop().call_later(wait, self._count_alone, now + wait)
+            self._timer = asyncio.get_running_loop().call_later(wait, self._make_own_pulses, now + wait)
 
-    def _count_alone(self, planned: float) -> None:
+    def _make_own_pulses(self, planned: float) -> None:
         now = self._clock()
-        if now - planned > _STALLED and self._connected:
-            # The process was held up, and what the server sent meanwhile may lie unread: read that first.
-            self._timer = asyncio.get_running_loop().call_later(0.0, self._count_alone, now)
+        if now - planned > _STALLED and self._server.connected:
+            # The process was stalled, and pulses may wait unread in the socket: read them first.
+            self._timer = asyncio.get_running_loop().call_later(0.0, self._make_own_pulses, now)
             return
-        if self._follower.next_due() is None:
-            self._follower.begin(now)
-        late = self._settings.own_after if self._connected else 0.0
-        for number, due in self._follower.own(now - late):
+        if self._counter.next_due() is None:
+            self._counter.start_at(now)
+        late = self._settings.own_after if self._server.connected else 0.0
+        for number, due in self._counter.count_own(now - late):
             self._put(number, due, now, own=True)
         self._schedule()

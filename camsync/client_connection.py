@@ -1,4 +1,4 @@
-"""One client's connection, seen from the server."""
+"""The server's end of one client's connection."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _log = logging.getLogger(__name__)
 _SEND_BUFFER = (
     4096  # bytes in the kernel: a slow client is noticed within seconds, not after an hour of pulses
 )
-_KEEPALIVE = 5  # seconds of quiet before the kernel asks whether the client is still there
+_KEEPALIVE = 5  # seconds of silence before TCP keepalive probes
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +69,9 @@ class ConnectionOwner(Protocol):
 
 
 class ClientConnection(asyncio.Protocol):
-    """One client: the server never waits for it; what it may send and what waits for it are bounded.
+    """One client. The server never waits for it; its input rate and its output buffer are bounded.
 
-    Where there is a ``gate``, it joins the others after TLS (with ``tls``) and after its login.
+    Where there is a ``gate``, it is registered after the TLS handshake (with ``tls``) and its login.
     """
 
     def __init__(
@@ -88,19 +88,19 @@ class ClientConnection(asyncio.Protocol):
         self._clock = clock
         self._limits = limits
         self._lines = LineBuffer(MAX_LINE)
-        self._joined = clock()
-        self._rate = RateLimit(limits.line_burst, limits.line_rate, self._joined)
-        self._kept_up = self._joined  # when a pulse last went out to it
+        self._joined_at = clock()
+        self._rate = RateLimit(limits.line_burst, limits.line_rate, self._joined_at)
+        self._last_sent_at = self._joined_at  # when a pulse last went out to it
         self._transport: asyncio.Transport | None = None
         self._handshake: asyncio.Task[None] | None = None
         self._sent = self._dropped = self._behind = self._errors = 0
         self._is_registered = False
-        self._early: list[bytes] = []
-        """Lines that came with the end of the TLS handshake."""
+        self._early_lines: list[bytes] = []
+        """Lines that arrived with the end of the TLS handshake."""
         self.address = self._host = "?"
         self.name: str | None = None
         self.user: str | None = None
-        """Who has logged in; None where no login is needed."""
+        """The user that has logged in; None where no login is needed."""
 
     @property
     def origin(self) -> str:
@@ -110,7 +110,7 @@ class ClientConnection(asyncio.Protocol):
     def info(self) -> ClientInfo:
         """Return the state of this client now."""
         return ClientInfo(
-            self.name, self.address, self._joined, self._sent, self._dropped, self._behind, self._errors
+            self.name, self.address, self._joined_at, self._sent, self._dropped, self._behind, self._errors
         )
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -120,41 +120,41 @@ class ClientConnection(asyncio.Protocol):
         self.address = f"{self._host}:{port}"
         _tune(transport.get_extra_info("socket"), self._limits.cut_off)
         if self._gate is None:
-            self._join()
+            self._register()
             return
         self._gate.admit(self)
         if self._tls is None:
             self._request_login(self._gate)
         else:
-            self._transport.pause_reading()  # what has come already belongs to TLS
+            self._transport.pause_reading()  # bytes that have arrived already belong to TLS
             self._handshake = asyncio.create_task(
                 self._start_tls(self._tls, self._gate), name="TLS of pulses"
             )
 
     def data_received(self, data: bytes) -> None:
-        """Answer what the client sends (called by asyncio)."""
+        """Parse and answer the client's lines (called by asyncio)."""
         try:
             for line in self._lines.feed(data):
-                if self._closing:
+                if self._is_closing:
                     return
                 if not self._rate.take(self._clock()):
                     self.end("flood", "too many lines")
                     return
-                self._take(line)
+                self._handle_line(line)
         except OverlongLineError as error:
             self._errors += 1
             self.end("overlong", str(error))
 
     def eof_received(self) -> bool:
-        """Keep sending to a client that has nothing to say, as ``nc`` with its input closed (asyncio).
+        """Keep sending to a client that closed its sending side, such as ``nc`` (called by asyncio).
 
-        One that has said HELLO has gone: else a camera that left would still count as waited for. TLS ends in
-        both directions at once.
+        A client that has sent HELLO has left: else a camera that is gone would still count as present. TLS
+        closes both directions at once.
         """
         return self.name is None and self._tls is None
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget the client (called by asyncio)."""
+        """Remove the client (called by asyncio)."""
         _log.debug("client %s (%s) left: %s", self.name, self.address, exc or "closed")
         self._transport = None
         if self._handshake is not None:
@@ -174,20 +174,20 @@ class ClientConnection(asyncio.Protocol):
         return True
 
     def send_pulse(self, line: bytes) -> None:
-        """Send a pulse, or count it as lost; cut the client off when it stays behind."""
+        """Send a pulse, or count it as dropped; close the connection of a client that stays behind."""
         now = self._clock()
         if self.send(line):
             self._sent += 1
             self._behind = 0
-            self._kept_up = now
+            self._last_sent_at = now
             return
-        if self._closing:
+        if self._is_closing:
             return
         if self._behind == 0:
-            self._kept_up = now
+            self._last_sent_at = now
         self._dropped += 1
         self._behind += 1
-        if now - self._kept_up > self._limits.cut_off:
+        if now - self._last_sent_at > self._limits.cut_off:
             _log.warning("client %s (%s) does not read its pulses: cut off", self.name, self.address)
             self.end("slow", "pulses were not read")
 
@@ -197,17 +197,17 @@ class ClientConnection(asyncio.Protocol):
         if transport is None or transport.is_closing():
             return
         if self._handshake is not None and not self._handshake.done():
-            transport.abort()  # nothing can be said before TLS is ready
+            transport.abort()  # no line can be sent before TLS is ready
             return
         if not transport.get_write_buffer_size():
             transport.write(encode(ErrorMessage(code, text)))
         if transport.get_write_buffer_size():
-            transport.abort()  # it does not read: a polite close would wait for it
+            transport.abort()  # the client does not read: close() would wait for it
         else:
             transport.close()
 
     @property
-    def _closing(self) -> bool:
+    def _is_closing(self) -> bool:
         return self._transport is None or self._transport.is_closing()
 
     async def _start_tls(self, tls: ssl.SSLContext, gate: LoginGate) -> None:
@@ -228,25 +228,25 @@ class ClientConnection(asyncio.Protocol):
 
     def _request_login(self, gate: LoginGate) -> None:
         self._handshake = None
-        if not gate.request(self) and not self._closing:
-            self._join()
-        for line in self._early:
-            if not self._closing:
-                self._take(line)
-        self._early.clear()
+        if not gate.request(self) and not self._is_closing:
+            self._register()
+        for line in self._early_lines:
+            if not self._is_closing:
+                self._handle_line(line)
+        self._early_lines.clear()
 
-    def _join(self) -> None:
+    def _register(self) -> None:
         self._is_registered = True
         self._owner.joined(self)
 
-    def _take(self, line: bytes) -> None:
+    def _handle_line(self, line: bytes) -> None:
         if self._handshake is not None:
-            self._early.append(line)
+            self._early_lines.append(line)
             return
         if not self._is_registered:
             if self._gate is not None and (user := self._gate.check(self, line)) is not None:
                 self.user = user
-                self._join()
+                self._register()
             return
         try:
             match parse_client_line(line):
@@ -271,7 +271,7 @@ class ClientConnection(asyncio.Protocol):
 
 
 def _tune(connection: socket.socket, cut_off: float) -> None:
-    """Let the kernel hold little for a slow client, and notice one that has vanished without a word."""
+    """Set a small send buffer for slow clients, and keepalive to detect clients that have vanished."""
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     if hasattr(socket, "TCP_USER_TIMEOUT"):

@@ -76,7 +76,7 @@ class ClientRegistry:
             client.send(line)
 
     def close(self) -> None:
-        """End all connections, those included that are just being made."""
+        """End all connections, also those that are still logging in."""
         self._closed = True
         if self._gate is not None:
             self._gate.close()
@@ -134,7 +134,7 @@ class ClientRegistry:
         evicted.end("full", f"too many connections of {evicted.origin}")
 
     def _log_arrival(self, client: ClientConnection, name: str) -> None:
-        """Log who has connected, throttled: two clients of one name may replace each other for ever."""
+        """Log an arrival, throttled: two clients of one name may replace each other for ever."""
         if client.name is not None:  # a repeated HELLO
             return
         before = next((other for other in self._connections.values() if other.name == name), None)

@@ -1,11 +1,11 @@
-"""How far the server's clock is from ours, from PING and PONG as NTP does it (RFC 5905, clock filter)."""
+"""Offset of the server's clock, from PING and PONG as in NTP (RFC 5905, clock filter)."""
 
 from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
 
-_SAMPLES = 16  # as many round trips are remembered: about as many seconds, so slow drift is followed
+_SAMPLES = 16  # round trips, about one a second: slow drift is followed
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,29 +15,29 @@ class _Sample:
 
 
 class ClockOffset:
-    """The offset of the sample with the shortest round trip: the one that queues disturbed least."""
+    """The offset measured in the shortest recent round trip, which queues disturbed least."""
 
     def __init__(self) -> None:
         self._samples: deque[_Sample] = deque(maxlen=_SAMPLES)
         self._rough: float | None = None
 
     def restart(self) -> None:
-        """Forget everything: another server, another clock."""
+        """Forget all samples: a new connection may be to another clock."""
         self._samples.clear()
         self._rough = None
 
     def greeted(self, server: float, received: float) -> None:
-        """Take the clock in a greeting: right up to the way here; good until the first PONG."""
+        """Use the clock in a greeting until the first PONG; it is late by the way here."""
         self._rough = server - received
 
     def ponged(self, sent: float, server: float, received: float) -> None:
-        """Take one round trip: sent and received by our clock, answered at ``server`` by theirs (seconds)."""
+        """Add a round trip: ``sent`` and ``received`` on the client's clock, ``server`` on the server's."""
         if received >= sent:
             self._samples.append(_Sample(server - (sent + received) / 2.0, received - sent))
 
     @property
     def offset(self) -> float | None:
-        """Server clock minus ours, in seconds; None before a server was heard."""
+        """Server clock minus client clock, seconds; None before the first greeting."""
         best = self._best()
         return best.offset if best else self._rough
 

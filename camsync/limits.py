@@ -10,18 +10,18 @@ from typing import Protocol, TypeVar
 
 @dataclass(frozen=True, slots=True)
 class ServerLimits:
-    """Settings of a PulseServer that are right for nearly everyone."""
+    """Limits and timeouts of a `PulseServer`."""
 
     catch_up: float = 0.5
     """Seconds that the server may be late and still send every pulse; later, it skips to the current one."""
     adopt_for: float = 30.0
-    """Seconds after the first pulse in which clients that have counted further may move the axis forward:
-    the expected ones, or all where none is expected. Afterwards the server follows no client."""
+    """Seconds after the first pulse in which clients that have counted further may move the axis forward: the
+    expected ones, or all where none is expected. Afterwards claims are ignored."""
     claims_for: float = 2.5
-    """Seconds from when enough clients have reported their count until the axis goes on there, so that the
-    others can report too: all reconnect within two seconds. They count on meanwhile."""
+    """Seconds from when enough clients have claimed a count until the axis continues there, so that the
+    others can claim too: all reconnect within two seconds, and count by themselves meanwhile."""
     counted_for: float = 10 * 365.25 * 86400.0
-    """Seconds that a client can have counted for: ten years. A report beyond that is ignored."""
+    """Seconds that a client can have counted for: ten years. Claims beyond that are ignored."""
     backlog: int = 4096
     """Bytes waiting for one client before pulses are dropped for it (a pulse has about 30)."""
     cut_off: float = 10.0
@@ -56,7 +56,7 @@ Connection = TypeVar("Connection", bound=HasOrigin)
 def select_evicted(connections: Sequence[Connection]) -> Connection:
     """Return the oldest connection of the origin that has the most; ``connections`` are oldest first.
 
-    A client that opens very many connections so pushes out its own. Ties go to the oldest.
+    So a client that opens very many connections evicts its own. Ties go to the oldest.
     """
     counts = Counter(connection.origin for connection in connections)
     most = max(counts.values())

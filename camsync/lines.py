@@ -1,4 +1,4 @@
-"""Bytes in, whole lines out: bounded in length and in rate, since they come from outside."""
+"""Line buffer and rate limit for bytes from untrusted peers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 
 class OverlongLineError(ValueError):
-    """A line is longer than the limit; what follows it cannot be trusted to be in step."""
+    """A line is longer than the limit; the stream cannot be parsed any further."""
 
 
 class LineBuffer:

@@ -1,7 +1,7 @@
 """Login to a pulse server that has users: TLS first, then one line with a name and a password.
 
-TLS keeps the password and the pulses private, and proves the server by its certificate. A server without TLS
-can have users too; whoever overhears a connection then reads the password.
+TLS keeps the password and the pulses private, and authenticates the server by its certificate. A server
+without TLS can have users too, but its logins can be overheard.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class LoginGate:
         return self._refused
 
     def admit(self, connection: PendingConnection) -> None:
-        """Begin to wait for a new connection, for ``limits.login_within`` seconds."""
+        """Hold a new connection for at most ``limits.login_within`` seconds."""
         if len(self._pending) >= self._limits.pending_logins:
             evicted = select_evicted([pending.connection for pending in self._pending.values()])
             self.refuse(evicted, "too many connections have not logged in")
@@ -88,7 +88,7 @@ class LoginGate:
         self._pending[id(connection)] = _Pending(connection, timer)
 
     def request(self, connection: PendingConnection) -> bool:
-        """Ask a connection for its login, once TLS is ready; return False where none is needed."""
+        """Send the login request, once TLS is ready; return False where no login is needed."""
         if self._users is None:
             self.forget(connection)
             return False
@@ -117,7 +117,7 @@ class LoginGate:
         return same and expected is not None
 
     def forget(self, connection: PendingConnection) -> None:
-        """Stop waiting for a connection."""
+        """Release a connection."""
         pending = self._pending.pop(id(connection), None)
         if pending is not None:
             pending.timer.cancel()

@@ -66,7 +66,7 @@ class Greeting:
 
 @dataclass(frozen=True, slots=True)
 class WaitMessage:
-    """The server has not begun: it waits for ``names``."""
+    """The server has not sent pulse 0 yet: it waits for ``names``."""
 
     names: tuple[str, ...]
 

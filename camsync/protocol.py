@@ -3,24 +3,24 @@ r"""The wire format: one ASCII line per message, readable and writable by hand w
 The server speaks first and needs no answer::
 
     MYVIEW-SYNC 1 fps=25 now=1732159200.000000 pulse=-     greeting: version, rate, server clock, last pulse
-    WAIT c0,c1                                             not begun: these have not said HELLO yet
+    WAIT c0,c1                                             no pulse yet: these have not sent HELLO
     PULSE 0 1732159201.000000                              pulse number, when it was due (server clock)
 
-A client may say, and the server answers::
+A client may send, and the server answers::
 
     HELLO 1 c0                                             ready for pulse 0, under this name
     HELLO 1 c0 last=123 ago=0.52                           has counted to pulse 123, due 0.52 seconds ago
     PING 1732159201.5      PONG 1732159201.500000 1732159201.502000      its own text, the server clock
-    WHO                    CLIENTS c0:0,-:7       who else is there, and how many pulses behind
+    WHO                    CLIENTS c0:0,-:7       the other clients, and how many pulses each is behind
     anything else          ERROR malformed ...                           a code, then a sentence
 
-A server that has users asks for a login first, over TLS (``login``), and greets who has logged in::
+A server with users requires a login first, over TLS (``login``), and then sends the greeting::
 
     LOGIN-REQUIRED 1 now=1732159200.000000
     LOGIN c0 <password>    MYVIEW-SYNC 1 fps=25 now=1732159200.250000 pulse=-
 
 All times are unix seconds. ``ago`` is a span, not a time, so that it means the same on a server whose clock
-differs. Unknown ``key=value`` words and unknown words of the server are passed over: room for later versions.
+differs. Unknown ``key=value`` words and unknown server lines are ignored: room for later versions.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _GREETING = "MYVIEW-SYNC"
 _LOGIN_REQUIRED = "LOGIN-REQUIRED"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 LAST_PULSE = 2**40
-"""Enough for centuries at any camera's rate; times in ticks of a clock stay within 64 bits, numbers exact."""
+"""Centuries at any camera's rate; times in clock ticks stay within 64 bits, and numbers are exact."""
 _NUMBER = re.compile(r"\d{1,13}")
 _TIME = re.compile(r"-?\d{1,12}(\.\d{1,20})?")  # seconds
 _PASSWORD = re.compile(r"[!-~]{1,128}")  # printable ASCII without a space: a line has to hold it
@@ -66,7 +66,7 @@ MIN_FPS, MAX_FPS = 1e-6, 10_000.0  # pulses per second that a server may have as
 
 
 class ProtocolError(ValueError):
-    """A line is not of this protocol; ``code`` is the first word of the answer."""
+    """A line is not of this protocol; ``code`` is that of the ERROR line that answers it."""
 
     def __init__(self, code: str, text: str) -> None:
         super().__init__(text)
@@ -155,11 +155,11 @@ def parse_server_line(line: bytes) -> ServerLine | None:
         ProtocolError: a known word with wrong words after it.
     """
     words = _words(line)
-    read = _SERVER_WORDS.get(words[0]) if words else None
-    if read is None:
+    parse = _SERVER_WORDS.get(words[0]) if words else None
+    if parse is None:
         return None
     try:
-        return read(words[1:])
+        return parse(words[1:])
     except (ValueError, KeyError) as error:
         raise ProtocolError("malformed", f"{words[0]}: {error}") from error
 
@@ -186,7 +186,7 @@ def _wait(words: list[str]) -> WaitMessage:
     return WaitMessage(tuple(_match(_NAME, name, "name") for name in names.split(",")))
 
 
-def _beat(words: list[str]) -> PulseMessage:
+def _pulse(words: list[str]) -> PulseMessage:
     number, due = words
     return PulseMessage(_number(number), _time(due))
 
@@ -197,15 +197,15 @@ def _pong(words: list[str]) -> Pong:
 
 
 def _clients(words: list[str]) -> ClientList:
-    return ClientList(tuple(_listener(it) for it in "".join(words).split(",") if it))
+    return ClientList(tuple(_listed_client(it) for it in "".join(words).split(",") if it))
 
 
-def _listener(text: str) -> ListedClient:
+def _listed_client(text: str) -> ListedClient:
     name, _, behind = text.partition(":")
     return ListedClient(None if name == _UNNAMED else _match(_NAME, name, "name"), _number(behind))
 
 
-def _refusal(words: list[str]) -> ErrorMessage:
+def _error(words: list[str]) -> ErrorMessage:
     code, *text = words
     return ErrorMessage(_match(_CODE, code, "code"), " ".join(text))
 
@@ -214,10 +214,10 @@ _SERVER_WORDS: dict[str, Callable[[list[str]], ServerLine]] = {
     _GREETING: _greeting,
     _LOGIN_REQUIRED: _login_request,
     "WAIT": _wait,
-    "PULSE": _beat,
+    "PULSE": _pulse,
     "PONG": _pong,
     "CLIENTS": _clients,
-    "ERROR": _refusal,
+    "ERROR": _error,
 }
 
 

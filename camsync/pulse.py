@@ -1,4 +1,4 @@
-"""What a pulse client gives to its user."""
+"""Pulses, status, settings and errors of a pulse client."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 
 class SyncError(Exception):
-    """The client cannot go on: starting it anew is the only remedy."""
+    """The client has stopped for good; only a new client can continue."""
 
 
 class ReplacedError(SyncError):
-    """Another client of the same name has come; the newer one stays."""
+    """Another client of the same name has connected and replaced this one."""
 
 
 class VersionError(SyncError):
@@ -22,7 +22,7 @@ class LoginError(SyncError):
 
 
 class AxisLostError(SyncError):
-    """The server counts far behind what this client has counted, and goes on so."""
+    """The server's count stays far behind what this client has counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,25 +33,25 @@ class Pulse:
     due: float
     """When it was due: unix seconds on the client's clock (``PulseClient.now()``)."""
     received: float
-    """When it came, or was made by the client: same clock."""
+    """When it arrived, or was made by the client: same clock."""
     missed: int
-    """Numbers between the pulse before this one and this one: the frames that will be missing."""
+    """Numbers skipped since the previous pulse: frames that will be missing."""
     own: bool
-    """Made by the client at its own rate, the server being away."""
+    """Made by the client itself, because the server is away or silent."""
 
 
 @dataclass(frozen=True, slots=True)
 class SyncStatus:
-    """How a pulse client stands."""
+    """Connection status of a pulse client."""
 
     connected: bool
-    """The server's greeting was heard on the present connection."""
+    """The server's greeting was received on the present connection."""
     pulse: int | None
     """The last pulse counted; None before the first."""
     fps: float
-    """Pulses per second: the server's, or the hint before it was heard."""
+    """Pulses per second: the server's, or ``fps_hint`` before the first greeting."""
     offset: float | None
-    """Server clock minus the client's clock, seconds; None before a server was heard."""
+    """Server clock minus the client's clock, seconds; None before the first greeting."""
     round_trip: float | None
     """The shortest recent round trip, seconds; None before the first was measured."""
     missed: int
@@ -59,9 +59,9 @@ class SyncStatus:
     own: int
     """Pulses made by the client itself."""
     connections: int
-    """How many times the server was greeted by: above 1 after reconnecting."""
+    """Greetings received: above 1 after reconnecting."""
     waiting_for: tuple[str, ...]
-    """Whom the server has not begun without, as far as it said; empty after the first pulse."""
+    """The clients that the server waits for before pulse 0; empty after the first pulse."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,15 +69,15 @@ class ClientSettings:
     """Settings of a PulseClient."""
 
     queue: int = 50
-    """Pulses kept for a consumer that is slow for a moment; beyond, the oldest are dropped. Many for
-    recordings, whose every frame counts; 1 for a live source, which has only the newest picture to give."""
+    """Pulses queued for a slow consumer; beyond, the oldest are dropped. Many for recordings, where every
+    frame counts; 1 for a live source, which has only its newest picture."""
     own_after: float = 0.1
-    """Seconds after a pulse was due that a connected client makes it itself."""
+    """Seconds after a pulse was due when a connected client makes it itself."""
     catch_up: float = 0.5
-    """Seconds of pulses that the client makes good itself after a stall; after a longer one, the count skips
-    to the present."""
+    """Seconds of missed pulses that the client makes after a stall; after a longer one, the count skips to
+    the present."""
     free_run_after: float | None = None
-    """Seconds without ever reaching a server until the client counts alone from 0; None: waits for ever."""
+    """Seconds without reaching any server until the client counts by itself from 0; None: it never does."""
     backoff_first: float = 0.1
     """Seconds before the first attempt to reconnect; doubled each time."""
     backoff_most: float = 2.0
@@ -87,8 +87,8 @@ class ClientSettings:
     ping_interval: float = 1.0
     """Seconds between measurements of the clock offset; the server takes 20 lines a second, no more."""
     silence: float = 5.0
-    """Seconds without a byte from the server (it answers every ping) until it is taken for gone."""
+    """Seconds without a byte from the server, which answers every ping, until the connection is closed."""
     ahead_most: float = 5.0
-    """Seconds that the count may be ahead of the server's before AxisLostError; less is waited for."""
+    """Seconds that the count may be ahead of the server's before AxisLostError; below, the client waits."""
     settle: float = 2.0
-    """Seconds that a new connection has to take up the client's count before that is judged."""
+    """Seconds that a new connection has to take up the client's count before AxisLostError."""

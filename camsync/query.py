@@ -1,10 +1,11 @@
-"""Ask a pulse server for its clients."""
+"""Query of a pulse server for its clients."""
 
 from __future__ import annotations
 
 import asyncio
 import ssl
 
+from camsync.clock import steady_unix_clock
 from camsync.login import Credentials
 from camsync.messages import (
     ClientList,
@@ -12,11 +13,12 @@ from camsync.messages import (
     ErrorMessage,
     Greeting,
     ListedClient,
-    LoginMessage,
     LoginRequest,
+    ServerLine,
 )
-from camsync.protocol import MAX_SERVER_LINE, VERSION, ProtocolError, encode, parse_server_line
+from camsync.protocol import VERSION
 from camsync.pulse import LoginError, SyncError, VersionError
+from camsync.server_connection import ServerConnection
 
 
 async def query_clients(
@@ -30,49 +32,55 @@ async def query_clients(
     """Return the clients of the server at ``host:port``, in the order of joining.
 
     Raises:
-        SyncError: no answer within ``timeout_s`` seconds, no pulse server of this version, or the server
-            refuses the login.
+        SyncError: no answer within ``timeout_s`` seconds, or no pulse server.
+        VersionError: the server speaks another version.
+        LoginError: the server needs a login, or refuses this one.
     """
-    where = f"{host}:{port}"
+    address = f"{host}:{port}"
+    query = _ClientQuery(address, credentials)
+    connection = query.connection
     try:
         async with asyncio.timeout(timeout_s):
-            return await _query(host, port, credentials, tls)
+            await asyncio.get_running_loop().create_connection(lambda: connection, host, port, ssl=tls)
+            return await query.answer
     except TimeoutError as error:
-        raise SyncError(f"the pulse server at {where} does not answer") from error
+        raise SyncError(f"the pulse server at {address} does not answer") from error
     except ssl.SSLError as error:
-        raise SyncError(f"no TLS with the pulse server at {where}: {error.reason or error}") from error
+        raise SyncError(f"no TLS with the pulse server at {address}: {error.reason or error}") from error
     except OSError as error:
-        raise SyncError(f"there is no pulse server at {where}: {error.strerror or error}") from error
-    except (ProtocolError, EOFError, ValueError) as error:
-        raise SyncError(f"what answers at {where} is no pulse server") from error
-
-
-async def _query(
-    host: str, port: int, credentials: Credentials | None, tls: ssl.SSLContext | None
-) -> tuple[ListedClient, ...]:
-    reader, writer = await asyncio.open_connection(host, port, limit=MAX_SERVER_LINE, ssl=tls)
-    try:
-        while True:
-            match parse_server_line(await _read_line(reader)):
-                case LoginRequest():
-                    if credentials is None:
-                        raise LoginError(f"the pulse server at {host}:{port} needs a login")
-                    writer.write(encode(LoginMessage(credentials.user, credentials.password)))
-                case Greeting(version) if version != VERSION:
-                    raise VersionError(f"the pulse server at {host}:{port} speaks version {version}")
-                case Greeting():
-                    writer.write(encode(ClientsRequest()))
-                case ErrorMessage(_, text):
-                    raise LoginError(f"the pulse server at {host}:{port} refuses: {text}")
-                case ClientList(clients):
-                    return clients
+        raise SyncError(f"there is no pulse server at {address}: {error.strerror or error}") from error
+    except ValueError as error:  # a malformed host name
+        raise SyncError(f"what answers at {address} is no pulse server") from error
     finally:
-        writer.close()
-        await asyncio.gather(writer.wait_closed(), return_exceptions=True)
+        query.answer.cancel()
+        connection.end("closed")
 
 
-async def _read_line(reader: asyncio.StreamReader) -> bytes:
-    line = await reader.readline()
-    if not line:
-        raise EOFError
-    return line.rstrip(b"\r\n")
+class _ClientQuery:
+    """One request for the list of clients, over a connection of its own."""
+
+    def __init__(self, address: str, credentials: Credentials | None) -> None:
+        self._address = address
+        self.connection = ServerConnection(self._receive, steady_unix_clock(), credentials)
+        self.connection.lost.add_done_callback(self._on_lost)
+        self.answer: asyncio.Future[tuple[ListedClient, ...]] = asyncio.get_running_loop().create_future()
+
+    def _on_lost(self, _lost: asyncio.Future[str]) -> None:
+        if not self.answer.done():
+            self.answer.set_exception(SyncError(f"what answers at {self._address} is no pulse server"))
+
+    def _receive(self, message: ServerLine, _received: float) -> None:
+        if self.answer.done():
+            return
+        server = f"the pulse server at {self._address}"
+        match message:
+            case LoginRequest():
+                self.answer.set_exception(LoginError(f"{server} needs a login"))
+            case Greeting(version) if version != VERSION:
+                self.answer.set_exception(VersionError(f"{server} speaks version {version}"))
+            case Greeting():
+                self.connection.send(ClientsRequest())
+            case ErrorMessage(_, text):
+                self.answer.set_exception(LoginError(f"{server} refuses: {text}"))
+            case ClientList(clients):
+                self.answer.set_result(clients)

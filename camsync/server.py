@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping
 from types import TracebackType
 from typing import Self
 
-from camsync.axis_claims import INEXACT, AxisClaims
+from camsync.axis_claims import MEASUREMENT_ERROR, AxisClaims
 from camsync.client_connection import ClientInfo
 from camsync.client_registry import ClientRegistry
 from camsync.clock import Clock, steady_unix_clock
@@ -31,18 +31,18 @@ class PulseServer:
     pulse next.
 
     The numbers only rise. They skip when the machine slept or stalled for more than ``limits.catch_up``
-    (no burst of old pulses), and when clients that have counted further return to a restarted server: when
-    enough have, that ends the wait, and the axis goes on where their own count has got to. No client decides
-    that alone (``claims``).
+    (no burst of old pulses), and when clients that have counted further reconnect to a restarted server: when
+    enough have, the server stops waiting and continues their count. No single client decides that
+    (``axis_claims``).
 
-    With ``users``, passwords by name, a client has to log in first, and can say HELLO under its user's name
-    alone. With ``tls`` all of it is encrypted; without, whoever overhears a login knows the password.
+    With ``users``, passwords by name, a client has to log in first, and its HELLO must carry its user's name.
+    With ``tls`` connections are encrypted; without, a login can be overheard.
 
     ``host`` None listens on all interfaces; ``port`` 0 takes a free one (see ``port``). With ``max_pulses``
-    the server falls silent before that pulse number. Not thread-safe: one event loop.
+    the server sends no pulse from that number on. Not thread-safe: one event loop.
 
     Raises:
-        ValueError: a rate out of range or an expected name that no client could say.
+        ValueError: a rate out of range or an expected name that the protocol cannot carry.
     """
 
     def __init__(
@@ -88,9 +88,9 @@ class PulseServer:
         self._claims = AxisClaims(fps, self._expect, self._limits, self._clock)
         self._server: asyncio.Server | None = None
         self._timer: asyncio.TimerHandle | None = None
-        self._settling: asyncio.TimerHandle | None = None
+        self._claims_timer: asyncio.TimerHandle | None = None
         self._axis: PulseAxis | None = None
-        self._begun_at = 0.0
+        self._started_at = 0.0
         self._next = 0
         self._pulse: int | None = None
         self._skipped = 0
@@ -141,7 +141,7 @@ class PulseServer:
         """Listen.
 
         Raises:
-            OSError: the address cannot be listened on (port in use, no such interface); the text says which.
+            OSError: the address cannot be listened on (port in use, no such interface).
         """
         loop = asyncio.get_running_loop()
         try:
@@ -159,7 +159,7 @@ class PulseServer:
     async def stop(self) -> None:
         """Stop sending, end all connections, free the port."""
         self._cancel_timer()
-        self._cancel_settling()
+        self._cancel_claims_timer()
         self._ended.set()
         if self._server is None:
             return
@@ -194,34 +194,34 @@ class PulseServer:
         return encode(WaitMessage(missing)) if missing else b""
 
     def _on_hello(self, hello: Hello) -> None:
-        """Continue the axis that clients have from before this server was started."""
-        if not self._claims.note(hello):
+        """Continue the count that clients have from before this server was started."""
+        if not self._claims.record(hello):
             return
-        self._claims.keep(self._registry.names())
+        self._claims.keep_only(self._registry.names())
         if self._axis is not None:
             self._move_forward(self._axis)
-        elif self._settling is None and self._claims.agreed() is not None:
+        elif self._claims_timer is None and self._claims.agreed_axis() is not None:
             loop = asyncio.get_running_loop()
-            self._settling = loop.call_later(self._limits.claims_for, self._settle)
+            self._claims_timer = loop.call_later(self._limits.claims_for, self._end_claims)
 
     def _move_forward(self, before: PulseAxis) -> None:
         now = self._clock()
-        if now - self._begun_at > self._limits.adopt_for:
+        if now - self._started_at > self._limits.adopt_for:
             return
-        axis = self._claims.agreed(before) or before
+        axis = self._claims.agreed_axis(before) or before
         first = axis.number_at(now) + 1
-        if first > before.number_at(now) + INEXACT:
-            _log.warning("clients have counted to %d: moving forward to it", first - 1)
+        if first > before.number_at(now) + MEASUREMENT_ERROR:
+            _log.warning("clients have counted to %d: moving forward to that pulse", first - 1)
             self._skipped += max(0, first - self._next)
             self._axis, self._next = axis, first
             self._schedule()
         self._claims.log_minority(self._axis or before)
 
-    def _settle(self) -> None:
+    def _end_claims(self) -> None:
         """Continue from the clients' count, if they are still connected."""
-        self._settling = None
-        self._claims.keep(self._registry.names())
-        if self._claims.agreed() is not None:
+        self._claims_timer = None
+        self._claims.keep_only(self._registry.names())
+        if self._claims.agreed_axis() is not None:
             self._begin()
 
     def _on_change(self) -> None:
@@ -240,10 +240,10 @@ class PulseServer:
 
     def _begin(self) -> None:
         """Begin with pulse 0, or where the clients have counted to."""
-        self._cancel_settling()
-        self._begun_at = now = self._clock()
-        self._claims.keep(self._registry.names())
-        agreed = self._claims.agreed()
+        self._cancel_claims_timer()
+        self._started_at = now = self._clock()
+        self._claims.keep_only(self._registry.names())
+        agreed = self._claims.agreed_axis()
         self._axis = agreed or PulseAxis(now, self._fps)
         if agreed is not None:
             self._next = agreed.number_at(now) + 1
@@ -252,10 +252,10 @@ class PulseServer:
         self._begun.set()
         self._schedule()
 
-    def _cancel_settling(self) -> None:
-        if self._settling is not None:
-            self._settling.cancel()
-            self._settling = None
+    def _cancel_claims_timer(self) -> None:
+        if self._claims_timer is not None:
+            self._claims_timer.cancel()
+            self._claims_timer = None
 
     def _cancel_timer(self) -> None:
         if self._timer is not None:
@@ -270,7 +270,7 @@ class PulseServer:
         self._timer = asyncio.get_running_loop().call_later(max(0.0, wait), self._tick)
 
     def _tick(self) -> None:
-        """Send what is due; skip what has been due for too long."""
+        """Send the pulses that are due; skip those overdue by more than ``limits.catch_up``."""
         if self._axis is None:
             return
         now = self._clock()
@@ -280,13 +280,13 @@ class PulseServer:
                 _log.warning("late by %d pulses: skipping to %d%s", current - self._next, current, more)
             self._skipped += current - self._next
             self._next = current
-        while self._next <= current and not self._full():
+        while self._next <= current and not self._reached_end():
             self._registry.send_pulse(encode(PulseMessage(self._next, self._axis.due(self._next))))
             self._pulse = self._next
             self._next += 1
         self._schedule()
 
-    def _full(self) -> bool:
+    def _reached_end(self) -> bool:
         if self._max_pulses is not None and self._next >= self._max_pulses:
             self._ended.set()
         return self._ended.is_set()

@@ -1,8 +1,9 @@
-"""A client's connection to the pulse server: parses lines, sends PING, notices silence."""
+"""A client's connection to the pulse server: logs in, parses lines, sends PING, notices silence."""
 
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from typing import cast
 
@@ -19,19 +20,21 @@ _QUICK_INTERVAL = 0.05  # seconds between those
 class ServerConnection(asyncio.Protocol):
     """One connection. ``receive`` gets every message from the greeting on, with its time of arrival.
 
-    ``ping_interval`` is in seconds; after ``silence`` seconds without a byte the server counts as gone.
-    ``hello`` makes the line to open with. With ``credentials`` it logs in where the server asks for that, and
-    opens when it is greeted.
+    With ``credentials`` it answers the server's login request; without, ``receive`` gets the request.
+    ``hello`` makes the line that opens the connection: at once, or after the greeting where there is a login.
+    Every ``ping_interval`` seconds it sends PING, and after ``silence`` seconds without a byte it ends;
+    an infinite interval means neither.
     """
 
     def __init__(
         self,
         receive: Callable[[ServerLine, float], None],
-        hello: Callable[[], ClientLine],
         clock: Clock,
-        ping_interval: float,
-        silence: float,
         credentials: Credentials | None = None,
+        *,
+        hello: Callable[[], ClientLine] | None = None,
+        ping_interval: float = math.inf,
+        silence: float = math.inf,
     ) -> None:
         self._credentials = credentials
         self._receive = receive
@@ -47,34 +50,40 @@ class ServerConnection(asyncio.Protocol):
         self._opened = False
         self.greeted = False
         self.lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-        """Done when the connection has ended: why, in one sentence."""
+        """Done when the connection has ended; the result is the reason."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Send HELLO where no login comes before it, begin to ping (called by asyncio)."""
+        """Send HELLO unless a login comes first, and begin to ping (called by asyncio)."""
         self._transport = cast("asyncio.Transport", transport)
         self._last_byte_at = self._clock()
         if self._credentials is None:
             self._open()
-        self._ping()
+        if self._ping_interval < math.inf:
+            self._ping()
 
     def data_received(self, data: bytes) -> None:
-        """Pass on what the server sends (called by asyncio)."""
+        """Parse what the server sends (called by asyncio)."""
         self._last_byte_at = now = self._clock()
         try:
             for line in self._lines.feed(data):
-                self._take(line, now)
+                self._handle_line(line, now)
                 if self.lost.done():
                     return
         except (ProtocolError, OverlongLineError) as error:
             self.end(f"it does not speak the pulse protocol ({error})")
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Note the end (called by asyncio)."""
+        """End the connection (called by asyncio)."""
         self._transport = None
         self.end(str(exc) if exc else "the server closed the connection")
 
+    def send(self, message: ClientLine) -> None:
+        """Send a message, if the connection is open."""
+        if self._transport is not None:
+            self._transport.write(encode(message))
+
     def end(self, reason: str) -> None:
-        """Cut the connection."""
+        """Abort the connection."""
         if self._timer is not None:
             self._timer.cancel()
         if not self.lost.done():
@@ -82,10 +91,10 @@ class ServerConnection(asyncio.Protocol):
         if self._transport is not None:
             self._transport.abort()
 
-    def _take(self, line: bytes, now: float) -> None:
+    def _handle_line(self, line: bytes, now: float) -> None:
         message = parse_server_line(line)
         if isinstance(message, LoginRequest) and self._credentials is not None:
-            self._send(LoginMessage(self._credentials.user, self._credentials.password))
+            self.send(LoginMessage(self._credentials.user, self._credentials.password))
             return
         if isinstance(message, Greeting):
             self.greeted = True
@@ -98,11 +107,8 @@ class ServerConnection(asyncio.Protocol):
     def _open(self) -> None:
         if not self._opened:
             self._opened = True
-            self._send(self._hello())
-
-    def _send(self, message: ClientLine) -> None:
-        if self._transport is not None:
-            self._transport.write(encode(message))
+            if self._hello is not None:
+                self.send(self._hello())
 
     def _ping(self) -> None:
         now = self._clock()
@@ -112,7 +118,7 @@ class ServerConnection(asyncio.Protocol):
             self.end(f"nothing received for {self._silence:g} seconds")
             return
         if self._opened:
-            self._send(Ping(now))
+            self.send(Ping(now))
         self._pings += 1
         wait = _QUICK_INTERVAL if self._pings < _QUICK_PINGS else self._ping_interval
         self._timer = asyncio.get_running_loop().call_later(min(wait, self._ping_interval), self._ping)

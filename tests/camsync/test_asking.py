@@ -49,7 +49,7 @@ async def test_where_there_is_no_server_the_error_says_so() -> None:
     ("said", "error"),
     [
         (b"", "does not answer"),
-        (b"HTTP/1.1 400 Bad Request\r\n", "does not answer"),
+        (b"HTTP/1.1 400 Bad Request\r\n", "is no pulse server"),
         (b"PULSE one\n", "is no pulse server"),
         (b"x" * 100_000 + b"\n", "is no pulse server"),
         (b"MYVIEW-SYNC 7 rate:25\n", "speaks version 7"),

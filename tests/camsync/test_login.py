@@ -180,7 +180,7 @@ async def test_a_client_whose_login_is_refused_counts_by_itself_and_tries_again(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     settings = ClientSettings(backoff_first=0.01, backoff_most=0.01, free_run_after=0.2)
-    caplog.set_level(logging.WARNING, "camsync.client")
+    caplog.set_level(logging.WARNING, "camsync")
     async with PulseServer(FPS, users={"c0": "another"}) as server:
         async with PulseClient(HERE, server.port, "c0", settings=settings, credentials=C0) as client:
             pulses = await take(client, 3)
@@ -189,7 +189,8 @@ async def test_a_client_whose_login_is_refused_counts_by_itself_and_tries_again(
             await until_refused(server, 3)
         with pytest.raises(LoginError, match="unknown user or wrong password"):
             await query_clients(HERE, server.port, PATIENCE, credentials=C0)
-    client_lines = [record.getMessage() for record in caplog.records if record.name == "camsync.client"]
+    client_loggers = {"camsync.client", "camsync.persistent_connection"}
+    client_lines = [record.getMessage() for record in caplog.records if record.name in client_loggers]
     refusals = [line for line in client_lines if "wrong password" in line]
     assert len(refusals) == 1, "an absence is one line"
 
@@ -244,7 +245,7 @@ async def test_a_client_gives_its_password_to_no_server_that_it_does_not_trust(
     certificates: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     settings = ClientSettings(backoff_first=0.01, backoff_most=0.01, free_run_after=0.2)
-    caplog.set_level(logging.WARNING, "camsync.client")
+    caplog.set_level(logging.WARNING, "camsync")
     trusted = client_tls(certificates, "other")
     async with PulseServer(FPS, users=USERS, tls=server_tls(certificates)) as server:
         async with PulseClient(

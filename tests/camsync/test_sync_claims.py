@@ -124,9 +124,9 @@ async def test_one_who_alone_remembers_a_count_begins_anew_with_the_others() -> 
     """Whether it lies nobody knows; it is told so, and can start anew."""
     settings = ClientSettings(backoff_first=0.01, backoff_most=0.05, ahead_most=0.1, settle=0.05)
     alone = PulseClient(HERE, 1, "c0", settings=settings, credentials=Credentials("c0", USERS["c0"]))
-    alone._follower.heard(10**6, alone.now())
+    alone._counter.accept(10**6, alone.now())
     async with PulseServer(FPS, expect=NAMES, start_timeout=0.0, users=USERS) as server:
-        alone._port = server.port
+        alone._server._port = server.port
         with pytest.raises(SyncError, match="the server is at pulse"):
             await counted(alone, 10**6)
         assert server.skipped < 10**6
@@ -138,9 +138,9 @@ def agreed(counts: Sequence[int | None], expect: int, *, at: int | None = None) 
     names = [f"c{number}" for number in range(len(counts))]
     claims = AxisClaims(1.0, [f"c{number}" for number in range(expect)], ServerLimits(), lambda: 0.0)
     for name, count in zip(names, counts, strict=True):
-        claims.note(Hello(name, None if count is None else CountedPulse(count, 0.0)))
-    claims.keep(names)
-    axis = claims.agreed(None if at is None else PulseAxis.through(at, 0.0, 1.0))
+        claims.record(Hello(name, None if count is None else CountedPulse(count, 0.0)))
+    claims.keep_only(names)
+    axis = claims.agreed_axis(None if at is None else PulseAxis.through(at, 0.0, 1.0))
     return None if axis is None else axis.number_at(0.0)
 
 

@@ -44,12 +44,12 @@ def test_numbers_only_rise_whatever_happens(fps: float, what: list[int | float])
     numbers: list[int] = []
     for event in what:
         if isinstance(event, int):
-            numbers += [number for number, _ in follower.gap(event, now)]
-            if follower.heard(event, now):
+            numbers += [number for number, _ in follower.fill_gap(event, now)]
+            if follower.accept(event, now):
                 numbers.append(event)
         else:
             now += event
-            numbers += [number for number, _ in follower.own(now)]
+            numbers += [number for number, _ in follower.count_own(now)]
     assert all(before < after for before, after in pairwise(numbers))
 
 
@@ -57,8 +57,8 @@ def test_numbers_only_rise_whatever_happens(fps: float, what: list[int | float])
 @given(rates, st.integers(0, 10**6), st.integers(1, 200))
 def test_counting_alone_goes_on_at_the_rate_of_the_server(fps: float, number: int, more: int) -> None:
     follower = PulseCounter(fps, catch_up=1000.0)
-    assert follower.heard(number, 1.8e9)
-    own = list(follower.own(1.8e9 + (more + 0.5) / fps))
+    assert follower.accept(number, 1.8e9)
+    own = list(follower.count_own(1.8e9 + (more + 0.5) / fps))
     assert [number for number, _ in own] == list(range(number + 1, number + more + 1))
     for i, (_, due) in enumerate(own, start=1):
         assert due == pytest.approx(1.8e9 + i / fps, abs=1e-6)
@@ -66,18 +66,18 @@ def test_counting_alone_goes_on_at_the_rate_of_the_server(fps: float, number: in
 
 def test_a_stalled_client_skips_to_the_present_instead_of_making_up_for_hours() -> None:
     follower = PulseCounter(25.0, catch_up=0.5)
-    follower.heard(10, 1000.0)
-    assert [number for number, _ in follower.own(1000.0 + 3600.0)] == [10 + 3600 * 25]
+    follower.accept(10, 1000.0)
+    assert [number for number, _ in follower.count_own(1000.0 + 3600.0)] == [10 + 3600 * 25]
 
 
 @settings(deadline=None, max_examples=60)
 @given(rates, st.integers(0, 10**6), st.integers(1, 300))
 def test_a_short_gap_is_made_good_and_a_long_one_is_not(fps: float, last: int, ahead: int) -> None:
     follower = PulseCounter(fps, catch_up=0.5)
-    follower.heard(last, 1.8e9)
+    follower.accept(last, 1.8e9)
     number = last + ahead
-    made = list(follower.gap(number, 1.8e9 + ahead / fps))
-    assert follower.heard(number, 1.8e9 + ahead / fps)
+    made = list(follower.fill_gap(number, 1.8e9 + ahead / fps))
+    assert follower.accept(number, 1.8e9 + ahead / fps)
     short = (ahead - 1) / fps <= 0.5
     assert [one for one, _ in made] == (list(range(last + 1, number)) if short else [])
     assert all(due == pytest.approx(1.8e9 + (one - last) / fps, abs=1e-6) for one, due in made)
@@ -85,14 +85,14 @@ def test_a_short_gap_is_made_good_and_a_long_one_is_not(fps: float, last: int, a
 
 def test_who_never_heard_a_pulse_counts_nothing() -> None:
     follower = PulseCounter(25.0, catch_up=0.5)
-    assert list(follower.own(1e9)) == []
+    assert list(follower.count_own(1e9)) == []
     assert follower.known(1e9) is None
     assert follower.next_due() is None
 
 
 def test_a_new_rate_holds_from_the_last_pulse_on() -> None:
     follower = PulseCounter(25.0, catch_up=10.0)
-    follower.heard(100, 1000.0)
+    follower.accept(100, 1000.0)
     follower.set_rate(50.0)
     assert follower.next_due() == pytest.approx(1000.02)
 

@@ -18,7 +18,7 @@ from fakes.timeouts import PATIENCE
 async def test_a_server_that_comes_and_goes_is_not_told_of_each_time(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    caplog.set_level(logging.INFO, "camsync.client")
+    caplog.set_level(logging.INFO, "camsync")
     clock = steady_unix_clock()
     axis = PulseAxis.through(7, clock(), FPS)
 

@@ -106,8 +106,8 @@ class ClientSessions(Scripts):
     async def _session(self, script: Script) -> bool:
         clock = Clock()
         client = PulseClient("nowhere", 1, "c0", settings=ClientSettings(queue=10_000), clock=clock)
-        link = ServerConnection(client._receive, client._hello, clock, 1.0, 5.0)
-        client._link = link
+        link = ServerConnection(client._receive, clock, hello=client._hello, ping_interval=1.0, silence=5.0)
+        client._server._connection = link
         wire = Wire()
         link.connection_made(wire)
         for _, said in script:
@@ -117,7 +117,7 @@ class ClientSessions(Scripts):
             clock.now += 0.01
         for _ in range(3):
             clock.now += 0.2
-            client._count_alone(clock.now)
+            client._make_own_pulses(clock.now)
         for line in wire.written.splitlines():
             parse_client_line(line)
         client.status()
