@@ -1,21 +1,21 @@
 """Run the whole suite part by part, and close with one summary: ``make test``.
 
-Every part runs, whatever became of those before it. The last line has the form of pytest's own. ``--load 4``
-keeps every processor busy with four endless loops meanwhile, ``--runs 20`` repeats everything: `make
-test-loaded` shows with them that no test depends on luck.
+Every part runs, whatever became of those before it. The last line has the form of pytest's own. ``--runs 20
+--at-once 5`` runs everything twenty times, five runs side by side, each of which is load for the others:
+`make test-loaded` shows with it that no test depends on luck.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from datetime import timedelta
 from pathlib import Path
@@ -33,7 +33,6 @@ _OTHER_EXAMPLES = ("-m", "hypothesis and not slow", "-n", "3", "--hypothesis-pro
 _NO_TESTS = 5
 """How pytest says that there was nothing to run."""
 _INTERRUPTED = 130
-_BUSY_LOOP = "import os; parent = os.getppid()\nwhile os.getppid() == parent: pass"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,15 +52,35 @@ class Outcome:
 def main() -> None:
     """Run the suite as often as asked; exit with 1 if anything failed."""
     asked = _arguments()
-    closing: list[str] = []
-    failed = False
-    with busy(asked.load * (os.cpu_count() or 1)):
-        for _ in range(asked.runs):
-            outcomes = run_slow(asked.may_skip) if asked.slow else run_fast(asked.may_skip)
-            closing.append(closing_line(outcomes))
-            failed |= any(it.failed for it in outcomes)
-            _tell(outcomes, closing if asked.runs > 1 else closing[-1:])
-    sys.exit(failed)
+    if asked.runs > 1:
+        command = [sys.executable, __file__, *["--slow"] * asked.slow]
+        command += [] if asked.may_skip is None else ["--may-skip", asked.may_skip]
+        sys.exit(not run_often(command, asked.runs, asked.at_once))
+    outcomes = run_slow(asked.may_skip) if asked.slow else run_fast(asked.may_skip)
+    _print_table(outcomes)
+    print("", closing_line(outcomes), sep="\n", flush=True)
+    sys.exit(any(it.failed for it in outcomes))
+
+
+def run_often(command: Sequence[str], runs: int, at_once: int) -> bool:
+    """Run a command several times, some of them side by side; return whether none failed.
+
+    Of a run that failed everything is printed, of others the last line.
+    """
+    closing, failed = [], 0
+    with ThreadPoolExecutor(at_once) as pool:
+        waiting = [
+            pool.submit(subprocess.run, command, capture_output=True, text=True, check=False)
+            for _ in range(runs)
+        ]
+        for number, run in enumerate((it.result() for it in as_completed(waiting)), 1):
+            lines = run.stdout.rstrip().splitlines() or [f"exit code {run.returncode}"]
+            closing.append(lines[-1])
+            failed += run.returncode != 0
+            print(f"run {number} of {runs} ended at a load of {os.getloadavg()[0]:.0f}")
+            print(run.stdout + run.stderr if run.returncode else lines[-1], flush=True)
+    print("", *closing, f"{runs - failed} of {runs} runs without a failure", sep="\n", flush=True)
+    return not failed
 
 
 def _arguments() -> argparse.Namespace:
@@ -70,9 +89,7 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--slow", action="store_true", help="run the tests that take minutes, and no others")
     parser.add_argument("--runs", type=int, default=1, metavar="N", help="run everything N times")
-    parser.add_argument(
-        "--load", type=int, default=0, metavar="N", help="keep every processor busy with N loops"
-    )
+    parser.add_argument("--at-once", type=int, default=1, metavar="N", help="of these runs, N side by side")
     parser.add_argument(
         "--may-skip", metavar="WORD", help="count a test as failed that is skipped for another reason"
     )
@@ -158,7 +175,7 @@ def closing_line(outcomes: Sequence[Outcome]) -> str:
     return f" {', '.join(counts)} in {seconds:.2f}s ({timedelta(seconds=int(seconds))}) ".center(80, "=")
 
 
-def _tell(outcomes: Sequence[Outcome], closing: Sequence[str]) -> None:
+def _print_table(outcomes: Sequence[Outcome]) -> None:
     print(f"\n{'part':<28}{'passed':>8}{'failed':>8}{'skipped':>9}{'time':>10}")
     for it in outcomes:
         if it.left_out is not None:
@@ -166,19 +183,6 @@ def _tell(outcomes: Sequence[Outcome], closing: Sequence[str]) -> None:
             continue
         time_taken = str(timedelta(seconds=int(it.seconds)))
         print(f"{it.name:<28}{it.passed:>8}{it.failed:>8}{it.skipped.total():>9}{time_taken:>10}")
-    print("", *closing, sep="\n", flush=True)
-
-
-@contextlib.contextmanager
-def busy(loops: int) -> Iterator[None]:
-    """Run endless loops, each a process of its own, beside what is done meanwhile."""
-    running = [subprocess.Popen([sys.executable, "-c", _BUSY_LOOP]) for _ in range(loops)]
-    try:
-        yield
-    finally:
-        for process in running:
-            process.kill()
-            process.wait()
 
 
 if __name__ == "__main__":

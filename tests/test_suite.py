@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from suite import Outcome, closing_line, run_pytest
+from suite import Outcome, closing_line, run_often, run_pytest
 
 MIXED = """
 import pytest
@@ -50,3 +51,12 @@ def test_the_closing_line_is_the_sum_of_all_parts() -> None:
     ]
     assert closing_line(parts).strip("= ") == "1 failed, 12 passed, 2 skipped in 3661.50s (1:01:01)"
     assert closing_line(parts[2:]).strip("= ") == "7 passed in 3600.00s (1:00:00)"
+
+
+def test_one_failure_of_many_runs_is_a_failure(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    once = f"import os; os.mkdir({str(tmp_path / 'made')!r}); print('made')"  # the second run finds it
+    assert not run_often([sys.executable, "-c", once], runs=3, at_once=2)
+    printed = capfd.readouterr().out
+    assert printed.count("FileExistsError") == 2
+    assert printed.rstrip().endswith("1 of 3 runs without a failure")
+    assert run_often([sys.executable, "-c", "print('passed')"], runs=2, at_once=2)
