@@ -12,6 +12,7 @@ from camsync.login import Credentials
 from camsync.messages import Hello, ServerLine
 from camsync.pulse import ClientSettings
 from camsync.server_connection import ServerConnection
+from expbackoff import Backoff
 from logthrottle import LogThrottle
 
 _log = logging.getLogger(__name__)
@@ -63,16 +64,15 @@ class PersistentConnection:
 
     async def run(self) -> None:
         """Stay connected until ``stop``; errors that reconnecting cannot solve are raised."""
-        backoff = self._settings.backoff_first
+        backoff = Backoff(self._settings.backoff_first, self._settings.backoff_most)
         while not self._stopped:
             greeted, reason = await self._connect()
             if greeted:
-                backoff = self._settings.backoff_first
+                backoff.reset()
             if not self._stopped and (more := self._absences.record(reason)) is not None:
                 _log.warning("pulse server %s is away: %s%s", self.address, reason, more)
             self._on_lost()
-            await asyncio.sleep(backoff)
-            backoff = min(2.0 * backoff, self._settings.backoff_most)
+            await asyncio.sleep(backoff.next())
 
     def accept_greeting(self, fps: float) -> None:
         """Count a greeting, and log the server's rate after an absence and at the first one."""

@@ -26,20 +26,19 @@ async def events(url: str, settings: HttpSettings = _DEFAULT) -> AsyncIterator[E
         ClientError: the server refuses, or what it says is not understood.
     """
     address = server_url(url) / "api/events"
-    failures = 0
+    backoff = settings.backoff()
     while True:
         try:
             async for event in _once(address, settings):
-                failures = 0
+                backoff.reset()
                 yield event
         except AwayError as error:
             problem = error
         else:
             problem = AwayError(f"{address.origin()}: the stream of events has ended")
-        failures += 1
-        if failures > settings.retries:
+        if backoff.failures >= settings.retries:
             raise problem
-        await asyncio.sleep(settings.backoff(failures))
+        await asyncio.sleep(backoff.next())
 
 
 async def _once(address: URL, settings: HttpSettings) -> AsyncIterator[Event]:

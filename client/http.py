@@ -1,4 +1,4 @@
-"""Speaking to a MyView server: addresses, errors in one line, how long to wait and how often to try."""
+"""Requests to a MyView server: addresses, timeouts, retries, and errors in one line."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ import aiohttp
 import msgspec
 from yarl import URL
 
+from expbackoff import Backoff
+
 MAX_BODY = 64_000_000
-"""Bytes of an answer that is read as a whole: everybody whom a large site has seen takes some millions."""
+"""Bytes of an answer that is read as a whole; all objects of a large site take some millions."""
 _MAX_WORDS = 64_000
-"""Bytes of an answer that refuses."""
+"""Bytes of an error response."""
 _MAX_SHOWN = 300
-"""Characters of a library's own words."""
+"""Characters of a library's message."""
 _NOT_FOUND = 404
 _CLIENT_ERRORS = range(400, 500)
 _ANSWER = TypeVar("_ANSWER")
@@ -64,9 +66,9 @@ class HttpSettings:
     token: str | None = field(default=None, repr=False)
     """What lets in, where the server asks for it."""
 
-    def backoff(self, failures: int) -> float:
-        """Return the seconds to wait after so many failures in a row (1 or more)."""
-        return min(self.backoff_most, self.backoff_first * 2.0 ** min(failures - 1, 30))
+    def backoff(self) -> Backoff:
+        """Return the delays between attempts at one thing."""
+        return Backoff(self.backoff_first, self.backoff_most)
 
 
 def server_url(text: str) -> URL:

@@ -53,7 +53,7 @@ class Session:
 
     async def run(self, address: URL, settings: HttpSettings) -> bool:
         """Stream until full (True) or the server is gone for good (False)."""
-        failures = 0
+        backoff = settings.backoff()
         while True:
             before = self._record.fragments
             try:
@@ -69,12 +69,13 @@ class Session:
                 if not isinstance(error, AwayError) and not self._record.fragments:
                     raise
                 problem = AwayError(str(error))
-            failures = 1 if self._record.fragments > before else failures + 1
-            if failures > settings.retries:
+            if self._record.fragments > before:
+                backoff.reset()
+            if backoff.failures >= settings.retries:
                 if self._record.fragments:
                     return False
                 raise problem
-            await asyncio.sleep(settings.backoff(failures))
+            await asyncio.sleep(backoff.next())
             self.reconnections += 1
 
     def _asking(self, address: URL) -> URL:

@@ -16,7 +16,7 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 def stale_names() -> list[str]:
     """Return names under Args, Attributes or Raises, or in a role, that do not exist, with their places."""
-    modules = list(parsed(*PRODUCT, "logthrottle", "benchmarks"))
+    modules = list(parsed(*PRODUCT, "logthrottle", "expbackoff", "benchmarks"))
     defined = {name for path, tree in modules for name in (*path.with_suffix("").parts, *_defined_in(tree))}
     return [
         f"{path}:{getattr(node, 'lineno', 1)} {name}"

@@ -7,6 +7,7 @@ import contextlib
 import logging
 
 from camsync import SyncError
+from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.camera.process import CameraProcess
 from server.config.camera_password import fill_in_password
@@ -17,7 +18,6 @@ from server.supervisor.reload import ReloadPlan
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_checks import check_recording
 from server.supervisor.startup_signal import signal_started
-from server.system.backoff import Backoff
 from server.system.errors import UnavailableError, UserError
 
 log = logging.getLogger(__name__)

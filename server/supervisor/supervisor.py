@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.config.site_config import Config
 from server.supervisor.shutdown import EXIT_FINISHED, SUPERVISED_VARIABLE
 from server.supervisor.startup_signal import STARTED_FD_VARIABLE, open_startup_pipe
-from server.system.backoff import Backoff
 from server.system.child_process import start_command
 from server.system.errors import UserError
 from server.system.processors import available_processors

@@ -25,7 +25,7 @@ build_meta.build_wheel(folder)
 
 
 def product() -> set[str]:
-    return {path.as_posix() for path in tracked(*PRODUCT, "logthrottle")}
+    return {path.as_posix() for path in tracked(*PRODUCT, "logthrottle", "expbackoff")}
 
 
 @pytest.fixture(scope="module")

@@ -14,13 +14,13 @@ from av.audio.stream import AudioStream
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
+from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.camera.audio import LiveAudioSource
 from server.camera.sources.base import Image
 from server.camera.sources.opening import OpenedVideo, open_video, timeout_message
 from server.camera.sources.orientation import INTERLACED, Orientation, parse_orientation, pixel_aspect
 from server.system.address_redaction import ffmpeg_reason, redact_address
-from server.system.backoff import Backoff
 from server.system.errors import UnavailableError, UserError
 
 log = logging.getLogger(__name__)

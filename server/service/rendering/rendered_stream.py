@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
+from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.media.rendering_messages import Canvas, JpegPicture, RenderRequest, Still
 from server.service.rendering.decided_boxes import GopOverlay
@@ -19,7 +20,6 @@ from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.media_chunk import MediaChunk
 from server.service.streaming.subscriber_queue import Chunk, Subscriber
-from server.system.backoff import Backoff
 
 
 @dataclass(slots=True)

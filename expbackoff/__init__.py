@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from tenacity import RetryCallState, Retrying, wait_exponential
 
+__all__ = ["Backoff"]
+
 
 class Backoff:
     """Delays that double from ``first_s`` to ``max_s`` seconds, one per failure in a row."""
@@ -12,6 +14,11 @@ class Backoff:
         self._wait = wait_exponential(multiplier=first_s, max=max_s)
         self._attempts = RetryCallState(Retrying(), None, (), {})
         self.reset()
+
+    @property
+    def failures(self) -> int:
+        """Failures in a row: the calls of :meth:`next` since the last :meth:`reset`."""
+        return self._attempts.attempt_number
 
     def next(self) -> float:
         """Return the seconds to wait before the next attempt."""
