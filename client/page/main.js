@@ -87,7 +87,7 @@ function readOut() {
   banner.show();
   const delay = median(probe.delays.slice(-DELAY_FRAMES).map(({ delayMs }) => delayMs ?? NaN));
   element('delay').textContent = viewer.now.flowing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
-  if (!viewer.now.mapped) reason.put('This browser does not say which moment it shows: no boxes, no past, no reasons.');
+  if (!viewer.now.mapped) reason.put('This browser reports no frame times: no boxes, no past, no reasons.');
   if (!site || !viewer.now.mapped || probe.pulse === null || viewer.object === null) return strip.clear();
   const live = viewer.travel.moment === null;
   const views = (/** @type {number} */ from) => viewer.views(from);

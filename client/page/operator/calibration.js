@@ -10,9 +10,9 @@ import { copy } from '../shared/tools.js';
 const EVERY_MS = 1000;
 /** @type {Record<Walk['state'], string>} */
 const WORDS = {
-  none: 'Nobody walks.',
+  none: 'No walk yet.',
   walking: 'Walk now.',
-  working: 'It is being calculated.',
+  working: 'Calculating.',
   done: '',
 };
 
@@ -48,7 +48,7 @@ export class CalibrationWalk {
     this.#forget.addEventListener('click', () => void this.#do('DELETE'));
     element('walk-copy').addEventListener('click', async () => {
       const done = await copy(this.#lines.value);
-      put(this.#state, done ? 'The lines are copied.' : 'The lines can be selected and copied by hand.');
+      put(this.#state, done ? 'The lines are copied.' : 'Select the lines and copy them.');
       if (!done) this.#lines.select();
     });
   }
@@ -95,7 +95,7 @@ export class CalibrationWalk {
     const come = walk.state === 'done' ? walk.error + walk.lines.join() : '';
     if (come === this.#shown) return;
     this.#shown = come;
-    if (come) put(this.#state, walk.error ? `Nothing has come of it: ${walk.error}` : found(walk));
+    if (come) put(this.#state, walk.error ? `Calibration failed: ${walk.error}` : found(walk));
     const there = walk.configuration !== '';
     element('walk-result').hidden = !there;
     list('walk-lines', walk.lines);
@@ -107,14 +107,14 @@ export class CalibrationWalk {
 
 /** @param {Walk} walk */
 function said({ state, seconds, max_seconds: most }) {
-  if (state === 'walking' && seconds >= most) return `That is enough: after ${most / 60} minutes nothing more is taken in.`;
+  if (state === 'walking' && seconds >= most) return `That is enough: a walk has at most ${most / 60} minutes.`;
   const minutes = `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, '0')}`;
   return state === 'none' ? WORDS.none : `${WORDS[state]} ${minutes} minutes so far.`;
 }
 
 /** @param {Walk} walk */
 function found({ insufficient }) {
-  return insufficient ? `It is a guess, since the walk covered too little: ${insufficient}.` : 'The cameras are calibrated; what is in force is as before.';
+  return insufficient ? `The result is a guess, the walk covered too little: ${insufficient}.` : 'Calibrated. The configuration in force is unchanged.';
 }
 
 /** @param {WalkCamera} camera */

@@ -16,14 +16,14 @@ const STATES = { live: 'Live', gone: 'Gone', ended: 'Ended', starting: 'Starting
 /** @type {[string, string, (camera: OperatorCamera) => string][]} what a tile says: name, what it means, value */
 const ROWS = [
   ['Rate', 'Frames taken per second', (it) => `${it.fps.toFixed(1)} fps`],
-  ['Behind the pulse', 'From when a frame was due to when it was taken: median, worst', (it) => spread(it.sync_error)],
-  ['Pulses', 'Whether they come from the server', (it) => (it.synchronized ? 'in step' : 'by itself')],
+  ['Behind the pulse', 'From a pulse to its frame: median, worst', (it) => spread(it.sync_error)],
+  ['Pulses', 'Whether pulses come from the server', (it) => (it.synchronized ? 'synchronized' : 'not synchronized')],
   ['Clock', "The pulse server's clock minus the camera's", (it) => seconds(it.clock_offset)],
-  ['Tracking', 'From when a frame was due to when its window was solved: median, worst', (it) => spread(it.tracking_delay)],
-  ['Certified', 'Windows whose answer is proven to be the optimum', certified],
+  ['Tracking', 'From a pulse to its tracks: median, worst', (it) => spread(it.tracking_delay)],
+  ['Certified', 'Windows whose solution is proven optimal', certified],
   ['Missed', 'Pulses without a frame, since the start', (it) => String(it.missed)],
   ['Not searched', 'Frames not searched for people, since the start', (it) => String(it.shed)],
-  ['Late', 'Windows that came after they were decided about', (it) => String(it.late)],
+  ['Late', 'Windows that came after their views were decided', (it) => String(it.late)],
 ];
 
 /** @implements {Section} */

@@ -44,7 +44,7 @@ export class Configuration {
       (it) => (it.differs || it.default === null || !this.#onlyDiffering) && `${it.key}: ${it.value}`.toLowerCase().includes(wanted),
     );
     element('settings').replaceChildren(...shown.map(row));
-    put(element('settings-none'), shown.length || !this.#settings.length ? '' : 'No setting is like that.');
+    put(element('settings-none'), shown.length || !this.#settings.length ? '' : 'No matching setting.');
   }
 }
 
@@ -54,7 +54,7 @@ export class Configuration {
  */
 function onDisk(error, pending) {
   if (error) return `The file is not in force: ${error}`;
-  return pending.length ? `The file says something else, which is not in force: ${pending.join(', ')}` : '';
+  return pending.length ? `Changed in the file, not in force: ${pending.join(', ')}` : '';
 }
 
 /** @param {Setting} setting */

@@ -55,7 +55,7 @@ export class Downloads {
     const spans = (await Promise.all(asked)).flat();
     const begins = spans.map(({ begins: it }) => it).filter((it) => it !== null).sort();
     const since = begins.length ? new Date(begins[0]).toLocaleString() : '';
-    put(element('downloads-kept'), since ? `Something is kept since ${since}.` : 'Nothing is kept yet.');
+    put(element('downloads-kept'), since ? `Recorded since ${since}.` : 'Nothing is recorded yet.');
   }
 
   #link() {
@@ -92,7 +92,7 @@ export class Downloads {
 
 /** @param {boolean} whole */
 function reason(whole) {
-  return whole ? 'A site of VP8 keeps no pictures.' : 'The end is not after the beginning.';
+  return whole ? 'VP8 is not recorded.' : 'The end is not after the beginning.';
 }
 
 /**

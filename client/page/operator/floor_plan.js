@@ -97,7 +97,7 @@ export class FloorPlan {
     const list = element('places');
     while (list.children.length > lines.length) list.lastChild?.remove();
     lines.forEach((line, at) => put(list.children[at] ?? list.appendChild(make('li')), line));
-    put(element('floor').querySelector('h2') ?? list, walkers.length ? 'On the floor now' : 'Nobody is on the floor now');
+    put(element('floor').querySelector('h2') ?? list, walkers.length ? 'On the floor now' : 'No one is on the floor now');
   }
 
   /**
@@ -129,8 +129,8 @@ export class FloorPlan {
  */
 function words(parts, uncalibrated) {
   if (parts) return uncalibrated.length ? `Not calibrated: ${uncalibrated.join(', ')}.` : '';
-  if (!uncalibrated.length) return 'No camera has said yet what it sees.';
-  return 'No camera is calibrated: where its floor is can be marked under Zones, or found from a walk (myview calibrate).';
+  if (!uncalibrated.length) return 'No camera has reported yet.';
+  return 'No camera is calibrated: mark the floor under Zones, or calibrate by a walk.';
 }
 
 /** @param {number[]} values */

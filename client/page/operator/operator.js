@@ -83,7 +83,7 @@ function build(site) {
       tell(null);
       flags.open(); // another run of the service has raised others
     },
-    lost: () => tell(new Error('The connection is lost; it is tried again.')),
+    lost: () => tell(new Error('Connection lost; retrying.')),
     heard: (name, data) => {
       if (name === 'gop') floor.add(data);
       if (name === 'flag') flags.take(data);

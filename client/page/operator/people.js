@@ -35,12 +35,12 @@ export class KnownPeople {
     element('merge-form').addEventListener('submit', (event) => {
       event.preventDefault();
       const [kept, lost] = [Number(this.#kept.value), Number(this.#lost.value)];
-      void this.#say({ object: kept, merge: lost }, () => `${lost} is ${kept} from now on.`);
+      void this.#say({ object: kept, merge: lost }, () => `${lost} is merged into ${kept}.`);
     });
     element('split-form').addEventListener('submit', (event) => {
       event.preventDefault();
       const split = this.#camera.value === EVERY_CAMERA ? [] : [this.#camera.value];
-      void this.#say({ object: Number(this.#who.value), split }, ({ new_object }) => `They are ${new_object} from now on.`);
+      void this.#say({ object: Number(this.#who.value), split }, ({ new_object }) => `Split off as person ${new_object}.`);
     });
   }
 
@@ -74,8 +74,8 @@ export class KnownPeople {
     const choices = [...known.keys()].sort((one, other) => one - other).map((it) => /** @type {[string, string]} */ ([String(it), label(it)]));
     for (const select of [this.#kept, this.#lost, this.#who]) options(select, choices);
     if (this.#lost.value === this.#kept.value) this.#lost.value = choices.find(([it]) => it !== this.#kept.value)?.[0] ?? '';
-    if (!people.length) put(this.#words, 'Nobody is known yet.');
-    else if (this.#words.textContent === 'Nobody is known yet.') put(this.#words, '');
+    if (!people.length) put(this.#words, 'No people yet.');
+    else if (this.#words.textContent === 'No people yet.') put(this.#words, '');
   }
 
   /**

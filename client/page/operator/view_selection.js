@@ -11,18 +11,18 @@ import { copy } from '../shared/tools.js';
 const FIELDS = [
   ['lookahead', 'Look-ahead, frames', 'How many frames are seen before a view is chosen; all of it is delay.'],
   ['switch_cost_s', 'Cut cost λ, s', 'How many seconds of not seeing the person are worth a cut.'],
-  ['extrapolate_s', 'Extrapolation, s', 'For how long the views at the end of the look-ahead are taken to go on.'],
-  ['presence_decay_s', 'Presence decay, s', 'For how long somebody who is not found any more is taken to be still there.'],
-  ['undetected_weight', 'Undetected weight', 'What a view counts for of somebody whom only other cameras find, 0 to 1.'],
-  ['min_shot_s', 'Shortest shot, s', 'For how long a camera is shown at least.'],
+  ['extrapolate_s', 'Extrapolation, s', 'For how long after the look-ahead its last views are assumed to stay.'],
+  ['presence_decay_s', 'Presence decay, s', 'How long a view takes to decay to nothing after the last detection.'],
+  ['undetected_weight', 'Undetected weight', 'Weight of a view in which only other cameras detect the person, 0 to 1.'],
+  ['min_shot_s', 'Shortest shot, s', 'The least time that a camera is shown.'],
   ['quality.size', 'Size', 'How large the person is in the picture.'],
-  ['quality.truncation', 'Truncation', "How much of the person the picture's edges leave."],
-  ['quality.occlusion', 'Occlusion', 'How much of the person other people leave to be seen.'],
+  ['quality.truncation', 'Truncation', "How much of the person is inside the picture."],
+  ['quality.occlusion', 'Occlusion', 'How much of the person is not occluded by others.'],
   ['quality.centering', 'Centering', 'How near the middle of the picture.'],
-  ['quality.sharpness', 'Sharpness', 'How much detail there is; cameras measure it only where the file has a weight for it.'],
+  ['quality.sharpness', 'Sharpness', 'How much detail there is; cameras measure it only if the file has a weight for it.'],
   ['quality.facing', 'Facing', 'Walking towards the camera, not away from it; needs the ground.'],
-  ['quality.confidence', 'Confidence', 'How surely the track is there.'],
-  ['quality.relative', 'Relative', 'A view is measured by the best view of the moment.'],
+  ['quality.confidence', 'Confidence', 'Confidence of the track.'],
+  ['quality.relative', 'Relative', 'Quality relative to the best view of the moment.'],
 ];
 
 /** @implements {Section} */
@@ -45,7 +45,7 @@ export class ViewSelectionForm {
     element('selection-back').addEventListener('click', () => void this.#change('DELETE'));
     element('selection-copy').addEventListener('click', async () => {
       const done = await copy(this.#lines.value);
-      put(this.#state, done ? 'The lines are copied.' : 'The lines can be selected and copied by hand.');
+      put(this.#state, done ? 'The lines are copied.' : 'Select the lines and copy them.');
       if (!done) this.#lines.select();
     });
   }
@@ -95,7 +95,7 @@ export class ViewSelectionForm {
       tried += Number(differs);
       put(said, differs ? `file: ${file[key]}` : '');
     }
-    put(this.#state, tried ? `${tried} tried out, not as the file says.` : 'As the file says.');
+    put(this.#state, tried ? `${tried} changed from the file.` : 'As in the file.');
     this.#lines.value = lines || '# all at their defaults\n';
   }
 

@@ -52,7 +52,7 @@ export class ZoneEditor {
     element('mark-picture').addEventListener('click', () => void this.#takePicture());
     element('mark-copy').addEventListener('click', async () => {
       const done = await copy(this.#lines.value);
-      put(this.#said, done ? 'Copied.' : 'It can be selected and copied by hand.');
+      put(this.#said, done ? 'Copied.' : 'Select the lines and copy them.');
       if (!done) this.#lines.select();
     });
     element('mark-download').addEventListener('click', () => this.#download());
@@ -105,7 +105,7 @@ export class ZoneEditor {
     const there = await load(this.#image, `cameras/${camera}/live.jpg`);
     if (camera !== this.#camera) return;
     if (!there) put(this.#said, `There is no picture of ${camera} now.`);
-    else if (!this.#picture) put(this.#said, `${camera} has not said yet how large its own picture is: open this section again.`);
+    else if (!this.#picture) put(this.#said, `The size of ${camera}'s own picture is not known yet: open this section again.`);
     else put(this.#said, '');
   }
 
@@ -167,8 +167,8 @@ export class ZoneEditor {
     element('mark-next').hidden = !this.#onAreas;
     element('mark-table').hidden = element('mark-download').hidden = this.#onAreas;
     element('mark-how').textContent = this.#onAreas
-      ? 'Press the corners of what is to be ignored, one after the other. These lines replace those of the configuration.'
-      : 'Press a place of the floor, and say below where that is. The file is for: myview calibrate points.json --out ground.json';
+      ? 'Press the corners of the area to ignore, one after the other. These lines replace those of the configuration.'
+      : 'Press a place on the floor, and enter below where it is. The file is for: myview calibrate points.json --out ground.json';
     if (!this.#onAreas) this.#table();
     this.#write();
     this.#draw();

@@ -66,7 +66,7 @@ export class Override {
     const { camera } = this;
     if (camera === null || (this.prefers && !live)) return null;
     if (this.prefers && shown !== camera) return `${camera} is preferred, and does not see this person just now.`;
-    const better = best === camera ? 'It is the best view just now.' : `The best view just now is ${best}.`;
+    const better = best === camera ? 'It is the best view now.' : `The best view now is ${best}.`;
     return [this.prefers ? 'Preferred.' : 'Held by hand.', ...(best === null ? [] : [better])].join(' ');
   }
 

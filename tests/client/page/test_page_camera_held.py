@@ -60,7 +60,7 @@ async def test_a_preferred_camera_gives_way_where_it_does_not_see_the_person(bro
         assert visit.page.url.endswith("?object=2&prefer=c0")
         await visit.until("myview.camera === 'c0' && myview.delays.length")
         assert await camera_on_the_stage(visit) == "c0"
-        await expect(visit.page.locator("#reason")).to_have_text("Preferred. The best view just now is c2.")
+        await expect(visit.page.locator("#reason")).to_have_text("Preferred. The best view now is c2.")
         site = visit.server.site
         first = site.edge - site.edge % GOP + 3 * GOP
         site.blind = range(first, first + 10_000 * GOP)  # until it has been looked at

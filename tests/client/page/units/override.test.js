@@ -37,9 +37,9 @@ test('what the site does not have is not wished for, and stays in the address', 
 });
 
 test('it is said why a camera is shown', () => {
-  assert.equal(override('c1').words('c0', 'c1', true), 'Held by hand. The best view just now is c0.');
+  assert.equal(override('c1').words('c0', 'c1', true), 'Held by hand. The best view now is c0.');
   assert.equal(override('c1').words(null, 'c1', false), 'Held by hand.');
-  assert.equal(override(null, 'c1').words('c1', 'c1', true), 'Preferred. It is the best view just now.');
+  assert.equal(override(null, 'c1').words('c1', 'c1', true), 'Preferred. It is the best view now.');
   assert.match(override(null, 'c1').words('c0', 'c0', true), /c1 is preferred, and does not see this person/);
   assert.equal(override(null, 'c1').words('c0', 'c0', false), null, 'the past is as it was chosen');
 });

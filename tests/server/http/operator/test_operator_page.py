@@ -129,7 +129,7 @@ async def test_every_camera_has_a_tile_that_says_how_it_is(browser: Browser) -> 
 async def test_the_floor_plan_has_cameras_and_people_where_they_stand(browser: Browser) -> None:
     cameras = [{"id": it, "source": "scene:room", "ground": PLAN} for it in CAMERAS]
     async with operating(browser, "#floor", cameras=cameras) as (hall, page):
-        await expect(page.locator("#floor-words")).to_have_text("No camera has said yet what it sees.")
+        await expect(page.locator("#floor-words")).to_have_text("No camera has reported yet.")
         see(hall)
         await page.reload()
         await expect(page.locator("#plan polygon")).to_have_count(2)
@@ -153,7 +153,7 @@ async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(b
     async with operating(browser, "#known") as (hall, page):
         people = hall.service.decider.people
         people._registry = IdentityRegistry(hall.service.config.view.identity, dict.fromkeys(CAMERAS))
-        await expect(page.locator("#known-words")).to_have_text("Nobody is known yet.")
+        await expect(page.locator("#known-words")).to_have_text("No people yet.")
         see(hall)
         first, second, *_ = people.known
         await page.get_by_label(f"Name of person {first}").fill("Ann")
@@ -162,7 +162,7 @@ async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(b
         await expect(page.locator("#merge-kept option").first).to_have_text(f"{first} Ann")
         await page.get_by_label("who is also").select_option(str(second))
         await page.get_by_role("button", name="Merge").click()
-        await expect(page.locator("#known-words")).to_have_text(f"{second} is {first} from now on.")
+        await expect(page.locator("#known-words")).to_have_text(f"{second} is merged into {first}.")
         assert people.registry.merged == {second: first}
         hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
         await expect(page.locator(f'#known-people [data-object="{second}"]')).to_have_count(0)
@@ -170,7 +170,7 @@ async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(b
         await page.get_by_label("As whom").select_option(str(shown))
         await page.get_by_label("Which camera").select_option(A)
         await page.get_by_role("button", name="Split off as new person").click()
-        await expect(page.locator("#known-words")).to_have_text(re.compile(r"They are \d+ from now on\."))
+        await expect(page.locator("#known-words")).to_have_text(re.compile(r"Split off as person \d+\."))
         assert people.number(A, 1, 19) != shown
         await page.goto(f"http://127.0.0.1:{hall.port}/?object={first}")
         await expect(page.locator("#people .number").first).to_have_text(f"{first} Ann")
@@ -336,7 +336,7 @@ async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes
 ) -> None:
     async with operating(browser, "#calibration", patience=280, **SITE) as (hall, page):
         walking, state = hall.service.walking, page.locator("#walk-state")
-        await expect(state).to_have_text("Nobody walks.")
+        await expect(state).to_have_text("No walk yet.")
         await expect(page.get_by_role("button", name="Finish")).to_be_disabled()
         await page.get_by_role("button", name="Start the walk").click()
         await expect(state).to_have_text("Walk now. 0:00 minutes so far.")
@@ -355,10 +355,10 @@ async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes
         async with page.expect_download() as download:
             await page.get_by_role("link", name="Download the ground file").click()
         await (await download.value).save_as(tmp_path / "ground.json")
-        found = yaml.safe_load(await page.get_by_label("What names the ground file").input_value())
+        found = yaml.safe_load(await page.get_by_label("Configuration lines for the ground file").input_value())
         assert found["ground"] == (await download.value).suggested_filename == "ground.json"
         await page.get_by_role("button", name="Discard").click()
-        await expect(state).to_have_text("Nobody walks.")
+        await expect(state).to_have_text("No walk yet.")
         await expect(page.locator("#walk-result")).to_be_hidden()
     matrices = json.loads((tmp_path / "ground.json").read_text())["homography"]
     assert np.median(errors_on_floor([np.array(matrices[it]) for it in CAMERAS])) < 0.15  # metres
@@ -372,7 +372,7 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         await cost.fill("2")
         await page.get_by_label("Centering").fill("0.5")
         await page.keyboard.press("Enter")
-        await expect(page.locator("#selection-state")).to_have_text("2 tried out, not as the file says.")
+        await expect(page.locator("#selection-state")).to_have_text("2 changed from the file.")
         assert (decider.view.switch_cost_s, decider.view.quality.centering) == (2.0, 0.5)
         assert "switch_cost_s: 2.0" in await lines.input_value()
         ahead = page.get_by_label("Look-ahead, frames")
@@ -381,7 +381,7 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         assert await ahead.evaluate("(it) => it.validity.rangeOverflow")
         await ahead.fill("15")
         await page.keyboard.press("Enter")
-        await expect(page.locator("#selection-state")).to_have_text("3 tried out, not as the file says.")
+        await expect(page.locator("#selection-state")).to_have_text("3 changed from the file.")
         assert decider.view.lookahead == 15
         await page.get_by_label("Size").fill("0")  # the page lets it pass, the site does not: all are 0
         for name in ("Truncation", "Occlusion", "Centering"):
@@ -389,7 +389,7 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         await page.get_by_role("button", name="Try it").click()
         await expect(page.locator("#trouble")).to_contain_text("all weights are 0")
         await page.get_by_role("button", name="Back to the file").click()
-        await expect(page.locator("#selection-state")).to_have_text("As the file says.")
+        await expect(page.locator("#selection-state")).to_have_text("As in the file.")
         await expect(page.locator("#trouble")).to_be_empty()
         assert decider.view == hall.service.config.view
 
@@ -403,7 +403,7 @@ async def test_the_configuration_shows_what_differs_and_finds_the_rest(browser: 
         await page.get_by_label("Find").fill("jpeg")
         await expect(rows).to_have_text(["http.jpeg_quality80"])
         await page.get_by_label("Find").fill("no such")
-        await expect(page.get_by_text("No setting is like that.")).to_be_visible()
+        await expect(page.get_by_text("No matching setting.")).to_be_visible()
 
 
 async def test_at_every_width_nothing_overflows_and_axe_finds_no_serious_fault(browser: Browser) -> None:
