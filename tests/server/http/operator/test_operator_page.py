@@ -355,7 +355,8 @@ async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes
         async with page.expect_download() as download:
             await page.get_by_role("link", name="Download the ground file").click()
         await (await download.value).save_as(tmp_path / "ground.json")
-        found = yaml.safe_load(await page.get_by_label("Configuration lines for the ground file").input_value())
+        lines = page.get_by_label("Configuration lines for the ground file")
+        found = yaml.safe_load(await lines.input_value())
         assert found["ground"] == (await download.value).suggested_filename == "ground.json"
         await page.get_by_role("button", name="Discard").click()
         await expect(state).to_have_text("No walk yet.")
