@@ -45,7 +45,7 @@ MILESTONES = (
     Milestone("install what MyView runs on", re.compile(r"^\S*myview demo$")),
     Milestone("start the demo", re.compile(r"^Three cameras at")),
     Milestone("start the best-view service: the page answers", re.compile(r"page, streams and API on")),
-    Milestone("start the cameras", re.compile(r"camera c\d is there"), 3),
+    Milestone("start the cameras", re.compile(r"camera c\d connected"), 3),
     Milestone("find somebody and show them", re.compile(r"^MyView is ready")),
 )
 

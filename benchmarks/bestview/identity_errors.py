@@ -64,13 +64,13 @@ class Met:
         """Compare the cameras with each other, frame by frame."""
         people = _pairs(self.frame, self.person)
         numbers = _pairs(self.frame, self.number)
-        return _agreement(people, numbers, _pairs(self.frame, self.person, self.number))
+        return _stream_format(people, numbers, _pairs(self.frame, self.person, self.number))
 
     def later(self, frames: int) -> Agreement:
         """Compare each camera with itself so many frames later."""
         people = self._still(frames, self.person)
         numbers = self._still(frames, self.number)
-        return _agreement(people, numbers, self._still(frames, self.person, self.number))
+        return _stream_format(people, numbers, self._still(frames, self.person, self.number))
 
     def _still(self, frames: int, *names: Ints) -> int:
         """Count what has these names and is there in the same camera so many frames later."""
@@ -78,7 +78,7 @@ class Met:
         return len(now.intersection(_rows(self.camera, self.frame + frames, *names)))
 
 
-def _agreement(people: int, numbers: int, both: int) -> Agreement:
+def _stream_format(people: int, numbers: int, both: int) -> Agreement:
     return Agreement(both / people if people else np.nan, both / numbers if numbers else np.nan)
 
 

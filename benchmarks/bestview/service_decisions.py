@@ -56,14 +56,14 @@ def decide(config: Config, messages: Messages, people: Sequence[int] | None = No
     if people is not None:
         decider.people._registry = GivenNumbers(people)  # type: ignore[assignment]  # noqa: SLF001 — truth in its place
     for camera in config.camera_ids:
-        aligner.come(camera)
-        aligner.frame(camera, messages[camera][0].boot, 0)
+        aligner.camera_connected(camera)
+        aligner.frame_received(camera, messages[camera][0].boot, 0)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        recorder = DecisionWriter(folder, config.camera_ids, decider.people.fits)
+        recorder = DecisionWriter(folder, config.camera_ids, decider.people.letterboxes)
         for message in chain.from_iterable(zip_longest(*messages.values())):
             if message is not None:
-                aligner.tracks(message)
+                aligner.add_tracks(message)
             for epoch in aligner.ready(now=-1):
                 for decision in decider.step(epoch):
                     recorder.write(decision)

@@ -23,12 +23,12 @@ def own_parts(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
     ground, error = camera_homographies(config), FootPointError(settings.foot_sideways, settings.foot_upwards)
     aligner = EpochAligner(config.camera_ids, config.track.window.stride, grace=0)
     for camera in config.camera_ids:
-        aligner.come(camera)
-        aligner.frame(camera, messages[camera][0].boot, 0)
+        aligner.camera_connected(camera)
+        aligner.frame_received(camera, messages[camera][0].boot, 0)
     parts: dict[str, list[MotRow]] = {camera: [] for camera in config.camera_ids}
     for message in chain.from_iterable(zip_longest(*messages.values())):
         if message is not None:
-            aligner.tracks(message)
+            aligner.add_tracks(message)
         for epoch in aligner.ready(now=-1):
             tracks = [it for window in reader.read(epoch) for it in window.local_tracks()]
             seen = align_tracks(tracks, ground, error, config.overhead)
@@ -37,7 +37,7 @@ def own_parts(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
             for track, column in zip(*np.nonzero(rows >= 0), strict=True):
                 camera = seen.keys[track].camera
                 left, top, right, bottom = (
-                    reader.fits[camera].boxes_to_site(seen.boxes[track, column]).tolist()
+                    reader.letterboxes[camera].boxes_to_site(seen.boxes[track, column]).tolist()
                 )
                 frame, number = seen.first_frame + int(column) + 1, int(rows[track, column]) + 1
                 parts[camera].append(MotRow(frame, number, left, top, right - left, bottom - top))

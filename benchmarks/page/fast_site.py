@@ -54,10 +54,10 @@ class FastSite:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._agreement = StreamFormat()
+        self._stream_format = StreamFormat()
         self._fragments = [self._loop(seed) for seed in range(len(_CAMERAS))]
-        assert self._agreement.parameters is not None  # noqa: S101 — pictures have been packed
-        self._head = init_segment(self._agreement.parameters, _WIDTH, _HEIGHT)
+        assert self._stream_format.parameters is not None  # noqa: S101 — pictures have been packed
+        self._head = init_segment(self._stream_format.parameters, _WIDTH, _HEIGHT)
 
     def app(self) -> web.Application:
         """Return what answers the page."""
@@ -74,7 +74,7 @@ class FastSite:
         site, rng = SiteSettings(width=_WIDTH, height=_HEIGHT, fps=_FPS), np.random.default_rng(seed)
         encoder, frame_buffer = (
             Encoder(site, EncodeSettings(gop=_GOP)),
-            FrameBuffer(_FPS, _LOOP, self._agreement),
+            FrameBuffer(_FPS, _LOOP, self._stream_format),
         )
         small = rng.integers(0, 255, (_LOOP, _HEIGHT // 16, _WIDTH // 16, 3), dtype=np.uint8)
         for pulse, picture in enumerate(small.repeat(16, axis=1).repeat(16, axis=2)):
@@ -95,7 +95,7 @@ class FastSite:
             first += _GOP
 
     def _describe(self) -> dict[str, Any]:
-        assert self._agreement.codec is not None  # noqa: S101 — as above
+        assert self._stream_format.codec is not None  # noqa: S101 — as above
         return {
             "name": "Hours",
             "fps": _FPS,
@@ -103,7 +103,7 @@ class FastSite:
             "height": _HEIGHT,
             "gop": _GOP,
             "lookahead_frames": _AHEAD,
-            "codec": self._agreement.codec,
+            "codec": self._stream_format.codec,
             "container": "mp4",
             "sound": None,
             "cameras": list(_CAMERAS),

@@ -21,7 +21,7 @@ from bestview import IdentityRegistry
 from server.cli.main import main as command_line
 from server.http.api.events import Events
 from server.messaging.bus import Bus
-from server.service.decision_state import Board
+from server.service.decision_state import DecisionState
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.ingest import Ingest
@@ -100,10 +100,10 @@ def watch(path: Path) -> None:
         (PersonTracker, "update", "people"),
         (ViewQualityBuffer, "put", "quality"),
         (LookaheadWindow, "__init__", "costs"),
-        (Board, "put", "board"),
+        (DecisionState, "put", "board"),
         (BestViewPipeline, "_publish", "publish"),
         (Bus, "publish", "publish"),
-        (Splicer, "decision", "splice"),
+        (Splicer, "publish_decision", "splice"),
         (Events, "_lists", LISTS),
     ):
         watched.wrap(owner, method, stage)

@@ -54,7 +54,7 @@ class Source:
         self._keys = ZenohKeys(service.config.site.name)
         self._trackers = [Tracker(hall, camera, _BOOT) for camera in range(CAMERAS)]
         for name in hall.ids:
-            service.intake.alive(self._keys.camera(name, "alive"), is_present=True)
+            service.ingest.alive(self._keys.camera(name, "alive"), is_present=True)
 
     def pulse(self, number: int) -> None:
         """Send what comes with a pulse, and let the service decide."""
@@ -62,14 +62,14 @@ class Source:
         for name, film in zip(self._hall.ids, self._films, strict=True):
             unit = film[number % len(film)]
             head = FrameHeader(pulse=number, key=unit.key, boot=_BOOT, due=0.0, taken=0.0, encoded=0.0)
-            service.intake.video(self._message(name, "video", unit.data, msgspec.json.encode(head)))
+            service.ingest.video(self._message(name, "video", unit.data, msgspec.json.encode(head)))
         service.pulse = number
         if (number + 1) % STRIDE:
             return
         places = self._hall.places(max(0, number + 1 - WINDOW), number)
         for name, tracker in zip(self._hall.ids, self._trackers, strict=True):
             word = msgspec.json.encode(tracker.message(number // STRIDE, places))
-            service.intake.tracks(self._message(name, "tracks", word, b""))
+            service.ingest.tracks(self._message(name, "tracks", word, b""))
         service.decide()
 
     def _message(self, camera: str, what: str, payload: bytes, attachment: bytes) -> Message:

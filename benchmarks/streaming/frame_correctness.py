@@ -76,10 +76,10 @@ async def judge(frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings
     chosen = schedule(frames // encode.gop, cuts, seed)
     pieces, cut = await _watch(made, chosen, encode)
     own = [_own(film, encode.codec) for film in made]
-    head = cut.agreement.head(_SITE.size, _SITE.fps)
+    head = cut.stream_format.head(_SITE.size, _SITE.fps)
     assert head is not None  # noqa: S101 — key pictures have come
     contained = head + b"".join(piece.data for piece in pieces)
-    has_ts = cut.agreement.container == "mp4"
+    has_ts = cut.stream_format.container == "mp4"
     ts = b"".join(piece.mpegts for piece in pieces if isinstance(piece, MediaChunk)) if has_ts else b""
     expected = [
         own[camera][gop * encode.gop + n] for gop, camera in enumerate(chosen) for n in range(encode.gop)

@@ -33,13 +33,13 @@ class Cut:
 
     def __init__(self, films: Sequence[Sequence[AccessUnit]], config: Config) -> None:
         self._films, self.gop = films, config.encode.gop
-        self.agreement = agreement = stream_format_for(
+        self.stream_format = stream_format = stream_format_for(
             config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
         )
         self._shelves = {
-            name: FrameBuffer(config.site.fps, 4 * self.gop, agreement) for name in config.camera_ids
+            name: FrameBuffer(config.site.fps, 4 * self.gop, stream_format) for name in config.camera_ids
         }
-        self.splicer = Splicer(self._shelves, agreement, config)
+        self.splicer = Splicer(self._shelves, stream_format, config)
 
     def shelve(self, gop: int) -> None:
         """Put a GOP of every camera on the shelves; films go round."""

@@ -14,7 +14,7 @@ from server.config.loader import build_config
 from server.config.site_config import Config
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import AppearanceHistogram, CameraTracks, TrackMessage
-from server.service.decision_state import Board
+from server.service.decision_state import DecisionState
 from server.service.identity.camera_window import WindowReader
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
@@ -116,7 +116,7 @@ def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> S
     ground = np.array([[1.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.002, 1.0]])
     decider = ViewDecider(config, dict.fromkeys(config.camera_ids, ground), lambda _camera, _pulse: True)
     decider.people._registry = _Given()  # type: ignore[assignment]  # noqa: SLF001 — joining is measured elsewhere
-    board, watch = Board(25.0), Stopwatch()
+    board, watch = DecisionState(25.0), Stopwatch()
     stages: tuple[Watched, ...] = (
         (WindowReader, "read", "reading"),
         (ViewQualityBuffer, "put", "quality"),
@@ -127,7 +127,7 @@ def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> S
         (ViewDecider, "step", "rest"),
         (PersonTracker, "update", "people"),
         (PersonTracker, "boxes", "telling"),
-        (Board, "put", "telling"),
+        (DecisionState, "put", "telling"),
     )
     for epoch in crowd.epochs(config, _WARM + epochs):
         if epoch.number < _WARM:

@@ -9,11 +9,11 @@ from server.service.view_selection.explanation import Explanation
 from server.service.view_selection.recent_reasons import RecentReasons, SelectedView, SelectionReason
 
 
-class Board:
+class DecisionState:
     """Remembers every object's newest decision, and the reasons of the last minute."""
 
     def __init__(self, fps: float) -> None:
-        self.standings: dict[int, SelectedView] = {}
+        self.selected_views: dict[int, SelectedView] = {}
         self.merged: dict[int, int] = {}
         self.cuts = 0
         self.end = 0
@@ -33,9 +33,9 @@ class Board:
                 cuts.append(cut)
             self._stand(decision, choice, tuple(seen_by.get(choice.number, ())))
         numbers = {choice.number for choice in decision.choices}
-        self.standings = {number: it for number, it in self.standings.items() if number in numbers}
+        self.selected_views = {number: it for number, it in self.selected_views.items() if number in numbers}
         self.merged = decision.merged
-        self._reasons.put(self.standings, decision.first, decision.why)
+        self._reasons.put(self.selected_views, decision.first, decision.why)
         self.cuts += len(cuts)
         self.end = decision.first + decision.frames
         return GopChoices(
@@ -68,16 +68,16 @@ class Board:
         Returns:
             None: there is no such object, or nothing is kept of that time.
         """
-        standing = self.standings.get(self.resolve(number))
+        standing = self.selected_views.get(self.resolve(number))
         if standing is None:
             return None
         newest = self._reasons.newest(standing)
         return newest if pulse is None else self._reasons.at(standing.choice.number, pulse)
 
     def _stand(self, decision: GopDecision, choice: ObjectChoice, cameras: tuple[str, ...]) -> None:
-        known = self.standings.get(choice.number)
+        known = self.selected_views.get(choice.number)
         stays = known is not None and known.choice.camera == choice.camera
-        self.standings[choice.number] = SelectedView(
+        self.selected_views[choice.number] = SelectedView(
             choice=choice,
             first=decision.first,
             frames=decision.frames,

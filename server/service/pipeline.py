@@ -1,4 +1,4 @@
-"""The best-view service: takes in what the cameras send, decides, splices."""
+"""The best-view pipeline: aligns the cameras' messages, selects views, splices and records streams."""
 
 from __future__ import annotations
 
@@ -11,21 +11,18 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import msgspec
-
 from camsync import Credentials, PulseClient
 from logthrottle import LogThrottle
 from server.config.pulse_access import bestview_client_name, pulse_client_tls, pulse_credentials
 from server.config.sections import ViewSettings
 from server.config.site_config import Config
 from server.media.codec import stream_format_for
-from server.messaging.bus import Bus
-from server.messaging.bus_access import access_control_of
-from server.messaging.inbox import Inbox, Message
-from server.messaging.messages import GopChoices, ZenohKeys
+from server.messaging.inbox import Message
+from server.messaging.messages import GopChoices
+from server.service.bus_connection import BusConnection
 from server.service.calibration.walk_session import WalkSession
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
-from server.service.decision_state import Board
+from server.service.decision_state import DecisionState
 from server.service.identity.state_replication import PATIENCE_S, StateReplication
 from server.service.ingest.backlog import BacklogMonitor
 from server.service.ingest.epoch_aligner import Epoch, EpochAligner
@@ -42,13 +39,12 @@ from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
-_FAR_S = 60.0
-"""How far a camera may have counted ahead of this service, which may have been held up; or this service be
-behind the pulses, and still go through all that it has missed."""
-_TURNS = 10
-"""How often, between two epochs, all inboxes have their turn, as long as something waits in them."""
+_MAX_AHEAD_S = 60.0
+"""How far a camera's pulses may be ahead of this service's, which may have been suspended."""
+_INBOX_TURNS = 10
+"""How often the inboxes are served between two epochs, at most."""
 _FIRST_PULSE_S = 3.0
-"""How long the first pulse is waited for: where there is no pulse server, cameras count alone."""
+"""How long to wait for the first pulse: without a pulse server, cameras count by themselves."""
 
 
 class BestViewPipeline:
@@ -58,100 +54,96 @@ class BestViewPipeline:
         self.config = config
         cameras = config.camera_ids
         fps, stride = config.site.fps, config.track.window.stride
-        grace, behind = round(config.view.late_after_s * fps), round(config.track.backlog_s * fps)
-        # What is waited for must still be there when it is decided.
-        frames = max(round(config.view.buffer_s * fps), behind + 4 * (config.view.lookahead + grace + stride))
-        self.most_lookahead = (frames - behind) // 2 - grace - stride
-        """Frames that can be looked ahead while this runs: half as many as what is kept could do for."""
-        self.agreement = stream_format_for(
+        grace, backlog = round(config.view.late_after_s * fps), round(config.track.backlog_s * fps)
+        # Frames must still be buffered when the last camera that is waited for has reported.
+        frames = max(
+            round(config.view.buffer_s * fps), backlog + 4 * (config.view.lookahead + grace + stride)
+        )
+        self.max_lookahead = (frames - backlog) // 2 - grace - stride
+        """The longest look-ahead, in frames, that can be set at run time: half of what the buffers allow."""
+        self.stream_format = stream_format_for(
             config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
         )
         self.frame_buffers = {
-            camera: FrameBuffer(config.site.fps, frames, self.agreement) for camera in cameras
+            camera: FrameBuffer(config.site.fps, frames, self.stream_format) for camera in cameras
         }
-        far = round(_FAR_S * fps)
-        self.aligner = EpochAligner(cameras, stride, grace, behind, far + grace + behind)
-        form = config.sound.format
-        self.sound = None if form is None else AudioBuffer(form, config.site.fps, frames / config.site.fps)
-        self._keeping_up = BacklogMonitor(frames - config.view.lookahead - config.encode.gop)
-        self.left_out = 0
-        """Epochs that were not decided, since there was more to decide than could be."""
-        self._leaving_out = LogThrottle()
-        self.splicer = Splicer(self.frame_buffers, self.agreement, config, self.sound)
-        self.intake = Ingest(
+        max_ahead = round(_MAX_AHEAD_S * fps)
+        self.aligner = EpochAligner(cameras, stride, grace, backlog, max_ahead + grace + backlog)
+        audio_format = config.sound.format
+        self.audio_buffer = (
+            None
+            if audio_format is None
+            else AudioBuffer(audio_format, config.site.fps, frames / config.site.fps)
+        )
+        self._backlog_monitor = BacklogMonitor(frames - config.view.lookahead - config.encode.gop)
+        self.skipped_epochs = 0
+        """Epochs that were not decided because decisions had fallen too far behind."""
+        self._skip_log = LogThrottle()
+        self.splicer = Splicer(self.frame_buffers, self.stream_format, config, self.audio_buffer)
+        self.ingest = Ingest(
             self.frame_buffers,
             self.aligner,
             self.splicer.publish_frame,
-            self.sound,
-            sounding=config.sounding,
-            now=lambda: self.pulse,
-            ahead=far,
+            self.audio_buffer,
+            audio_camera=config.sounding,
+            current_pulse=lambda: self.pulse,
+            max_ahead=max_ahead,
         )
         self.decider = ViewDecider(
             config, camera_homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
         )
-        self.board = Board(config.site.fps)
+        self.decision_state = DecisionState(config.site.fps)
+        self.bus = BusConnection(config)
         self.assist = OperatorAssist(
-            config, self.decider.people, partial(self._tell_camera, "operator_points")
+            config, self.decider.people, partial(self.bus.send_to_camera, "operator_points")
         )
         self.state_replication = StateReplication(
             self.decider.people,
             cameras,
             fps,
-            partial(self._tell_camera, "identities"),
+            partial(self.bus.send_to_camera, "identities"),
             sends=config.view.share.index == 0,
         )
-        self.walking = WalkSession(config)
-        self.past = Recorder(config, self.frame_buffers, self.agreement, frames, self.sound)
+        self.walk_session = WalkSession(config)
+        self.recorder = Recorder(config, self.frame_buffers, self.stream_format, frames, self.audio_buffer)
         self.pulse = -1
-        self._decided_to = -1
-        """The last pulse of the last epoch; a frame that is said to be of a later one shows nobody."""
+        self._last_decided = -1
+        """The last pulse of the last epoch; later frames have no tracks."""
         self.pulse0: float | None = None
         """When pulse 0 was due, unix seconds; None before the first pulse."""
-        self._pulsed_at: float | None = None
+        self._pulse_received_at: float | None = None
         self._clock: Callable[[], float] = time.time
-        """The pulses', which does not step when the system's is set."""
-        self.losses = LossRecorder(self.frame_buffers, self.intake.states, stride)
-        self.stages = StageTimers()
-        self.inboxes: list[Inbox[Message]] = []
-        """Where the bus's messages wait for the event loop."""
+        """The pulse clock, once connected: it does not jump when the system clock is set."""
+        self.loss_recorder = LossRecorder(self.frame_buffers, self.ingest.states, stride)
+        self.stage_timers = StageTimers()
         self.on_decision: list[Callable[[GopChoices], None]] = []
         self._out = out
-        self._recorder: LiveDecisionWriter | None = None
-        self._bus: Bus | None = None
+        self._decision_writer: LiveDecisionWriter | None = None
         self.pulse_credentials: Credentials | None = None
         self.pulse_tls: ssl.SSLContext | None = None
-        self._keys = ZenohKeys(config.site.name)
         self._changed = asyncio.Event()
-        self._without_pulses = False
-        """Whether the first pulse is not waited for any more."""
+        self._runs_without_pulses = False
+        """Whether the first pulse is no longer waited for."""
 
     def open(self) -> None:
-        """Open the bus, which the cameras connect to; of several services the first one's.
+        """Open the bus that the cameras connect to.
 
         Raises:
-            UserError: its address is in use, or a file of passwords cannot be read.
+            UserError: its address is in use, or a password file cannot be read.
         """
-        index, zenoh = self.config.view.share.index, self.config.zenoh
-        self.pulse_credentials = pulse_credentials(self.config, bestview_client_name(index))
+        self.pulse_credentials = pulse_credentials(
+            self.config, bestview_client_name(self.config.view.share.index)
+        )
         self.pulse_tls = pulse_client_tls(self.config)
-        if index:
-            self._bus = bus = Bus.second(zenoh, bestview_client_name(index))
-        else:
-            self._bus = bus = Bus.router(zenoh, access_control_of(self.config))
         handlers = {
-            "video": self.intake.video,
+            "video": self.ingest.video,
             "tracks": self._tracks,
-            "status": self.intake.status,
-            "thumbs/*": self.intake.thumbnail,
-            "retained_identities": self._remembered,
+            "status": self.ingest.status,
+            "thumbs/*": self.ingest.thumbnail,
+            "retained_identities": self._retained_identities,
         }
-        for what, handler in handlers.items():
-            self.inboxes.append(bus.subscribe(self._keys.camera("*", what), handler))
-        if self.sound is not None:
-            self.inboxes.append(bus.subscribe(self._keys.sound, self.intake.sound))
-        bus.watch_alive(self._keys.camera("*", "alive"), self._alive)
-        bus.declare_alive(self._keys.bestview("alive", index))
+        on_audio = None if self.audio_buffer is None else self.ingest.audio
+        self.bus.open(handlers, on_audio, self._alive)
 
     async def run(self) -> None:
         """Serve until every camera's recording is over.
@@ -159,10 +151,10 @@ class BestViewPipeline:
         Raises:
             UserError: the output folder cannot be written.
         """
-        if self._out is not None:  # not before all ports are listened on: a failed start leaves no files
-            self._recorder = self.losses.recorder = self._record(self._out)
-        self.past.open()
-        patience = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._go_without_pulses)
+        if self._out is not None:  # once all ports are open: a failed start leaves no files
+            self._decision_writer = self.loss_recorder.decision_writer = self._open_decision_files(self._out)
+        self.recorder.open()
+        patience = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._run_without_pulses)
         follow = asyncio.create_task(self._follow_pulses(), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())
         try:
@@ -171,9 +163,9 @@ class BestViewPipeline:
                 self._changed.clear()
                 if follow.done():
                     await follow  # raises what ended it
-                if (self.pulse >= 0 or self._without_pulses) and not self.state_replication.is_waiting:
-                    await self.decide_by_turns()
-            for decision in self.what_is_left():
+                if (self.pulse >= 0 or self._runs_without_pulses) and not self.state_replication.is_waiting:
+                    await self.decide_cooperatively()
+            for decision in self.finish():
                 self._publish(decision)
             log.info("every camera's recording is over")
         finally:
@@ -181,44 +173,43 @@ class BestViewPipeline:
             follow.cancel()
             await asyncio.gather(follow, return_exceptions=True)
 
-    def what_is_left(self) -> list[GopDecision]:
-        """Decide what is left when every recording is over."""
+    def finish(self) -> list[GopDecision]:
+        """Decide the remaining GOPs when every recording is over."""
         newest = max(frame_buffer.newest for frame_buffer in self.frame_buffers.values())
-        return self.decider.finish(min(newest, self._decided_to))
+        return self.decider.finish(min(newest, self._last_decided))
 
-    def _go_without_pulses(self) -> None:
-        self._without_pulses = True
+    def _run_without_pulses(self) -> None:
+        self._runs_without_pulses = True
         self._changed.set()
 
     def decide(self) -> None:
-        """Decide and publish whatever can be decided by now."""
+        """Decide and publish all epochs that are ready."""
         while self._decide_next():
             pass
 
-    async def decide_by_turns(self) -> None:
-        """Do the same, and let viewers, cameras and signals have their turn between two epochs.
+    async def decide_cooperatively(self) -> None:
+        """Decide and publish all epochs that are ready, and serve inboxes and tasks between two epochs.
 
-        On a machine with too much to do there may always be one more. What has come by then is taken in
-        first: pictures that are lost cannot be shown however well they are chosen. What would be decided too
-        late to be shown is left out.
+        On an overloaded machine another epoch may always be ready. Frames are taken in first: a lost frame
+        cannot be shown. Epochs whose decisions would come too late to be shown are skipped.
         """
         while self._decide_next():
             await asyncio.sleep(0)
-            for _ in range(_TURNS):
-                if not any(inbox.waiting for inbox in self.inboxes):
+            for _ in range(_INBOX_TURNS):
+                if not self.bus.has_waiting_messages:
                     break
                 await asyncio.sleep(0)
-            self._keep_up()
+            self._skip_backlog()
 
-    def _keep_up(self) -> None:
-        """Go on with the present where decisions are of pictures that are gone, and do not catch up."""
-        behind = self.aligner.behind(self.pulse)
-        if not self._keeping_up.is_lost(behind):
+    def _skip_backlog(self) -> None:
+        """Skip to the present where decisions do not catch up and their frames are no longer buffered."""
+        backlog = self.aligner.backlog(self.pulse)
+        if not self._backlog_monitor.is_lost(backlog):
             return
-        self.left_out += self.aligner.leave_out(self.pulse)
-        if (more := self._leaving_out.record()) is not None:
-            told = "decisions are %.1f s behind, and do not catch up%s: they go on with now"
-            log.warning(told, behind / self.config.site.fps, more)
+        self.skipped_epochs += self.aligner.skip_to(self.pulse)
+        if (more := self._skip_log.record()) is not None:
+            text = "decisions are %.1f s behind and do not catch up%s: skipping to the present"
+            log.warning(text, backlog / self.config.site.fps, more)
 
     def _decide_next(self) -> bool:
         epoch = self.aligner.next_ready(self.pulse)
@@ -226,52 +217,51 @@ class BestViewPipeline:
             self._step(epoch)
         return epoch is not None
 
-    def _record(self, out: Path) -> LiveDecisionWriter:
+    def _open_decision_files(self, out: Path) -> LiveDecisionWriter:
         try:
-            return LiveDecisionWriter(out, self.config.camera_ids, self.decider.people.fits)
+            return LiveDecisionWriter(out, self.config.camera_ids, self.decider.people.letterboxes)
         except OSError as error:
             raise UserError(f"{out}: cannot write there: {error.strerror}") from error
 
-    def choose_by(self, view: ViewSettings) -> None:
-        """Choose views by other settings from the next GOP on, as far as a running service can.
+    def apply_view_settings(self, view: ViewSettings) -> None:
+        """Select views by other settings from the next GOP on, as far as they can change at run time.
 
         Raises:
-            UserError: the look-ahead is not long enough, or longer than what is kept.
+            UserError: the look-ahead is too short, or longer than the frame buffers allow.
         """
         try:
             self.config.check_lookahead(view)
         except ValueError as error:
             raise UserError(str(error)) from error
-        if view.lookahead > self.most_lookahead:
+        if view.lookahead > self.max_lookahead:
             raise UserError(
-                f"view.lookahead: is {view.lookahead} frames but can be at most {self.most_lookahead} while "
-                "the service runs: what it keeps reaches no further; a longer view.buffer_s and a restart do"
+                f"view.lookahead: is {view.lookahead} frames but can be at most {self.max_lookahead} while "
+                "the service runs (frame buffers); set a longer view.buffer_s and restart for more"
             )
-        self.decider.choose_by(view)
+        self.decider.apply_view_settings(view)
 
-    def go_by(self, config: Config) -> None:
-        """Go by a configuration that differs in what a running service can do, and in what only cameras do.
+    def apply_config(self, config: Config) -> None:
+        """Apply a configuration that differs only in what can change at run time, or in the cameras' part.
 
-        What was tried out meanwhile ends where the configuration says something else about the choice.
+        View settings that were tried out are replaced where the configuration's own have changed.
 
         Raises:
-            UserError: the look-ahead is not long enough, or longer than what is kept.
+            UserError: the look-ahead is too short, or longer than the frame buffers allow.
         """
         if config.view != self.config.view:
-            self.choose_by(config.view)
-        ground = {it.id: {"ground": it.ground} for it in self.config.cameras}  # the scene's is in no file
+            self.apply_view_settings(config.view)
+        ground = {it.id: {"ground": it.ground} for it in self.config.cameras}  # no file has a drawn scene's
         cameras = [it.model_copy(update=ground[it.id]) for it in config.cameras]
         self.config = config.model_copy(update={"cameras": cameras})
 
     def close(self) -> None:
-        """End all streams and let go of the bus and the files."""
-        with contextlib.ExitStack() as closing:  # all of them, whatever one of them says; the last one first
-            if self._bus is not None:
-                closing.callback(self._bus.close)
-            if self._recorder is not None:
-                closing.callback(self._recorder.close)
-            closing.callback(self.past.close)
-            closing.callback(self.walking.stop)
+        """End all streams, and close the bus and the files."""
+        with contextlib.ExitStack() as closing:  # all of them, even if one raises; the last one first
+            closing.callback(self.bus.close)
+            if self._decision_writer is not None:
+                closing.callback(self._decision_writer.close)
+            closing.callback(self.recorder.close)
+            closing.callback(self.walk_session.discard)
             closing.callback(self.splicer.close)
 
     async def _follow_pulses(self) -> None:
@@ -284,65 +274,60 @@ class BestViewPipeline:
             async for pulse in pulses:
                 self.pulse = pulse.number
                 self.pulse0 = pulse.due - pulse.number / fps
-                self._pulsed_at = time.monotonic()
+                self._pulse_received_at = time.monotonic()
                 self._changed.set()
 
     @property
-    def silent_s(self) -> float | None:
+    def seconds_since_pulse(self) -> float | None:
         """Seconds since the newest pulse; None before the first."""
-        return None if self._pulsed_at is None else time.monotonic() - self._pulsed_at
+        received_at = self._pulse_received_at
+        return None if received_at is None else time.monotonic() - received_at
 
     def _tracks(self, message: Message) -> None:
-        self.intake.tracks(message)
+        self.ingest.tracks(message)
         self._changed.set()
 
-    def _alive(self, key: str, there: bool) -> None:
-        self.intake.alive(key, there)
-        self.state_replication.alive(key, there)
+    def _alive(self, key: str, is_present: bool) -> None:
+        self.ingest.alive(key, is_present)
+        self.state_replication.alive(key, is_present)
         self._changed.set()
         if self.state_replication.is_waiting:
             asyncio.get_running_loop().call_later(PATIENCE_S, self._changed.set)
 
-    def _remembered(self, message: Message) -> None:
-        self.intake.remembered(message, self.state_replication.snapshot_received)
+    def _retained_identities(self, message: Message) -> None:
+        self.ingest.retained_identities(message, self.state_replication.snapshot_received)
         self._changed.set()
 
     def _step(self, epoch: Epoch) -> None:
-        self._decided_to = epoch.last
-        self.losses.epoch(epoch)
-        self.walking.take(epoch)
+        self._last_decided = epoch.last
+        self.loss_recorder.epoch(epoch)
+        self.walk_session.add(epoch)
         self.state_replication.begin(epoch.last)
-        with self.stages.deciding():
+        with self.stage_timers.deciding():
             decisions = self.decider.step(epoch)
-        self.state_replication.take(epoch.last)  # names are there with the first decision
+        self.state_replication.take(epoch.last)  # before publishing: names are restored by then
         for decision in decisions:
             self._publish(decision)
         self.assist.step(epoch, self.config)
 
-    def _tell_camera(self, what: str, camera: str, payload: bytes) -> None:
-        if self._bus is not None:
-            self._bus.publish(self._keys.camera(camera, what), payload)
-
     def _publish(self, decision: GopDecision) -> None:
-        """Send a GOP's boxes, then its frames."""
-        with self.stages.sending(lambda: self._late(decision.first)):
+        """Publish a GOP's choices, then its frames."""
+        with self.stage_timers.sending(lambda: self._seconds_since(decision.first)):
             self._send(decision)
 
-    def _late(self, pulse: int) -> float | None:
+    def _seconds_since(self, pulse: int) -> float | None:
         """Return the seconds since a pulse was due; None before the first pulse."""
         return None if self.pulse0 is None else self._clock() - self.pulse0 - pulse / self.config.site.fps
 
     def _send(self, decision: GopDecision) -> None:
-        choices = self.board.put(decision)
-        self.past.put(choices, self.pulse0, self.state_replication.numbers_since)
-        for tell in self.on_decision:
-            tell(choices)
+        choices = self.decision_state.put(decision)
+        self.recorder.put(choices, self.pulse0, self.state_replication.numbers_since)
+        for callback in self.on_decision:
+            callback(choices)
         self.splicer.publish_decision(decision)
         self.splicer.forget(self.decider.people.known, decision.merged)
-        if self._bus is not None:
-            key = self._keys.bestview("choices", self.config.view.share.index)
-            self._bus.publish(key, msgspec.json.encode(choices))
-        if self._recorder is not None:
-            self._recorder.write(decision)
-        self.losses.gop(decision)
-        self.intake.forget_thumbnails_before(decision.first - self.config.view.identity.forget_after)
+        self.bus.publish_choices(choices)
+        if self._decision_writer is not None:
+            self._decision_writer.write(decision)
+        self.loss_recorder.gop(decision)
+        self.ingest.forget_thumbnails_before(decision.first - self.config.view.identity.forget_after)

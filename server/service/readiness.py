@@ -17,15 +17,15 @@ def why_not_ready(service: BestViewPipeline) -> list[str]:
     """
     reasons = []
     fps = service.config.site.fps
-    silent = service.silent_s
+    silent = service.seconds_since_pulse
     if service.pulse < 0:
         reasons.append("no pulse has come from the pulse server")
     elif silent is not None and silent > max(_SILENT_S, 3 / fps):
         reasons.append(f"no pulse has come for {silent:.0f} s")
-    if not any(state.word == "live" for state in service.intake.states.values()):
+    if not any(state.label == "live" for state in service.ingest.states.values()):
         reasons.append("no camera delivers frames")
-    behind = service.pulse + 1 - service.board.end
-    if service.board.end == 0:
+    behind = service.pulse + 1 - service.decision_state.end
+    if service.decision_state.end == 0:
         reasons.append("nothing has been decided yet")
     elif behind > most_behind(service):
         reasons.append(f"decisions are {behind / fps:.1f} s behind the pulses")

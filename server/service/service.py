@@ -62,7 +62,7 @@ class BestViewService:
     @property
     def decided_end(self) -> int:
         """The pulse after the newest decided frame."""
-        return self._pipeline.board.end
+        return self._pipeline.decision_state.end
 
     def register_metrics(self, registry: CollectorRegistry, queues: Mapping[str, Callable[[], int]]) -> None:
         """Register the metrics of cameras and service; ``queues`` are further lengths to report, by name."""

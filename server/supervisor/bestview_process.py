@@ -51,7 +51,7 @@ async def _follow(running: ActiveConfig, pipeline: BestViewPipeline) -> None:
     """Go by a configuration that is read again, as far as a running service can."""
     async for reload in reloads(running):
         try:
-            pipeline.go_by(reload.now)
+            pipeline.apply_config(reload.now)
         except UserError as error:
             log.warning("%s: %s; the previous configuration stays in force", running.path, error)
         except Exception:

@@ -175,7 +175,7 @@ async def test_an_access_unit_without_a_picture_is_counted_and_dropped(damaged: 
     right = video("c0", units[1])
     service.handle(Message(right.key, damaged, right.attachment))
     service.handle(video("c0", units[2]))
-    assert service.intake.states["c0"].bad_messages == 1
+    assert service.ingest.states["c0"].bad_messages == 1
     assert not service.frame_buffers["c0"].has(1)
     assert service.frame_buffers["c0"].has(2)
 
@@ -242,12 +242,12 @@ def test_a_playlist_of_a_time_that_no_calendar_has_is_written_without_it(tmp_pat
 
 
 def test_a_recording_whose_times_leave_all_bounds_becomes_a_film_from_time_0(tmp_path: Path) -> None:
-    agreement, (unit, *_) = StreamFormat(), pictures(0, 1)
-    agreement.accept(unit.data)
-    head = agreement.head(site().site.size, site().site.fps, AudioFormat(48_000, 2)) or b""
+    stream_format, (unit, *_) = StreamFormat(), pictures(0, 1)
+    stream_format.accept(unit.data)
+    head = stream_format.head(site().site.size, site().site.fps, AudioFormat(48_000, 2)) or b""
     form = AudioFormat(48_000, 2)
     sound = audio_fragment(form, [form.silence] * 3, 0)
-    picture = bytearray(agreement.pack(unit.data, 0, 25.0, key=True))
+    picture = bytearray(stream_format.pack(unit.data, 0, 25.0, key=True))
     at = picture.index(b"tfdt") + 8
     picture[at : at + 8] = (1 << 60).to_bytes(8, "big")
     part = tmp_path / "film.part"
@@ -279,7 +279,7 @@ def test_words_nested_without_end_are_counted_and_dropped() -> None:
     exchange._read(Message(KEYS.camera("c1", "detections"), payload, b""))
     service = Fed(site())
     service.handle(Message(KEYS.camera("c0", "status"), payload, b""))
-    assert exchange.bad_messages == service.intake.states["c0"].bad_messages == 1
+    assert exchange.bad_messages == service.ingest.states["c0"].bad_messages == 1
 
 
 BAD_REQUESTS: list[bytes] = [

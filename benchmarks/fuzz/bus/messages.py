@@ -58,7 +58,7 @@ _packed = msgspec.msgpack.encode
 
 
 class Messages(Target):
-    """One message to an intake that has just begun."""
+    """One message to an ingest that has just begun."""
 
     name = "bus-messages"
 
@@ -83,22 +83,22 @@ class Messages(Target):
 
     def feed(self, data: bytes) -> bool:
         """Take it in, and the epoch out that it may have made."""
-        agreement = StreamFormat()
-        frame_buffers = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
+        stream_format = StreamFormat()
+        frame_buffers = {camera: FrameBuffer(FPS, 50, stream_format) for camera in CAMERAS}
         aligner = EpochAligner(CAMERAS, STRIDE, grace=5)
         frame_buffer = AudioBuffer(self._form, FPS, 10.0)
-        intake = Ingest(frame_buffers, aligner, lambda *_: None, frame_buffer, sounding=CAMERAS[0])
-        handlers = (intake.video, intake.tracks, intake.status, intake.thumbnail)
+        ingest = Ingest(frame_buffers, aligner, lambda *_: None, frame_buffer, audio_camera=CAMERAS[0])
+        handlers = (ingest.video, ingest.tracks, ingest.status, ingest.thumbnail)
         for key, payload, head in _script.decode(data):
             message = Message(key, payload, head)
             if key == KEYS.sound:
-                intake.sound(message)
+                ingest.audio(message)
             for what, handle in zip(("video", "tracks", "status", "thumbs"), handlers, strict=True):
                 if f"/{what}" in key:
                     handle(message)
         aligner.ready(now=100)
-        intake.forget_thumbnails_before(1)
-        return not any(it.bad_messages for it in intake.states.values())
+        ingest.forget_thumbnails_before(1)
+        return not any(it.bad_messages for it in ingest.states.values())
 
 
 class Words(Scripts):
@@ -207,7 +207,7 @@ class Sessions(Scripts):
 
     async def _session(self, script: Script) -> bool:
         service = Fed(self._config)
-        service.agreement.accept(self._pictures[0][0].data)
+        service.stream_format.accept(self._pictures[0][0].data)
         viewers = [
             it.subscribe()
             for it in (*service.splicer.cameras.values(), *service.splicer.decided_cameras.values())
@@ -239,7 +239,7 @@ def ask(service: Fed) -> None:
     facade = BestViewService(service)
     for content in (site_info(facade), objects_info(facade), cameras_info(facade)):
         msgspec.json.encode(content)
-    for number in [*service.board.standings, 99]:
+    for number in [*service.decision_state.selected_views, 99]:
         msgspec.json.encode(facade.people.view_selection_of(number))
     generate_latest(make_app(facade)[METRICS])
 

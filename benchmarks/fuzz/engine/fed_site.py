@@ -186,33 +186,33 @@ class Fed(BestViewPipeline):
     def __init__(self, config: Config) -> None:
         super().__init__(config)
         self._handlers: Mapping[str, Callable[[Message], None]] = {
-            "video": self.intake.video,
-            "tracks": self.intake.tracks,
-            "status": self.intake.status,
-            "thumbs": self.intake.thumbnail,
+            "video": self.ingest.video,
+            "tracks": self.ingest.tracks,
+            "status": self.ingest.status,
+            "thumbs": self.ingest.thumbnail,
         }
         self.come(*CAMERAS)
 
     def come(self, *cameras: str) -> None:
         """Let cameras be there."""
         for camera in cameras:
-            self.intake.alive(KEYS.camera(camera, "alive"), is_present=True)
+            self.ingest.alive(KEYS.camera(camera, "alive"), is_present=True)
 
     def handle(self, message: Message) -> None:
         """Take a message in as the bus hands it on, by what its key ends with."""
         if message.key == KEYS.sound:
-            self.intake.sound(message)
+            self.ingest.audio(message)
         parts = message.key.split("/")
         what = parts[4] if len(parts) > 4 else ""
         if what == "alive":
-            self.intake.alive(message.key, is_present=message.payload == b"1")
+            self.ingest.alive(message.key, is_present=message.payload == b"1")
         elif what in self._handlers:
             self._handlers[what](message)
 
     @property
     def dropped(self) -> int:
         """Messages that were counted and dropped."""
-        return sum(it.bad_messages for it in self.intake.states.values())
+        return sum(it.bad_messages for it in self.ingest.states.values())
 
 
 def feed_epoch(service: Fed, rng: Random, epoch: int, epochs: int, word: Word = word) -> None:

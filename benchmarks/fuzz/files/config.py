@@ -211,7 +211,7 @@ class Tried(Target):
             view = change_view_settings(self._view, changes, "to try out")
         except UserError as error:
             return refused(error)
-        self._service.decider.choose_by(view)
+        self._service.decider.apply_view_settings(view)
         return True
 
 

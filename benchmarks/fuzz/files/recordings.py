@@ -76,7 +76,7 @@ class Runs(Scripts):
     async def _record(self) -> Fed:
         service, rng = Fed(self._config), Random(1)
         service.pulse0 = _PULSE0
-        service.past.open()
+        service.recorder.open()
         for epoch in range(_EPOCHS):
             feed_epoch(service, rng, epoch, _EPOCHS)
         service.close()
@@ -109,7 +109,7 @@ class Runs(Scripts):
             self.messages += 1
             (self._run / name).write_bytes(content)
         service = self._service
-        past = Recorder(self._config, service.frame_buffers, service.agreement, 10, service.sound)
+        past = Recorder(self._config, service.frame_buffers, service.stream_format, 10, service.audio_buffer)
         past.pulse0 = _PULSE0
         store = past.folder
         assert store is not None

@@ -52,7 +52,7 @@ class Served:
     async def _serve(self, sections: dict[str, Any], word: Word) -> None:
         config = site(record={"folder": str(Path(self._folder.name) / "kept")}, **sections)
         self.service, rng = Fed(config), Random(1)
-        self.service.past.open()
+        self.service.recorder.open()
         self._stack.callback(self.service.close)
         self.service.pulse0 = 1_700_000_000.0
         for epoch in range(EPOCHS):

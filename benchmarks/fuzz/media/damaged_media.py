@@ -28,13 +28,13 @@ def wrong(rng: Random, data: bytes) -> bytes:
 
 def stream(codec: Literal["h264", "vp8"], frames: int = 10) -> bytes:
     """Return a stream of some GOPs as a viewer is sent it."""
-    agreement = Vp8StreamFormat(WIDTH, HEIGHT) if codec == "vp8" else None
+    stream_format = Vp8StreamFormat(WIDTH, HEIGHT) if codec == "vp8" else None
     form, units = AudioFormat(48_000, 2), pictures(0, frames, codec)
-    if agreement is None:
+    if stream_format is None:
         found = StreamFormat()
         found.accept(units[0].data)
         head = found.head((WIDTH, HEIGHT), FPS, form) or b""
         sound = audio_fragment(form, [form.silence] * 9, 0)
         return head + sound + b"".join(found.pack(it.data, it.pulse, FPS, key=it.key) for it in units)
-    head = agreement.head((WIDTH, HEIGHT), FPS)
-    return head + b"".join(agreement.pack(it.data, it.pulse, FPS, key=it.key) for it in units)
+    head = stream_format.head((WIDTH, HEIGHT), FPS)
+    return head + b"".join(stream_format.pack(it.data, it.pulse, FPS, key=it.key) for it in units)

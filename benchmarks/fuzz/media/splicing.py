@@ -95,7 +95,7 @@ class _Splice(Scripts):
         ask(service)
         for viewer in viewers:
             drain(viewer)
-        return not any(it.refused for it in service.intake.states.values())
+        return not any(it.refused for it in service.ingest.states.values())
 
     async def _cut(self, cuts: _Cuts, units: _Units) -> bool:
         """Cut where the input says, as it may come to anybody's mind: to pictures that never came, too."""
@@ -112,14 +112,14 @@ class _Splice(Scripts):
             decision = replace(
                 self._decided[0], first=gop * STRIDE, choices=choices, merged={}, corrections=()
             )
-            service.past.put(service.board.put(decision), None)
+            service.recorder.put(service.decision_state.put(decision), None)
             service.splicer.publish_decision(decision)
             if gop == 0:
                 viewers += [it.subscribe() for it in service.splicer.persons.values()]
             before = now
         for viewer in viewers:
             drain(viewer)
-        return not any(it.refused for it in service.intake.states.values())
+        return not any(it.refused for it in service.ingest.states.values())
 
     def _show(self, service: Fed, units: _Units, gop: int) -> None:
         for camera, pulse, data in units:

@@ -49,11 +49,11 @@ def calibrate_from_walks(
     """
     with refusing("calibrate"):
         outcome = calibrate_walk(walked, settings, person)
-    if outcome.too_little and not force:
+    if outcome.insufficient and not force:
         raise UserError(
-            f"calibrate: the walk covered too little: {outcome.too_little} (--force writes it anyway)"
+            f"calibrate: the walk covered too little: {outcome.insufficient} (--force writes it anyway)"
         )
-    plot_floor_plan(floor_plan_cameras(outcome.found), "m", plan)
+    plot_floor_plan(floor_plan_cameras(outcome.calibration), "m", plan)
     out.write_text(outcome.ground, encoding="utf-8")
     offsets = ["for the configuration:", *outcome.offsets.splitlines()] if outcome.offsets else []
     return [*outcome.lines, *offsets]

@@ -41,12 +41,17 @@ class FilmWriter:
         self,
         folder: Path,
         frame_buffers: Mapping[str, FrameBuffer],
-        agreement: StreamFormat,
+        stream_format: StreamFormat,
         site: SiteSettings,
         sound: AudioBuffer | None = None,
     ) -> None:
         folder.mkdir()
-        self._folder, self._shelves, self._agreement, self._site = folder, frame_buffers, agreement, site
+        self._folder, self._shelves, self._stream_format, self._site = (
+            folder,
+            frame_buffers,
+            stream_format,
+            site,
+        )
         self._sound = sound
         self._films: dict[int, _Film] = {}
 
@@ -79,20 +84,20 @@ class FilmWriter:
                 film.file.close()
 
     def _begin(self, number: int, decision: GopDecision) -> _Film:
-        file = (self._folder / f"object-{number}.{self._agreement.container}").open("wb")
+        file = (self._folder / f"object-{number}.{self._stream_format.container}").open("wb")
         file.write(self._head(0))
-        showing = GopSequencer(GaplessTimeline(self._agreement, self._site.fps, decision.frames))
+        showing = GopSequencer(GaplessTimeline(self._stream_format, self._site.fps, decision.frames))
         return _Film(file, showing, decision.first, file.tell(), decision.first)
 
     def _write(self, film: _Film, footage: MediaChunk) -> None:
         if footage.audio is not None:
             film.file.write(_begun_at(film.origin, footage.audio, self._site.fps))
         for picture in footage.pictures:
-            film.file.write(self._agreement.begun_at(film.origin, picture.fragment, self._site.fps))
+            film.file.write(self._stream_format.begun_at(film.origin, picture.fragment, self._site.fps))
 
     def _head(self, pulses: int) -> bytes:
         sound = None if self._sound is None else self._sound.format
-        return self._agreement.head(self._site.size, self._site.fps, sound, pulses=pulses) or b""
+        return self._stream_format.head(self._site.size, self._site.fps, sound, pulses=pulses) or b""
 
 
 def _begun_at(origin: int, heard: AudioChunk, fps: float) -> bytes:

@@ -32,20 +32,20 @@ class Renderer:
         self._config, self._folder = config, folder
         # What is to be decided, and what the camera that was run first has done since.
         frames = 4 * (config.view.lookahead + config.encode.gop + config.track.window.stride)
-        agreement = stream_format_for(
+        stream_format = stream_format_for(
             config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
         )
-        self._shelves = {camera: FrameBuffer(config.site.fps, frames, agreement) for camera in cameras}
+        self._shelves = {camera: FrameBuffer(config.site.fps, frames, stream_format) for camera in cameras}
         self._aligner = EpochAligner(cameras, config.track.window.stride, grace=0)
         for camera in cameras:
-            self._aligner.come(camera)
+            self._aligner.camera_connected(camera)
         self._decider = ViewDecider(
             config, camera_homographies(config), lambda camera, pulse: self._shelves[camera].has(pulse)
         )
-        self._recorder = DecisionWriter(folder, cameras, self._decider.people.fits)
+        self._recorder = DecisionWriter(folder, cameras, self._decider.people.letterboxes)
         self._soundtrack = Soundtrack(config)
         frame_buffer = self._soundtrack.frame_buffer
-        self._films = FilmWriter(folder / "best", self._shelves, agreement, config.site, frame_buffer)
+        self._films = FilmWriter(folder / "best", self._shelves, stream_format, config.site, frame_buffer)
         self._sizes: dict[str, Size] = {}
         self.ended: dict[str, int] = {}
         """The last pulse of each camera whose recording is over."""
@@ -55,10 +55,10 @@ class Renderer:
         """Add a camera's batch, and decide what can be decided."""
         for unit in batch.units:
             self._shelves[batch.camera].put(unit.pulse, _BOOT, unit.data, key=unit.key)
-            self._aligner.frame(batch.camera, _BOOT, unit.pulse)
+            self._aligner.frame_received(batch.camera, _BOOT, unit.pulse)
             self.frames += 1
         if batch.tracks is not None:
-            self._aligner.tracks(batch.tracks)
+            self._aligner.add_tracks(batch.tracks)
             self._sizes[batch.camera] = batch.tracks.size
             if batch.ended:
                 self.ended[batch.camera] = batch.tracks.last

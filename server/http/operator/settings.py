@@ -135,7 +135,7 @@ def _selection_settings(service: BestViewService) -> SelectionSettings:
     )
     lines = {key: value for key, value in current.items() if value != defaults[key] or value != file[key]}
     written = "" if not lines else dump_yaml({"view": _nested(lines)})
-    least, most = service.config.least_lookahead, service.operations.most_lookahead
+    least, most = service.config.least_lookahead, service.operations.max_lookahead
     return SelectionSettings(
         values=current, file=file, lines=written, min_lookahead=least, max_lookahead=most
     )

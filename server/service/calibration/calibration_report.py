@@ -1,4 +1,4 @@
-"""From what the cameras saw of a walk to all that is said and written of it."""
+"""Calibrates from a recorded walk, and reports the result as text, configuration lines and a ground file."""
 
 from __future__ import annotations
 
@@ -18,16 +18,20 @@ from bestview.calibration import (
 )
 
 _MOMENT_S = 0.2
-"""Seconds between the moments at which cameras are compared: people walk a sixth of their height."""
+"""Seconds between the moments at which cameras are compared; people walk a sixth of their height in it."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedWalk:
-    """The cameras' walks, and how many frames there are in a second.
+    """One walk as each camera saw it.
 
-    `guessed` are cameras whose picture's size is only guessed, from the boxes; `rate_guessed` is whether the
-    rate is only what is usual. `offsets` are by camera those that the frames have in them already; of those
-    that are `live` none can be set.
+    Attributes:
+        walks: by camera.
+        fps: frames a second.
+        guessed: cameras whose picture size is estimated from the boxes.
+        rate_guessed: whether ``fps`` is a default, not measured.
+        offsets: by camera, the offset that its frame numbers include already.
+        live: cameras that cannot have an offset.
     """
 
     walks: tuple[Walk, ...]
@@ -38,9 +42,9 @@ class RecordedWalk:
     live: tuple[str, ...] = ()
 
 
-def walk_settings(fps: float, shift: float) -> WalkSettings:
-    """Return the settings for cameras that are out of sync by at most `shift` seconds."""
-    return WalkSettings(maximum_offset=round(shift * fps), step=comparison_step(fps))
+def walk_settings(fps: float, max_offset_s: float) -> WalkSettings:
+    """Return the settings for cameras that are out of sync by at most `max_offset_s` seconds."""
+    return WalkSettings(maximum_offset=round(max_offset_s * fps), step=comparison_step(fps))
 
 
 def comparison_step(fps: float) -> int:
@@ -59,76 +63,76 @@ def ground_file_text(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibrationReport:
-    """What a walk has shown.
+    """The result of a calibration, for people and for files.
 
     Attributes:
-        found: the calibration.
-        lines: the same in words: errors, coverage, offsets, and where to walk, too.
-        too_little: what the walk did not cover, where it is a guess for want of that; else empty.
-        offsets: lines of a configuration that bring the cameras into step; empty: they are.
+        calibration: the calibration.
+        lines: the report: errors, coverage, offsets, and where else to walk.
+        insufficient: what the walk did not cover, if the result is a guess because of that; else empty.
+        offsets: configuration lines that synchronize the cameras; empty: they are synchronized.
         ground: the text of the ground file.
     """
 
-    found: WalkCalibration
+    calibration: WalkCalibration
     lines: tuple[str, ...]
-    too_little: str
+    insufficient: str
     offsets: str
     ground: str
 
 
-def calibrate_walk(walked: RecordedWalk, settings: WalkSettings, person: float) -> CalibrationReport:
-    """Lay the cameras on one floor, in metres where people are `person` metres tall.
+def calibrate_walk(recorded: RecordedWalk, settings: WalkSettings, person: float) -> CalibrationReport:
+    """Calibrate the cameras on a common floor, in meters; the walking person is `person` meters tall.
 
     Raises:
-        CalibrationError: the walk says too little.
+        CalibrationError: the walk is insufficient.
     """
-    found = calibrate_from_walks(walked.walks, settings, person)
+    found = calibrate_from_walks(recorded.walks, settings, person)
     missing = [line for it in found.cameras for line in coverage_gaps(it.camera, it.thirds, it.depth_ratio)]
     homographies = {it.camera: it.homography for it in found.cameras}
     return CalibrationReport(
         found,
-        (*report_lines(walked, found, settings), *(it.words for it in missing)),
-        next((it.words for it in missing if it.serious), ""),
-        offset_lines(walked, found) if settings.maximum_offset else "",
-        ground_file_text("m", homographies, details(walked, found, person)),
+        (*report_lines(recorded, found, settings), *(it.text for it in missing)),
+        next((it.text for it in missing if it.serious), ""),
+        offset_lines(recorded, found) if settings.maximum_offset else "",
+        ground_file_text("m", homographies, details(recorded, found, person)),
     )
 
 
 _THIRDS = ("left", "middle", "right")
-_LITTLE = 0.03
-"""Share of a walk below which it has not covered a third of the picture."""
-_SURE = 2.0
-"""Standard errors that an offset must be away from 0, or else it is none."""
-_SHORT_S = 0.15
-"""Seconds in which people walk by a tenth of their height, which is how exactly feet are found."""
-_SHALLOW = 1.25
-"""How many times as tall the nearest must appear as the farthest."""
+_MIN_SHARE = 0.03
+"""Share of a walk's foot points below which a third of the picture is not covered."""
+_SIGNIFICANT = 2.0
+"""An offset counts if it is more standard errors than this away from 0."""
+_DOUBTFUL_S = 0.15
+"""Offsets below this may be errors of foot points: in it people walk a tenth of their height."""
+_MIN_DEPTH_RATIO = 1.25
+"""How many times as tall the nearest person must appear as the farthest."""
 
 
 @dataclass(frozen=True, slots=True)
 class CoverageGap:
-    """Something that the walk did not cover; serious, where a calibration would be a guess."""
+    """Something that the walk did not cover; ``serious`` if the calibration is a guess without it."""
 
-    words: str
+    text: str
     serious: bool
 
 
-def coverage_gaps(camera: str, thirds: Sequence[float], deep: float) -> Iterator[CoverageGap]:
-    """Yield what the walk did not cover; `thirds` and `deep` are as of a `CameraCalibration`."""
-    bare = [name for name, share in zip(_THIRDS, thirds, strict=True) if share < _LITTLE]
-    if bare:
-        where = " and the ".join(bare)
+def coverage_gaps(camera: str, thirds: Sequence[float], depth_ratio: float) -> Iterator[CoverageGap]:
+    """Yield what the walk did not cover; `thirds` and `depth_ratio` are those of a `CameraCalibration`."""
+    uncovered = [name for name, share in zip(_THIRDS, thirds, strict=True) if share < _MIN_SHARE]
+    if uncovered:
+        where = " and the ".join(uncovered)
         yield CoverageGap(
             f"walk also through the {where} third of camera {camera}, if there is floor and another "
             "camera sees it",
-            serious=len(bare) > 1,
+            serious=len(uncovered) > 1,
         )
-    if deep < _SHALLOW:
+    if depth_ratio < _MIN_DEPTH_RATIO:
         yield CoverageGap(f"walk also nearer to camera {camera}, and farther from it", serious=True)
 
 
-def report_lines(walked: RecordedWalk, found: WalkCalibration, settings: WalkSettings) -> list[str]:
-    """Return the report about errors, coverage and offsets, line by line."""
+def report_lines(recorded: RecordedWalk, found: WalkCalibration, settings: WalkSettings) -> list[str]:
+    """Return the lines about errors, coverage and offsets."""
     on_floor, in_pictures = _heights(found.heights), _shares(found.picture)
     lines = [f"feet that two cameras see are {on_floor} apart, in the pictures {in_pictures} of the diagonal"]
     for it in found.cameras:
@@ -140,21 +144,21 @@ def report_lines(walked: RecordedWalk, found: WalkCalibration, settings: WalkSet
         )
     lines += [f"{it.camera}: left out: {it.reason}" for it in found.uncalibrated]
     lines += _floors(found)
-    if walked.guessed:
-        sizes = ", ".join(f"{it.camera} {it.size[0]}x{it.size[1]}" for it in walked.walks)
-        lines.append(f"the pictures' size is guessed from the boxes ({sizes}); --size says it better")
-    if walked.rate_guessed:
-        lines.append(f"{walked.fps:g} frames a second are taken for granted; --fps says it better")
+    if recorded.guessed:
+        sizes = ", ".join(f"{it.camera} {it.size[0]}x{it.size[1]}" for it in recorded.walks)
+        lines.append(f"picture sizes are estimated from the boxes ({sizes}); set them with --size")
+    if recorded.rate_guessed:
+        lines.append(f"{recorded.fps:g} frames a second are assumed; set the rate with --fps")
     if settings.maximum_offset:
-        lines += _offsets(walked, found)
+        lines += _offsets(recorded, found)
     return lines
 
 
-def details(walked: RecordedWalk, found: WalkCalibration, person: float) -> dict[str, Any]:
-    """Return what the ground file holds beside the homographies."""
+def details(recorded: RecordedWalk, found: WalkCalibration, person: float) -> dict[str, Any]:
+    """Return the content of the ground file besides the homographies."""
     return {
         "person": person,
-        "offset": {it.camera: _offset(walked, it) for it in found.cameras},
+        "offset": {it.camera: _offset(recorded, it) for it in found.cameras},
         "floor": {it.camera: it.floor for it in found.cameras},
         "residuals": {
             it.camera: {"heights": _numbers(it.heights), "picture": _numbers(it.picture)}
@@ -169,49 +173,49 @@ def _floors(found: WalkCalibration) -> list[str]:
     if len(floors) == 1:
         return []
     groups = (", ".join(it.camera for it in found.cameras if it.floor == floor) for floor in floors)
-    said = f"there are {len(floors)} floors: {'; '.join(groups)}; no camera sees two of them"
-    return [f"{said}; they lie far apart in the file, and offsets hold within each"]
+    text = f"there are {len(floors)} floors: {'; '.join(groups)}; no camera sees two of them"
+    return [f"{text}; they are placed far apart in the file, and offsets hold within each"]
 
 
-def _offsets(walked: RecordedWalk, found: WalkCalibration) -> list[str]:
+def _offsets(recorded: RecordedWalk, found: WalkCalibration) -> list[str]:
     """Return the report about the cameras' time offsets."""
-    first, fps = found.cameras[0].camera, walked.fps
+    first, fps = found.cameras[0].camera, recorded.fps
     lines = []
     for it in found.cameras:
         if it.offset or it.offset_error:
-            how = "out of step" if _moved(it) else "in step, as far as can be told"
-            if _moved(it) and abs(it.offset) / fps < _SHORT_S:
-                how = "perhaps out of step; feet that are found late look so, too: compare two frames first"
-            if _moved(it) and it.camera in walked.live:
-                how += "; its pictures come when they come: nothing can be set for that"
+            how = "out of sync" if _is_out_of_sync(it) else "in sync, within the error"
+            if _is_out_of_sync(it) and abs(it.offset) / fps < _DOUBTFUL_S:
+                how = "perhaps out of sync; late foot points look alike: compare two frames first"
+            if _is_out_of_sync(it) and it.camera in recorded.live:
+                how += "; a live camera has no configurable offset"
             frames = f"{it.offset:+.1f} frames ({it.offset / fps:+.2f} s)"
-            unsure = f"give or take {_SURE * it.offset_error:.1f}"
-            lines.append(f"{it.camera}: {frames} later than {first}, {unsure}: {how}")
+            margin = f"± {_SIGNIFICANT * it.offset_error:.1f}"
+            lines.append(f"{it.camera}: {frames} later than {first}, {margin}: {how}")
     return lines
 
 
-def offset_lines(walked: RecordedWalk, found: WalkCalibration) -> str:
+def offset_lines(recorded: RecordedWalk, found: WalkCalibration) -> str:
     """Return configuration lines that synchronize the cameras; empty if they are synchronized."""
-    moved = [it for it in found.cameras if _moved(it) and it.camera not in walked.live]
-    lines = [f"  - id: {it.camera}\n    offset: {_use(walked, it)}\n" for it in moved]
+    moved = [it for it in found.cameras if _is_out_of_sync(it) and it.camera not in recorded.live]
+    lines = [f"  - id: {it.camera}\n    offset: {_use(recorded, it)}\n" for it in moved]
     return "".join(["cameras:\n", *lines]) if lines else ""
 
 
-def _offset(walked: RecordedWalk, camera: CameraCalibration) -> dict[str, float]:
+def _offset(recorded: RecordedWalk, camera: CameraCalibration) -> dict[str, float]:
     return {
         "frames": round(camera.offset, 2),
         "error": round(camera.offset_error, 2),
-        "use": _use(walked, camera),
+        "use": _use(recorded, camera),
     }
 
 
-def _use(walked: RecordedWalk, camera: CameraCalibration) -> int:
+def _use(recorded: RecordedWalk, camera: CameraCalibration) -> int:
     """Return the offset to configure: the configured one plus the measured one."""
-    return walked.offsets.get(camera.camera, 0) + (round(camera.offset) if _moved(camera) else 0)
+    return recorded.offsets.get(camera.camera, 0) + (round(camera.offset) if _is_out_of_sync(camera) else 0)
 
 
-def _moved(camera: CameraCalibration) -> bool:
-    return abs(camera.offset) > _SURE * camera.offset_error and round(camera.offset) != 0
+def _is_out_of_sync(camera: CameraCalibration) -> bool:
+    return abs(camera.offset) > _SIGNIFICANT * camera.offset_error and round(camera.offset) != 0
 
 
 def _heights(spread: ErrorSummary) -> str:

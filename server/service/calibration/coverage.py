@@ -11,30 +11,30 @@ from numpy.typing import NDArray
 
 from server.service.calibration.walk_samples import CameraWalk, WalkSamples
 
-_FEW = 10
-"""Feet below which nothing is said of shares."""
+_MIN_FEET = 10
+"""Foot points below which no depth ratio is computed."""
 
 
 @dataclass(frozen=True, slots=True)
 class CameraCoverage:
-    """What one camera has seen of it.
+    """One camera's coverage of the walk.
 
     Attributes:
         camera: its name.
-        feet: feet seen while another camera saw somebody, too, at the moments that are compared.
-        thirds: what shares of them were in the left, middle and right third of the picture; 0 of none.
-        deep: how many times as tall the nearest of them appear as the farthest; None: too few were seen.
+        feet: foot points at compared moments at which another camera saw a person, too.
+        thirds: shares of them in the left, middle and right third of the picture.
+        depth_ratio: apparent height of the nearest over that of the farthest; None: too few foot points.
     """
 
     camera: str
     feet: int
     thirds: tuple[float, float, float]
-    deep: float | None
+    depth_ratio: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class PairCoverage:
-    """For how many seconds two cameras saw somebody at once."""
+    """For how many seconds two cameras saw a person at the same time."""
 
     one: str
     other: str
@@ -43,25 +43,25 @@ class PairCoverage:
 
 @dataclass(frozen=True, slots=True)
 class WalkCoverage:
-    """What all of them have seen of it."""
+    """The coverage of all cameras and pairs."""
 
     cameras: tuple[CameraCoverage, ...] = ()
     pairs: tuple[PairCoverage, ...] = ()
 
 
-def walk_coverage(trails: Sequence[CameraWalk], seconds: float) -> WalkCoverage:
+def walk_coverage(walks: Sequence[CameraWalk], seconds: float) -> WalkCoverage:
     """Return what a walk has covered; compared moments are ``seconds`` apart."""
-    samples = [it.samples for it in trails]
+    samples = [it.samples for it in walks]
     moments = 1 + max((int(it.moment.max()) for it in samples if it.moment.size), default=-1)
     there = np.zeros((len(samples), moments), dtype=np.bool_)
     for row, it in zip(there, samples, strict=True):
         row[it.moment] = True
     count = there.sum(axis=0)
-    cameras = [_camera(trail.camera, it, count) for trail, it in zip(trails, samples, strict=True)]
+    cameras = [_camera(walk.camera, it, count) for walk, it in zip(walks, samples, strict=True)]
     both = there.astype(np.int64) @ there.T.astype(np.int64)
     pairs = [
-        PairCoverage(trails[one].camera, trails[other].camera, seconds * int(both[one, other]))
-        for one, other in combinations(range(len(trails)), 2)
+        PairCoverage(walks[one].camera, walks[other].camera, seconds * int(both[one, other]))
+        for one, other in combinations(range(len(walks)), 2)
     ]
     return WalkCoverage(tuple(cameras), tuple(pairs))
 
@@ -69,8 +69,8 @@ def walk_coverage(trails: Sequence[CameraWalk], seconds: float) -> WalkCoverage:
 def _camera(name: str, samples: WalkSamples, count: NDArray[np.int64]) -> CameraCoverage:
     """Return one camera's coverage; ``count`` (M,) is how many cameras saw a person at each moment."""
     shared = count[samples.moment] > 1
-    third, tall = samples.third[shared], samples.tall[shared]
+    third, height = samples.third[shared], samples.height[shared]
     left, middle, right = (float(it) for it in np.bincount(third, minlength=3) / max(1, len(third)))
-    small, large = np.quantile(tall, (0.05, 0.95)) if len(tall) >= _FEW else (0.0, 0.0)
-    deep = float(large / small) if small > 0 else None
-    return CameraCoverage(name, len(third), (left, middle, right), deep)
+    small, large = np.quantile(height, (0.05, 0.95)) if len(height) >= _MIN_FEET else (0.0, 0.0)
+    depth_ratio = float(large / small) if small > 0 else None
+    return CameraCoverage(name, len(third), (left, middle, right), depth_ratio)

@@ -1,4 +1,4 @@
-"""What the service tells the process that calibrates, and what that answers: a message each, MessagePack."""
+"""Messages to and from the calibration process, MessagePack, and the function that runs it."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from server.system.child_process import start_worker
 
 
 class CameraBoxes(msgspec.Struct, frozen=True, array_like=True):
-    """What one camera saw of a walk: R boxes. Arrays as they lie in memory: they are long."""
+    """One camera's R boxes of a walk. Arrays are sent as raw bytes: they are long."""
 
     camera: str
     size: tuple[int, int]
     """Width and height of its own picture, pixels."""
     frames: bytes
     """(R,) int64 from 0."""
-    who: bytes
-    """(R,) int64, whose track each is."""
+    track: bytes
+    """(R,) int64, the index of the track."""
     boxes: bytes
     """(R, 4) float64, left, top, right, bottom in pixels of that picture."""
 
@@ -27,26 +27,27 @@ class CameraBoxes(msgspec.Struct, frozen=True, array_like=True):
 class CalibrationTask(msgspec.Struct, frozen=True):
     """A walk to calibrate from."""
 
-    seen: list[CameraBoxes]
+    cameras: list[CameraBoxes]
     fps: float
-    shift: float
-    """Largest time offset between cameras, seconds."""
+    max_offset_s: float
+    """The largest time offset between cameras, in seconds."""
     person: float
-    """People's height, meters."""
+    """The person's height, meters."""
     offsets: dict[str, int]
-    """By camera: what the frames have in them already; of those that it can be set of."""
+    """By camera, the offset that the configuration applies already; only cameras that can have one."""
 
 
 class CalibrationResult(msgspec.Struct, frozen=True):
-    """What has come of it."""
+    """The result of a calibration."""
 
     error: str = ""
-    """Why nothing has; empty: something has."""
+    """Why the calibration failed; empty: it succeeded."""
     lines: list[str] = []
-    too_little: str = ""
-    """What the walk did not cover, where the result is a guess for want of that."""
+    """The report."""
+    insufficient: str = ""
+    """What the walk did not cover, if the result is only a guess because of that; else empty."""
     offsets: str = ""
-    """Lines of a configuration that bring the cameras into step; empty: they are."""
+    """Configuration lines that synchronize the cameras; empty: they are synchronized."""
     ground: str = ""
     """The text of the ground file."""
     plan: bytes = b""
@@ -57,17 +58,17 @@ log = logging.getLogger(__name__)
 
 
 async def run_calibration(task: CalibrationTask) -> CalibrationResult:
-    """Let a process of its own calibrate from a walk; it is ended where nobody waits for it any more."""
+    """Calibrate from a walk in a process of its own, which is killed if the caller is cancelled."""
     try:
         process = await start_worker("server.service.calibration")
     except OSError as error:
         return CalibrationResult(error=f"the calibration cannot be started: {error.strerror}")
     try:
-        said, _ = await process.communicate(msgspec.msgpack.encode(task))
-        return msgspec.msgpack.decode(said, type=CalibrationResult)
+        answer, _ = await process.communicate(msgspec.msgpack.encode(task))
+        return msgspec.msgpack.decode(answer, type=CalibrationResult)
     except msgspec.DecodeError:
-        log.error("the process that calibrates ended with status %s", process.returncode)  # noqa: TRY400
-        return CalibrationResult(error="the calibration went wrong; the server's log says more")
+        log.error("the calibration process ended with status %s", process.returncode)  # noqa: TRY400
+        return CalibrationResult(error="the calibration failed; see the server's log")
     finally:
         if process.returncode is None:
             with contextlib.suppress(ProcessLookupError):

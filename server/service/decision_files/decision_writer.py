@@ -34,14 +34,19 @@ class DecisionWriter:
     """
 
     def __init__(
-        self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Letterbox], *, private: bool = False
+        self,
+        folder: Path,
+        cameras: Sequence[str],
+        letterboxes: Mapping[str, Letterbox],
+        *,
+        private: bool = False,
     ) -> None:
         """Begin new files in a folder, which may exist; ``private``: for this user alone.
 
         Raises:
             OSError: one cannot be written.
         """
-        self._fits = fits
+        self._fits = letterboxes
         if private:
             make_private_folder(folder / "tracks")
         else:

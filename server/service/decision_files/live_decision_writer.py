@@ -34,14 +34,14 @@ class LiveDecisionWriter:
     ``late.csv`` lists the frames that are missing.
     """
 
-    def __init__(self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Letterbox]) -> None:
+    def __init__(self, folder: Path, cameras: Sequence[str], letterboxes: Mapping[str, Letterbox]) -> None:
         """Begin new files, for this user alone, in a folder, which may exist.
 
         Raises:
             OSError: one cannot be written.
         """
         self._folder = folder
-        self._recorder = DecisionWriter(folder, cameras, fits, private=True)
+        self._recorder = DecisionWriter(folder, cameras, letterboxes, private=True)
         self._late: list[_LateFrame] = []
         self._missing = range(0)
         """Pulses of which nothing could be written, and ``late.csv`` does not say so yet."""

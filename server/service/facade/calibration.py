@@ -14,19 +14,19 @@ _LINES = "ground: ground.json\n"
 
 
 class WalkCamera(msgspec.Struct, frozen=True):
-    """What one camera has seen of a walk."""
+    """One camera's coverage of a walk."""
 
     camera: str
     foot_points: int
-    """Feet that were seen while another camera saw somebody, too, some five a second."""
+    """Foot points seen while another camera saw a person, too; some five a second."""
     thirds: list[float]
-    """What shares of them were in the left, the middle and the right third of the picture."""
+    """Shares of them in the left, middle and right third of the picture."""
     depth_ratio: float | None
-    """How many times as tall the nearest of them appear as the farthest; null: too few were seen."""
+    """Apparent height of the nearest over that of the farthest; null: too few foot points."""
 
 
 class WalkPair(msgspec.Struct, frozen=True):
-    """For how many seconds two cameras saw somebody at once."""
+    """For how many seconds two cameras saw a person at the same time."""
 
     one: str
     other: str
@@ -34,70 +34,72 @@ class WalkPair(msgspec.Struct, frozen=True):
 
 
 class OperatorWalk(msgspec.Struct, frozen=True):
-    """The walk that the cameras are calibrated from."""
+    """The calibration walk: its coverage so far, and its result."""
 
     state: str
-    """none, walking, working (it is calibrated from) or done."""
+    """none, walking, working (calibration runs) or done."""
     seconds: float
-    """For how long was walked."""
+    """The duration of the walk."""
     max_seconds: float
-    """Seconds after which nothing more is taken in."""
+    """The longest walk; later boxes are ignored."""
     cameras: list[WalkCamera]
     pairs: list[WalkPair]
     uncovered: list[str]
-    """Where to walk, too, as far as can be told before it is calibrated from."""
+    """Where else to walk, as far as is known before the calibration."""
     error: str
-    """Why nothing has come of it; empty: something has, or it is not done."""
+    """Why the calibration failed; empty: it succeeded, or has not finished."""
     lines: list[str]
-    """What has come of it, in words."""
+    """The report of the calibration."""
     insufficient: str
-    """What was not walked, where the result is a guess for want of that; else empty."""
+    """What the walk did not cover, if the result is only a guess because of that; else empty."""
     configuration: str
-    """The lines for the configuration; empty: there is no ground file."""
+    """Lines for the configuration; empty: there is no ground file."""
 
 
 class CalibrationService:
     """Queries and commands about the calibration walk."""
 
     def __init__(self, pipeline: BestViewPipeline) -> None:
-        self._walking = pipeline.walking
+        self._walk = pipeline.walk_session
 
     def status(self) -> OperatorWalk:
-        """Return what was covered of the walk so far, and its result once it is calibrated from."""
-        walking = self._walking
-        done = walking.done or CalibrationResult()
-        covered = walking.coverage()
+        """Return the coverage of the walk so far, and the result of the calibration."""
+        walk = self._walk
+        result = walk.result or CalibrationResult()
+        covered = walk.coverage()
         uncovered = [
-            it.words
-            for seen in covered.cameras
-            for it in coverage_gaps(seen.camera, seen.thirds, seen.deep or float("inf"))
+            gap.text
+            for camera in covered.cameras
+            for gap in coverage_gaps(camera.camera, camera.thirds, camera.depth_ratio or float("inf"))
         ]
         return OperatorWalk(
-            state=walking.state.value,
-            seconds=walking.seconds,
+            state=walk.state.value,
+            seconds=walk.seconds,
             max_seconds=MAX_WALK_S,
-            cameras=[WalkCamera(it.camera, it.feet, list(it.thirds), it.deep) for it in covered.cameras],
+            cameras=[
+                WalkCamera(it.camera, it.feet, list(it.thirds), it.depth_ratio) for it in covered.cameras
+            ],
             pairs=[WalkPair(it.one, it.other, it.seconds) for it in covered.pairs],
             uncovered=uncovered,
-            error=done.error,
-            lines=done.lines,
-            insufficient=done.too_little,
-            configuration=_LINES + done.offsets if done.ground else "",
+            error=result.error,
+            lines=result.lines,
+            insufficient=result.insufficient,
+            configuration=_LINES + result.offsets if result.ground else "",
         )
 
     def start(self) -> None:
         """Start a walk; an earlier one is discarded."""
-        self._walking.start()
+        self._walk.start()
 
     def resume(self) -> None:
-        """Go on with the walk after it was calibrated from.
+        """Continue the walk after a calibration.
 
         Raises:
             ConflictError: there is no walk.
         """
         self._check_started()
-        if self._walking.state is not WalkState.WALKING:
-            self._walking.go_on()
+        if self._walk.state is not WalkState.WALKING:
+            self._walk.resume()
 
     def finish(self, person_height: float) -> None:
         """Calibrate from the walk, in a process of its own; ``person_height`` is in meters.
@@ -106,23 +108,23 @@ class CalibrationService:
             ConflictError: there is no walk.
         """
         self._check_started()
-        if self._walking.state is not WalkState.WORKING:
-            self._walking.finish(person_height)
+        if self._walk.state is not WalkState.WORKING:
+            self._walk.finish(person_height)
 
     def discard(self) -> None:
         """Discard the walk and its result."""
-        self._walking.stop()
+        self._walk.discard()
 
     def ground_file(self) -> bytes | None:
         """Return the ground file that the walk has resulted in, JSON; None: there is none."""
-        done = self._walking.done
-        return done.ground.encode() if done is not None and done.ground else None
+        result = self._walk.result
+        return result.ground.encode() if result is not None and result.ground else None
 
     def floor_plan(self) -> bytes | None:
         """Return the drawn floor plan that the walk has resulted in, PNG; None: there is none."""
-        done = self._walking.done
-        return done.plan if done is not None and done.plan else None
+        result = self._walk.result
+        return result.plan if result is not None and result.plan else None
 
     def _check_started(self) -> None:
-        if self._walking.state is WalkState.NONE:
+        if self._walk.state is WalkState.NONE:
             raise ConflictError("there is no walk: start one first")

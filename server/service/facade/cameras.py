@@ -103,18 +103,18 @@ class CameraService:
 
     def list_cameras(self) -> list[CameraInfo]:
         """Return how each camera works, as far as any viewer may know."""
-        return [self._info(*it) for it in self._pipeline.intake.states.items()]
+        return [self._info(*it) for it in self._pipeline.ingest.states.items()]
 
     def diagnose_cameras(self) -> list[OperatorCamera]:
         """Return all that is measured of each camera, for the operator."""
-        return [self._diagnosed(*it) for it in self._pipeline.intake.states.items()]
+        return [self._diagnosed(*it) for it in self._pipeline.ingest.states.items()]
 
     def map_floor(self) -> Floor:
         """Return what each calibrated camera covers of the floor."""
         config = self._pipeline.config
         cameras = []
         for camera in config.cameras:
-            own = self._pipeline.intake.states[camera.id].gauge.size
+            own = self._pipeline.ingest.states[camera.id].metrics.size
             if camera.ground is not None and own is not None:
                 ground = np.array(camera.ground, dtype=np.float64)
                 part = floor_coverage(ground, own, (config.site.width, config.site.height))
@@ -125,7 +125,7 @@ class CameraService:
         status = state.status
         return CameraInfo(
             camera=camera,
-            state=state.word,
+            state=state.label,
             pulse=self._pipeline.frame_buffers[camera].newest,
             late=self._pipeline.aligner.late_messages[camera],
             fps=status.fps if status else 0.0,
@@ -137,7 +137,7 @@ class CameraService:
         )
 
     def _diagnosed(self, camera: str, state: CameraState) -> OperatorCamera:
-        status, gauge = state.status, state.gauge
+        status, gauge = state.status, state.metrics
         return OperatorCamera(
             **msgspec.structs.asdict(self._info(camera, state)),
             bad_messages=state.bad_messages,

@@ -54,8 +54,8 @@ class OperationsService:
 
     def readiness(self) -> Readiness:
         """Return whether a best view can be served: pulses and frames arrive, and decisions keep up."""
-        states = self._pipeline.intake.states.values()
-        live = sum(state.word == "live" for state in states)
+        states = self._pipeline.ingest.states.values()
+        live = sum(state.label == "live" for state in states)
         return Readiness(why_not_ready(self._pipeline), live, len(states))
 
     async def list_pulse_clients(self) -> Pulses:
@@ -82,9 +82,9 @@ class OperationsService:
         return self._pipeline.decider.view
 
     @property
-    def most_lookahead(self) -> int:
+    def max_lookahead(self) -> int:
         """The longest look-ahead that can be set while the service runs, in frames."""
-        return self._pipeline.most_lookahead
+        return self._pipeline.max_lookahead
 
     def change_view_settings(self, view: ViewSettings) -> None:
         """Select views by other settings until they are changed again or the service ends.
@@ -92,8 +92,8 @@ class OperationsService:
         Raises:
             UserError: the look-ahead is too short, or longer than what is kept.
         """
-        self._pipeline.choose_by(view)
+        self._pipeline.apply_view_settings(view)
 
     def reset_view_settings(self) -> None:
         """Select views by the configuration's settings again."""
-        self._pipeline.choose_by(self._pipeline.config.view)
+        self._pipeline.apply_view_settings(self._pipeline.config.view)

@@ -158,7 +158,7 @@ class PeopleService:
         """Return everybody who has a stream, by number."""
         people, thumbnails = self._pipeline.decider.people, self._thumbnails()
         summaries = []
-        for number, standing in sorted(self._pipeline.board.standings.items()):
+        for number, standing in sorted(self._pipeline.decision_state.selected_views.items()):
             thumbnail = self._newest(number, thumbnails.get(number, []))
             summaries.append(
                 PersonSummary(
@@ -187,7 +187,7 @@ class PeopleService:
 
     def current_number(self, number: int) -> int:
         """Return the number that a merged one goes by now, as far as decisions have been published."""
-        return self._pipeline.board.resolve(number)
+        return self._pipeline.decision_state.resolve(number)
 
     def unknown(self, number: int) -> UnknownObjectError:
         """Return the error to raise where nobody has this number."""
@@ -204,7 +204,7 @@ class PeopleService:
         Returns:
             None: there is no such person, or nothing is kept of that time.
         """
-        explained = self._pipeline.board.explain(number, pulse)
+        explained = self._pipeline.decision_state.explain(number, pulse)
         if explained is None:
             return None
         standing, why = explained.standing, explained.why
@@ -316,7 +316,7 @@ class PeopleService:
     def _thumbnails(self) -> dict[int, list[tuple[str, Thumbnail]]]:
         """Return every person's thumbnails by number, each with its camera."""
         thumbnails: dict[int, list[tuple[str, Thumbnail]]] = {}
-        for (camera, boot, track), thumbnail in self._pipeline.intake.thumbnails.items():
+        for (camera, boot, track), thumbnail in self._pipeline.ingest.thumbnails.items():
             number = self._pipeline.decider.people.person_of(camera, boot, track, thumbnail.pulse)
             if number is not None:
                 thumbnails.setdefault(number, []).append((camera, thumbnail))
@@ -325,7 +325,7 @@ class PeopleService:
     def _newest(self, number: int, thumbnails: list[tuple[str, Thumbnail]]) -> Thumbnail | None:
         if not thumbnails:
             return None
-        standing = self._pipeline.board.standings.get(number)
+        standing = self._pipeline.decision_state.selected_views.get(number)
         chosen = standing.choice.camera if standing else None
         newest = max(thumbnail.pulse for _, thumbnail in thumbnails)
         recent = newest - round(_THUMBNAIL_RECENT_S * self._pipeline.config.site.fps)

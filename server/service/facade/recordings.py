@@ -100,7 +100,7 @@ class RecordedStream:
         self, playback: PlaybackRange, live: Callable[[], Broadcaster | None]
     ) -> AsyncGenerator[MediaChunk, None]:
         """Play GOP after GOP from a moment on; ``live`` returns the stream to go on with at the present."""
-        fps, audio = self._pipeline.config.site.fps, self._pipeline.past.audio_buffer
+        fps, audio = self._pipeline.config.site.fps, self._pipeline.recorder.audio_buffer
         hearing = None if audio is None else PlaybackAudio(audio, self._recorded_audio, lambda: self.end)
         stream = TimeShiftStream(self._source, self._timeline(), fps, live, hearing)
         return stream.send(playback)
@@ -114,7 +114,7 @@ class RecordedStream:
             self._timeline,
             self._hearing,
             gop=pipeline.config.encode.gop,
-            decided=pipeline.past.recent.end,
+            decided=pipeline.recorder.recent.end,
             has_ended=over,
         )
 
@@ -130,21 +130,21 @@ class RecordedStream:
 
     def _timeline(self) -> GaplessTimeline:
         config = self._pipeline.config
-        return GaplessTimeline(self._pipeline.agreement, config.site.fps, config.encode.gop)
+        return GaplessTimeline(self._pipeline.stream_format, config.site.fps, config.encode.gop)
 
     def _hearing(self) -> PlaybackAudio | None:
-        audio = self._pipeline.past.audio_buffer
+        audio = self._pipeline.recorder.audio_buffer
         return None if audio is None else PlaybackAudio(audio, self._recorded_audio)
 
     def _recorded_audio(self) -> Sequence[SessionEntries]:
-        return recorded_audio(self._pipeline.past)
+        return recorded_audio(self._pipeline.recorder)
 
 
 class RecordingService:
     """Queries about what is kept."""
 
     def __init__(self, pipeline: BestViewPipeline) -> None:
-        self._pipeline, self._past = pipeline, pipeline.past
+        self._pipeline, self._past = pipeline, pipeline.recorder
 
     @property
     def end(self) -> int:
@@ -160,7 +160,7 @@ class RecordingService:
     def of_person(self, number: int, *, scoped: bool) -> RecordedStream:
         """Return what is kept of a person, ``scoped``: blanked where nobody saw them."""
         pipeline, past = self._pipeline, self._past
-        now = pipeline.board.resolve(number)
+        now = pipeline.decision_state.resolve(number)
         numbers = (number,) if number == now else (now, number)
         presence = None
         if scoped:

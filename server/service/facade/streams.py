@@ -48,12 +48,12 @@ class StreamService:
     @property
     def codec(self) -> str | None:
         """RFC 6381 codec string of every stream's video; None before the first keyframe."""
-        return self._pipeline.agreement.codec
+        return self._pipeline.stream_format.codec
 
     @property
     def container(self) -> str:
         """The container of every stream, mp4 or webm, which follows from the codec."""
-        return self._pipeline.agreement.container
+        return self._pipeline.stream_format.container
 
     @property
     def audio_codec(self) -> str | None:
@@ -64,12 +64,12 @@ class StreamService:
     def init_segment(self) -> bytes | None:
         """Return the MP4 init segment that all streams share; None before the first keyframe."""
         config = self._pipeline.config
-        return self._pipeline.agreement.head(config.site.size, config.site.fps, config.sound.format)
+        return self._pipeline.stream_format.head(config.site.size, config.site.fps, config.sound.format)
 
     def webm_header(self) -> bytes | None:
         """Return the header of all WebM streams of a VP8 site; None before the first keyframe."""
         site = self._pipeline.config.site
-        return self._pipeline.agreement.head(site.size, site.fps)
+        return self._pipeline.stream_format.head(site.size, site.fps)
 
     @property
     def segment_plan(self) -> SegmentLayout:

@@ -91,7 +91,7 @@ class WindowReader:
     def __init__(self, site_size: tuple[int, int]) -> None:
         self._site_size = site_size
         self.locals = LocalNumbers()
-        self.fits: dict[str, Letterbox] = {}
+        self.letterboxes: dict[str, Letterbox] = {}
         """By camera, from its first message on; replaced when the size of its picture changes."""
         self._final: dict[str, int] = {}
         """By camera, the last frame that was final."""
@@ -107,13 +107,13 @@ class WindowReader:
 
         Decoded lazily: the repair of one may exchange the keys that the next is decoded with.
         """
-        for message in epoch.mended:
+        for message in epoch.late_revisions:
             yield self._window(message)
 
     def _window(self, message: CameraTracks) -> CameraWindow:
-        fit = self.fits.get(message.camera)
+        fit = self.letterboxes.get(message.camera)
         if fit is None or fit.own != message.size:
-            fit = self.fits[message.camera] = Letterbox(message.size, self._site_size)
+            fit = self.letterboxes[message.camera] = Letterbox(message.size, self._site_size)
         keys = self.locals.of(message)
         frames = max(0, message.last - message.first + 1)
         boxes = boxes_array(track.boxes for track in message.tracks)

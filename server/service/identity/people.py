@@ -108,9 +108,9 @@ class PersonTracker:
         return [*late, *windows]
 
     @property
-    def fits(self) -> Mapping[str, Letterbox]:
+    def letterboxes(self) -> Mapping[str, Letterbox]:
         """The letterbox of each camera's picture, known from its first message on."""
-        return self._reader.fits
+        return self._reader.letterboxes
 
     @property
     def known(self) -> list[int]:

@@ -1,4 +1,4 @@
-"""Whether the service decides as fast as there is something to decide."""
+"""Detects when decisions fall behind the pulses for good."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ import time
 from camsync.clock import Clock
 
 _PATIENCE_S = 2.0
-"""For how long being too far behind is looked at before anything is left out: it may be made up for."""
+"""How long decisions may be too far behind before epochs are skipped: they may catch up."""
 _CATCHES_UP = 0.95
-"""Being behind by less than this part of what it was is catching up."""
+"""Decisions catch up when the backlog has shrunk to this share."""
 
 
 class BacklogMonitor:
     """Detects decisions that are too far behind the pulses to be useful, and do not catch up.
 
-    ``reach`` is by how many pulses they may be behind: what is decided later is of pictures that are gone.
+    ``max_backlog`` is how many pulses they may be behind: later, their frames are no longer buffered.
     """
 
-    def __init__(self, reach: int, clock: Clock = time.monotonic) -> None:
-        self._reach, self._clock = reach, clock
+    def __init__(self, max_backlog: int, clock: Clock = time.monotonic) -> None:
+        self._max_backlog, self._clock = max_backlog, clock
         self._since: float | None = None
-        self._by = 0
+        self._backlog_before = 0
 
-    def is_lost(self, behind: int) -> bool:
-        """Return whether to skip what waits; ``behind`` is by how many pulses decisions are late."""
+    def is_lost(self, backlog: int) -> bool:
+        """Return whether to skip the waiting epochs; ``backlog`` is how many pulses decisions are behind."""
         now = self._clock()
-        if behind <= self._reach:
+        if backlog <= self._max_backlog:
             self._since = None
         elif self._since is None:
-            self._since, self._by = now, behind
+            self._since, self._backlog_before = now, backlog
         elif now - self._since >= _PATIENCE_S:
-            lost = behind > _CATCHES_UP * self._by
-            self._since, self._by = (None, 0) if lost else (now, behind)
+            lost = backlog > _CATCHES_UP * self._backlog_before
+            self._since, self._backlog_before = (None, 0) if lost else (now, backlog)
             return lost
         return False

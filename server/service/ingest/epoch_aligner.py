@@ -1,4 +1,4 @@
-"""Lining the cameras up: an epoch is decided when every camera that can has spoken, or time is up."""
+"""Aligns the cameras' windows by epoch: an epoch is complete when all expected cameras have reported."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import CameraTracks
 
-_MENDED_MOST = 16
-"""Words that have mended the past, and came too late, that are kept until the next epoch."""
+_MAX_LATE_REVISIONS = 16
+"""Late windows that revise the past, kept until the next epoch."""
 
 
 @dataclass(frozen=True, slots=True)
 class Epoch:
-    """All that is known of one epoch."""
+    """The windows of all cameras for one epoch."""
 
     number: int
     last: int
@@ -23,18 +23,18 @@ class Epoch:
     tracks: dict[str, CameraTracks]
     """By camera, in the order of the configuration."""
     late: tuple[str, ...] = ()
-    """Cameras that were waited for in vain, and cameras whose word on it was lost on the way."""
-    mended: tuple[CameraTracks, ...] = ()
-    """Words on earlier epochs that came too late for these, and say who was who before."""
+    """Cameras whose window did not arrive in time, or was lost."""
+    late_revisions: tuple[CameraTracks, ...] = ()
+    """Windows that arrived too late for their own epoch, but revise track identities of the past."""
     skipped: int = 0
-    """Epochs before it that are left out: nobody spoke of them, and they are long past."""
+    """Epochs before it that are skipped: no camera reported them, and they are too long ago."""
 
 
 @dataclass(slots=True)
-class _Place:
-    """One camera's place in the line."""
+class _CameraQueue:
+    """One camera's state and its waiting windows."""
 
-    there: bool = False
+    connected: bool = False
     boot: int | None = None
     first: int | None = None
     """First pulse of this boot."""
@@ -42,88 +42,95 @@ class _Place:
     trusted: bool = True
     """False after it was late: it is not waited for until it is in time again."""
     waiting: dict[int, CameraTracks] = field(default_factory=dict)
+    """By epoch."""
 
 
 class EpochAligner:
-    """Collects the cameras' messages by epoch. Has no clock: the caller passes the pulse number.
+    """Collects the cameras' windows by epoch. Has no clock: the caller passes the pulse number.
 
-    ``grace`` is how many pulses a camera that is there is waited for, after an epoch's end and the first
-    word on it. While none has, they are all ``behind``: the first is waited for so many pulses more.
-    Without any of them it could only go on with nobody.
-
-    What is more than ``far`` pulses away from the present is of another time: epochs begin with what is not,
-    and where nobody has a word on one that is so long past, they go on with what is not. None: there is no
-    present, as of recordings, and nothing is left out.
+    Args:
+        cameras: all cameras.
+        stride: pulses of an epoch.
+        grace: pulses to wait for a connected camera, after an epoch's end and the first window of it.
+        backlog: further pulses to wait while no camera has reported: then all of them are behind.
+        max_distance: pulses between an epoch and the present, at most. Windows farther away are dropped at
+            the start, and epochs that no camera reports are skipped once they are so long ago. None: there
+            is no present, as with recordings, and nothing is skipped.
     """
 
     def __init__(
-        self, cameras: Sequence[str], stride: int, grace: int, behind: int = 0, far: int | None = None
+        self,
+        cameras: Sequence[str],
+        stride: int,
+        grace: int,
+        backlog: int = 0,
+        max_distance: int | None = None,
     ) -> None:
-        self.stride, self._grace, self._behind, self._far = stride, grace, behind, far
-        self._places = {camera: _Place() for camera in cameras}
+        self.stride, self._grace, self._backlog, self._max_distance = stride, grace, backlog, max_distance
+        self._queues = {camera: _CameraQueue() for camera in cameras}
         self._next: int | None = None
-        self._shown: dict[str, int] = {}
-        """By camera: the first epoch of which a frame has come, while it is not known where to begin."""
-        self._heard: int | None = None
-        """The pulse at which somebody had spoken of the next epoch, or of a later one."""
-        self._left_out = 0
-        """Epochs that are, before the next one."""
+        self._first_frames: dict[str, int] = {}
+        """By camera, the first epoch that a frame arrived of; until the first epoch is known."""
+        self._reported_at: int | None = None
+        """The pulse at which a camera first reported the next epoch, or a later one."""
+        self._skipped = 0
+        """Epochs skipped before the next one."""
         self.late_messages = dict.fromkeys(cameras, 0)
-        self._mended: deque[CameraTracks] = deque(maxlen=_MENDED_MOST)
+        self._late_revisions: deque[CameraTracks] = deque(maxlen=_MAX_LATE_REVISIONS)
 
-    def come(self, camera: str) -> None:
-        """A camera is there."""
-        self._places[camera].there = True
+    def camera_connected(self, camera: str) -> None:
+        """Record that a camera is connected: its windows are waited for."""
+        self._queues[camera].connected = True
 
-    def gone(self, camera: str) -> None:
-        """A camera's process is gone; what it said before still counts."""
-        place = self._places[camera]
-        place.there, place.first, place.boot = False, None, None
+    def camera_disconnected(self, camera: str) -> None:
+        """Record that a camera's process is gone; its earlier windows still count."""
+        queue = self._queues[camera]
+        queue.connected, queue.first, queue.boot = False, None, None
 
-    def frame(self, camera: str, boot: int, pulse: int) -> None:
-        """A camera's frame came: from its pulse on the camera takes part."""
-        place = self._places[camera]
-        place.there = True
-        if place.boot != boot:
-            place.boot, place.first, place.ended, place.trusted = boot, pulse, False, True
+    def frame_received(self, camera: str, boot: int, pulse: int) -> None:
+        """Record a camera's frame: windows are expected from its pulse on."""
+        queue = self._queues[camera]
+        queue.connected = True
+        if queue.boot != boot:
+            queue.boot, queue.first, queue.ended, queue.trusted = boot, pulse, False, True
         if self._next is None:
             epoch = pulse // self.stride
-            self._shown[camera] = min(epoch, self._shown.get(camera, epoch))
+            self._first_frames[camera] = min(epoch, self._first_frames.get(camera, epoch))
 
-    def tracks(self, message: CameraTracks) -> None:
-        """A camera's window came."""
+    def add_tracks(self, message: CameraTracks) -> None:
+        """Add a camera's window."""
         if self._next is not None and message.epoch < self._next:
-            self._too_late(message)
+            self._count_late(message)
             return
-        place = self._places[message.camera]
-        place.waiting[message.epoch] = message
-        place.trusted = True
+        queue = self._queues[message.camera]
+        queue.waiting[message.epoch] = message
+        queue.trusted = True
 
-    def behind(self, now: int) -> int:
-        """Return pulses between the end of the next epoch that somebody has spoken of and pulse ``now``."""
-        first = min(self._words(), default=None)
+    def backlog(self, now: int) -> int:
+        """Return the pulses between the end of the first epoch with a waiting window and pulse ``now``."""
+        first = min(self._waiting_epochs(), default=None)
         return 0 if first is None else max(0, now - end_of_epoch(first, self.stride))
 
-    def leave_out(self, now: int) -> int:
-        """Go on with the newest epoch up to pulse ``now`` that anybody has spoken of.
+    def skip_to(self, now: int) -> int:
+        """Skip to the newest epoch up to pulse ``now`` that has a waiting window.
 
         Returns:
-            How many are left out for that.
+            The number of skipped epochs.
         """
-        to = max((it for it in self._words() if end_of_epoch(it, self.stride) <= now), default=0)
+        to = max((it for it in self._waiting_epochs() if end_of_epoch(it, self.stride) <= now), default=0)
         if self._next is None or to <= self._next:
             return 0
-        return self._leap(self._next, to)
+        return self._skip(self._next, to)
 
     @property
     def waiting(self) -> int:
-        """How many windows wait for others of their epoch."""
-        return sum(len(place.waiting) for place in self._places.values())
+        """The number of windows that wait for others of their epoch."""
+        return sum(len(queue.waiting) for queue in self._queues.values())
 
     @property
     def all_ended(self) -> bool:
         """Whether every camera's recording is over and was taken out."""
-        return all(place.ended and not place.waiting for place in self._places.values())
+        return all(queue.ended and not queue.waiting for queue in self._queues.values())
 
     def ready(self, now: int) -> list[Epoch]:
         """Take out the epochs that can be decided at pulse ``now``, in order."""
@@ -133,93 +140,100 @@ class EpochAligner:
         return epochs
 
     def next_ready(self, now: int) -> Epoch | None:
-        """Take out the next one of them; None: there is none."""
+        """Take out the next epoch that can be decided at pulse ``now``; None: none can."""
         if self._next is None:
             self._begin(now)
         if self._next is None or self.all_ended:
             return None
-        number = self._next = self._caught_up(now, self._next)
+        number = self._next = self._skip_long_past(now, self._next)
         end = end_of_epoch(number, self.stride)
-        missing = [name for name, place in self._places.items() if self._awaited(place, end)]
-        any_word = any(place.waiting for place in self._places.values())
-        if any_word and self._heard is None:
-            self._heard = now
-        if (missing or not any_word) and now <= self._patience(end):
+        missing = [name for name, queue in self._queues.items() if self._is_expected(queue, end)]
+        any_reported = any(queue.waiting for queue in self._queues.values())
+        if any_reported and self._reported_at is None:
+            self._reported_at = now
+        if (missing or not any_reported) and now <= self._deadline(end):
             return None
-        if self._far is not None and 0 <= now < end - self._grace:
-            return None  # who speaks of what is to come does not take the others' word from them
-        late = tuple(missing)
-        for name in late:
-            self._places[name].trusted = False
-        self._next, self._heard = number + 1, None
-        taken = {}
-        for name, place in self._places.items():
-            message = place.waiting.pop(number, None)
+        if self._max_distance is not None and 0 <= now < end - self._grace:
+            return None  # a window ahead of time does not cut the others' time short
+        for name in missing:
+            self._queues[name].trusted = False
+        self._next, self._reported_at = number + 1, None
+        tracks = {}
+        for name, queue in self._queues.items():
+            message = queue.waiting.pop(number, None)
             if message is not None:
-                taken[name] = message
-                place.ended |= message.ended
-        mended, self._mended = tuple(self._mended), deque(maxlen=_MENDED_MOST)
-        skipped, self._left_out = self._left_out, 0
-        return Epoch(number, end, taken, (*late, *self._skipped(end, taken)), mended, skipped)
+                tracks[name] = message
+                queue.ended |= message.ended
+        revisions, self._late_revisions = tuple(self._late_revisions), deque(maxlen=_MAX_LATE_REVISIONS)
+        skipped, self._skipped = self._skipped, 0
+        return Epoch(number, end, tracks, (*missing, *self._lost(end, tracks)), revisions, skipped)
 
     def _begin(self, now: int) -> None:
-        """Begin with the first epoch that anybody has spoken of, but for words of another time."""
+        """Begin with the first epoch that a camera has reported, unless it is too far from the present."""
         self._drop(lambda epoch: not self._is_near(epoch, now))
-        words = [*self._words(), *(it for it in self._shown.values() if self._is_near(it, now))]
-        self._next = min(words, default=None)
-        self._shown.clear()
+        epochs = [
+            *self._waiting_epochs(),
+            *(it for it in self._first_frames.values() if self._is_near(it, now)),
+        ]
+        self._next = min(epochs, default=None)
+        self._first_frames.clear()
 
-    def _caught_up(self, now: int, number: int) -> int:
-        """Return the epoch to go on with: where ``number`` is long past, one of the present."""
-        if end_of_epoch(number, self.stride) > now or self._is_near(number, now) or number in self._words():
+    def _skip_long_past(self, now: int, number: int) -> int:
+        """Return the epoch to continue with: if ``number`` is too long ago, one of the present."""
+        if (
+            end_of_epoch(number, self.stride) > now
+            or self._is_near(number, now)
+            or number in self._waiting_epochs()
+        ):
             return number
-        to = min((it for it in self._words() if self._is_near(it, now)), default=now // self.stride)
-        self._leap(number, to)
+        to = min((it for it in self._waiting_epochs() if self._is_near(it, now)), default=now // self.stride)
+        self._skip(number, to)
         return to
 
-    def _leap(self, number: int, to: int) -> int:
+    def _skip(self, number: int, to: int) -> int:
         self._drop(lambda epoch: epoch < to)
-        self._left_out, self._heard, self._next = self._left_out + to - number, None, to
+        self._skipped, self._reported_at, self._next = self._skipped + to - number, None, to
         return to - number
 
-    def _words(self) -> list[int]:
-        """List the epochs of all words that wait."""
-        return [epoch for place in self._places.values() for epoch in place.waiting]
+    def _waiting_epochs(self) -> list[int]:
+        """Return the epochs of all waiting windows."""
+        return [epoch for queue in self._queues.values() for epoch in queue.waiting]
 
     def _is_near(self, epoch: int, now: int) -> bool:
-        """Return whether an epoch is of about now; all are while nobody knows what is now."""
-        return self._far is None or now < 0 or abs(end_of_epoch(epoch, self.stride) - now) <= self._far
+        """Return whether an epoch is near pulse ``now``; True while the present is unknown."""
+        distance = abs(end_of_epoch(epoch, self.stride) - now)
+        return self._max_distance is None or now < 0 or distance <= self._max_distance
 
-    def _drop(self, which: Callable[[int], bool]) -> None:
-        """Drop the words on some epochs, as those that come too late."""
-        for place in self._places.values():
-            for epoch in [epoch for epoch in place.waiting if which(epoch)]:
-                self._too_late(place.waiting.pop(epoch))
+    def _drop(self, is_dropped: Callable[[int], bool]) -> None:
+        """Drop the waiting windows of some epochs, as if they had come too late."""
+        for queue in self._queues.values():
+            for epoch in [epoch for epoch in queue.waiting if is_dropped(epoch)]:
+                self._count_late(queue.waiting.pop(epoch))
 
-    def _too_late(self, message: CameraTracks) -> None:
+    def _count_late(self, message: CameraTracks) -> None:
         self.late_messages[message.camera] += 1
         if message.revised_from is not None:
-            self._mended.append(message)  # that the past was mended is not said again
-        # It ended while nobody waited for it: that must not be lost, or its end is waited for.
-        self._places[message.camera].ended |= message.ended
+            self._late_revisions.append(message)  # a camera sends a revision only once
+        # The end of a recording must not be lost, or it is waited for.
+        self._queues[message.camera].ended |= message.ended
 
-    def _patience(self, end: int) -> int:
+    def _deadline(self, end: int) -> int:
         """Return the last pulse at which an epoch with this end is waited for."""
-        if self._heard is not None:
-            return max(end, self._heard) + self._grace
-        expected = any(place.there and not place.ended for place in self._places.values())
-        return end + self._grace + (self._behind if expected else 0)
+        if self._reported_at is not None:
+            return max(end, self._reported_at) + self._grace
+        any_expected = any(queue.connected and not queue.ended for queue in self._queues.values())
+        return end + self._grace + (self._backlog if any_expected else 0)
 
-    def _skipped(self, end: int, taken: Container[str]) -> list[str]:
-        """List the cameras whose word on an epoch is lost: they were there, and have spoken of later ones."""
+    def _lost(self, end: int, tracks: Container[str]) -> list[str]:
+        """Return the cameras whose window of an epoch is lost: they have reported later ones."""
         return [
             name
-            for name, place in self._places.items()
-            if name not in taken and place.waiting and place.first is not None and place.first <= end
+            for name, queue in self._queues.items()
+            if name not in tracks and queue.waiting and queue.first is not None and queue.first <= end
         ]
 
-    def _awaited(self, place: _Place, end: int) -> bool:
-        """Return whether this camera's word on the epoch is still to come."""
-        if place.waiting or place.ended or not place.there or not place.trusted:
-            return False  # a word on a later epoch: on this one there will be none
-        return place.first is None or place.first <= end
+    def _is_expected(self, queue: _CameraQueue, end: int) -> bool:
+        """Return whether this camera's window of the epoch is still expected."""
+        if queue.waiting or queue.ended or not queue.connected or not queue.trusted:
+            return False  # waiting windows are of later epochs: windows come in order
+        return queue.first is None or queue.first <= end

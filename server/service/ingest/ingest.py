@@ -1,4 +1,4 @@
-"""What comes from the cameras: frames onto the shelves, tracks to the aligner, states for the page."""
+"""Ingest of the cameras' messages: frames to buffers, tracks to the epoch aligner, status to the page."""
 
 from __future__ import annotations
 
@@ -33,33 +33,33 @@ from server.service.streaming.frame_buffer import FrameBuffer, UndecodableFrameE
 
 log = logging.getLogger(__name__)
 
-_THUMBNAILS_MOST = 300
-"""Small pictures of one camera that are kept; there are as many as tracks were seen lately."""
-_TOLD_MOST, _TOLD_RATE = 10, 1 / 30
-"""Lines of the log that say that a camera has come or gone: at once, and a second. It may do so for ever."""
-_THUMBNAIL_BYTES = 1 << 17
-"""More than one of 160 lines has."""
+_MAX_THUMBNAILS = 300
+"""Thumbnails kept of one camera: one for each recent track."""
+_PRESENCE_LOG_BURST, _PRESENCE_LOG_RATE = 10, 1 / 30
+"""Log lines about a camera that connects or disconnects: at once, and a second; it may flap for ever."""
+_THUMBNAIL_BYTES_MAX = 1 << 17
+"""More than any thumbnail of 160 lines takes."""
 
 
 @dataclass(slots=True)
 class CameraState:
-    """How a camera is, as far as the best-view service knows."""
+    """The state of a camera as the best-view service knows it."""
 
     alive: bool = False
     refused: str = ""
-    """Why its frames are not used; empty when they are."""
+    """Why its frames are refused; empty: they are used."""
     status: CameraStatus | None = None
     ended: bool = False
     bad_messages: int = 0
     frames: int = 0
-    unheard: int = 0
-    """Frames in which people were followed without what some other camera found."""
-    gauge: CameraMetrics = field(default_factory=CameraMetrics)
-    """What is measured of it, for the operator."""
+    frames_without_peers: int = 0
+    """Frames that were tracked without another camera's detections."""
+    metrics: CameraMetrics = field(default_factory=CameraMetrics)
+    """Measurements for the operator."""
 
     @property
-    def word(self) -> str:
-        """The state in one word."""
+    def label(self) -> str:
+        """The state in one word: refused, ended, starting, live or gone."""
         if self.refused:
             return "refused"
         if self.ended:
@@ -70,37 +70,44 @@ class CameraState:
 
     @property
     def away(self) -> bool:
-        """Whether the camera's process is there, but its source gives no pictures."""
+        """Whether the camera's process is connected but its source delivers no pictures."""
         return self.status is not None and self.status.state == "away"
 
     @property
     def message(self) -> str:
-        """What a person should know of it, if anything."""
+        """A message for people about what is wrong; empty: nothing is."""
         if self.refused:
             return self.refused
         if self.alive and self.away:
-            return "its source gives no pictures; retrying"
+            return "its source delivers no pictures; retrying"
         return self.status.load if self.alive and self.status is not None else ""
 
-    def bad(self, why: Exception | str) -> None:
-        """Count a message that cannot be used."""
+    def count_bad_message(self, why: Exception | str) -> None:
+        """Count an invalid message."""
         self.bad_messages += 1
-        self.gauge.trouble(f"a message that cannot be used: {why}")
+        self.metrics.record_problem(f"invalid message: {why}")
 
 
 @dataclass(frozen=True, slots=True)
 class Thumbnail:
-    """A small picture of a person."""
+    """A small JPEG picture of a person."""
 
     jpeg: bytes
     pulse: int
 
 
 class Ingest:
-    """Receives the cameras' messages. A message that cannot be parsed is counted and dropped.
+    """Receives the cameras' messages; invalid ones are counted and dropped.
 
-    So is what is of pulses more than ``ahead`` after the newest, which ``now`` gives (below 0: none):
-    it would be waited for as long as that takes. ``sounding`` is the camera that sends the ``sound``.
+    Args:
+        frame_buffers: by camera.
+        aligner: takes the tracks, and who is connected.
+        on_frame: called with each frame of a camera.
+        audio_buffer: takes the site's audio; None at a site without.
+        audio_camera: the camera that sends the audio.
+        current_pulse: returns the newest pulse; below 0: unknown.
+        max_ahead: pulses by which a message may be ahead of it. A later one is dropped: the aligner would
+            wait until its time has come.
     """
 
     def __init__(
@@ -108,162 +115,169 @@ class Ingest:
         frame_buffers: Mapping[str, FrameBuffer],
         aligner: EpochAligner,
         on_frame: Callable[[str, EncodedPicture], None],
-        sound: AudioBuffer | None = None,
+        audio_buffer: AudioBuffer | None = None,
         *,
-        sounding: str | None = None,
-        now: Callable[[], int] = lambda: -1,
-        ahead: int = 0,
+        audio_camera: str | None = None,
+        current_pulse: Callable[[], int] = lambda: -1,
+        max_ahead: int = 0,
     ) -> None:
-        self._now, self._ahead = now, ahead
-        self._shelves, self._aligner, self._on_frame = frame_buffers, aligner, on_frame
-        self._sound, self._sounding = sound, sounding
-        self._unknown = LogThrottle()
-        self._told = {camera: RateLimit(_TOLD_MOST, _TOLD_RATE, time.monotonic()) for camera in frame_buffers}
+        self._current_pulse, self._max_ahead = current_pulse, max_ahead
+        self._frame_buffers, self._aligner, self._on_frame = frame_buffers, aligner, on_frame
+        self._audio_buffer, self._audio_camera = audio_buffer, audio_camera
+        self._unknown_log = LogThrottle()
+        self._presence_log_limits = {
+            camera: RateLimit(_PRESENCE_LOG_BURST, _PRESENCE_LOG_RATE, time.monotonic())
+            for camera in frame_buffers
+        }
         self.states = {camera: CameraState() for camera in frame_buffers}
         self._thumbnails: dict[str, OrderedDict[tuple[int, int], Thumbnail]] = {
             camera: OrderedDict() for camera in frame_buffers
         }
         """By camera, boot and track; the newest is the last."""
-        self._frame_head = msgspec.json.Decoder(FrameHeader)
-        self._tracks = msgspec.json.Decoder(CameraTracks)
-        self._status = msgspec.json.Decoder(CameraStatus)
-        self._sound_head = msgspec.json.Decoder(AudioHeader)
-        self._thumb_head = msgspec.json.Decoder(ThumbnailHeader)
+        self._frame_header = msgspec.json.Decoder(FrameHeader)
+        self._camera_tracks = msgspec.json.Decoder(CameraTracks)
+        self._camera_status = msgspec.json.Decoder(CameraStatus)
+        self._audio_header = msgspec.json.Decoder(AudioHeader)
+        self._thumbnail_header = msgspec.json.Decoder(ThumbnailHeader)
 
     def alive(self, key: str, is_present: bool) -> None:
-        """A camera's liveliness token came or went."""
+        """Record that a camera's liveliness token came or went."""
         camera = camera_of_key(key)
         state = self.states.get(camera)
         if state is None:
-            if (more := self._unknown.record(camera)) is not None:
-                log.warning("camera %s is not in the configuration%s; it is ignored", camera, more)
+            if (more := self._unknown_log.record(camera)) is not None:
+                log.warning("camera %s is not in the configuration%s: ignored", camera, more)
             return
         state.alive = is_present
-        state.status = None  # what was said before is of another time
-        state.gauge.begin()
+        state.status = None  # of an earlier connection
+        state.metrics.reset_recent()
         if is_present:
             state.refused, state.ended = "", False
-            self._aligner.come(camera)
+            self._aligner.camera_connected(camera)
         else:
-            state.gauge.trouble("its process was gone")
-            self._aligner.gone(camera)
+            state.metrics.record_problem("its process disconnected")
+            self._aligner.camera_disconnected(camera)
             self._thumbnails[camera].clear()
-        if self._told[camera].take(time.monotonic()):
-            log.info("camera %s %s", camera, "is there" if is_present else "is gone")
+        if self._presence_log_limits[camera].take(time.monotonic()):
+            log.info("camera %s %s", camera, "connected" if is_present else "disconnected")
 
     def video(self, message: Message) -> None:
-        """Shelve a frame."""
+        """Buffer and publish a frame."""
         state, camera = self._state_of(message)
         if state is None:
             return
         try:
-            head = self._frame_head.decode(message.attachment)
+            head = self._frame_header.decode(message.attachment)
             if state.refused or self._is_far_ahead(state, head.pulse):
                 return
-            frame_buffer = self._shelves[camera]
+            frame_buffer = self._frame_buffers[camera]
             frame = frame_buffer.put(head.pulse, head.boot, message.payload, key=head.key, after=head.after)
         except (*DECODE_ERRORS, UndecodableFrameError) as error:
-            state.bad(error)
+            state.count_bad_message(error)
         except ParameterMismatchError as error:
-            state.refused = f"{error}; are all cameras of this site run with the same configuration?"
-            state.gauge.trouble(state.refused)
-            log.error("camera %s is refused: %s", camera, state.refused)  # noqa: TRY400 — says all there is
+            state.refused = f"{error}; do all cameras of this site run with the same configuration?"
+            state.metrics.record_problem(state.refused)
+            log.error("camera %s is refused: %s", camera, state.refused)  # noqa: TRY400 — a traceback adds nothing
         else:
             state.frames += 1
-            state.gauge.frame(head)
-            self._aligner.frame(camera, head.boot, head.pulse)
+            state.metrics.frame(head)
+            self._aligner.frame_received(camera, head.boot, head.pulse)
             self._on_frame(camera, frame)
 
-    def sound(self, message: Message) -> None:
-        """Shelve some of the site's sound."""
-        if self._sound is None or self._sounding is None:
+    def audio(self, message: Message) -> None:
+        """Buffer some of the site's audio."""
+        if self._audio_buffer is None or self._audio_camera is None:
             return
         try:
-            self._sound.put(self._sound_head.decode(message.attachment), message.payload)
+            self._audio_buffer.put(self._audio_header.decode(message.attachment), message.payload)
         except (*DECODE_ERRORS, ValueError) as error:
-            self.states[self._sounding].bad(f"sound: {error}")
+            self.states[self._audio_camera].count_bad_message(f"audio: {error}")
 
     def tracks(self, message: Message) -> None:
-        """Hand a window's tracks to the aligner."""
+        """Pass a window's tracks to the aligner."""
         state, camera = self._state_of(message)
         if state is None:
             return
         try:
-            tracks = self._tracks.decode(message.payload)
+            tracks = self._camera_tracks.decode(message.payload)
         except DECODE_ERRORS as error:
-            state.bad(error)
+            state.count_bad_message(error)
             return
         if tracks.camera != camera or not is_plausible(tracks, self._aligner.stride):
-            state.bad("its tracks make no sense; is it run with this configuration?")
+            state.count_bad_message("its tracks are inconsistent; does it run with this configuration?")
             return
         if self._is_far_ahead(state, end_of_epoch(tracks.epoch, self._aligner.stride)):
             return
-        state.gauge.window(tracks)
+        state.metrics.window(tracks)
         state.ended = tracks.ended
-        self._aligner.tracks(tracks)
+        self._aligner.add_tracks(tracks)
 
-    def remembered(self, message: Message, heard: Callable[[Message], None]) -> None:
-        """Hand what a camera remembers on."""
+    def retained_identities(self, message: Message, handler: Callable[[Message], None]) -> None:
+        """Pass the identities that a camera has retained to a handler, which may raise a decode error."""
         state, _ = self._state_of(message)
         if state is None:
             return
         try:
-            heard(message)
+            handler(message)
         except DECODE_ERRORS as error:
-            state.bad(error)
+            state.count_bad_message(error)
 
     def status(self, message: Message) -> None:
-        """Note how a camera is."""
+        """Record a camera's status."""
         state, _ = self._state_of(message)
         if state is None:
             return
         try:
-            status = self._status.decode(message.payload)
+            status = self._camera_status.decode(message.payload)
         except DECODE_ERRORS as error:
-            state.bad(error)
+            state.count_bad_message(error)
         else:
             was_away, state.status = state.away, status
             if state.away and not was_away:
-                state.gauge.trouble(state.message)
+                state.metrics.record_problem(state.message)
 
     def thumbnail(self, message: Message) -> None:
-        """Keep the newest small picture of a track."""
+        """Keep the newest thumbnail of a track."""
         state, camera = self._state_of(message)
         if state is None:
             return
         try:
-            head = self._thumb_head.decode(message.attachment)
+            head = self._thumbnail_header.decode(message.attachment)
         except DECODE_ERRORS as error:
-            state.bad(error)
+            state.count_bad_message(error)
             return
-        if len(message.payload) > _THUMBNAIL_BYTES:
-            state.bad(f"a small picture of {len(message.payload)} bytes")
+        if len(message.payload) > _THUMBNAIL_BYTES_MAX:
+            state.count_bad_message(f"a thumbnail of {len(message.payload)} bytes")
             return
         if self._is_far_ahead(state, head.pulse):
             return
-        theirs = self._thumbnails[camera]
-        theirs[head.boot, head.track] = Thumbnail(message.payload, head.pulse)
-        theirs.move_to_end((head.boot, head.track))
-        if len(theirs) > _THUMBNAILS_MOST:
-            theirs.popitem(last=False)
+        thumbnails = self._thumbnails[camera]
+        thumbnails[head.boot, head.track] = Thumbnail(message.payload, head.pulse)
+        thumbnails.move_to_end((head.boot, head.track))
+        if len(thumbnails) > _MAX_THUMBNAILS:
+            thumbnails.popitem(last=False)
 
     @property
     def thumbnails(self) -> dict[tuple[str, int, int], Thumbnail]:
-        """Return all small pictures, by camera, boot and track."""
-        return {(camera, *it): kept for camera, of in self._thumbnails.items() for it, kept in of.items()}
+        """All thumbnails, by camera, boot and track."""
+        return {
+            (camera, boot, track): thumbnail
+            for camera, thumbnails in self._thumbnails.items()
+            for (boot, track), thumbnail in thumbnails.items()
+        }
 
     def forget_thumbnails_before(self, pulse: int) -> None:
-        """Let go of the small pictures of tracks that were not seen since."""
-        for theirs in self._thumbnails.values():
-            for key in [key for key, thumbnail in theirs.items() if thumbnail.pulse < pulse]:
-                del theirs[key]
+        """Drop the thumbnails of tracks not seen since a pulse."""
+        for thumbnails in self._thumbnails.values():
+            for key in [key for key, thumbnail in thumbnails.items() if thumbnail.pulse < pulse]:
+                del thumbnails[key]
 
     def _is_far_ahead(self, state: CameraState, pulse: int) -> bool:
-        """Return whether a pulse is one that nobody can have counted to, and count that."""
-        newest = self._now()
-        if newest < 0 or pulse <= newest + self._ahead:
+        """Return whether a pulse is too far in the future to be real; if so, count a bad message."""
+        newest = self._current_pulse()
+        if newest < 0 or pulse <= newest + self._max_ahead:
             return False
-        state.bad(f"of pulse {pulse}, while the site is at {newest}")
+        state.count_bad_message(f"pulse {pulse}, while the site is at pulse {newest}")
         return True
 
     def _state_of(self, message: Message) -> tuple[CameraState | None, str]:

@@ -1,4 +1,4 @@
-"""Whether a camera's message, well formed as it is, can be true: what follows relies on it."""
+"""Validation of cameras' messages beyond their format: the pipeline relies on their consistency."""
 
 from __future__ import annotations
 
@@ -8,27 +8,30 @@ from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import CameraTracks
 
 _WINDOW_MAX = 100_000
-"""Frames of one message; far more than any window and any gap that a tracker joins."""
+"""Frames of one message, at most; far more than any window or any gap that a tracker bridges."""
 
 
 def is_plausible(message: CameraTracks, stride: int) -> bool:
     """Return whether the frames, the tracks and the sizes in a message are consistent."""
     frames, end = message.last - message.first + 1, end_of_epoch(message.epoch, stride)
     ids = [track.id for track in message.tracks]
-    looks = [look for track in message.tracks for look in track.appearance]
-    bins = [len(look.histogram) for look in looks]
+    samples = [sample for track in message.tracks for sample in track.appearance]
+    bins = [len(sample.histogram) for sample in samples]
     return (
         0 <= frames <= _WINDOW_MAX
         and message.final_to <= message.last <= end
-        and all(_is_short(it, end) for it in (message.shed, message.without_detection, message.without_peers))
+        and all(
+            _are_valid_frames(it, end)
+            for it in (message.shed, message.without_detection, message.without_peers)
+        )
         and len(ids) == len(dict.fromkeys(ids))
         and all(count == bins[0] > 0 for count in bins)
         and all(len(track.boxes) == frames for track in message.tracks)
         and (message.revised_from is None or message.first <= message.revised_from <= message.final_to)
-        and all(message.first <= look.first <= look.last <= message.final_to for look in looks)
+        and all(message.first <= it.first <= it.last <= message.final_to for it in samples)
     )
 
 
-def _is_short(pulses: Sequence[int], end: int) -> bool:
-    """Return whether these can be frames of an epoch that ends with a pulse; later ones would be kept."""
+def _are_valid_frames(pulses: Sequence[int], end: int) -> bool:
+    """Return whether these can be frames of an epoch that ends with a pulse."""
     return len(pulses) <= _WINDOW_MAX and max(pulses, default=-1) <= end

@@ -1,4 +1,4 @@
-"""What was said last of every frame of one camera."""
+"""The newest window that covers each frame of one camera."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ class HistorySpan(Generic[Window]):
 
 
 class WindowHistory(Generic[Window]):
-    """Keeps for every frame of one camera the newest window that has it."""
+    """Stores for every frame of one camera the newest window that covers it."""
 
     def __init__(self) -> None:
         self._spans: list[HistorySpan[Window]] = []
-        """In order; no frame is in two of them."""
+        """In order, without overlap."""
 
     def put(self, window: Window, first: int, last: int) -> None:
-        """Take over what a window says of the frames from `first` to `last`."""
+        """Replace the frames from `first` to `last` by those of a window."""
         if last < first:
             return
         before, after = self.over(self._earliest, first - 1), self.over(last + 1, self._latest)
         self._spans = [*before, HistorySpan(window, first, last), *after]
 
     def over(self, first: int, last: int) -> list[HistorySpan[Window]]:
-        """Return what is known of the frames from `first` to `last`, in order; frames may be missing."""
+        """Return the spans in the frames from `first` to `last`, in order; frames may be missing."""
         return [
             HistorySpan(it.window, max(it.first, first), min(it.last, last))
             for it in self._spans
@@ -40,7 +40,7 @@ class WindowHistory(Generic[Window]):
         ]
 
     def forget_before(self, pulse: int) -> None:
-        """Let go of the frames before a pulse."""
+        """Drop the frames before a pulse."""
         self._spans = self.over(pulse, self._latest)
 
     @property

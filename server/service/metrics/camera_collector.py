@@ -43,16 +43,16 @@ class CameraCollector(Collector):
         )
         for what, words, spread in _SPREADS:
             yield self._spread(what, words, spread)
-        late, lost = self._pipeline.aligner.late_messages, self._pipeline.losses.lost_pictures
+        late, lost = self._pipeline.aligner.late_messages, self._pipeline.loss_recorder.lost_pictures
         yield self._counter("late_windows", "Windows that came too late to count.", lambda it, _: late[it])
         yield self._counter(
             "lost_pictures", "Pictures not there when their GOP was decided.", lambda it, _: lost[it]
         )
-        yield self._counter("windows", "Windows solved.", lambda _, it: it.gauge.totals.windows)
+        yield self._counter("windows", "Windows solved.", lambda _, it: it.metrics.totals.windows)
         yield self._counter(
             "certified_windows",
             "Windows whose answer is proven to be the best there is.",
-            lambda _, it: it.gauge.totals.certified,
+            lambda _, it: it.metrics.totals.certified,
         )
         yield self._counter(
             "operator_points",
@@ -62,9 +62,11 @@ class CameraCollector(Collector):
         yield self._counter(
             "corrected_windows",
             "Windows that have changed what was final, by where an operator pointed.",
-            lambda _, it: it.gauge.totals.mended,
+            lambda _, it: it.metrics.totals.corrected,
         )
-        yield self._counter("gap", "Sum of the gaps of all other windows.", lambda _, it: it.gauge.totals.gap)
+        yield self._counter(
+            "gap", "Sum of the gaps of all other windows.", lambda _, it: it.metrics.totals.gap
+        )
 
     def _cameras(self) -> Iterable[Metric]:
         live = GaugeMetricFamily("myview_camera_live", "The camera delivers frames.", labels=["camera"])
@@ -86,11 +88,11 @@ class CameraCollector(Collector):
             "Pulse server's clock minus the camera's.",
             labels=["camera"],
         )
-        for camera, state in self._pipeline.intake.states.items():
+        for camera, state in self._pipeline.ingest.states.items():
             labels = [camera]
-            live.add_metric(labels, float(state.word == "live"))
+            live.add_metric(labels, float(state.label == "live"))
             frames.add_metric(labels, state.frames)
-            unheard.add_metric(labels, state.unheard)
+            unheard.add_metric(labels, state.frames_without_peers)
             bad.add_metric([camera, "sent"], state.bad_messages)
             if state.status is not None:
                 missed.add_metric(labels, state.status.missed)
@@ -103,8 +105,8 @@ class CameraCollector(Collector):
         family = HistogramMetricFamily(
             "myview_stage_seconds", "How long a camera's stage took.", labels=["camera", "stage"]
         )
-        for camera, state in self._pipeline.intake.states.items():
-            for stage, took in state.gauge.totals.stages.items():
+        for camera, state in self._pipeline.ingest.states.items():
+            for stage, took in state.metrics.totals.stages.items():
                 samples = [sample for metric in took.collect() for sample in metric.samples]
                 buckets = [(it.labels["le"], it.value) for it in samples if it.name.endswith("_bucket")]
                 seconds = next(it.value for it in samples if it.name.endswith("_sum"))
@@ -113,7 +115,7 @@ class CameraCollector(Collector):
 
     def _spread(self, what: str, words: str, of: Callable[[CameraState], RecentSeconds | None]) -> Metric:
         family = GaugeMetricFamily(f"myview_camera_{what}_seconds", words, labels=["camera", "statistic"])
-        for camera, state in self._pipeline.intake.states.items():
+        for camera, state in self._pipeline.ingest.states.items():
             spread = of(state)
             if spread is not None:
                 family.add_metric([camera, "median"], spread.median)
@@ -127,7 +129,7 @@ class CameraCollector(Collector):
         return self._filled(CounterMetricFamily(f"myview_camera_{what}", words, labels=["camera"]), value)
 
     def _filled(self, family: GaugeMetricFamily | CounterMetricFamily, value: Value) -> Metric:
-        for camera, state in self._pipeline.intake.states.items():
+        for camera, state in self._pipeline.ingest.states.items():
             number = value(camera, state)
             if number is not None:
                 family.add_metric([camera], number)
@@ -139,10 +141,10 @@ def _of_status(value: Callable[[CameraStatus], float]) -> Value:
 
 
 _SPREADS: tuple[tuple[str, str, Callable[[CameraState], RecentSeconds | None]], ...] = (
-    ("sync_error", "How long after its pulse a frame was taken.", lambda it: it.gauge.sync_error),
+    ("sync_error", "How long after its pulse a frame was taken.", lambda it: it.metrics.sync_error),
     (
         "tracking_delay",
         "How long after the pulse of a window's last frame it was solved.",
-        lambda it: it.gauge.tracking_delay,
+        lambda it: it.metrics.tracking_delay,
     ),
 )

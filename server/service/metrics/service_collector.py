@@ -25,25 +25,29 @@ class ServiceCollector(Collector):
 
     def collect(self) -> Iterable[Metric]:
         """Return all metrics as they are now."""
-        pipeline, stages = self._pipeline, self._pipeline.stages
+        pipeline, stages = self._pipeline, self._pipeline.stage_timers
         yield GaugeMetricFamily("myview_pulse", "Newest pulse.", value=pipeline.pulse)
-        yield GaugeMetricFamily("myview_objects", "People known.", value=len(pipeline.board.standings))
-        yield CounterMetricFamily("myview_cuts", "Changes of view.", value=pipeline.board.cuts)
+        yield GaugeMetricFamily(
+            "myview_objects", "People known.", value=len(pipeline.decision_state.selected_views)
+        )
+        yield CounterMetricFamily("myview_cuts", "Changes of view.", value=pipeline.decision_state.cuts)
         yield CounterMetricFamily(
             "myview_late_epochs",
             "Windows decided without a camera that was there.",
-            value=pipeline.losses.late_epochs,
+            value=pipeline.loss_recorder.late_epochs,
         )
         yield CounterMetricFamily(
             "myview_left_out_epochs",
             "Windows not decided at all: their pictures would have been gone by then.",
-            value=pipeline.left_out,
+            value=pipeline.skipped_epochs,
         )
         yield GaugeMetricFamily(
             "myview_ready", "A best view can be served now.", value=float(not why_not_ready(pipeline))
         )
         yield GaugeMetricFamily(
-            "myview_decided_pulse", "First pulse that nothing is decided about.", value=pipeline.board.end
+            "myview_decided_pulse",
+            "First pulse that nothing is decided about.",
+            value=pipeline.decision_state.end,
         )
         for histogram in (stages.decide, stages.send, stages.delay):
             yield from histogram.collect()
@@ -52,9 +56,9 @@ class ServiceCollector(Collector):
         yield from self._recording()
 
     def _queues(self) -> Iterable[Metric]:
-        pipeline, writer = self._pipeline, self._pipeline.past.writer
+        pipeline, writer = self._pipeline, self._pipeline.recorder.writer
         waiting = GaugeMetricFamily("myview_waiting", "What waits, by queue.", labels=["queue"])
-        waiting.add_metric(["messages"], sum(inbox.waiting for inbox in pipeline.inboxes))
+        waiting.add_metric(["messages"], sum(inbox.waiting for inbox in pipeline.bus.inboxes))
         waiting.add_metric(["windows"], pipeline.aligner.waiting)
         waiting.add_metric(["recording"], writer.queued if writer else 0)
         for queue, length in self._more_queues.items():
@@ -63,7 +67,7 @@ class ServiceCollector(Collector):
         yield CounterMetricFamily(
             "myview_lost_messages",
             "Messages of the bus that came faster than they could be read.",
-            value=sum(inbox.lost for inbox in pipeline.inboxes),
+            value=sum(inbox.lost for inbox in pipeline.bus.inboxes),
         )
 
     def _flags(self) -> Iterable[Metric]:
@@ -80,7 +84,7 @@ class ServiceCollector(Collector):
         )
 
     def _recording(self) -> Iterable[Metric]:
-        past = self._pipeline.past
+        past = self._pipeline.recorder
         size, writer = past.folder.bytes if past.folder else 0, past.writer
         well = writer is not None and not writer.problem
         yield GaugeMetricFamily("myview_recording", "What is streamed is being recorded.", value=float(well))

@@ -37,11 +37,11 @@ class Recorder:
         self,
         config: Config,
         frame_buffers: Mapping[str, FrameBuffer],
-        agreement: StreamFormat,
+        stream_format: StreamFormat,
         frames: int,
         audio_buffer: AudioBuffer | None = None,
     ) -> None:
-        self._config, self._agreement = config, agreement
+        self._config, self._stream_format = config, stream_format
         self.audio_buffer = audio_buffer
         """The newest audio; None at a site without."""
         self.recent = RecentGops(frame_buffers, config.encode.gop, frames)
@@ -177,7 +177,7 @@ class Recorder:
     @property
     def _init(self) -> InitSegments | None:
         """The init segments of this service's files; None before the first keyframe."""
-        parameters, site, sound = self._agreement.parameters, self._config.site, self._config.sound.format
+        parameters, site, sound = self._stream_format.parameters, self._config.site, self._config.sound.format
         if parameters is None:
             return None
         known_init = self._init_of_parameters
@@ -192,7 +192,7 @@ class Recorder:
 
     def _write(self, record: GopRecord) -> None:
         """Write a GOP; called in the writer thread."""
-        parameters, init, site = self._agreement.parameters, self._init, self._config.site
+        parameters, init, site = self._stream_format.parameters, self._init, self._config.site
         if self.folder is None or parameters is None or init is None:
             return
         info = SessionInfo(

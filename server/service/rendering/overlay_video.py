@@ -35,8 +35,8 @@ class OverlayVideo:
         self._format = None if sound is None else sound.format
         self._sound = None if sound is None else AudioFollower(sound)
         self._silent_holes = silent_holes
-        self._agreement = StreamFormat()
-        self._time = GaplessTimeline(self._agreement, canvas.fps, canvas.gop)
+        self._stream_format = StreamFormat()
+        self._time = GaplessTimeline(self._stream_format, canvas.fps, canvas.gop)
         self._process = 0
         self.channel = Broadcaster(queue_gops=queue_gops)
         self.wanted = 0
@@ -71,9 +71,11 @@ class OverlayVideo:
     def _picture(self, unit: EncodedFrame) -> EncodedPicture:
         units, canvas = nal_units(unit.data), self._canvas
         if unit.key:
-            self._agreement.check(parameter_sets(units))
-        if self.head is None and self._agreement.parameters is not None:
-            self.head = init_segment(self._agreement.parameters, canvas.width, canvas.height, self._format)
+            self._stream_format.check(parameter_sets(units))
+        if self.head is None and self._stream_format.parameters is not None:
+            self.head = init_segment(
+                self._stream_format.parameters, canvas.width, canvas.height, self._format
+            )
             self.begun.set()
         made = fragment([FragmentSample(join_sample(units), unit.key, unit.lasts)], unit.pulse, canvas.fps)
         return EncodedPicture(unit.pulse, unit.key, made, self._process, unit.lasts)

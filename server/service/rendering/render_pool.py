@@ -78,7 +78,7 @@ class RenderPool:
             max_kbps=config.encode.max_kbps,
             jpeg_quality=config.http.jpeg_quality,
         )
-        self._decided = DecidedBoxes(service.board.resolve, config.site.fps, self._queue + _BESIDE)
+        self._decided = DecidedBoxes(service.decision_state.resolve, config.site.fps, self._queue + _BESIDE)
         service.on_decision.append(self._decided.put)
         self._running: dict[Subject, _RunningStream] = {}
         self._tasks: set[asyncio.Task[None]] = set()
@@ -136,9 +136,9 @@ class RenderPool:
         """
         service = self._service
         if isinstance(subject, PersonView):
-            standing = service.board.standings[subject.number]
+            standing = service.decision_state.selected_views[subject.number]
             return None if standing.choice.camera is None else standing.first + standing.frames - 1
-        if service.intake.states[subject.camera].word not in {"live", "ended"}:
+        if service.ingest.states[subject.camera].label not in {"live", "ended"}:
             return None
         if subject.decided:
             return self._decided.newest
@@ -189,7 +189,7 @@ class RenderPool:
             self._canvas,
             live=live,
             queue_gops=self._queue,
-            sound=self._service.sound,
+            sound=self._service.audio_buffer,
             silent_holes=isinstance(subject, PersonView) and subject.scoped,  # what was there is not known
         )
 

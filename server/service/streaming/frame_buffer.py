@@ -17,10 +17,10 @@ class FrameBuffer:
     All frame buffers of a site share one ``agreement``, the format of its streams.
     """
 
-    def __init__(self, fps: float, frames: int, agreement: StreamFormat) -> None:
+    def __init__(self, fps: float, frames: int, stream_format: StreamFormat) -> None:
         self._fps = fps
         self._max_frames = frames
-        self._agreement = agreement
+        self._stream_format = stream_format
         self._pictures: dict[int, EncodedPicture] = {}
         self._parameters: ParameterSets | None = None
         self.newest = -1
@@ -35,10 +35,10 @@ class FrameBuffer:
             UndecodableFrameError: it is damaged; nothing is stored.
         """
         if key:
-            self._parameters = self._agreement.accept(access_unit)
-        fragment = self._agreement.pack(access_unit, pulse, self._fps, key=key)
+            self._parameters = self._stream_format.accept(access_unit)
+        fragment = self._stream_format.pack(access_unit, pulse, self._fps, key=key)
         picture = EncodedPicture(pulse, key, fragment, boot, parameters=self._parameters, after=after)
-        bridge = self._agreement.bridge(picture, self._fps)
+        bridge = self._stream_format.bridge(picture, self._fps)
         if bridge is not None and not bridge.can_follow(picture):
             raise UndecodableFrameError(f"no picture can be read in the access unit of pulse {pulse}")
         self._pictures[pulse] = picture

@@ -24,8 +24,8 @@ class GaplessTimeline:
     ``gop`` is the number of pulses from keyframe to keyframe.
     """
 
-    def __init__(self, agreement: StreamFormat, fps: float, gop: int) -> None:
-        self.agreement, self._fps, self._gop = agreement, fps, gop
+    def __init__(self, stream_format: StreamFormat, fps: float, gop: int) -> None:
+        self.stream_format, self._fps, self._gop = stream_format, fps, gop
         self._newest: EncodedPicture | None = None
         """The reference of the next picture."""
         self._until = 0
@@ -100,4 +100,4 @@ class GaplessTimeline:
         return picture.key and picture.pulse < self._until - _RESTART_S * self._fps
 
     def _bridge(self) -> GapFiller | None:
-        return None if self._newest is None else self.agreement.bridge(self._newest, self._fps)
+        return None if self._newest is None else self.stream_format.bridge(self._newest, self._fps)

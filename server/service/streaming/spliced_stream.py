@@ -51,14 +51,14 @@ class GopAssembler:
             self._complete[camera] = self.chunk(pictures) if is_complete else None
         return self._complete[camera]
 
-    def blank_chunk(self, agreement: StreamFormat, newest: EncodedPicture | None) -> MediaChunk | None:
+    def blank_chunk(self, stream_format: StreamFormat, newest: EncodedPicture | None) -> MediaChunk | None:
         """Return a gray GOP that can follow a picture, shared by all streams of its parameter sets.
 
         None if there is no gray picture of this format.
         """
         form = None if newest is None else newest.parameters
         if form not in self._blank:
-            pictures = agreement.blank(newest, self.first, self.until - self.first, self._fps)
+            pictures = stream_format.blank(newest, self.first, self.until - self.first, self._fps)
             self._blank[form] = self.chunk(pictures, is_muted=True) if pictures else None
         return self._blank[form]
 
@@ -107,7 +107,7 @@ class GopSequencer:
         self._camera = None
         before = self._timeline.fill(gop.first)
         chunks = [gop.chunk(before, is_muted=True)] if before else []
-        gray = gop.blank_chunk(self._timeline.agreement, self._timeline.newest)
+        gray = gop.blank_chunk(self._timeline.stream_format, self._timeline.newest)
         if gray is None:
             return chunks
         self._timeline.advance_past(gray.pictures[-1])

@@ -92,15 +92,15 @@ class TimeShift:
             return None
         lead = await last_gop_before(self._source, first)
         timeline, playback_audio = self._timeline(), self._audio()
-        agreement = timeline.agreement
+        stream_format = timeline.stream_format
         lead_pictures = (
             []
             if lead is None
-            else (await visible_pictures(lead, self._source, agreement, self._layout.fps)).pictures
+            else (await visible_pictures(lead, self._source, stream_format, self._layout.fps)).pictures
         )
         if lead_pictures:  # as if it were shown just now: a repetition does not show how old it is
             timeline.advance_past(replace(lead_pictures[-1], pulse=first - 1))
-        arrived, audible = await self._read(first, until, agreement)
+        arrived, audible = await self._read(first, until, stream_format)
         chunks: list[MediaChunk] = []
         for begin in range(first, until, self._gop):
             end = min(begin + self._gop, until)
@@ -121,7 +121,7 @@ class TimeShift:
         return segment
 
     async def _read(
-        self, first: int, until: int, agreement: StreamFormat
+        self, first: int, until: int, stream_format: StreamFormat
     ) -> tuple[list[EncodedPicture], frozenset[int]]:
         """Return the pictures of some pulses, and the first pulses of GOPs whose audio may be heard."""
         arrived: list[EncodedPicture] = []
@@ -130,7 +130,7 @@ class TimeShift:
             async for gop in gops:
                 if gop.first >= until:
                     break
-                shown = await visible_pictures(gop, self._source, agreement, self._layout.fps)
+                shown = await visible_pictures(gop, self._source, stream_format, self._layout.fps)
                 arrived += shown.pictures
                 if not shown.is_muted:
                     audible.add(gop.first)

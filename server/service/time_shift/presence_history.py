@@ -59,10 +59,12 @@ class VisiblePictures:
 
 
 async def visible_pictures(
-    gop: RecordedGop, source: PlaybackSource, agreement: StreamFormat, fps: float
+    gop: RecordedGop, source: PlaybackSource, stream_format: StreamFormat, fps: float
 ) -> VisiblePictures:
     """Return a GOP's pictures; gray ones, if there are any, where the person had not been seen lately."""
-    pictures, presence = pictures_of_gop(gop, agreement), source.presence
+    pictures, presence = pictures_of_gop(gop, stream_format), source.presence
     if presence is None or await presence.had_been_seen(gop.first, gop.end):
         return VisiblePictures(pictures, is_muted=False)
-    return VisiblePictures(agreement.blank(pictures[0], gop.first, gop.end - gop.first, fps), is_muted=True)
+    return VisiblePictures(
+        stream_format.blank(pictures[0], gop.first, gop.end - gop.first, fps), is_muted=True
+    )

@@ -58,7 +58,7 @@ class TimeShiftStream:
             async for gop in gops:
                 if requested.end is not None and gop.first >= requested.end:
                     return
-                visible = await visible_pictures(gop, self._source, self._timeline.agreement, self._fps)
+                visible = await visible_pictures(gop, self._source, self._timeline.stream_format, self._fps)
                 pictures = [
                     it for it in visible.pictures if requested.end is None or it.pulse < requested.end
                 ]

@@ -110,7 +110,7 @@ class CrossViewInference:
         self._findable.learn(tested.camera[of], tested.feet[of], tested.found[of], looks, kept)
 
     def _floor(self) -> _Floor:
-        spoken = [at for at, name in enumerate(self._cameras) if name in self._sight.fits]
+        spoken = [at for at, name in enumerate(self._cameras) if name in self._sight.letterboxes]
         looks = self._sight.looks([self._cameras[at] for at in spoken])
         known = [at for at, homography in enumerate(looks.homographies) if homography is not None]
         matrices = [looks.homographies[at] for at in known]

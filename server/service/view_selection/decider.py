@@ -97,7 +97,7 @@ class ViewDecider:
         stride, gop = config.track.window.stride, config.encode.gop
         self._at_once = -(-stride // gop) + 1
         """GOPs that an epoch decides at most: one more than it completes while the look-ahead stays."""
-        self._sight = ViewQualityBuffer(config, camera_homographies, self.people.fits)
+        self._sight = ViewQualityBuffer(config, camera_homographies, self.people.letterboxes)
         self._elsewhere = CrossViewInference(config, self._sight)
         self._shots = CurrentShots()
         self._lately = RecentViews()
@@ -108,7 +108,7 @@ class ViewDecider:
         """What the choices are made by now."""
         return self._config.view
 
-    def choose_by(self, view: ViewSettings) -> None:
+    def apply_view_settings(self, view: ViewSettings) -> None:
         """Apply other settings from the next GOP on, as far as `LIVE_VIEW_SETTINGS` names them.
 
         A longer look-ahead is waited for first; with a shorter one there is more to decide, which is done

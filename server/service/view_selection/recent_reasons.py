@@ -49,7 +49,7 @@ class RecentReasons:
         self._newest = 0
         self._why: SelectionReasons | None = None
 
-    def put(self, standings: Mapping[int, SelectedView], first: int, why: SelectionReasons) -> None:
+    def put(self, selected_views: Mapping[int, SelectedView], first: int, why: SelectionReasons) -> None:
         """Take in the GOP that begins at `first`."""
         if first < self._newest:  # the pulses began anew
             self._asked, self._kept = {}, {}
@@ -57,8 +57,8 @@ class RecentReasons:
         self._asked = {it: at for it, at in self._asked.items() if at >= first - self._asked_for}
         self._kept = {it: kept for it, kept in self._kept.items() if it in self._asked}
         for number in self._asked:
-            if number in standings:
-                self._keep(standings[number], why)
+            if number in selected_views:
+                self._keep(selected_views[number], why)
 
     def newest(self, standing: SelectedView) -> SelectionReason:
         """Explain an object's newest view; from now on its reasons are kept.

@@ -42,12 +42,12 @@ class ViewQualityBuffer:
     """
 
     def __init__(
-        self, config: Config, homographies: Mapping[str, Floats | None], fits: Mapping[str, Letterbox]
+        self, config: Config, homographies: Mapping[str, Floats | None], letterboxes: Mapping[str, Letterbox]
     ) -> None:
         self.settings: QualitySettings = config.view.quality
         self._size = (float(config.site.width), float(config.site.height))
         self._fps = config.site.fps
-        self._homographies, self.fits = homographies, fits
+        self._homographies, self.letterboxes = homographies, letterboxes
         self._overhead = config.overhead
         self._histories = {camera: WindowHistory[WindowQuality]() for camera in config.camera_ids}
 
@@ -111,7 +111,7 @@ class ViewQualityBuffer:
 
     def _picture(self, camera: str) -> tuple[float, float, float, float]:
         """Return where a camera's own picture lies in the site's: in its middle."""
-        left, top = (float(side) for side in self.fits[camera].to_site(np.zeros(2)))
+        left, top = (float(side) for side in self.letterboxes[camera].to_site(np.zeros(2)))
         return left, top, self._size[0] - left, self._size[1] - top
 
     def _ground(self, camera: str) -> Floats | None:
@@ -119,7 +119,7 @@ class ViewQualityBuffer:
         own = self._homographies[camera]
         if own is None or camera in self._overhead:
             return None
-        (left, top), scale = self.fits[camera].to_site(np.zeros(2)), self.fits[camera].scale
+        (left, top), scale = self.letterboxes[camera].to_site(np.zeros(2)), self.letterboxes[camera].scale
         to_own = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, scale]]) / scale
         return np.asarray(own @ to_own)
 

@@ -25,23 +25,23 @@ def shows(hall: Hall, gops: range, choices: dict[int, str | None] | None = None)
         camera = CAMERAS[gop % 2] if choices is None else choices[gop]
         for seed, own in enumerate(CAMERAS if camera is not None else ()):
             for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
-                service.intake.video(video(own, unit))
+                service.ingest.video(video(own, unit))
         told = {} if camera is None else {1: camera}
-        service.past.put(GopChoices(first=gop * GOP, frames=GOP, choices=told, boxes={}, cuts=[]), PULSE0)
+        service.recorder.put(GopChoices(first=gop * GOP, frames=GOP, choices=told, boxes={}, cuts=[]), PULSE0)
         choice = ObjectChoice(1, camera, None, away=False)
         service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
 async def until_written(hall: Hall, gops: int) -> None:
-    while hall.service.past.writer is not None and hall.service.past.writer.written < gops:  # noqa: ASYNC110
+    while hall.service.recorder.writer is not None and hall.service.recorder.writer.written < gops:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
 
 
 def forget(hall: Hall) -> None:
     """Let the disk alone know what was, but for the newest GOP."""
-    hall.service.past.recent._frames = GOP
-    hall.service.past.recent._choices = type(hall.service.past.recent._choices)(
-        [hall.service.past.recent._choices[-1]]
+    hall.service.recorder.recent._frames = GOP
+    hall.service.recorder.recent._choices = type(hall.service.recorder.recent._choices)(
+        [hall.service.recorder.recent._choices[-1]]
     )
 
 

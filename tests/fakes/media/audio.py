@@ -95,7 +95,7 @@ def sends(service: FedService, recording: Path, silent: range = range(0)) -> lis
     sound = RecordedAudioSource(str(recording), service.config.sound, FPS, 0, "stop")
     frames = [*sound.until(0), *sound.until(FRAMES)]
     for message in messages([it for it in frames if it.number not in silent]):
-        service.intake.sound(message)
+        service.ingest.audio(message)
     return [frame.data for frame in frames]
 
 

@@ -31,9 +31,9 @@ def behind() -> FedService:
     for epoch in range(EPOCHS):
         for seed, camera in enumerate(CAMERAS):
             for unit in encoded(seed)[epoch * STRIDE : (epoch + 1) * STRIDE]:
-                service.intake.video(video(camera, unit))
+                service.ingest.video(video(camera, unit))
             boxes = {1: LARGE if (epoch + seed) % 4 < 2 else SMALL}
-            service.intake.tracks(tracks(word(camera, epoch, boxes)))
+            service.ingest.tracks(tracks(word(camera, epoch, boxes)))
     service.pulse = end_of_epoch(EPOCHS - 1, STRIDE)
     return service
 

@@ -87,12 +87,12 @@ class Drawn(Hall):
                 if camera not in cameras:
                     continue
                 for unit in units(number, MOST)[first : first + STRIDE]:
-                    self.service.intake.video(video(camera, unit))
+                    self.service.ingest.video(video(camera, unit))
                 seen = [
                     TrackMessage(id=person, boxes=places, confidence=1.0)
                     for person, places in boxes(number, first, STRIDE).items()
                 ]
-                self.service.intake.tracks(tracks(word(camera, epoch, {}, tracks=seen, size=SIZE)))
+                self.service.ingest.tracks(tracks(word(camera, epoch, {}, tracks=seen, size=SIZE)))
             self.service.pulse = end_of_epoch(epoch, STRIDE)
             self.service.decide()
         self.epochs += epochs

@@ -173,7 +173,7 @@ class FedService(BestViewPipeline):
     def come(self, *cameras: str) -> None:
         """Let cameras be there, which remember nobody."""
         for camera in cameras:
-            for part in (self.intake, self.state_replication):
+            for part in (self.ingest, self.state_replication):
                 part.alive(ZenohKeys("hall").camera(camera, "alive"), is_present=True)
             self.state_replication.snapshot_received(
                 Message(ZenohKeys("hall").camera(camera, "retained_identities"), b"", b"")
@@ -186,7 +186,7 @@ class FedService(BestViewPipeline):
                 continue
             units = encoded(seed, self.frames, codec=self.config.encode.codec)
             for unit in units[epoch * STRIDE : (epoch + 1) * STRIDE]:
-                self.intake.video(video(camera, unit))
-            self.intake.tracks(tracks(word(camera, epoch, seen[camera])))
+                self.ingest.video(video(camera, unit))
+            self.ingest.tracks(tracks(word(camera, epoch, seen[camera])))
         self.pulse = end_of_epoch(epoch, STRIDE)
         self.decide()

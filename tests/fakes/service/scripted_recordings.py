@@ -66,13 +66,13 @@ class ClocksByHand:
 @cache
 def filled() -> tuple[dict[str, FrameBuffer], bytes]:
     """Return a shelf per camera with all its frames, and what every file begins with."""
-    agreement = StreamFormat()
-    frame_buffers = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
+    stream_format = StreamFormat()
+    frame_buffers = {camera: FrameBuffer(FPS, FRAMES, stream_format) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, FRAMES):
             frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
-    assert agreement.parameters is not None
-    return frame_buffers, init_segment(agreement.parameters, WIDTH, HEIGHT)
+    assert stream_format.parameters is not None
+    return frame_buffers, init_segment(stream_format.parameters, WIDTH, HEIGHT)
 
 
 @cache

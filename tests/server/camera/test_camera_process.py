@@ -119,8 +119,8 @@ async def test_recordings_run_to_their_end_and_every_frame_and_word_is_there(
     for camera in config.camera_ids:
         frame_buffer = it.service.frame_buffers[camera]
         assert [pulse for pulse in range(FRAMES + 5) if frame_buffer.has(pulse)] == list(range(FRAMES))
-        assert it.service.intake.states[camera].word == "ended"
-        assert it.service.intake.states[camera].bad_messages == 0
+        assert it.service.ingest.states[camera].label == "ended"
+        assert it.service.ingest.states[camera].bad_messages == 0
     assert sum(gop.frames for gop in gops) == FRAMES
     written = in_folder(tmp_path / "out")
     assert written["late.csv"] == b"frame,camera,what\n"
@@ -151,17 +151,17 @@ async def test_a_camera_that_goes_is_seen_to_be_gone_and_the_others_go_on(
     it.service.on_decision.append(lambda _: decided.set())
     await it.start()
     _, second = it.camera("c0"), it.camera("c1")
-    states = it.service.intake.states
+    states = it.service.ingest.states
     async with asyncio.timeout(PATIENCE):
         await decided.wait()
         second.cancel()
         await asyncio.gather(second, return_exceptions=True)
-        while states["c1"].word != "gone":
+        while states["c1"].label != "gone":
             decided.clear()
             await decided.wait()
         decided.clear()
         await decided.wait()
-    assert states["c0"].word == "live"
+    assert states["c0"].label == "live"
 
 
 async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
@@ -181,7 +181,7 @@ async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
         for _ in range(4):
             decided.clear()
             await decided.wait()
-    gauge = it.service.intake.states["c0"].gauge
+    gauge = it.service.ingest.states["c0"].metrics
     for spread in (gauge.sync_error, gauge.tracking_delay):
         assert spread is not None
         assert abs(spread.worst) < PATIENCE
@@ -240,7 +240,7 @@ async def test_a_camera_started_after_its_recording_was_over_lets_everything_end
         await second
         await it.camera("c0")
         await over
-    assert it.service.intake.states["c0"].word == "ended"
+    assert it.service.ingest.states["c0"].label == "ended"
 
 
 class Overloaded(LoadMonitor):

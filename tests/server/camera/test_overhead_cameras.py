@@ -79,7 +79,7 @@ def seen_by_two() -> NDArray[np.float64]:
     return boxes
 
 
-def _agreement(boxes: NDArray[np.float64], overhead: tuple[str, ...]) -> float:
+def _stream_format(boxes: NDArray[np.float64], overhead: tuple[str, ...]) -> float:
     """Return the share of the time in which people have one number in both cameras, by where they are."""
     scene = Scene("overhead", 2, 3, 2, *SIZE, 25.0)
     registry = IdentityRegistry(
@@ -105,8 +105,8 @@ def _agreement(boxes: NDArray[np.float64], overhead: tuple[str, ...]) -> float:
 def test_people_are_the_same_in_two_cameras_that_look_straight_down(
     seen_by_two: NDArray[np.float64],
 ) -> None:
-    assert _agreement(seen_by_two, ("c0", "c1")) > 0.95
-    assert _agreement(seen_by_two, ()) < 0.9
+    assert _stream_format(seen_by_two, ("c0", "c1")) > 0.95
+    assert _stream_format(seen_by_two, ()) < 0.9
 
 
 def test_who_stands_upright_and_who_is_seen_from_above_do_not_vouch_for_each_other() -> None:

@@ -48,7 +48,7 @@ async def watched(hall: Hall, out: Path) -> client.Watched:
 def chosen(hall: Hall) -> dict[int, str]:
     return {
         pulse: choices.choices[1]
-        for choices in hall.service.past.recent.choices(0)
+        for choices in hall.service.recorder.recent.choices(0)
         for pulse in range(choices.first, choices.first + GOP)
     }
 

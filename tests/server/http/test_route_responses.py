@@ -215,9 +215,9 @@ async def test_the_page_and_its_files_are_served(hall: Hall) -> None:
 
 
 async def test_metrics_count_what_happens(busy: Hall) -> None:
-    busy.service.intake.status(status(A, missed=3, shed=2, clock_offset=0.25))
-    busy.service.intake.tracks(tracks(word(A, 3, {}, without_peers=[15, 17])))
-    busy.service.intake.tracks(tracks(word(B, 3, {})))
+    busy.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
+    busy.service.ingest.tracks(tracks(word(A, 3, {}, without_peers=[15, 17])))
+    busy.service.ingest.tracks(tracks(word(B, 3, {})))
     busy.service.decide()
     async with busy.session.get("/metrics") as answer:
         lines = (await answer.text()).splitlines()

@@ -6,7 +6,7 @@ from typing import cast
 
 from bestview import Merge, Split
 from server.messaging.messages import PersonMerge, PersonSplit, ViewCut
-from server.service.decision_state import Board
+from server.service.decision_state import DecisionState
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 from server.service.view_selection.explanation import Explanation, SelectionReasons
 
@@ -27,14 +27,16 @@ class Counted:
 def test_a_decision_is_told_with_its_cuts_and_corrections() -> None:
     choices = (ObjectChoice(1, "c1", "c0", away=False), ObjectChoice(2, "c0", "c0", away=False))
     turned_out = (Merge(kept=1, lost=5), Split(kept=2, split_off=3, camera="c1"))
-    told = Board(25.0).put(GopDecision(20, 10, choices, {"c0": [], "c1": []}, {5: 1}, turned_out, _UNTOLD))
+    told = DecisionState(25.0).put(
+        GopDecision(20, 10, choices, {"c0": [], "c1": []}, {5: 1}, turned_out, _UNTOLD)
+    )
     assert told.choices == {1: "c1", 2: "c0"}
     assert told.cuts == [ViewCut(object=1, pulse=20, from_camera="c0", to_camera="c1")]
     assert told.merged == [PersonMerge(kept=1, lost=5)]
     assert told.split == [PersonSplit(kept=2, new_object=3, camera="c1")]
 
 
-def decided(board: Board, first: int, numbers: tuple[int, ...] = (1, 2)) -> Counted:
+def decided(board: DecisionState, first: int, numbers: tuple[int, ...] = (1, 2)) -> Counted:
     """Put a GOP of ten frames; give what explains it."""
     choices = tuple(ObjectChoice(number, "c0", "c0", away=False) for number in numbers)
     why = Counted()
@@ -43,14 +45,14 @@ def decided(board: Board, first: int, numbers: tuple[int, ...] = (1, 2)) -> Coun
 
 
 def test_nobody_is_explained_whom_nobody_asks_about() -> None:
-    board = Board(25.0)
+    board = DecisionState(25.0)
     assert all(decided(board, first).asked == [] for first in range(0, 500, 10))
     assert board.explain(9) is None
     assert board.explain(2, 480) is None, "that was before the first question"
 
 
 def test_from_the_first_question_on_a_minute_is_explained_and_each_gop_once() -> None:
-    board = Board(25.0)
+    board = DecisionState(25.0)
     whys = [decided(board, 0)]
     for first in range(10, 4000, 10):
         newest = board.explain(7 if first % 20 else 1)
@@ -68,7 +70,7 @@ def test_from_the_first_question_on_a_minute_is_explained_and_each_gop_once() ->
 
 
 def test_who_is_not_asked_about_any_more_is_not_explained() -> None:
-    board = Board(25.0)
+    board = DecisionState(25.0)
     decided(board, 0)
     board.explain(1)
     asked = [decided(board, first).asked for first in range(10, 2000, 10)]
@@ -78,7 +80,7 @@ def test_who_is_not_asked_about_any_more_is_not_explained() -> None:
 
 
 def test_pulses_that_begin_anew_take_their_reasons_with_them() -> None:
-    board = Board(25.0)
+    board = DecisionState(25.0)
     decided(board, 1000)
     board.explain(1)
     decided(board, 1010)
@@ -88,7 +90,7 @@ def test_pulses_that_begin_anew_take_their_reasons_with_them() -> None:
 
 
 def test_who_is_gone_is_not_explained() -> None:
-    board = Board(25.0)
+    board = DecisionState(25.0)
     decided(board, 0)
     board.explain(2)
     decided(board, 10, (1,))

@@ -181,15 +181,15 @@ def test_what_a_supervisor_keeps_is_what_its_processes_run_by(
 
 def test_a_service_goes_by_it_and_what_was_tried_out_stays_where_nothing_else_is_said() -> None:
     service = FedService(small_config())
-    service.choose_by(service.config.view.model_copy(update={"switch_cost_s": 3.0}))
-    service.go_by(small_config([{"id": "c0", "source": "scene:room", "offset": 4}, "c1"]))
+    service.apply_view_settings(service.config.view.model_copy(update={"switch_cost_s": 3.0}))
+    service.apply_config(small_config([{"id": "c0", "source": "scene:room", "offset": 4}, "c1"]))
     assert service.config.camera("c0").offset == 4
     assert service.decider.view.switch_cost_s == 3.0
-    service.go_by(small_config(view={"switch_cost_s": 2.0}))
+    service.apply_config(small_config(view={"switch_cost_s": 2.0}))
     assert service.decider.view.switch_cost_s == service.config.view.switch_cost_s == 2.0
     before = service.config
     with pytest.raises(UserError, match="can be at most"):
-        service.go_by(small_config(view={"lookahead": 10_000}))
+        service.apply_config(small_config(view={"lookahead": 10_000}))
     assert service.config is before
     service.close()
 

@@ -192,7 +192,7 @@ async def test_drawing_processes_that_die_again_and_again_are_counted_and_told_o
 async def test_a_mistake_in_an_answer_is_told_of_once_however_often_it_is_asked_for(
     hall: Hall, caplog: pytest.LogCaptureFixture
 ) -> None:
-    hall.service.losses = None  # type: ignore[assignment]
+    hall.service.loss_recorder = None  # type: ignore[assignment]
     with caplog.at_level(logging.WARNING):
         for _ in range(5):
             async with hall.session.get("/metrics") as answer:

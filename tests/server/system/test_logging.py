@@ -39,13 +39,13 @@ def line(message: str, *values: object, **more: Any) -> dict[str, Any]:
 
 def test_a_line_says_when_how_bad_who_and_what() -> None:
     before = time.time()
-    said = line("camera %s is gone", "c1", level=logging.WARNING)
+    said = line("camera %s disconnected", "c1", level=logging.WARNING)
     assert datetime.fromisoformat(said.pop("time")).timestamp() == pytest.approx(before, abs=5.0)
     assert said == {
         "level": "WARNING",
         "process": "bestview",
         "logger": "server.service.ingest.ingest",
-        "event": "camera c1 is gone",
+        "event": "camera c1 disconnected",
         "camera": "c1",
     }
 
@@ -131,12 +131,12 @@ def test_every_line_of_a_whole_site_can_be_parsed(tmp_path: Path) -> None:
         lines = []
         for written in up.stderr:
             lines.append(json.loads(written))
-            if lines[-1]["event"] == "camera c0 is there":
+            if lines[-1]["event"] == "camera c0 connected":
                 up.send_signal(signal.SIGTERM)
         assert up.wait(PATIENCE) == 0
     assert all(set(it) >= FIELDS for it in lines)
     assert {it["process"] for it in lines} >= {"bestview", "c0", "sync"}
-    assert "camera c0 is there" in {it["event"] for it in lines if it.get("camera") == "c0"}
+    assert "camera c0 connected" in {it["event"] for it in lines if it.get("camera") == "c0"}
 
 
 def test_why_a_process_does_not_start_is_a_line_of_its_log(tmp_path: Path) -> None:

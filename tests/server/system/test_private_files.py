@@ -91,7 +91,7 @@ def test_a_folder_that_was_there_is_left_as_it_is_and_told_of(
     folder.chmod(0o755)
     config = small_config(record={"folder": str(folder)})
     service = FedService(config)
-    service.past.open()
+    service.recorder.open()
     service.close()
     assert stat.S_IMODE(folder.stat().st_mode) == 0o755
     (told,) = [it for it in caplog.messages if it.startswith("record.folder")]

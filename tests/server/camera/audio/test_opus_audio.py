@@ -154,11 +154,11 @@ async def hall(recording: Path, tmp_path: Path) -> AsyncIterator[Hall]:
     record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
     sound = {"source": str(recording), "codec": "opus"}
     async for hall in opened(sound=sound, record=record, http={"viewer_queue_gops": 100}):
-        hall.service.past.open()
+        hall.service.recorder.open()
         hall.service.come(*CAMERAS)
         for camera in CAMERAS:
             for unit in flashing(recording):
-                hall.service.intake.video(video(camera, unit))
+                hall.service.ingest.video(video(camera, unit))
         yield hall
 
 
@@ -166,7 +166,7 @@ def decide(hall: Hall, gops: range) -> None:
     for gop in gops:
         choice = ObjectChoice(1, CAMERAS[gop % 2], None, away=False)
         decision = GopDecision(gop * GOP, GOP, (choice,), {A: []}, {}, (), NO_REASON)
-        hall.service.past.put(hall.service.board.put(decision), None)
+        hall.service.recorder.put(hall.service.decision_state.put(decision), None)
         hall.service.splicer.publish_decision(decision)
 
 
@@ -186,10 +186,10 @@ async def test_streams_live_and_past_have_it_in_step_and_transport_streams_none(
     own = sends(hall.service, recording)
     assert (await hall.get_json("/api/site"))["sound"] == "opus"
     live, ts = await watched(hall, "/objects/1/best.mp4", "/objects/1/best.ts")
-    while hall.service.past.writer is not None and hall.service.past.writer.written < GOPS:  # noqa: ASYNC110
+    while hall.service.recorder.writer is not None and hall.service.recorder.writer.written < GOPS:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
-    assert hall.service.sound is not None
-    hall.service.sound._frames.clear()
+    assert hall.service.audio_buffer is not None
+    hall.service.audio_buffer._frames.clear()
     async with hall.session.get(f"/objects/1/best.mp4?from=p0&to=p{FRAMES}") as answer:
         past = await answer.read()
     for data in (live, past):
@@ -231,7 +231,7 @@ async def test_what_somebody_keeps_has_it_too(hall: Hall, recording: Path, tmp_p
 async def test_chromium_plays_it(hall: Hall, recording: Path) -> None:
     sends(hall.service, recording)
     decide(hall, range(GOPS))
-    parameters = hall.service.agreement.parameters
+    parameters = hall.service.stream_format.parameters
     assert parameters is not None
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)

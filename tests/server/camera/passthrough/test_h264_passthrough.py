@@ -115,8 +115,8 @@ def test_the_tracker_is_given_the_pictures_that_are_sent(tmp_path: Path) -> None
 
 def test_it_can_be_cut_with_what_another_camera_encodes(tmp_path: Path) -> None:
     pipeline = CameraPipeline(site(written(tmp_path, "mp4")), "c0")
-    agreement = StreamFormat()
-    frame_buffers = [FrameBuffer(FPS, FRAMES, agreement) for _ in range(2)]
+    stream_format = StreamFormat()
+    frame_buffers = [FrameBuffer(FPS, FRAMES, stream_format) for _ in range(2)]
     for frame_buffer, units in zip(frame_buffers, (passed(pipeline, range(FRAMES)), encoded(1)), strict=True):
         for unit in units:
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)

@@ -67,12 +67,12 @@ def test_the_files_are_these_bytes(tmp_path: Path) -> None:
 
 
 def films(folder: Path, codec: Codec = "h264") -> tuple[FilmWriter, dict[str, FrameBuffer]]:
-    agreement = stream_format_for(codec, (WIDTH, HEIGHT))
-    frame_buffers = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
+    stream_format = stream_format_for(codec, (WIDTH, HEIGHT))
+    frame_buffers = {camera: FrameBuffer(FPS, 40, stream_format) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, codec=codec):
             frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
-    return FilmWriter(folder, frame_buffers, agreement, SITE), frame_buffers
+    return FilmWriter(folder, frame_buffers, stream_format, SITE), frame_buffers
 
 
 def own_pictures(seed: int, codec: Codec) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
@@ -143,12 +143,12 @@ def test_what_cannot_be_shown_or_did_not_come_is_bridged_as_it_is_live(
 def test_a_film_has_the_sites_sound_in_step(tmp_path: Path, codec: Literal["aac", "opus"]) -> None:
     recording = write_flashes(tmp_path / "flashes.mkv", SOUNDING)
     config = small_config(sound={"source": str(recording), "codec": codec})
-    agreement, track = stream_format_for(config.encode.codec, config.site.size), Soundtrack(config)
-    frame_buffers = {camera: FrameBuffer(FPS, SOUNDING, agreement) for camera in CAMERAS}
+    stream_format, track = stream_format_for(config.encode.codec, config.site.size), Soundtrack(config)
+    frame_buffers = {camera: FrameBuffer(FPS, SOUNDING, stream_format) for camera in CAMERAS}
     for unit in flashing(recording):
         for frame_buffer in frame_buffers.values():
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
-    it = FilmWriter(tmp_path / "best", frame_buffers, agreement, config.site, track.frame_buffer)
+    it = FilmWriter(tmp_path / "best", frame_buffers, stream_format, config.site, track.frame_buffer)
     begin = 3
     for gop in range(begin, SOUNDING // GOP):
         track.read(gop * GOP, (gop + 1) * GOP)

@@ -44,8 +44,8 @@ def printed(now: client.SiteNow, rates: Rates = Rates(), notice: str = "") -> st
 
 async def test_a_site_is_shown_as_it_is(busy: Hall) -> None:
     solve = SolverReport(objective=-4.0, bound=-4.0, gap=0.0, integral=True, rounds=1)
-    busy.service.intake.status(status(A, fps=24.5, missed=3, shed=2, waiting=7, synchronized=False))
-    busy.service.intake.tracks(tracks(word(A, 2, {}, solve=solve, solved_at=0.25)))
+    busy.service.ingest.status(status(A, fps=24.5, missed=3, shed=2, waiting=7, synchronized=False))
+    busy.service.ingest.tracks(tracks(word(A, 2, {}, solve=solve, solved_at=0.25)))
     busy.service.decider.people.registry.names[1] = "Ann"
     now = await client.status(url(busy))
     assert (now.name, now.ready, now.why, now.pulse) == ("hall", True, "2 of 2 cameras", 14)
@@ -58,7 +58,7 @@ async def test_a_site_is_shown_as_it_is(busy: Hall) -> None:
     assert other.camera == A
     assert now.service is not None
     assert now.service.viewers["object"] == 0
-    assert now.service.decided_pulse == busy.service.board.end
+    assert now.service.decided_pulse == busy.service.decision_state.end
     text = printed(now)
     assert "hall  " in text
     assert "ready" in text

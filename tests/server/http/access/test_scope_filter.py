@@ -62,7 +62,7 @@ async def test_one_person_alone_is_listed(site: Hall) -> None:
 
 
 async def test_one_camera_alone_is_listed_and_what_is_wrong_with_others_is_not_told(site: Hall) -> None:
-    site.service.intake.states[B].refused = "its parameters are not those of camera c0"
+    site.service.ingest.states[B].refused = "its parameters are not those of camera c0"
     everything = (await get(site, "/api/cameras", "desk"))["cameras"]
     assert [it["camera"] for it in everything] == [A, B]
     assert "its parameters" in repr(everything)
@@ -80,7 +80,7 @@ async def test_events_are_of_one_person_alone_from_the_first_to_the_next(site: H
         site.session.get("/api/events", headers=bearer("desk")) as all_of_it,
     ):
         site.service.feed(3, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
-        last = site.service.board.end - 5
+        last = site.service.decision_state.end - 5
         told = await events(theirs, last)
         assert [name for name, _ in told[:3]] == ["site", "objects", "cameras"]
         gops = [content for name, content in told if name == "gop"]
@@ -109,8 +109,8 @@ async def test_flags_are_of_who_may_be_seen_alone(site: Hall, monkeypatch: pytes
     ]
     said = word(A, 3, {1: SMALL, 2: SMALL}, risk_events=troubles)
     async with site.session.get("/api/events", headers=bearer("family")) as theirs:
-        site.service.intake.tracks(tracks(said))
-        site.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
+        site.service.ingest.tracks(tracks(said))
+        site.service.ingest.tracks(tracks(word(B, 3, {1: LARGE})))
         site.service.decide()
         everything = (await get(site, "/api/flags", "desk"))["flags"]
         assert [(it["objects"], it["cameras"], it["state"]) for it in everything] == [
@@ -120,7 +120,7 @@ async def test_flags_are_of_who_may_be_seen_alone(site: Hall, monkeypatch: pytes
         flag = {**everything[0], "objects": [1]}
         assert (await get(site, "/api/flags", "family"))["flags"] == [flag]
         site.service.feed(4, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
-        told = await events(theirs, site.service.board.end - 5)
+        told = await events(theirs, site.service.decision_state.end - 5)
         assert [content for name, content in told if name == "flag"] == [flag]
     assert len((await get(site, "/api/flags", "door"))["flags"]) == 2
     async with site.session.get("/api/events", headers=bearer("family")) as later:

@@ -122,7 +122,7 @@ async def test_a_browser_plays_on_through_what_stands_and_what_is_grey(tmp_path:
     codec = "vp8" if form == "webm" else "h264"
     async with left(tmp_path, encode={"codec": codec}) as hall:
         go_on(hall, range(3))
-        kind = f'video/{form}; codecs="{hall.service.agreement.codec}"'
+        kind = f'video/{form}; codecs="{hall.service.stream_format.codec}"'
         path = f"/objects/1/best.{form}?token={token_of('family')}"
         told = await seen_in_chromium(
             *(hall.port, hall.service.splicer, EPOCHS - 2, lambda gop: go_on(hall, range(gop + 2, gop + 3))),

@@ -37,7 +37,7 @@ HLS = {**PATIENT, "hls_segment_s": 0.4, "hls_window_s": 0.8}
 
 async def written(hall: Hall, gops: int) -> None:
     """Let the disk alone know what was, but for the newest GOP."""
-    past = hall.service.past
+    past = hall.service.recorder
     while past.writer is not None and past.writer.written < gops:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
     past.recent._frames = GOP
@@ -51,7 +51,7 @@ async def kept(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[
     on_disk = request.param == "disk"
     record = {"folder": str(tmp_path / "kept") if on_disk else None, "segment_s": 1.0}
     async with left(tmp_path, record=record, http=HLS) as hall:
-        hall.service.past.open()
+        hall.service.recorder.open()
         told = go_on(hall, range(EPOCHS))
         if on_disk:
             await written(hall, len(told) - 2)
@@ -110,7 +110,7 @@ async def test_the_room_of_the_past_is_not_heard_without_the_person(tmp_path: Pa
     recording = write_flashes(tmp_path / "flashes.mp4", SOUNDING)
     record = {"folder": str(tmp_path / "kept"), "segment_s": 1.0}
     async with left(tmp_path, sound={"source": str(recording)}, record=record, http=HLS) as hall:
-        hall.service.past.open()
+        hall.service.recorder.open()
         sends(hall.service, recording)
         told = go_on(hall, range(EPOCHS))
         await written(hall, len(told) - 2)

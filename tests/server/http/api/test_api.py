@@ -78,7 +78,7 @@ async def test_everybody_is_listed_with_who_shows_and_who_sees_them(busy: Hall) 
 
 
 async def test_the_cameras_are_listed_with_how_they_are(busy: Hall) -> None:
-    busy.service.intake.status(status(A, fps=24.5, missed=3, shed=2, load_level=2))
+    busy.service.ingest.status(status(A, fps=24.5, missed=3, shed=2, load_level=2))
     c0, c1 = (await busy.get_json("/api/cameras"))["cameras"]
     assert c0 == {
         "camera": A,
@@ -98,7 +98,7 @@ async def test_the_cameras_are_listed_with_how_they_are(busy: Hall) -> None:
 
 
 async def test_a_refused_camera_says_why(busy: Hall) -> None:
-    busy.service.intake.video(video(A, encoded(5, crf=40)[0]))
+    busy.service.ingest.video(video(A, encoded(5, crf=40)[0]))
     c0 = (await busy.get_json("/api/cameras"))["cameras"][0]
     assert c0["state"] == "refused"
     assert "parameter sets differ" in c0["message"]
@@ -148,8 +148,8 @@ async def test_a_choice_is_explained(busy: Hall) -> None:
 
 
 async def test_a_thumbnail_is_the_chosen_cameras_and_its_address_changes_with_it(busy: Hall) -> None:
-    busy.service.intake.thumbnail(thumbnail(A, 1, b"\xff\xd8 of c0", pulse=14))
-    busy.service.intake.thumbnail(thumbnail(B, 1, b"\xff\xd8 of c1", pulse=10))
+    busy.service.ingest.thumbnail(thumbnail(A, 1, b"\xff\xd8 of c0", pulse=14))
+    busy.service.ingest.thumbnail(thumbnail(B, 1, b"\xff\xd8 of c1", pulse=10))
     one = (await busy.get_json("/api/objects"))["objects"][0]
     assert one["thumbnail"].endswith("objects/1/thumb.jpg?v=10")
     async with busy.session.get("/objects/1/thumb.jpg?v=10") as answer:

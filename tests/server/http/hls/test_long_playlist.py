@@ -30,7 +30,7 @@ async def hall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator
         monkeypatch.setattr(module, "MOST", 12)
     monkeypatch.setattr(long_module, "_DATED_EVERY", 4)
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 1.0}, http=HTTP):
-        hall.service.past.open()
+        hall.service.recorder.open()
         hall.service.come(*CAMERAS)
         yield hall
 
@@ -67,7 +67,7 @@ async def test_no_playlist_promises_that_nothing_is_taken_from_it(hall: Hall) ->
     shows(hall, range(16))
     await until_written(hall, 16)
     forget(hall)
-    run = hall.service.past.session
+    run = hall.service.recorder.session
     assert run is not None
     for query in ("from=p10&to=live", "from=p10&to=p80"):
         path = f"/objects/1/hls/index.m3u8?{query}"

@@ -44,7 +44,7 @@ def shows(hall: Hall, gops: range, nobody: frozenset[int] = frozenset()) -> None
     for gop in gops:
         for seed, camera in enumerate(CAMERAS if gop not in nobody else ()):
             for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
-                hall.service.intake.video(video(camera, unit))
+                hall.service.ingest.video(video(camera, unit))
         choice = ObjectChoice(1, None if gop in nobody else CAMERAS[gop % 2], None, away=False)
         hall.service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
@@ -276,7 +276,7 @@ async def test_gops_that_are_too_short_are_no_parts_but_segments_can_be_waited_f
         gops = 40
         for camera in CAMERAS:
             for unit in encoded(0, 100, gop=2)[: 2 * gops]:
-                hall.service.intake.video(video(camera, unit))
+                hall.service.ingest.video(video(camera, unit))
         choice = ObjectChoice(1, A, None, away=False)
         decisions = [GopDecision(2 * gop, 2, (choice,), {}, {}, (), NO_REASON) for gop in range(gops)]
         for decision in decisions[: gops // 2]:

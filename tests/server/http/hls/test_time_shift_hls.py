@@ -42,7 +42,7 @@ NOTHING = "nothing of camera c0 is recorded from p999 on; there is p0 to p104"
 async def hall(tmp_path: Path) -> AsyncIterator[Hall]:
     """A site that keeps everything."""
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 1.0}, http=HTTP):
-        hall.service.past.open()
+        hall.service.recorder.open()
         hall.service.come(*CAMERAS)
         hall.service.state_replication.begin(0)
         yield hall
@@ -190,7 +190,7 @@ async def test_ffmpeg_plays_the_past_with_its_sound_to_the_end(tmp_path: Path) -
     recording = write_flashes(tmp_path / "flashes.mp4", SOUNDING)
     record = {"folder": str(tmp_path / "kept"), "segment_s": 1.0}
     async for hall in opened(record=record, http=HTTP, sound={"source": str(recording)}):
-        hall.service.past.open()
+        hall.service.recorder.open()
         hall.service.come(*CAMERAS)
         sends(hall.service, recording)
         gops = SOUNDING // GOP

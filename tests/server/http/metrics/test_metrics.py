@@ -36,13 +36,13 @@ async def test_a_cameras_stages_are_measured_by_its_own_times(hall: Hall) -> Non
     see(hall)
     unit = encoded(0)[15]
     head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=1, due=100.0, taken=100.03, encoded=100.04)
-    hall.service.intake.video(
+    hall.service.ingest.video(
         Message(ZenohKeys("hall").camera(A, "video"), unit.data, msgspec.json.encode(head))
     )
     solve = SolverReport(objective=-4.0, bound=-4.2, gap=0.2, integral=False, rounds=3)
     said = word(A, 3, {1: SMALL}, solve=solve, search_s=0.02, solve_s=0.2, solved_at=100.5)
-    hall.service.intake.tracks(tracks(msgspec.structs.replace(said, first=11, last=15, final_to=15)))
-    hall.service.intake.tracks(tracks(said))
+    hall.service.ingest.tracks(tracks(msgspec.structs.replace(said, first=11, last=15, final_to=15)))
+    hall.service.ingest.tracks(tracks(said))
     told = await samples(hall)
     assert told["myview_stage_seconds_bucket", A, "take", "0.05"] == 16
     assert told["myview_stage_seconds_bucket", A, "take", "0.025"] == 15  # what is fed by hand takes no time
@@ -58,7 +58,7 @@ async def test_a_cameras_stages_are_measured_by_its_own_times(hall: Hall) -> Non
 async def test_what_a_camera_says_of_itself_is_there_once_it_has_said_it(busy: Hall) -> None:
     before = await samples(busy)
     assert ("myview_camera_waiting_frames", A) not in before
-    busy.service.intake.status(status(A, waiting=7, fps=12.5, synchronized=False))
+    busy.service.ingest.status(status(A, waiting=7, fps=12.5, synchronized=False))
     told = await samples(busy)
     assert told["myview_camera_waiting_frames", A] == 7
     assert told["myview_camera_fps", A] == 12.5
@@ -66,8 +66,8 @@ async def test_what_a_camera_says_of_itself_is_there_once_it_has_said_it(busy: H
 
 
 async def test_messages_that_were_not_understood_are_counted_whoever_heard_them(hall: Hall) -> None:
-    hall.service.intake.tracks(Message(ZenohKeys("hall").camera(A, "tracks"), b"{", b""))
-    hall.service.intake.status(status(B, bad_messages=3))
+    hall.service.ingest.tracks(Message(ZenohKeys("hall").camera(A, "tracks"), b"{", b""))
+    hall.service.ingest.status(status(B, bad_messages=3))
     told = {key[1:]: value for key, value in (await samples(hall)).items() if key[0] == _BAD}
     assert told == {(A, "sent"): 1, (B, "sent"): 0, (B, "received"): 3}
 
@@ -84,7 +84,7 @@ _BAD = "myview_camera_bad_messages_total"
 async def test_deciding_and_sending_are_counted_by_epoch_and_by_gop(busy: Hall) -> None:
     told = await samples(busy)
     assert told["myview_decide_seconds_count",] == 3
-    assert told["myview_send_seconds_count",] == busy.service.board.end // GOP == 2
+    assert told["myview_send_seconds_count",] == busy.service.decision_state.end // GOP == 2
     assert told["myview_delay_seconds_count",] == 0  # nobody knows when pulses were due
     busy.service.pulse0 = time.time() - 100.0
     busy.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
@@ -177,7 +177,7 @@ async def test_a_site_is_ready_when_pulses_and_frames_come_and_decisions_keep_up
 
 async def test_a_site_whose_decisions_fall_behind_is_not_ready(busy: Hall) -> None:
     allowed = most_behind(busy.service)
-    busy.service.pulse = busy.service.board.end - 1 + allowed
+    busy.service.pulse = busy.service.decision_state.end - 1 + allowed
     assert (await ready(busy))[0] == 200
     busy.service.pulse += 1
     code, words = await ready(busy)
@@ -186,9 +186,9 @@ async def test_a_site_whose_decisions_fall_behind_is_not_ready(busy: Hall) -> No
 
 
 async def test_a_site_without_pulses_or_live_cameras_is_not_ready(busy: Hall) -> None:
-    busy.service._pulsed_at = time.monotonic() - 60.0
+    busy.service._pulse_received_at = time.monotonic() - 60.0
     assert await ready(busy) == (503, "no pulse has come for 60 s")
-    busy.service._pulsed_at = time.monotonic()
+    busy.service._pulse_received_at = time.monotonic()
     for camera in CAMERAS:
-        busy.service.intake.alive(ZenohKeys("hall").camera(camera, "alive"), is_present=False)
+        busy.service.ingest.alive(ZenohKeys("hall").camera(camera, "alive"), is_present=False)
     assert await ready(busy) == (503, "no camera delivers frames")

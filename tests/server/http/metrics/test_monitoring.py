@@ -23,8 +23,8 @@ SEVERITIES = {"critical", "warning", "info"}
 async def printed(hall: Hall) -> Printed:
     """Read what /metrics prints of a site in which everything has happened."""
     for camera in CAMERAS:
-        hall.service.intake.status(status(camera))
-        hall.service.intake.tracks(tracks(word(camera, 2, {}, solved_at=1.0)))
+        hall.service.ingest.status(status(camera))
+        hall.service.ingest.tracks(tracks(word(camera, 2, {}, solved_at=1.0)))
     async with hall.session.get("/metrics") as answer:
         assert answer.status == 200
         return Printed.of(await answer.text())

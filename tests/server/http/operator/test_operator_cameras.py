@@ -14,7 +14,7 @@ from server.messaging.messages import ZenohKeys
 
 
 async def test_every_camera_is_told_with_what_is_measured(busy: Hall) -> None:
-    busy.service.intake.status(status(A, missed=3, shed=2, clock_offset=0.25))
+    busy.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
     told = (await busy.get_json("/api/operator/cameras"))["cameras"]
     plain = (await busy.get_json("/api/cameras"))["cameras"]
     assert [it["camera"] for it in told] == [A, B]
@@ -32,15 +32,15 @@ async def test_what_went_wrong_last_is_told_until_something_else_does(busy: Hall
         camera = (await busy.get_json("/api/operator/cameras"))["cameras"][0]
         return str(camera["last_error"]["text"])
 
-    intake = busy.service.intake
-    intake.status(Message(ZenohKeys("hall").camera(A, "status"), b"{}", b""))
-    assert "a message that cannot be used: " in await trouble()
-    intake.status(status(A, state="away"))
-    assert await trouble() == "its source gives no pictures; retrying"
-    intake.status(status(A, state="live"))
-    assert await trouble() == "its source gives no pictures; retrying"
-    intake.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
-    assert await trouble() == "its process was gone"
+    ingest = busy.service.ingest
+    ingest.status(Message(ZenohKeys("hall").camera(A, "status"), b"{}", b""))
+    assert "invalid message: " in await trouble()
+    ingest.status(status(A, state="away"))
+    assert await trouble() == "its source delivers no pictures; retrying"
+    ingest.status(status(A, state="live"))
+    assert await trouble() == "its source delivers no pictures; retrying"
+    ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+    assert await trouble() == "its process disconnected"
 
 
 async def test_the_floor_has_the_calibrated_cameras_that_have_spoken() -> None:

@@ -122,8 +122,8 @@ async def test_a_flag_is_raised_followed_answered_and_counted(helped: Hall) -> N
     trouble = RiskEvent(reason="crossing", tracks=[1, 2], pulse=expected, margin=0.1, risk=0.5)
     nobody = [RiskEvent(reason="optimality_gap", tracks=[], pulse=17, margin=0.0, risk=0.5)]
     nobody += [RiskEvent(reason="track_loss", tracks=[77], pulse=17, margin=0.0, risk=0.5)]
-    helped.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, risk_events=[*nobody, trouble])))
-    helped.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
+    helped.service.ingest.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, risk_events=[*nobody, trouble])))
+    helped.service.ingest.tracks(tracks(word(B, 3, {1: LARGE})))
     helped.service.pulse = 4 * STRIDE - 1
     helped.service.decide()
 

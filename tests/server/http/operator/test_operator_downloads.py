@@ -38,7 +38,7 @@ async def test_every_box_and_choice_of_the_span_is_a_line(busy: Hall) -> None:
 
 async def test_without_an_end_it_is_all_that_is_decided(busy: Hall) -> None:
     frames = {int(it["frame"]) for it in await rows(busy, "tracks", "from=p0")}
-    assert frames == set(range(1, busy.service.board.end + 1))
+    assert frames == set(range(1, busy.service.decision_state.end + 1))
     assert await rows(busy, "tracks", "from=p900") == []
 
 

@@ -118,11 +118,11 @@ async def test_every_camera_has_a_tile_that_says_how_it_is(browser: Browser) -> 
             await tile.locator("dt").all_text_contents()
             == await page.locator(".camera-tile >> nth=1 >> dt").all_text_contents()
         )
-        hall.service.intake.status(status(A, missed=3, clock_offset=-0.25))
+        hall.service.ingest.status(status(A, missed=3, clock_offset=-0.25))
         await expect(tile.get_by_text("-250 ms")).to_be_visible()
-        hall.service.intake.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+        hall.service.ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
         await expect(tile.locator(".state")).to_have_text("Gone")
-        await expect(tile.locator(".last-trouble")).to_contain_text("its process was gone")
+        await expect(tile.locator(".last-trouble")).to_contain_text("its process disconnected")
         await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
 
 
@@ -183,8 +183,8 @@ async def test_flags_are_listed_with_what_has_become_of_them(browser: Browser) -
         see(hall)
         hall.service.decider.people.registry.set_name(1, "Ann")
         trouble = RiskEvent(reason="crossing", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
-        hall.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, risk_events=[trouble])))
-        hall.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
+        hall.service.ingest.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, risk_events=[trouble])))
+        hall.service.ingest.tracks(tracks(word(B, 3, {1: LARGE})))
         hall.service.pulse = 19
         hall.service.decide()
         line = page.locator("#flag-list li")
@@ -335,14 +335,14 @@ async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes
     browser: Browser, tmp_path: Path
 ) -> None:
     async with operating(browser, "#calibration", patience=280, **SITE) as (hall, page):
-        walking, state = hall.service.walking, page.locator("#walk-state")
+        walking, state = hall.service.walk_session, page.locator("#walk-state")
         await expect(state).to_have_text("No walk yet.")
         await expect(page.get_by_role("button", name="Finish")).to_be_disabled()
         await page.get_by_role("button", name="Start the walk").click()
         await expect(state).to_have_text("Walk now. 0:00 minutes so far.")
         await expect(page.locator("#walk-uncovered li")).to_have_count(len(CAMERAS))
         for said in words(hall.service.config, curved(500)):
-            walking.take(said)
+            walking.add(said)
         await expect(state).to_have_text("Walk now. 0:20 minutes so far.")
         await expect(page.locator("#walk-pairs li")).to_have_text(re.compile(rf"{A} and {B}: \d+ s"))
         await expect(page.locator("#walk-cameras tr")).to_have_text([re.compile(r"(\d+ %){3}")] * 2)
@@ -377,7 +377,7 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         assert (decider.view.switch_cost_s, decider.view.quality.centering) == (2.0, 0.5)
         assert "switch_cost_s: 2.0" in await lines.input_value()
         ahead = page.get_by_label("Look-ahead, frames")
-        await ahead.fill(str(hall.service.most_lookahead + 1))
+        await ahead.fill(str(hall.service.max_lookahead + 1))
         await page.keyboard.press("Enter")
         assert await ahead.evaluate("(it) => it.validity.rangeOverflow")
         await ahead.fill("15")

@@ -36,7 +36,7 @@ def decided(config: Config, tuned: ViewSettings | None = None, after: int = 0) -
     decisions = []
     for number in range(12):
         if tuned is not None and number == after:
-            decider.choose_by(tuned)
+            decider.apply_view_settings(tuned)
         one, other = (SMALL, LARGE) if number // 3 % 2 else (LARGE, SMALL)
         words = [word(A, number, {1: one, 2: SMALL}), word(B, number, {1: other, 2: one})]
         decisions += decider.step(epoch_of(number, *words))
@@ -72,10 +72,10 @@ def test_tuned_meanwhile_holds_from_the_next_gop_on_and_what_was_said_is_weighed
 def test_tuned_back_goes_on_as_ever() -> None:
     config = small_config()
     decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
-    decider.choose_by(TRIED)
+    decider.apply_view_settings(TRIED)
     assert decider.view.lookahead == config.view.lookahead
     assert decider.view.identity == config.view.identity
-    decider.choose_by(config.view)
+    decider.apply_view_settings(config.view)
     assert decider.view == config.view
     assert np.isclose(decider.switch_cost, 1.0)
 

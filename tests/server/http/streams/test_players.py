@@ -57,8 +57,8 @@ def feed(hall: Hall, epoch: int) -> None:
     sizes = {A: SMALL, B: LARGE} if epoch % 4 < 2 else {A: LARGE, B: SMALL}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, EPOCHS * STRIDE)[epoch * STRIDE : (epoch + 1) * STRIDE]:
-            hall.service.intake.video(video(camera, unit))
-        hall.service.intake.tracks(tracks(word(camera, epoch, {1: sizes[camera]})))
+            hall.service.ingest.video(video(camera, unit))
+        hall.service.ingest.tracks(tracks(word(camera, epoch, {1: sizes[camera]})))
     hall.service.pulse = end_of_epoch(epoch, STRIDE)
     hall.service.pulse0 = 1_800_000_000.0
     hall.service.decide()

@@ -124,9 +124,9 @@ async def go_on(hall: Hall) -> None:
         sizes = (SMALL, LARGE) if epoch // 5 % 2 else (LARGE, SMALL)
         for seed, camera in enumerate(CAMERAS):
             for unit in encoded(seed, frames, codec="vp8")[epoch * STRIDE : (epoch + 1) * STRIDE]:
-                hall.service.intake.video(video(camera, unit))
+                hall.service.ingest.video(video(camera, unit))
             boxes = {1: sizes[seed], 2: sizes[1 - seed]}
-            hall.service.intake.tracks(tracks(word(camera, epoch, boxes)))
+            hall.service.ingest.tracks(tracks(word(camera, epoch, boxes)))
         hall.service.pulse = end_of_epoch(epoch, STRIDE)
         hall.service.decide()
         await asyncio.sleep(STRIDE / FPS)

@@ -80,8 +80,8 @@ def test_the_time_reference_comes_often_and_before_its_picture(pulse: int, fps: 
 
 def spliced(cameras: list[int]) -> tuple[bytes, list[tuple[int, int]]]:
     """Return a stream of GOPs of these cameras, and which camera and pulse each picture is."""
-    agreement, data, frames = StreamFormat(), b"", []
-    frame_buffers = [FrameBuffer(FPS, 40, agreement) for _ in CAMERAS]
+    stream_format, data, frames = StreamFormat(), b"", []
+    frame_buffers = [FrameBuffer(FPS, 40, stream_format) for _ in CAMERAS]
     for seed, frame_buffer in enumerate(frame_buffers):
         for unit in encoded(seed):
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)

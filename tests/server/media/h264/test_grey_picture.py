@@ -76,26 +76,26 @@ def test_so_it_is_in_vp8(blocks: tuple[int, int]) -> None:
 
 @pytest.mark.parametrize("own", [False, True])
 def test_a_grey_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> None:
-    agreement = PerCameraStreamFormat() if own else StreamFormat()
+    stream_format = PerCameraStreamFormat() if own else StreamFormat()
     cameras = list(MAKES) if own else list(MAKES)[:1] * 2
-    frame_buffers = {camera: FrameBuffer(FPS, 99, agreement) for camera in cameras}
+    frame_buffers = {camera: FrameBuffer(FPS, 99, stream_format) for camera in cameras}
     for camera, frame_buffer in frame_buffers.items():
         for unit in sent(camera):
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
-    shown: list[EncodedPicture] = agreement.blank(None, 0, GOP, FPS)
+    shown: list[EncodedPicture] = stream_format.blank(None, 0, GOP, FPS)
     for gop, camera in enumerate([cameras[0], None, cameras[1], None, cameras[0]], start=1):
         first = gop * GOP
         newest = shown[-1]
         shown += (
-            agreement.blank(newest, first, GOP, FPS)
+            stream_format.blank(newest, first, GOP, FPS)
             if camera is None
             else frame_buffers[camera].pictures(first, GOP)
         )
         if camera is None:
             assert shown[-1].parameters == newest.parameters
-    assert agreement.parameters is not None
+    assert stream_format.parameters is not None
     data = b"".join([
-        init_segment(agreement.parameters, WIDTH, HEIGHT),
+        init_segment(stream_format.parameters, WIDTH, HEIGHT),
         *(it.fragment for it in shown),
     ])  # fmt: skip
     with av.open(io.BytesIO(data), "r") as stream:
@@ -126,18 +126,18 @@ def with_order_said(parameters: ParameterSets) -> ParameterSets:
 def test_where_no_picture_can_be_repeated_one_grey_picture_lasts_for_all_of_it() -> None:
     parameters = parameter_sets(nal_units(encoded((WIDTH, HEIGHT), "ultrafast", 1)[0].data))
     assert parameters is not None
-    agreement = StreamFormat()
-    agreement.check(with_order_said(parameters))
-    [grey] = agreement.blank(None, 10, 5, FPS)
+    stream_format = StreamFormat()
+    stream_format.check(with_order_said(parameters))
+    [grey] = stream_format.blank(None, 10, 5, FPS)
     assert (grey.pulse, grey.until, grey.key) == (10, 15, True)
-    assert all(map(is_grey, decoded([grey.sample, agreement.blank(grey, 15, 5, FPS)[0].sample])))
+    assert all(map(is_grey, decoded([grey.sample, stream_format.blank(grey, 15, 5, FPS)[0].sample])))
 
 
 def test_in_a_format_that_cannot_be_written_there_is_none() -> None:
-    agreement = StreamFormat()
-    assert agreement.blank(None, 0, 5, FPS) == []
-    agreement.check(ParameterSets(b"\x67\x00\x00\x00", b"\x68"))
-    assert agreement.blank(None, 0, 5, FPS) == []
+    stream_format = StreamFormat()
+    assert stream_format.blank(None, 0, 5, FPS) == []
+    stream_format.check(ParameterSets(b"\x67\x00\x00\x00", b"\x68"))
+    assert stream_format.blank(None, 0, 5, FPS) == []
 
 
 @settings(deadline=None)  # some say that they are very large
@@ -148,6 +148,6 @@ def test_parameter_sets_of_any_bytes_are_written_for_or_unfit(sps: bytes, pps: b
 
 
 def test_a_grey_gop_of_vp8_has_no_hole() -> None:
-    agreement: Any = Vp8StreamFormat(WIDTH, HEIGHT)
-    pictures = agreement.blank(None, 10, 5, FPS)
+    stream_format: Any = Vp8StreamFormat(WIDTH, HEIGHT)
+    pictures = stream_format.blank(None, 10, 5, FPS)
     assert [(it.pulse, it.until, it.key) for it in pictures] == [(n, n + 1, n == 10) for n in range(10, 15)]

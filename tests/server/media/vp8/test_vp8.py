@@ -113,8 +113,8 @@ def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(
     first -= first % GOP
     units = {unit.pulse: unit for unit in encoded(64, 48, missed=frozenset(missed))}
     plain = dict(zip(units, decoded([unit.data for unit in units.values()], "vp8"), strict=True))
-    agreement = Vp8StreamFormat(64, 48)
-    time, on = GaplessTimeline(agreement, FPS, GOP), FrameBuffer(FPS, FRAMES, agreement)
+    stream_format = Vp8StreamFormat(64, 48)
+    time, on = GaplessTimeline(stream_format, FPS, GOP), FrameBuffer(FPS, FRAMES, stream_format)
     shown: list[EncodedPicture] = []
     seen: list[int] = []
     """The pulse of the picture that is to be seen at each pulse."""
@@ -140,10 +140,10 @@ def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(
 
 
 def test_a_long_hole_is_one_picture_that_lasts() -> None:
-    agreement = Vp8StreamFormat(64, 48)
-    time, (first, *_) = GaplessTimeline(agreement, FPS, GOP), encoded(64, 48)
+    stream_format = Vp8StreamFormat(64, 48)
+    time, (first, *_) = GaplessTimeline(stream_format, FPS, GOP), encoded(64, 48)
     shown = time.push(
-        EncodedPicture(0, key=True, fragment=agreement.pack(first.data, 0, FPS, key=True), boot=1)
+        EncodedPicture(0, key=True, fragment=stream_format.pack(first.data, 0, FPS, key=True), boot=1)
     )
     shown += time.fill(1000)
     assert [(picture.pulse, picture.lasts) for picture in shown] == [(0, 1), (1, 999)]

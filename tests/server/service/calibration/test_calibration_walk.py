@@ -38,14 +38,14 @@ async def do(hall: Hall, **step: Any) -> tuple[int, Any]:
 
 
 async def finished(hall: Hall) -> Any:
-    assert hall.service.walking._task is not None
-    await hall.service.walking._task
+    assert hall.service.walk_session._task is not None
+    await hall.service.walk_session._task
     return await hall.get_json(WALK)
 
 
 def walk(hall: Hall, frames: int, epoch: int = 0, **how: Any) -> None:
     for said in words(hall.service.config, curved(frames, **how), epoch):
-        hall.service.walking.take(said)
+        hall.service.walk_session.add(said)
 
 
 async def test_a_walk_becomes_homographies_that_are_the_scenes(wide: Hall, tmp_path: Path) -> None:
@@ -119,7 +119,7 @@ async def test_steps_that_make_no_sense_are_refused(hall: Hall, step: Any, statu
     code, told = await do(hall, **step)
     assert code == status
     assert told["error"].startswith(error)
-    assert hall.service.walking.state is WalkState.NONE
+    assert hall.service.walk_session.state is WalkState.NONE
 
 
 async def told_to(work: list[CalibrationTask], config: Any, *parts: Any) -> CalibrationTask:
@@ -144,23 +144,23 @@ async def test_every_final_box_is_told_once_and_counts_from_the_start_of_the_wal
     places = curved(100)
 
     def before_and_on(walking: WalkSession) -> None:
-        walking.stop()
+        walking.discard()
         for said in words(config, places[:50]):  # nobody has started yet
-            walking.take(said)
+            walking.add(said)
         walking.start()
         for said in words(config, places[50:], epoch=10):
-            walking.take(said)
-            walking.take(said)  # what was said before is not counted again
+            walking.add(said)
+            walking.add(said)  # what was said before is not counted again
 
     task = await told_to([], config, before_and_on)
     assert task.person == 1.7
-    for seen in task.seen:
+    for seen in task.cameras:
         frames = np.frombuffer(seen.frames, dtype=np.int64)
         assert len(set(frames.tolist())) == len(frames)
         assert frames.min() >= 0
         assert frames.max() <= 49
         boxes = np.frombuffer(seen.boxes, dtype=np.float64).reshape(-1, 4)
-        assert len(boxes) == len(frames) == len(np.frombuffer(seen.who, dtype=np.int64))
+        assert len(boxes) == len(frames) == len(np.frombuffer(seen.track, dtype=np.int64))
 
 
 async def test_a_camera_that_comes_again_has_other_tracks() -> None:
@@ -169,10 +169,10 @@ async def test_a_camera_that_comes_again_has_other_tracks() -> None:
     def twice(walking: WalkSession) -> None:
         for boot in (1, 2):
             for said in words(config, curved(50), epoch=10 * (boot - 1), boot=boot):
-                walking.take(said)
+                walking.add(said)
 
     task = await told_to([], config, twice)
-    who = np.frombuffer(task.seen[0].who, dtype=np.int64)
+    who = np.frombuffer(task.cameras[0].track, dtype=np.int64)
     assert set(who.tolist()) == {0, 1}
 
 
@@ -181,10 +181,10 @@ async def test_a_walk_that_is_started_before_any_camera_speaks_counts_from_the_f
 
     def late(walking: WalkSession) -> None:
         for said in words(config, curved(50), epoch=10_000_000):
-            walking.take(said)
+            walking.add(said)
 
     task = await told_to([], config, late)
-    frames = np.frombuffer(task.seen[0].frames, dtype=np.int64)
+    frames = np.frombuffer(task.cameras[0].frames, dtype=np.int64)
     assert 0 <= frames.min() <= frames.max() <= 49
 
 
@@ -200,14 +200,14 @@ async def test_after_the_most_that_is_kept_nothing_more_is(monkeypatch: pytest.M
     walking = WalkSession(config)
     walking.start()
     for said in words(config, curved(100)):
-        walking.take(said)
+        walking.add(said)
     assert walking.seconds == 1.0
 
 
 async def test_whose_process_dies_learns_of_it_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     nonsense = CameraBoxes("c0", (WIDTH, HEIGHT), b"123", b"", b"")
     done = await run_calibration(CalibrationTask([nonsense], FPS, 0.0, 1.75, {}))
-    assert done.error == "the calibration went wrong; the server's log says more"
+    assert done.error == "the calibration failed; see the server's log"
     monkeypatch.setattr("sys.executable", "/nowhere/python")
     done = await run_calibration(CalibrationTask([], FPS, 0.0, 1.75, {}))
     assert done.error.startswith("the calibration cannot be started: ")
@@ -217,10 +217,10 @@ async def test_who_forgets_the_walk_ends_its_calculation(wide: Hall) -> None:
     await do(wide, action="start")
     walk(wide, 20 * STRIDE)
     await do(wide, action="finish")
-    task = wide.service.walking._task
+    task = wide.service.walk_session._task
     async with wide.session.delete(WALK, headers=MINE) as answer:
         assert json.loads(await answer.read())["state"] == "none"
     assert task is not None
     await asyncio.gather(task, return_exceptions=True)
     assert task.cancelled()
-    assert wide.service.walking.done is None
+    assert wide.service.walk_session.result is None

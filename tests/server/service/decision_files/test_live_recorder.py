@@ -68,7 +68,7 @@ def test_a_disk_that_is_full_at_the_end_is_said_and_all_files_are_whole(
 async def test_a_service_decides_and_closes_whatever_its_disk_does(tmp_path: Path) -> None:
     service = behind()
     decided = noted(service)
-    service._recorder = service.losses.recorder = service._record(tmp_path)
+    service._decision_writer = service.loss_recorder.decision_writer = service._open_decision_files(tmp_path)
     with files_of_at_most(0):
         service.decide()
         service.close()

@@ -27,8 +27,8 @@ def test_all_or_none(heads: tuple[str, ...], said: list[dict[str, str]], most: i
         expected = dict(zip(NAMES, heads, strict=True))
         for it in said:
             longer = {which: expected[which] + it.get(which, "") for which in NAMES}
-            fits = all(len(longer[which]) <= most for which in it if it[which])
-            refused = contextlib.nullcontext() if fits else pytest.raises(OSError, match="too large")
+            letterboxes = all(len(longer[which]) <= most for which in it if it[which])
+            refused = contextlib.nullcontext() if letterboxes else pytest.raises(OSError, match="too large")
             with files_of_at_most(most), refused:
                 files.append({folder / which: text for which, text in it.items()})
                 expected = longer

@@ -104,8 +104,8 @@ def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
         service.feed(epoch, {"c0": {1: SMALL, 2: LARGE}, "c1": {}})
         if epoch == 2:
             service.splicer.persons[2].subscribe()
-    assert service.board.resolve(2) == 1
-    assert list(service.board.standings) == [1]
+    assert service.decision_state.resolve(2) == 1
+    assert list(service.decision_state.selected_views) == [1]
     assert service.decider.people.remote == []
     assert set(service.splicer.persons) == {1, 2}
     service.close()
@@ -198,7 +198,7 @@ async def test_both_hear_every_camera_and_tell_under_keys_of_their_own(pair: lis
         sending = asyncio.create_task(send(camera, pair))
         await heard.all_of("myview/hall/bestview/choices", "myview/hall/bestview/1/choices")
         sending.cancel()
-        assert [list(service.board.standings) for service in pair] == [[2], [1]]
+        assert [list(service.decision_state.selected_views) for service in pair] == [[2], [1]]
     finally:
         camera.close()
 

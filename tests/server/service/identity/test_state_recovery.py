@@ -65,7 +65,7 @@ class Site:
         self.service = it = FedService(small_config(**self._changes))
         it.state_replication._send = self._tell
         for camera in CAMERAS:
-            for part in (it.intake, it.state_replication):
+            for part in (it.ingest, it.state_replication):
                 part.alive(KEYS.camera(camera, "alive"), is_present=True)
             if camera != deaf:
                 self.cameras[camera].service(there=True)
@@ -75,7 +75,7 @@ class Site:
         """Push an epoch with these tracks; pictures do not matter here."""
         for epoch in epochs:
             for camera in CAMERAS:
-                self.service.intake.tracks(tracks(word(camera, epoch, seen[camera], boot=boot)))
+                self.service.ingest.tracks(tracks(word(camera, epoch, seen[camera], boot=boot)))
             self.service.pulse = end_of_epoch(epoch, STRIDE)
             self.service.decide()
 
@@ -89,7 +89,7 @@ class Site:
         self.cameras[camera].put(Message(KEYS.camera(camera, "identities"), payload, b""))
 
     def _hear(self, camera: str, payload: bytes) -> None:
-        self.service._remembered(Message(KEYS.camera(camera, "retained_identities"), payload, b""))
+        self.service._retained_identities(Message(KEYS.camera(camera, "retained_identities"), payload, b""))
 
 
 def told(*, merge: bool = False, **changes: object) -> Site:
@@ -351,7 +351,7 @@ def test_what_a_camera_says_that_is_none_is_counted(damage: bytes, caplog: pytes
     site.cameras[B].put(Message("", damage, b""))
     with caplog.at_level(logging.ERROR):
         service = site.start()
-    assert service.intake.states[B].bad_messages == 1
+    assert service.ingest.states[B].bad_messages == 1
     assert caplog.messages == []
     site.tell(range(7, 9))
     assert site.service.decider.people.registry.names == {site.person_of(A, 2, 8): "Ann"}

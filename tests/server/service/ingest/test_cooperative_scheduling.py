@@ -18,7 +18,7 @@ from server.service.ingest.epoch_aligner import Epoch
 
 async def test_between_two_epochs_others_have_their_turn() -> None:
     service, turns = behind(), list[int]()
-    deciding = asyncio.create_task(service.decide_by_turns())
+    deciding = asyncio.create_task(service.decide_cooperatively())
     while not deciding.done():
         turns.append(service.aligner._next or 0)
         await asyncio.sleep(0)
@@ -29,7 +29,7 @@ async def test_between_two_epochs_others_have_their_turn() -> None:
 async def test_what_has_come_is_taken_in_before_the_next_epoch_is_decided() -> None:
     service, taken, waited = behind(), list[int](), list[int]()
     inbox = Inbox(taken.append, turn_s=0.0)
-    service.inboxes.append(inbox)
+    service.bus.inboxes.append(inbox)
     step = service._step
 
     def noting(epoch: Epoch) -> None:
@@ -39,7 +39,7 @@ async def test_what_has_come_is_taken_in_before_the_next_epoch_is_decided() -> N
             inbox.put(number)
 
     service._step = noting  # type: ignore[method-assign]
-    await service.decide_by_turns()
+    await service.decide_cooperatively()
     assert waited == [0] * EPOCHS
     assert len(taken) == 5 * EPOCHS
     service.close()
@@ -48,9 +48,9 @@ async def test_what_has_come_is_taken_in_before_the_next_epoch_is_decided() -> N
 async def test_a_flood_does_not_keep_the_service_from_deciding() -> None:
     service = behind()
     inbox: Inbox[int] = Inbox(lambda left: inbox.put(left - 1) if left else None, turn_s=0.0)
-    service.inboxes.append(inbox)
+    service.bus.inboxes.append(inbox)
     inbox.put(100_000)
-    await service.decide_by_turns()
+    await service.decide_cooperatively()
     assert inbox.waiting
     assert service.aligner._next == EPOCHS
     service.close()
@@ -61,7 +61,7 @@ async def test_what_can_be_decided_only_after_its_pictures_are_gone_is_left_out(
 ) -> None:
     """Half as fast as the pulses: after each epoch they are two further on."""
     service, now = behind(), itertools.count(0.0, 1.5)
-    service._keeping_up = BacklogMonitor(2 * STRIDE, lambda: next(now))
+    service._backlog_monitor = BacklogMonitor(2 * STRIDE, lambda: next(now))
     decided, step = list[int](), service._step
 
     def slow(epoch: Epoch) -> None:
@@ -70,9 +70,9 @@ async def test_what_can_be_decided_only_after_its_pictures_are_gone_is_left_out(
         step(epoch)
 
     service._step = slow  # type: ignore[method-assign]
-    await service.decide_by_turns()
+    await service.decide_cooperatively()
     assert decided[-1] == EPOCHS - 1, "it goes on with the newest"
-    assert service.left_out == EPOCHS - len(decided) > 0
+    assert service.skipped_epochs == EPOCHS - len(decided) > 0
     assert "do not catch up" in caplog.text
     assert service.aligner.waiting == 0
     service.close()
@@ -80,7 +80,7 @@ async def test_what_can_be_decided_only_after_its_pictures_are_gone_is_left_out(
 
 async def test_who_is_told_to_end_does_not_finish_first() -> None:
     service = behind()
-    deciding = asyncio.create_task(service.decide_by_turns())
+    deciding = asyncio.create_task(service.decide_cooperatively())
     await asyncio.sleep(0)
     deciding.cancel()
     await asyncio.gather(deciding, return_exceptions=True)
@@ -93,7 +93,7 @@ async def test_by_turns_or_at_once_the_same_is_decided() -> None:
     one, other = behind(), behind()
     at_once, by_turns = noted(one), noted(other)
     one.decide()
-    await other.decide_by_turns()
+    await other.decide_cooperatively()
     assert [it.choices for it in at_once] == [it.choices for it in by_turns]
     assert len(at_once) > 1
     one.close()

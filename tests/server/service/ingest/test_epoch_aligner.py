@@ -33,8 +33,8 @@ def word(camera: str, epoch: int, *, boot: int = 1, ended: bool = False) -> Came
 def begun(*cameras: str) -> EpochAligner:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE)
     for camera in cameras:
-        aligner.come(camera)
-        aligner.frame(camera, 1, 0)
+        aligner.camera_connected(camera)
+        aligner.frame_received(camera, 1, 0)
     return aligner
 
 
@@ -44,9 +44,9 @@ def heard(epochs: list[Epoch]) -> list[tuple[int, tuple[str, ...], tuple[str, ..
 
 def test_an_epoch_waits_for_every_camera_that_is_there() -> None:
     aligner = begun("c0", "c1")
-    aligner.tracks(word("c0", 0))
+    aligner.add_tracks(word("c0", 0))
     assert aligner.ready(now=5) == []
-    aligner.tracks(word("c1", 0))
+    aligner.add_tracks(word("c1", 0))
     assert heard(aligner.ready(now=5)) == [(0, ("c0", "c1"), ())]
 
 
@@ -58,7 +58,7 @@ def test_the_epochs_are_the_same_in_whatever_order_the_cameras_messages_mix(
     counts = dict.fromkeys(CAMERAS, 0)
     epochs = []
     for camera, _ in order:  # a camera's own messages stay in order, as on the bus
-        aligner.tracks(word(camera, counts[camera]))
+        aligner.add_tracks(word(camera, counts[camera]))
         counts[camera] += 1
         epochs += aligner.ready(now=0)
     assert heard(epochs) == [(number, CAMERAS, ()) for number in range(4)]
@@ -66,62 +66,62 @@ def test_the_epochs_are_the_same_in_whatever_order_the_cameras_messages_mix(
 
 def test_a_camera_that_is_late_is_left_out_once_and_not_waited_for_until_it_is_in_time_again() -> None:
     aligner = begun("c0", "c1")
-    aligner.tracks(word("c0", 0))
+    aligner.add_tracks(word("c0", 0))
     assert aligner.ready(now=4) == []
     assert aligner.ready(now=4 + GRACE) == []
     assert heard(aligner.ready(now=5 + GRACE)) == [(0, ("c0",), ("c1",))]
-    aligner.tracks(word("c0", 1))
+    aligner.add_tracks(word("c0", 1))
     assert heard(aligner.ready(now=10)) == [(1, ("c0",), ())], "no waiting for the late one"
-    aligner.tracks(word("c1", 0))
+    aligner.add_tracks(word("c1", 0))
     assert aligner.late_messages["c1"] == 1
-    aligner.tracks(word("c1", 2))
+    aligner.add_tracks(word("c1", 2))
     assert aligner.ready(now=15) == [], "in time again: c0 is waited for as c1 would be"
-    aligner.tracks(word("c0", 2))
+    aligner.add_tracks(word("c0", 2))
     assert heard(aligner.ready(now=15)) == [(2, ("c0", "c1"), ())]
 
 
 def test_a_camera_that_is_gone_is_not_waited_for() -> None:
     aligner = begun("c0", "c1")
-    aligner.tracks(word("c0", 0))
-    aligner.gone("c1")
+    aligner.add_tracks(word("c0", 0))
+    aligner.camera_disconnected("c1")
     assert heard(aligner.ready(now=5)) == [(0, ("c0",), ())]
 
 
 def test_a_camera_that_comes_back_takes_part_from_its_first_frame_on() -> None:
     aligner = begun("c0", "c1")
-    aligner.gone("c1")
-    aligner.come("c1")
-    aligner.frame("c1", 2, 7)
-    aligner.tracks(word("c0", 0))
+    aligner.camera_disconnected("c1")
+    aligner.camera_connected("c1")
+    aligner.frame_received("c1", 2, 7)
+    aligner.add_tracks(word("c0", 0))
     assert heard(aligner.ready(now=5)) == [(0, ("c0",), ())]
-    aligner.tracks(word("c0", 1))
+    aligner.add_tracks(word("c0", 1))
     assert aligner.ready(now=10) == [], "frame 7 is in epoch 1"
-    aligner.tracks(word("c1", 1, boot=2))
+    aligner.add_tracks(word("c1", 1, boot=2))
     assert heard(aligner.ready(now=10)) == [(1, ("c0", "c1"), ())]
 
 
 def test_a_camera_whose_recording_is_over_is_not_waited_for_and_the_last_ends_everything() -> None:
     aligner = begun("c0", "c1")
-    aligner.gone("c2")
+    aligner.camera_disconnected("c2")
     for camera in ("c0", "c1"):
-        aligner.tracks(word(camera, 0, ended=camera == "c0"))
+        aligner.add_tracks(word(camera, 0, ended=camera == "c0"))
     assert heard(aligner.ready(now=5)) == [(0, ("c0", "c1"), ())]
     assert not aligner.all_ended
-    aligner.tracks(word("c1", 1))
+    aligner.add_tracks(word("c1", 1))
     assert heard(aligner.ready(now=10)) == [(1, ("c1",), ())]
 
 
 def test_when_every_camera_is_gone_time_goes_on() -> None:
     aligner = begun("c0")
-    aligner.gone("c0")
+    aligner.camera_disconnected("c0")
     assert heard(aligner.ready(now=9 + GRACE + 1)) == [(0, (), ()), (1, (), ())]
 
 
 def test_a_camera_whose_word_on_an_epoch_was_lost_is_not_waited_for_and_the_loss_is_told() -> None:
     aligner = begun("c0", "c1")
-    aligner.tracks(word("c0", 1))
-    aligner.tracks(word("c1", 0))
-    aligner.tracks(word("c1", 1))
+    aligner.add_tracks(word("c0", 1))
+    aligner.add_tracks(word("c1", 0))
+    aligner.add_tracks(word("c1", 1))
     assert heard(aligner.ready(now=0)) == [(0, ("c1",), ("c0",)), (1, ("c0", "c1"), ())]
 
 
@@ -134,14 +134,14 @@ def taken(aligner: EpochAligner, now: int, count: int) -> list[Epoch]:
 
 
 def test_what_nobody_spoke_of_and_is_long_past_is_left_out_at_once() -> None:
-    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
     for camera in ("c0", "c1"):
-        aligner.frame(camera, 1, 0)
-        aligner.tracks(word(camera, 0))
+        aligner.frame_received(camera, 1, 0)
+        aligner.add_tracks(word(camera, 0))
     assert heard(aligner.ready(now=4)) == [(0, ("c0", "c1"), ())]
-    aligner.tracks(word("c0", 2))
-    aligner.tracks(word("c1", 1_000_000))
-    aligner.tracks(word("c0", 1_000_001, ended=True))
+    aligner.add_tracks(word("c0", 2))
+    aligner.add_tracks(word("c1", 1_000_000))
+    aligner.add_tracks(word("c0", 1_000_001, ended=True))
     (leap,) = taken(aligner, 5_000_020, 2)
     (after,) = taken(aligner, 5_000_021 + GRACE, 1)
     assert heard([leap, after]) == [(1_000_000, ("c1",), ("c0",)), (1_000_001, ("c0",), ("c1",))]
@@ -150,22 +150,22 @@ def test_what_nobody_spoke_of_and_is_long_past_is_left_out_at_once() -> None:
 
 
 def test_with_nobody_left_it_goes_on_with_now() -> None:
-    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, far=FAR)
-    aligner.frame("c0", 1, 0)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
+    aligner.frame_received("c0", 1, 0)
     assert aligner.ready(now=0) == []
-    aligner.gone("c0")
+    aligner.camera_disconnected("c0")
     assert aligner.ready(now=5_000_000) == []
     (epoch,) = aligner.ready(now=5_000_004 + GRACE + 1)
     assert (epoch.number, epoch.skipped) == (1_000_000, 1_000_000)
 
 
 def test_what_is_not_long_past_and_what_somebody_spoke_of_are_taken_out_one_by_one() -> None:
-    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, far=FAR)
-    aligner.frame("c0", 1, 0)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
+    aligner.frame_received("c0", 1, 0)
     assert aligner.ready(now=0) == []
     one_by_one = (FAR - GRACE) // STRIDE
     assert [it.number for it in aligner.ready(now=FAR)] == list(range(one_by_one))
-    aligner.tracks(word("c0", one_by_one))
+    aligner.add_tracks(word("c0", one_by_one))
     (spoken,) = taken(aligner, 1000 * FAR, 2)
     (leap,) = taken(aligner, 1000 * FAR + STRIDE + GRACE, 1)
     assert (spoken.number, spoken.skipped) == (one_by_one, 0)
@@ -173,10 +173,10 @@ def test_what_is_not_long_past_and_what_somebody_spoke_of_are_taken_out_one_by_o
 
 
 def test_words_of_another_time_do_not_say_where_to_begin() -> None:
-    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
     for camera, epoch in (("c0", 3), ("c1", 1_000_000), ("c2", 9_000_000)):
-        aligner.frame(camera, 1, epoch * STRIDE)
-        aligner.tracks(word(camera, epoch))
+        aligner.frame_received(camera, 1, epoch * STRIDE)
+        aligner.add_tracks(word(camera, epoch))
     assert taken(aligner, 5_000_004, 1) == [], "c0 may still come to its senses"
     assert heard(taken(aligner, 5_000_005 + GRACE, 1)) == [(1_000_000, ("c1",), ("c0",))]
     assert aligner.late_messages == {"c0": 1, "c1": 0, "c2": 1}
@@ -184,7 +184,7 @@ def test_words_of_another_time_do_not_say_where_to_begin() -> None:
 
 def test_of_recordings_nothing_is_left_out() -> None:
     aligner = begun("c0")
-    aligner.tracks(word("c0", 1000))
+    aligner.add_tracks(word("c0", 1000))
     assert [it.number for it in taken(aligner, 10**9, 1001)] == list(range(1001))
 
 
@@ -195,14 +195,14 @@ def test_cameras_that_are_all_behind_are_waited_for_and_nobody_is_left_out() -> 
     """As on a machine with too much to do: everybody speaks two seconds late."""
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, BEHIND)
     for camera in CAMERAS:
-        aligner.come(camera)
-        aligner.frame(camera, 1, 0)
+        aligner.camera_connected(camera)
+        aligner.frame_received(camera, 1, 0)
     epochs = []
     for now in range(400):
         for place, camera in enumerate(CAMERAS):
             epoch, rest = divmod(now - BEHIND - 3 * place + 1, STRIDE)
             if rest == 0 and epoch > 0:
-                aligner.tracks(word(camera, epoch - 1))
+                aligner.add_tracks(word(camera, epoch - 1))
         epochs += aligner.ready(now)
     assert heard(epochs) == [(number, CAMERAS, ()) for number in range(len(epochs))]
     assert len(epochs) > 60
@@ -210,11 +210,11 @@ def test_cameras_that_are_all_behind_are_waited_for_and_nobody_is_left_out() -> 
 
 def test_nobody_is_waited_for_longer_than_they_may_be_behind() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, BEHIND)
-    aligner.come("c0")
-    aligner.frame("c0", 1, 0)
+    aligner.camera_connected("c0")
+    aligner.frame_received("c0", 1, 0)
     assert aligner.ready(now=4 + GRACE + BEHIND) == []
     assert heard(aligner.ready(now=5 + GRACE + BEHIND)) == [(0, (), ("c0",))]
-    aligner.gone("c0")
+    aligner.camera_disconnected("c0")
     assert aligner.ready(now=9 + GRACE) == []
     assert heard(aligner.ready(now=10 + GRACE)) == [(1, (), ())], "nobody is there to be behind"
 
@@ -222,9 +222,9 @@ def test_nobody_is_waited_for_longer_than_they_may_be_behind() -> None:
 def test_the_others_are_waited_for_from_the_first_word_on() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, BEHIND)
     for camera in ("c0", "c1"):
-        aligner.come(camera)
-        aligner.frame(camera, 1, 0)
-    aligner.tracks(word("c0", 0))
+        aligner.camera_connected(camera)
+        aligner.frame_received(camera, 1, 0)
+    aligner.add_tracks(word("c0", 0))
     assert aligner.ready(now=40) == []
     assert aligner.ready(now=40 + GRACE) == []
     assert heard(aligner.ready(now=41 + GRACE)) == [(0, ("c0",), ("c1",))]
@@ -233,31 +233,31 @@ def test_the_others_are_waited_for_from_the_first_word_on() -> None:
 def test_what_cannot_be_decided_in_time_is_left_out_up_to_the_newest_word_of_now() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE)
     for camera in CAMERAS:
-        aligner.come(camera)
+        aligner.camera_connected(camera)
     for epoch in (0, 1, 2, 3, 4, 90):  # the last one is of a camera that has counted too far
         for camera in CAMERAS:
-            aligner.tracks(word(camera, epoch))
+            aligner.add_tracks(word(camera, epoch))
     now = end_of_epoch(4, STRIDE)
     assert [it.number for it in [aligner.next_ready(now)] if it] == [0]
-    assert aligner.behind(now) == 3 * STRIDE
-    assert aligner.leave_out(now) == 3
+    assert aligner.backlog(now) == 3 * STRIDE
+    assert aligner.skip_to(now) == 3
     found = aligner.next_ready(now)
     assert found is not None
     assert (found.number, found.skipped, set(found.tracks)) == (4, 3, set(CAMERAS))
-    assert aligner.leave_out(now) == 0
+    assert aligner.skip_to(now) == 0
 
 
 def test_who_speaks_of_what_is_to_come_takes_nobody_elses_word_from_them() -> None:
-    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
     for camera in ("c0", "c1"):
-        aligner.frame(camera, 1, 0)
+        aligner.frame_received(camera, 1, 0)
     for epoch in range(30):
-        aligner.tracks(word("c0", epoch))
+        aligner.add_tracks(word("c0", epoch))
     late = STRIDE - 1 + GRACE + 1
     assert aligner.ready(now=0) == []
     epochs = aligner.ready(now=late)
     assert (epochs[0].number, epochs[0].late) == (0, ("c1",)), "it was waited for"
-    aligner.tracks(word("c1", 8))
+    aligner.add_tracks(word("c1", 8))
     taken_out = [it for now in range(late, 9 * STRIDE) for it in aligner.ready(now)]
     assert "c1" in next(it.tracks for it in taken_out if it.number == 8)
     assert aligner.late_messages["c1"] == 0

@@ -39,28 +39,28 @@ KEYS = ZenohKeys("hall")
 
 
 class Hall:
-    """An intake and what it fills."""
+    """An ingest and what it fills."""
 
     def __init__(self) -> None:
-        agreement = StreamFormat()
-        self.frame_buffers = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
+        stream_format = StreamFormat()
+        self.frame_buffers = {camera: FrameBuffer(FPS, 50, stream_format) for camera in CAMERAS}
         self.aligner = EpochAligner(CAMERAS, STRIDE, grace=5)
         self.frames: list[tuple[str]] = []
-        self.intake = Ingest(self.frame_buffers, self.aligner, lambda *frame: self.frames.append(frame))
+        self.ingest = Ingest(self.frame_buffers, self.aligner, lambda *frame: self.frames.append(frame))
         for camera in CAMERAS:
-            self.intake.alive(KEYS.camera(camera, "alive"), is_present=True)
+            self.ingest.alive(KEYS.camera(camera, "alive"), is_present=True)
 
     def handle(self, what: str, message: Message) -> None:
         handlers = {
-            "video": self.intake.video,
-            "tracks": self.intake.tracks,
-            "status": self.intake.status,
-            "thumbs": self.intake.thumbnail,
+            "video": self.ingest.video,
+            "tracks": self.ingest.tracks,
+            "status": self.ingest.status,
+            "thumbs": self.ingest.thumbnail,
         }
         handlers[what](message)
 
     def bad(self, camera: str = "c0") -> int:
-        return self.intake.states[camera].bad_messages
+        return self.ingest.states[camera].bad_messages
 
 
 KINDS = ["video", "tracks", "status", "thumbs"]
@@ -79,7 +79,7 @@ def test_a_count_that_no_metric_could_say_is_refused(field: str) -> None:
     hall = Hall()
     hall.handle("status", status("c0", **{field: 10**400}))
     assert hall.bad() == 1
-    assert hall.intake.states["c0"].status is None
+    assert hall.ingest.states["c0"].status is None
 
 
 @pytest.mark.parametrize("words", ["\x1b[2J", "searching\n", "x" * 201, "suchend: zu groß"])
@@ -87,19 +87,19 @@ def test_what_is_left_out_is_told_in_words_that_a_terminal_can_show(words: str) 
     hall = Hall()
     hall.handle("status", status("c0", load=words))
     assert hall.bad() == 1
-    assert hall.intake.states["c0"].status is None
+    assert hall.ingest.states["c0"].status is None
 
 
 def test_a_camera_that_leaves_frames_out_says_so_while_it_is_there() -> None:
     hall = Hall()
     words = "searching every 3rd frame: the machine is too busy"
-    state = hall.intake.states["c0"]
+    state = hall.ingest.states["c0"]
     hall.handle("status", status("c0", load_level=2, load=words))
     assert state.message == words
     hall.handle("status", status("c0"))
     assert state.message == ""
     hall.handle("status", status("c0", load_level=2, load=words))
-    hall.intake.alive(KEYS.camera("c0", "alive"), is_present=False)
+    hall.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
     assert state.message == ""
 
 
@@ -125,7 +125,7 @@ def test_any_bytes_are_counted_and_dropped(what: str, payload: bytes, attachment
 def test_any_key_is_ignored(what: str, key: str) -> None:
     hall = Hall()
     hall.handle(what, Message(key, b"", b""))
-    hall.intake.alive(key, is_present=True)
+    hall.ingest.alive(key, is_present=True)
     assert hall.bad() == 0
 
 
@@ -173,28 +173,28 @@ def test_a_word_that_cannot_be_true_is_refused(changes: dict[str, Any]) -> None:
     hall = Hall()
     fields = {**msgspec.json.decode(GOOD["tracks"].payload), **msgspec.to_builtins(changes)}
     payload = json.dumps(fields).encode()
-    hall.intake.tracks(Message(GOOD["tracks"].key, payload, b""))
+    hall.ingest.tracks(Message(GOOD["tracks"].key, payload, b""))
     assert hall.bad() == 1
 
 
 def test_cameras_that_nobody_configured_are_ignored(caplog: pytest.LogCaptureFixture) -> None:
     hall = Hall()
-    hall.intake.video(video("cellar", encoded(0)[0]))
-    hall.intake.tracks(tracks(word("cellar", 0, {})))
+    hall.ingest.video(video("cellar", encoded(0)[0]))
+    hall.ingest.tracks(tracks(word("cellar", 0, {})))
     for there in (True, False) * 5:
-        hall.intake.alive(KEYS.camera("cellar", "alive"), is_present=there)
+        hall.ingest.alive(KEYS.camera("cellar", "alive"), is_present=there)
     assert len(caplog.messages) == 1
-    assert list(hall.intake.states) == list(CAMERAS)
+    assert list(hall.ingest.states) == list(CAMERAS)
     assert not hall.frames
 
 
 def test_a_camera_of_other_parameters_is_refused_and_its_frames_reach_nobody() -> None:
     hall = Hall()
-    hall.intake.video(video("c0", encoded(0)[0]))
+    hall.ingest.video(video("c0", encoded(0)[0]))
     for unit in encoded(1, crf=40)[:10]:
-        hall.intake.video(video("c1", unit))
-    state = hall.intake.states["c1"]
-    assert state.word == "refused"
+        hall.ingest.video(video("c1", unit))
+    state = hall.ingest.states["c1"]
+    assert state.label == "refused"
     assert "differ from the other cameras'" in state.refused
     assert "same configuration?" in state.refused
     assert "\n" not in state.refused
@@ -204,47 +204,49 @@ def test_a_camera_of_other_parameters_is_refused_and_its_frames_reach_nobody() -
 
 def test_a_refused_camera_that_is_started_again_with_the_right_settings_is_welcome() -> None:
     hall = Hall()
-    hall.intake.video(video("c0", encoded(0)[0]))
-    hall.intake.video(video("c1", encoded(1, crf=40)[0]))
-    hall.intake.alive(KEYS.camera("c1", "alive"), is_present=False)
-    hall.intake.alive(KEYS.camera("c1", "alive"), is_present=True)
-    hall.intake.video(video("c1", encoded(1)[5], boot=2))
-    assert hall.intake.states["c1"].word == "live"
+    hall.ingest.video(video("c0", encoded(0)[0]))
+    hall.ingest.video(video("c1", encoded(1, crf=40)[0]))
+    hall.ingest.alive(KEYS.camera("c1", "alive"), is_present=False)
+    hall.ingest.alive(KEYS.camera("c1", "alive"), is_present=True)
+    hall.ingest.video(video("c1", encoded(1)[5], boot=2))
+    assert hall.ingest.states["c1"].label == "live"
     assert hall.frame_buffers["c1"].has(5)
 
 
 def test_a_cameras_state_follows_what_it_does() -> None:
     hall = Hall()
-    state = hall.intake.states["c0"]
-    words = [state.word]
-    hall.intake.video(video("c0", encoded(0)[0]))
-    words.append(state.word)
-    hall.intake.alive(KEYS.camera("c0", "alive"), is_present=False)
-    words.append(state.word)
-    hall.intake.alive(KEYS.camera("c0", "alive"), is_present=True)
-    hall.intake.tracks(tracks(word("c0", 0, {}, ended=True)))
-    words.append(state.word)
-    hall.intake.alive(KEYS.camera("c0", "alive"), is_present=False)
-    words.append(state.word)
-    hall.intake.alive(KEYS.camera("c0", "alive"), is_present=True)
-    words.append(state.word)
+    state = hall.ingest.states["c0"]
+    words = [state.label]
+    hall.ingest.video(video("c0", encoded(0)[0]))
+    words.append(state.label)
+    hall.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
+    words.append(state.label)
+    hall.ingest.alive(KEYS.camera("c0", "alive"), is_present=True)
+    hall.ingest.tracks(tracks(word("c0", 0, {}, ended=True)))
+    words.append(state.label)
+    hall.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
+    words.append(state.label)
+    hall.ingest.alive(KEYS.camera("c0", "alive"), is_present=True)
+    words.append(state.label)
     assert words == ["starting", "live", "gone", "ended", "ended", "live"]
 
 
 def test_small_pictures_are_kept_by_run_and_track_until_they_are_old_or_the_camera_is_gone() -> None:
     hall = Hall()
-    hall.intake.thumbnail(thumbnail("c0", 1, b"old", pulse=5))
-    hall.intake.thumbnail(thumbnail("c0", 2, b"new", pulse=50))
-    hall.intake.thumbnail(thumbnail("c1", 1, b"other", pulse=50))
-    hall.intake.forget_thumbnails_before(20)
-    assert [kept.jpeg for kept in hall.intake.thumbnails.values()] == [b"new", b"other"]
-    hall.intake.alive(KEYS.camera("c1", "alive"), is_present=False)
-    assert list(hall.intake.thumbnails) == [("c0", 1, 2)]
+    hall.ingest.thumbnail(thumbnail("c0", 1, b"old", pulse=5))
+    hall.ingest.thumbnail(thumbnail("c0", 2, b"new", pulse=50))
+    hall.ingest.thumbnail(thumbnail("c1", 1, b"other", pulse=50))
+    hall.ingest.forget_thumbnails_before(20)
+    assert [kept.jpeg for kept in hall.ingest.thumbnails.values()] == [b"new", b"other"]
+    hall.ingest.alive(KEYS.camera("c1", "alive"), is_present=False)
+    assert list(hall.ingest.thumbnails) == [("c0", 1, 2)]
 
 
 def test_what_is_of_pulses_that_nobody_can_have_counted_to_is_counted_and_dropped() -> None:
     hall = Hall()
-    hall.intake = Ingest(hall.frame_buffers, hall.aligner, lambda *_: None, now=lambda: 20, ahead=50)
+    hall.ingest = Ingest(
+        hall.frame_buffers, hall.aligner, lambda *_: None, current_pulse=lambda: 20, max_ahead=50
+    )
     far = 2**40
     unit = dataclasses.replace(encoded(0)[0], pulse=far)
     hall.handle("video", video("c0", unit))
@@ -252,7 +254,7 @@ def test_what_is_of_pulses_that_nobody_can_have_counted_to_is_counted_and_droppe
     hall.handle("thumbs", thumbnail("c0", 1, b"jpeg", pulse=far))
     assert hall.bad() == 3
     assert hall.frame_buffers["c0"].newest == -1
-    assert not hall.intake.thumbnails
+    assert not hall.ingest.thumbnails
     hall.handle("tracks", tracks(word("c0", 0, {})))
     hall.handle("tracks", tracks(word("c1", 0, {})))
     assert [epoch.number for epoch in hall.aligner.ready(now=4)] == [0]
@@ -260,19 +262,19 @@ def test_what_is_of_pulses_that_nobody_can_have_counted_to_is_counted_and_droppe
 
 def test_small_pictures_of_a_camera_are_so_many_at_most_and_take_no_other_cameras_place() -> None:
     hall = Hall()
-    hall.intake.thumbnail(thumbnail("c1", 7, b"jpeg"))
+    hall.ingest.thumbnail(thumbnail("c1", 7, b"jpeg"))
     for track in range(1200):
-        hall.intake.thumbnail(thumbnail("c0", track, b"jpeg"))
-    assert len(hall.intake.thumbnails) == 301
-    assert ("c0", 1, 1199) in hall.intake.thumbnails
-    assert ("c1", 1, 7) in hall.intake.thumbnails
+        hall.ingest.thumbnail(thumbnail("c0", track, b"jpeg"))
+    assert len(hall.ingest.thumbnails) == 301
+    assert ("c0", 1, 1199) in hall.ingest.thumbnails
+    assert ("c1", 1, 7) in hall.ingest.thumbnails
 
 
 def test_a_small_picture_that_is_none_is_counted_and_dropped() -> None:
     hall = Hall()
-    hall.intake.thumbnail(thumbnail("c0", 1, bytes(1 << 18)))
+    hall.ingest.thumbnail(thumbnail("c0", 1, bytes(1 << 18)))
     assert hall.bad() == 1
-    assert not hall.intake.thumbnails
+    assert not hall.ingest.thumbnails
 
 
 def test_a_camera_that_comes_and_goes_without_end_is_few_lines_of_the_log(
@@ -282,14 +284,16 @@ def test_a_camera_that_comes_and_goes_without_end_is_few_lines_of_the_log(
     hall = Hall()
     caplog.clear()
     for there in (False, True) * 50:
-        hall.intake.alive(KEYS.camera("c0", "alive"), is_present=there)
-    assert caplog.messages == ["camera c0 is gone", "camera c0 is there"] * 4 + ["camera c0 is gone"]
+        hall.ingest.alive(KEYS.camera("c0", "alive"), is_present=there)
+    assert caplog.messages == ["camera c0 disconnected", "camera c0 connected"] * 4 + [
+        "camera c0 disconnected"
+    ]
 
 
 def test_a_status_is_kept() -> None:
     hall = Hall()
-    hall.intake.status(status("c0", fps=24.5))
-    told = hall.intake.states["c0"].status
+    hall.ingest.status(status("c0", fps=24.5))
+    told = hall.ingest.states["c0"].status
     assert told is not None
     assert told.fps == 24.5
 
@@ -298,8 +302,8 @@ def test_frames_and_words_become_epochs() -> None:
     hall = Hall()
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed)[:STRIDE]:
-            hall.intake.video(video(camera, unit))
-        hall.intake.tracks(tracks(word(camera, 0, {1: LARGE})))
+            hall.ingest.video(video(camera, unit))
+        hall.ingest.tracks(tracks(word(camera, 0, {1: LARGE})))
     [epoch] = hall.aligner.ready(now=4)
     assert list(epoch.tracks) == list(CAMERAS)
     assert len(hall.frames) == 2 * STRIDE

@@ -36,5 +36,5 @@ def test_tracks_exchange_their_names_once_however_many_words_say_so(late: int) -
     now = 4 + late
     words = tuple(mended(epoch) for epoch in range(4, now))
     newest = {"c0": word("c0", now, {1: RIGHT, 2: LEFT})}
-    for window in people.update(Epoch(now, end_of_epoch(now, STRIDE), newest, mended=words)):
+    for window in people.update(Epoch(now, end_of_epoch(now, STRIDE), newest, late_revisions=words)):
         assert window.keys == (right, left), "a name stays where it was: on the left, or on the right"

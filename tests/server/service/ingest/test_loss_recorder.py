@@ -1,4 +1,4 @@
-"""Tracks that come too late again and again are one event of the log, and each of them is counted."""
+"""Repeated late tracks are one event of the log, and each is counted."""
 
 from __future__ import annotations
 
@@ -14,55 +14,55 @@ from server.service.streaming.frame_buffer import FrameBuffer
 A, B = CAMERAS
 
 
-class Told:
-    """What was lacking in some epochs, each at its time."""
+class LossyEpochs:
+    """Records the losses of some epochs, each at its time."""
 
     def __init__(self) -> None:
         self.now = 0.0
         frame_buffers = {camera: FrameBuffer(FPS, 50, StreamFormat()) for camera in CAMERAS}
         states = {camera: CameraState() for camera in CAMERAS}
-        self.losses = LossRecorder(frame_buffers, states, STRIDE, lambda: self.now)
+        self.loss_recorder = LossRecorder(frame_buffers, states, STRIDE, lambda: self.now)
 
     def epochs(self, numbers: range, late: str | None = None) -> None:
-        """Decide epochs, to which all have spoken but one."""
+        """Decide epochs that all cameras but one have reported."""
         for number in numbers:
             self.now = number * STRIDE / FPS
-            words = [word(camera, number, {}) for camera in CAMERAS if camera != late]
-            epoch = epoch_of(number, *words)
+            messages = [word(camera, number, {}) for camera in CAMERAS if camera != late]
+            epoch = epoch_of(number, *messages)
             late_ones = () if late is None else (late,)
-            self.losses.epoch(Epoch(epoch.number, epoch.last, epoch.tracks, late_ones))
+            self.loss_recorder.epoch(Epoch(epoch.number, epoch.last, epoch.tracks, late_ones))
 
 
-def test_a_spell_of_late_tracks_is_told_when_it_begins_and_when_it_is_over(
+def test_a_spell_of_late_tracks_is_logged_when_it_begins_and_when_it_ends(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level("INFO")
-    told, minute = Told(), round(60 * FPS / STRIDE)
+    lossy, minute = LossyEpochs(), round(60 * FPS / STRIDE)
     for ten in range(0, 100, 10):  # some come in time in between
-        told.epochs(range(ten, ten + 4), late=B)
-        told.epochs(range(ten + 4, ten + 10))
-    told.epochs(range(100, 100 + minute))
+        lossy.epochs(range(ten, ten + 4), late=B)
+        lossy.epochs(range(ten + 4, ten + 10))
+    lossy.epochs(range(100, 100 + minute))
     [begun, over] = caplog.records
     assert (begun.levelname, over.levelname) == ("WARNING", "INFO")
     assert begun.getMessage() == f"camera {B}: its tracks for pulses up to {STRIDE - 1} came too late"
     seconds = 93 * STRIDE / FPS
     assert over.getMessage() == (
-        f"camera {B}: its tracks come in time again; those of 40 windows in {seconds:.0f} s did not"
+        f"camera {B}: its tracks come in time again; 40 windows in {seconds:.0f} s were late"
     )
-    assert told.losses.late_epochs == 40
+    assert lossy.loss_recorder.late_epochs == 40
 
 
-def test_cameras_are_told_of_each_for_itself(caplog: pytest.LogCaptureFixture) -> None:
-    told = Told()
-    told.epochs(range(5), late=A)
-    told.epochs(range(5, 10), late=B)
+def test_each_camera_is_logged_separately(caplog: pytest.LogCaptureFixture) -> None:
+    lossy = LossyEpochs()
+    lossy.epochs(range(5), late=A)
+    lossy.epochs(range(5, 10), late=B)
     assert [it.partition(":")[0] for it in caplog.messages] == [f"camera {A}", f"camera {B}"]
 
 
-def test_a_camera_that_has_gone_meanwhile_is_not_said_to_be_in_time(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_camera_that_has_disconnected_is_not_logged_as_in_time(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("INFO")
-    told = Told()
-    told.epochs(range(3), late=B)
-    told.now += 1000.0
-    told.losses.epoch(epoch_of(9, word(A, 9, {})))
+    lossy = LossyEpochs()
+    lossy.epochs(range(3), late=B)
+    lossy.now += 1000.0
+    lossy.loss_recorder.epoch(epoch_of(9, word(A, 9, {})))
     assert len(caplog.messages) == 1

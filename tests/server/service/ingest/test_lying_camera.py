@@ -139,9 +139,9 @@ def said_right(epoch: int) -> list[Message]:
 
 def take(service: FedService, message: Message) -> None:
     what = message.key.split("/")[4]
-    intake = service.intake
-    handlers = {"video": intake.video, "tracks": intake.tracks, "status": intake.status}
-    handlers.get(what, intake.thumbnail)(message)
+    ingest = service.ingest
+    handlers = {"video": ingest.video, "tracks": ingest.tracks, "status": ingest.status}
+    handlers.get(what, ingest.thumbnail)(message)
 
 
 class Lived:
@@ -156,7 +156,7 @@ class Lived:
         self.shown: list[MediaChunk] = []
         """What those are sent who watch the other camera."""
         service.pulse = 0
-        service.intake.video(video(OTHER, encoded(1)[0]))
+        service.ingest.video(video(OTHER, encoded(1)[0]))
         for epoch in range(EPOCHS):
             self._send(epoch)
             for message in lie(epoch):
@@ -165,15 +165,15 @@ class Lived:
         self.last = end_of_epoch(EPOCHS - 2, STRIDE)
         """The last pulse of which all that there is to look ahead to has come."""
         # It may be waited for, but not for ever.
-        self._pass(service.pulse + service.aligner._grace + service.aligner._behind + 1)
+        self._pass(service.pulse + service.aligner._grace + service.aligner._backlog + 1)
 
     def _send(self, epoch: int) -> None:
-        intake = self.service.intake
+        ingest = self.service.ingest
         for unit in encoded(1)[epoch * STRIDE : (epoch + 1) * STRIDE]:
-            intake.video(video(OTHER, unit))
-        intake.tracks(tracks(word(OTHER, epoch, {7: LARGE})))
-        intake.status(status(OTHER))
-        intake.thumbnail(thumbnail(OTHER, 7, b"jpeg", pulse=end_of_epoch(epoch, STRIDE)))
+            ingest.video(video(OTHER, unit))
+        ingest.tracks(tracks(word(OTHER, epoch, {7: LARGE})))
+        ingest.status(status(OTHER))
+        ingest.thumbnail(thumbnail(OTHER, 7, b"jpeg", pulse=end_of_epoch(epoch, STRIDE)))
 
     def _pass(self, pulse: int) -> None:
         while self.service.pulse < pulse:
@@ -207,8 +207,8 @@ async def test_whatever_a_camera_says_the_other_one_goes_on(name: str) -> None:
     assert all(it.choices.get(number) in CAMERAS for it in told_of), "they are shown all the time"
     sent = [picture.pulse for it in lived.shown for picture in it.pictures]
     assert [it for it in sent if it <= lived.last] == list(range(lived.last + 1)), "and the stream goes on"
-    assert any(camera == OTHER for camera, *_ in service.intake.thumbnails)
-    states = service.intake.states
+    assert any(camera == OTHER for camera, *_ in service.ingest.thumbnails)
+    states = service.ingest.states
     assert states[OTHER].bad_messages == 0
     assert (states[LIAR].bad_messages > 0) == (name in REFUSED)
     assert sum(map(len, people.undetected._frames.values())) < 1000
@@ -219,16 +219,16 @@ def test_when_all_recordings_are_over_nothing_is_decided_of_pulses_that_nobody_h
     """Before the first pulse nobody can tell that a frame is far ahead."""
     service = FedService(small_config())
     service.come(*CAMERAS)
-    service.intake.video(video(LIAR, replace(encoded(0)[0], pulse=FAR)))
+    service.ingest.video(video(LIAR, replace(encoded(0)[0], pulse=FAR)))
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed)[: 2 * STRIDE]:
-            service.intake.video(video(camera, unit))
-        service.intake.tracks(tracks(word(camera, 0, {1: LARGE})))
-        service.intake.tracks(tracks(word(camera, 1, {1: LARGE}, ended=True)))
+            service.ingest.video(video(camera, unit))
+        service.ingest.tracks(tracks(word(camera, 0, {1: LARGE})))
+        service.ingest.tracks(tracks(word(camera, 1, {1: LARGE}, ended=True)))
     service.pulse = 2 * STRIDE - 1
     service.decide()
     assert service.aligner.all_ended
-    left = list(itertools.islice(service.what_is_left(), 10))
+    left = list(itertools.islice(service.finish(), 10))
     assert left[-1].first + left[-1].frames == 2 * STRIDE
 
 

@@ -45,8 +45,8 @@ def sent(service: FedService, epoch: int, *cameras: str) -> None:
             continue
         again = epoch % ENCODED
         for unit in encoded(seed)[again * STRIDE : (again + 1) * STRIDE]:
-            service.intake.video(video(camera, replace(unit, pulse=unit.pulse + (epoch - again) * STRIDE)))
-        service.intake.tracks(tracks(word(camera, epoch, {1: LARGE if seed else SMALL})))
+            service.ingest.video(video(camera, replace(unit, pulse=unit.pulse + (epoch - again) * STRIDE)))
+        service.ingest.tracks(tracks(word(camera, epoch, {1: LARGE if seed else SMALL})))
 
 
 def lived(service: FedService, epochs: range) -> None:
@@ -61,8 +61,8 @@ def lived(service: FedService, epochs: range) -> None:
 def service(tmp_path: Path) -> FedService:
     """A service that records and writes decisions, and has lived for some epochs."""
     it = FedService(small_config(record={"folder": str(tmp_path / "kept")}), out=tmp_path)
-    it._recorder = it.losses.recorder = it._record(tmp_path)
-    it.past.open()
+    it._decision_writer = it.loss_recorder.decision_writer = it._open_decision_files(tmp_path)
+    it.recorder.open()
     it.come(*CAMERAS)
     return it
 
@@ -79,13 +79,13 @@ def test_who_slept_decides_what_is_of_now_and_nothing_of_what_is_long_past(
     firsts = [it.first for it in decided]
     assert firsts == [*range(0, before, GOP), *range(then * STRIDE, (then + BEFORE - 1) * STRIDE, GOP)]
     assert all(it.choices[0].camera == "c1" for it in decided[-3:]), "all is known of what is of now"
-    assert service.board.end == decided[-1].first + GOP
+    assert service.decision_state.end == decided[-1].first + GOP
     service.close()
     rows = (tmp_path / "late.csv").read_text(encoding="utf-8").splitlines()[1:]
     assert f"{before + 1},,not decided up to {then * STRIDE}" in rows
     assert len(rows) < 50
-    assert service.past.writer is not None
-    assert (service.past.writer.written, service.past.writer.lost) == (len(decided), 0)
+    assert service.recorder.writer is not None
+    assert (service.recorder.writer.written, service.recorder.writer.lost) == (len(decided), 0)
     for path in everything_that_plays(tmp_path / "kept"):
         decodes_without_errors(path)
 
@@ -97,12 +97,12 @@ def test_streams_go_on_after_a_leap_with_one_picture_that_bridges_it_or_with_a_h
     lived(service, range(BEFORE))
     channels = [service.splicer.decided_cameras["c0"], *service.splicer.persons.values()]
     viewers = [it.subscribe() for it in channels]
-    until, then = service.board.end, minutes * HOUR // 60 // ENCODED * ENCODED
+    until, then = service.decision_state.end, minutes * HOUR // 60 // ENCODED * ENCODED
     lived(service, range(then, then + BEFORE))
     for viewer in viewers:
         footage = [it for it in viewer._queue if isinstance(it, MediaChunk) and it.until > until]
         first, *more = [(it.first, it.until) for it in footage]
-        expected = [(it, it + GOP) for it in range(then * STRIDE, service.board.end, GOP)]
+        expected = [(it, it + GOP) for it in range(then * STRIDE, service.decision_state.end, GOP)]
         if minutes < 60:
             assert first == (until, then * STRIDE)
             assert len(footage[0].pictures) == 1
@@ -117,7 +117,9 @@ def test_what_is_a_minute_late_is_decided_epoch_by_epoch(service: FedService) ->
     lived(service, range(BEFORE))
     then = HOUR // 60
     lived(service, range(then, then + BEFORE))
-    assert [it.first for it in decided] == list(range(0, service.board.end, GOP)), "nothing is left out"
+    assert [it.first for it in decided] == list(range(0, service.decision_state.end, GOP)), (
+        "nothing is left out"
+    )
     service.close()
 
 

@@ -53,8 +53,8 @@ def test_a_window_is_certified_where_nothing_can_be_better(gaps: list[float], sh
 def test_another_run_is_measured_anew_but_what_went_wrong_is_remembered() -> None:
     gauge = CameraMetrics(now=lambda: 7.0)
     gauge.frame(head(0, 0.1))
-    gauge.trouble("it went\nwrong")
-    gauge.begin()
+    gauge.record_problem("it went\nwrong")
+    gauge.reset_recent()
     assert gauge.sync_error is None
     assert gauge.last_error is not None
     assert (gauge.last_error.text, gauge.last_error.at) == ("it went wrong", 7.0)

@@ -90,7 +90,7 @@ def played(
         missed = late and bool(said)
         tracks, came = {} if missed else {"c0": message}, tuple(held)
         held = [message] if missed else []
-        people.update(Epoch(message.epoch, frame, tracks, mended=came))
+        people.update(Epoch(message.epoch, frame, tracks, late_revisions=came))
         for pulse in range(first, frame - 19):
             told[pulse] = at(people, pulse)
         first = max(first, frame - 19)

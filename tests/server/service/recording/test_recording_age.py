@@ -334,7 +334,7 @@ def test_what_a_pass_takes_away_is_told_seldom_and_says_why(
 def test_a_service_records_by_the_machines_clocks(tmp_path: Path) -> None:
     service = FedService(small_config(record={"folder": str(tmp_path / "kept"), "trust_clock": True}))
     service.come(*CAMERAS)
-    service.past.open()
+    service.recorder.open()
     service.close()
     ledger = json.loads((tmp_path / "kept" / "clock.json").read_bytes())
     assert ledger["seconds"] >= 0

@@ -58,7 +58,7 @@ async def hall(recording: Path, tmp_path: Path) -> AsyncIterator[Hall]:
     async for hall in opened(
         sound={"source": str(recording)}, record=record, http={"viewer_queue_gops": 100}
     ):
-        hall.service.past.open()
+        hall.service.recorder.open()
         hall.service.come(*CAMERAS)
         yield hall
 
@@ -69,27 +69,27 @@ def shows(hall: Hall, recording: Path, gops: range, choices: Mapping[int, str | 
     for gop in gops:
         for camera in CAMERAS:
             for unit in flashing(recording)[gop * GOP : (gop + 1) * GOP]:
-                service.intake.video(video(camera, unit))
+                service.ingest.video(video(camera, unit))
         camera = CAMERAS[gop % 2] if choices is None else choices[gop]
         told = GopChoices(
             first=gop * GOP, frames=GOP, choices={} if camera is None else {1: camera}, boxes={}, cuts=[]
         )
-        service.past.put(told, PULSE0)
+        service.recorder.put(told, PULSE0)
         choice = ObjectChoice(1, camera, None, away=False)
         service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
 async def until_written(service: FedService, gops: int) -> None:
-    while service.past.writer is not None and service.past.writer.written < gops:  # noqa: ASYNC110
+    while service.recorder.writer is not None and service.recorder.writer.written < gops:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
 
 
 def forget(service: FedService) -> None:
     """Let nothing be in memory any more, but the last GOPs' pictures and sound."""
-    assert service.sound is not None
-    service.past.recent._frames = GOP
-    for number in list(service.sound._frames)[:-20]:
-        del service.sound._frames[number]
+    assert service.audio_buffer is not None
+    service.recorder.recent._frames = GOP
+    for number in list(service.audio_buffer._frames)[:-20]:
+        del service.audio_buffer._frames[number]
 
 
 async def download(hall: Hall, path: str) -> bytes:
@@ -167,7 +167,7 @@ async def test_what_retention_took_away_or_nobody_kept_is_silent(hall: Hall, rec
     shows(hall, recording, range(GOPS))
     await until_written(hall.service, GOPS)
     forget(hall.service)
-    run = hall.service.past.session
+    run = hall.service.recorder.session
     assert run is not None
     gone = run.segments[6].first
     run.paths.audio_file(gone).unlink()
@@ -189,7 +189,7 @@ async def test_the_sound_of_an_earlier_run_is_heard_after_a_restart(recording: P
             sound={"source": str(recording)}, record=record, http={"viewer_queue_gops": 100}
         ):
             hall.service.pulse0 = PULSE0
-            hall.service.past.open()
+            hall.service.recorder.open()
             hall.service.come(*CAMERAS)
             if not gops.start:
                 sends(hall.service, recording)
@@ -231,7 +231,7 @@ async def test_the_sound_plays_from_the_disk_by_itself(hall: Hall, recording: Pa
     sends(hall.service, recording)
     shows(hall, recording, range(GOPS))
     await until_written(hall.service, GOPS)
-    run = hall.service.past.session
+    run = hall.service.recorder.session
     assert run is not None
     for path in (run.audio.path, run.paths.audio_file(0)):
         ((codec, frames, *_),) = probed(path, "codec_name,nb_read_frames")
@@ -241,11 +241,11 @@ async def test_the_sound_plays_from_the_disk_by_itself(hall: Hall, recording: Pa
 
 async def test_a_site_without_sound_keeps_none(tmp_path: Path, recording: Path) -> None:
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
-        hall.service.past.open()
+        hall.service.recorder.open()
         hall.service.come(*CAMERAS)
         shows(hall, recording, range(4))
         await until_written(hall.service, 4)
-        run = hall.service.past.session
+        run = hall.service.recorder.session
         assert run is not None
         assert not (run.folder / "sound").exists()
         assert not run.audio.path.exists()

@@ -310,8 +310,8 @@ async def hall(tmp_path: Path) -> AsyncIterator[Hall]:
 
 async def shows(hall: Hall) -> None:
     """Let six GOPs of person 1 be recorded."""
-    hall.service.past.recent._frames = GOP
-    hall.service.past.open()
+    hall.service.recorder.recent._frames = GOP
+    hall.service.recorder.open()
     hall.service.come(*CAMERAS)
     hall.service.state_replication.begin(0)
     for epoch in range(7):
@@ -325,8 +325,8 @@ async def until(condition: Callable[[], bool]) -> None:
 
 
 def written(hall: Hall) -> int:
-    assert hall.service.past.writer is not None
-    return hall.service.past.writer.written
+    assert hall.service.recorder.writer is not None
+    return hall.service.recorder.writer.written
 
 
 async def asked(hall: Hall, path: str) -> tuple[int, bytes]:
@@ -336,7 +336,7 @@ async def asked(hall: Hall, path: str) -> tuple[int, bytes]:
 
 @pytest.mark.parametrize("harm", [gone("."), gone("RUN"), moved("."), made_anew("RUN"), made_a_file("RUN")])
 async def test_nobody_is_promised_what_is_gone(hall: Hall, harm: Harm) -> None:
-    store = hall.service.past.folder
+    store = hall.service.recorder.folder
     assert store is not None
     assert store.session is not None
     assert (await asked(hall, "/objects/1/best.mp4?from=p0&to=p10"))[0] == 200
@@ -371,9 +371,9 @@ async def test_nobody_is_promised_what_is_gone(hall: Hall, harm: Harm) -> None:
 async def test_who_is_nowhere_else_is_gone_with_what_was_recorded(
     hall: Hall, path: str, status: int, error: str
 ) -> None:
-    store = hall.service.past.folder
+    store = hall.service.recorder.folder
     assert store is not None
-    hall.service.past.recent._choices.clear()
+    hall.service.recorder.recent._choices.clear()
     hall.service.splicer.forget([], [])
     hall.service.splicer._persons._ended.clear()
     hall.service.decider.people.registry.first_seen.clear()
@@ -383,7 +383,7 @@ async def test_who_is_nowhere_else_is_gone_with_what_was_recorded(
 
 
 async def test_a_part_that_is_gone_is_a_hole(hall: Hall) -> None:
-    store = hall.service.past.folder
+    store = hall.service.recorder.folder
     assert store is not None
     assert store.session is not None
     store.session.paths.camera_file(A, 0).unlink()
@@ -400,7 +400,7 @@ async def test_what_may_not_be_read_is_told_in_one_line() -> None:
     with nobodys_folder() as tmp_path:
         async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
             await shows(hall)
-            store = hall.service.past.folder
+            store = hall.service.recorder.folder
             assert store is not None
             assert store.session is not None
             (store.session.folder / "cameras" / "c0").chmod(0)
@@ -412,7 +412,7 @@ async def test_what_may_not_be_read_is_told_in_one_line() -> None:
 
 
 async def test_that_recording_stands_is_told_and_that_it_goes_on(hall: Hall) -> None:
-    store, writer = hall.service.past.folder, hall.service.past.writer
+    store, writer = hall.service.recorder.folder, hall.service.recorder.writer
     assert store is not None
     assert writer is not None
     writer._retry_s = 0.0
@@ -421,8 +421,8 @@ async def test_that_recording_stands_is_told_and_that_it_goes_on(hall: Hall) -> 
     hall.service.feed(7, {A: {1: LARGE}, B: {1: SMALL}})
     await until(lambda: writer.lost == 1)
     assert b"myview_recording 0.0" in (await asked(hall, "/metrics"))[1]
-    hall.service.pulse = hall.service.board.end
-    hall.service._pulsed_at = asyncio.get_running_loop().time()
+    hall.service.pulse = hall.service.decision_state.end
+    hall.service._pulse_received_at = asyncio.get_running_loop().time()
     assert await asked(hall, "/readyz") == (200, b"2 of 2 cameras; nothing is recorded: File exists\n")
     store.folder.unlink()
     hall.service.feed(8, {A: {1: LARGE}, B: {1: SMALL}})

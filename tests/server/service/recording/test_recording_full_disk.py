@@ -164,7 +164,7 @@ def test_a_full_disk_does_not_keep_the_service_from_its_start(tmp_path: Path, cl
     service = FedService(small_config(record={"folder": str(folder), "keep_s": 1.5}))
     service.come(*CAMERAS)
     with files_of_at_most(0):
-        service.past.open()
+        service.recorder.open()
         assert on_disk(folder) == [50, 75]
         service.close()
 

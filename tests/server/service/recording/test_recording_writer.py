@@ -177,11 +177,11 @@ def fed(folder: Path) -> FedService:
 
 def test_a_service_records_what_it_decides(tmp_path: Path) -> None:
     service = fed(tmp_path / "kept")
-    service.past.open()
+    service.recorder.open()
     for epoch in range(7):
         service.feed(epoch, {A: {1: SMALL}, B: {}})
     service.close()
-    run = service.past.session
+    run = service.recorder.session
     assert run is not None
     assert [pulse for pulse, _ in pictures(run.objects[1].path)] == list(range(6 * GOP))
     assert [pulse for pulse, _ in pictures(run.cameras[B].path)] == list(range(6 * GOP))
@@ -189,16 +189,16 @@ def test_a_service_records_what_it_decides(tmp_path: Path) -> None:
 
 def test_pictures_that_come_after_the_decision_are_recorded_too(tmp_path: Path) -> None:
     service = fed(tmp_path / "kept")
-    service.past.open()
+    service.recorder.open()
     for epoch in range(7):
         service.feed(epoch, {A: {1: SMALL}})
     for unit in encoded(1)[: 7 * GOP]:
-        service.intake.video(video(B, unit))
+        service.ingest.video(video(B, unit))
     service.feed(7, {A: {1: SMALL}})
     service.close()
-    run = service.past.session
+    run = service.recorder.session
     assert run is not None
-    decided = service.past.recent.end
+    decided = service.recorder.recent.end
     assert decided >= 5 * GOP
     for camera in CAMERAS:
         assert [pulse for pulse, _ in pictures(run.cameras[camera].path)] == list(range(decided))
@@ -207,16 +207,16 @@ def test_pictures_that_come_after_the_decision_are_recorded_too(tmp_path: Path) 
 def test_a_folder_that_cannot_be_used_is_told_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match=r"record\.folder: .*file: cannot write there"):
-        fed(tmp_path / "file").past.open()
+        fed(tmp_path / "file").recorder.open()
     first = fed(tmp_path / "kept")
-    first.past.open()
+    first.recorder.open()
     with pytest.raises(UserError, match="another process records there"):
-        fed(tmp_path / "kept").past.open()
+        fed(tmp_path / "kept").recorder.open()
     first.close()
 
 
 def test_nothing_is_written_where_no_folder_is_named() -> None:
     service = FedService(small_config())
-    service.past.open()
-    assert service.past.session is None
+    service.recorder.open()
+    assert service.recorder.session is None
     service.close()

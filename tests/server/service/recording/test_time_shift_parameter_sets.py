@@ -25,16 +25,16 @@ async def hall(tmp_path: Path) -> AsyncIterator[Hall]:
     record = {"folder": str(tmp_path / "kept"), "segment_s": 1.0}
     async for hall in opened(**OWN, record=record, http={"hls_segment_s": 0.4}):
         service = hall.service
-        service.past.open()
+        service.recorder.open()
         put(service.frame_buffers)
         for gop in range(GOPS):
             chosen = decision(gop)
             choices = {it.number: it.camera for it in chosen.choices}
-            service.past.put(
+            service.recorder.put(
                 GopChoices(first=gop * GOP, frames=GOP, choices=choices, boxes={}, cuts=[]), PULSE0
             )
             service.splicer.publish_decision(chosen)
-        while service.past.writer is not None and service.past.writer.written < GOPS - 2:  # noqa: ASYNC110
+        while service.recorder.writer is not None and service.recorder.writer.written < GOPS - 2:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
         yield hall
 

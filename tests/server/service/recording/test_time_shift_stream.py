@@ -59,8 +59,8 @@ IN_B: Mapping[str, Mapping[int, Box | None]] = {A: {1: SMALL}, B: {1: LARGE}}
 async def recorded(tmp_path: Path) -> AsyncIterator[Hall]:
     """Six GOPs of person 1, in c0, then in c1; all but the last two are on the disk alone."""
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
-        hall.service.past.recent._frames = GOP
-        hall.service.past.open()
+        hall.service.recorder.recent._frames = GOP
+        hall.service.recorder.open()
         hall.service.come(*CAMERAS)
         for epoch in range(7):
             hall.service.feed(epoch, IN_A if epoch < 3 else IN_B)
@@ -69,7 +69,7 @@ async def recorded(tmp_path: Path) -> AsyncIterator[Hall]:
 
 
 async def until_written(hall: Hall, gops: int) -> None:
-    while hall.service.past.writer is not None and hall.service.past.writer.written < gops:  # noqa: ASYNC110
+    while hall.service.recorder.writer is not None and hall.service.recorder.writer.written < gops:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
 
 
@@ -105,7 +105,7 @@ async def read_up_to(hall: Hall, path: str, pulse: int, then: int) -> list[tuple
 async def test_somebodys_past_goes_over_into_the_present_without_a_hole(recorded: Hall) -> None:
     camera = {
         pulse: choices.choices[1]
-        for choices in recorded.service.past.recent.choices(0)
+        for choices in recorded.service.recorder.recent.choices(0)
         for pulse in range(choices.first, choices.first + GOP)
     }
     assert min(camera) >= 4 * GOP, "the beginning is on the disk alone"
@@ -152,7 +152,7 @@ async def test_an_end_that_is_yet_to_come_is_waited_for(recorded: Hall) -> None:
 
 
 async def test_without_a_recording_the_memory_is_the_past(busy: Hall) -> None:
-    for source in (PersonPlayback(busy.service.past, (1,)), CameraPlayback(busy.service.past, A)):
+    for source in (PersonPlayback(busy.service.recorder, (1,)), CameraPlayback(busy.service.recorder, A)):
         (span,) = available_ranges(source)
         assert (first_available(source, 0), end_of_available(source)) == (span.first, span.end)
         assert first_available(source, span.end) is None
@@ -250,7 +250,7 @@ async def test_who_watches_the_past_is_a_viewer_like_others(
     recorded: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_stream, "_LEAD_S", 0.2)
-    past = recorded.service.past
+    past = recorded.service.recorder
     async with recorded.session.get("/objects/1/best.mp4?from=p0") as answer:
         await answer.content.readany()
         assert (past.viewers, recorded.service.splicer.viewers) == (1, 0)
@@ -262,7 +262,7 @@ async def test_who_watches_the_past_is_a_viewer_like_others(
 
 
 async def test_who_watches_the_past_takes_a_viewers_place_and_gives_it_back(recorded: Hall) -> None:
-    past = recorded.service.past
+    past = recorded.service.recorder
     async with recorded.session.get("/objects/1/best.mp4?from=p0") as answer:
         await answer.content.readany()
         while not recorded.service.splicer.viewers:  # noqa: ASYNC110
@@ -292,7 +292,7 @@ class OnDisk:
 def site_of(store: RecordingFolder) -> tuple[StreamFormat, bytes]:
     del store
     frame_buffers, header = filled()
-    return frame_buffers[A]._agreement, header
+    return frame_buffers[A]._stream_format, header
 
 
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -312,8 +312,8 @@ async def test_any_part_of_any_past_is_played_without_a_hole(
         [SessionEntries(store.session, store.session.objects[1].index)] if 1 in store.session.objects else []
     )
     source = OnDisk(*tapes, end=len(shown) * GOP)
-    agreement, header = site_of(store)
-    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
+    stream_format, header = site_of(store)
+    stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: None)
     data = b"".join([it.data async for it in stream.send(PlaybackRange(start, start + frames))])
     store.close()
     there = available_ranges(source)
@@ -341,8 +341,8 @@ async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -
     assert store.session is not None
     store.session.paths.camera_file(A, 25).unlink()
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=60)
-    agreement, header = site_of(store)
-    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
+    stream_format, header = site_of(store)
+    stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: None)
     data = b"".join([it.data async for it in stream.send(PlaybackRange(0, 60))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(60)), "bridged, as live"
     assert available_ranges(source) == [PulseRange(0, 60)]
@@ -356,9 +356,9 @@ async def test_who_is_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, e
     )
     assert store.session is not None
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=now)
-    agreement, header = site_of(store)
+    stream_format, header = site_of(store)
     stream = TimeShiftStream(
-        source, GaplessTimeline(agreement, FPS, GOP), FPS, Broadcaster
+        source, GaplessTimeline(stream_format, FPS, GOP), FPS, Broadcaster
     )  # in which nothing comes
     data = b"".join([it.data async for it in stream.send(PlaybackRange(0, end))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
@@ -370,11 +370,11 @@ async def test_who_comes_back_after_the_end_does_not_make_the_past_longer(tmp_pa
     )
     assert store.session is not None
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=4 * GOP)
-    agreement, header = site_of(store)
+    stream_format, header = site_of(store)
     channel, back = Broadcaster(), piece(8, {1: A}).cameras[A]
     came = [Shown(back.first + at, not at, it, boot=1) for at, it in enumerate(back.fragments)]
     channel.publish(MediaChunk(came, FPS, ContinuityCounters()))
-    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: channel)
+    stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: channel)
     data = b"".join([it.data async for it in stream.send(PlaybackRange(0, 5 * GOP))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
     assert len(fragments(data)) == 2 * GOP, "and nothing that lasts up to then"
@@ -392,9 +392,9 @@ async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
 
     monkeypatch.setattr(loop, "time", lambda: now[0])
     monkeypatch.setattr(asyncio, "sleep", slept)
-    agreement, _ = site_of(store)
+    stream_format, _ = site_of(store)
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=200)
-    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
+    stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: None)
     arrived = [now[0] - 100.0 async for _ in stream.send(PlaybackRange(0))]
     lead = 4.0
     for gop, at in enumerate(arrived):
@@ -406,7 +406,7 @@ async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path
     written(RecordingFolder(tmp_path / "kept", AMPLE), [piece(gop, {1: A}) for gop in range(4)]).close()
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
         hall.service.pulse0 = PULSE0 + 0.01
-        hall.service.past.open()
+        hall.service.recorder.open()
         hall.service.come(*CAMERAS)
         for epoch in range(5, 8):
             hall.service.feed(epoch, IN_A)
@@ -423,7 +423,7 @@ async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path
         async with hall.session.get("/api/past?from=p7") as answer:
             lines = [json.loads(line) async for line in answer.content]
         assert [line["first"] for line in lines] == [5, 10, 15, 25, 30]
-        (earlier,) = hall.service.past.folder.earlier
+        (earlier,) = hall.service.recorder.folder.earlier
         assert [line.get("run") for line in lines] == [earlier.folder.name] * 3 + [None] * 2
     other = RecordingFolder(tmp_path / "kept", AMPLE)
     other.open()
@@ -439,7 +439,7 @@ async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tm
     store.close()
     async for hall in opened(record={"folder": str(folder), "segment_s": 0.4}):
         hall.service.pulse0 = PULSE0 + 0.01
-        hall.service.past.open()
+        hall.service.recorder.open()
         hall.service.come(*CAMERAS)
         said = IdentitySnapshot(pulse=19, boot=1, next_number=9, numbered_since=since, people=[])
         key = ZenohKeys("hall").camera(A, "retained_identities")

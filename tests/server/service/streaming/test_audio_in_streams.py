@@ -74,7 +74,7 @@ async def watched(
     for camera in CAMERAS:
         for unit in flashing(recording):
             if unit.pulse not in lost:
-                service.intake.video(video(camera, unit))
+                service.ingest.video(video(camera, unit))
     decide(service, 0, A)
     answers = [await hall.session.get(way) for way in ways]
     for gop in range(1, GOPS):
@@ -115,10 +115,10 @@ async def test_a_camera_has_the_sound_at_once_or_silence_a_little_later(loud: Ha
     own = sends(service, recording, silent=range(60, 1000))
     service.come(*CAMERAS)
     units = flashing(recording)
-    service.intake.video(video(B, units[0]))
+    service.ingest.video(video(B, units[0]))
     answers = [await loud.session.get(f"/cameras/c1/live.{kind}") for kind in ("mp4", "ts")]
     for unit in units[1:]:
-        service.intake.video(video(B, unit))
+        service.ingest.video(video(B, unit))
         await asyncio.sleep(0.002)
     service.splicer.close()
     data, ts = [await answer.read() for answer in answers]
@@ -156,7 +156,7 @@ async def test_everybody_shares_the_bytes_of_sound(loud: Hall, recording: Path) 
     sends(service, recording)
     for camera in CAMERAS:
         for unit in encoded(0):
-            service.intake.video(video(camera, unit))
+            service.ingest.video(video(camera, unit))
     both = (ObjectChoice(1, A, None, away=False), ObjectChoice(2, B, None, away=False))
     service.splicer.publish_decision(GopDecision(0, GOP, both, {}, {}, (), NO_REASON))
     reels = [service.splicer.segmenter_of_person(number) for number in (1, 2)]
@@ -171,7 +171,7 @@ async def test_a_site_without_sound_is_as_it_always_was(hall: Hall) -> None:
     for epoch in range(3):
         service.feed(epoch, {A: {1: SMALL}, B: {}})
     site = small_config().site
-    parameters = service.agreement.parameters
+    parameters = service.stream_format.parameters
     assert parameters is not None
     answer = await hall.session.get("/objects/1/best.mp4")
     head = await answer.content.readexactly(len(init_segment(parameters, site.width, site.height)))
@@ -197,11 +197,11 @@ async def test_the_site_says_what_sound_it_has_and_passes_over_what_is_none(loud
         b'{"first":1,"sizes":[0]}',
         b'{"first":1,"sizes":[7]}',
     ):
-        loud.service.intake.sound(type(good)(good.key, good.payload, bad))
-    state = loud.service.intake.states[A]
+        loud.service.ingest.audio(type(good)(good.key, good.payload, bad))
+    state = loud.service.ingest.states[A]
     assert state.bad_messages == 5, "of the camera whose process sends it"
-    assert state.gauge.last_error is not None
-    assert state.gauge.last_error.text.startswith("a message that cannot be used: sound: ")
+    assert state.metrics.last_error is not None
+    assert state.metrics.last_error.text.startswith("invalid message: audio: ")
 
 
 async def test_where_boxes_are_burnt_in_a_beep_is_with_its_flash(loud: Hall, recording: Path) -> None:
@@ -209,10 +209,10 @@ async def test_where_boxes_are_burnt_in_a_beep_is_with_its_flash(loud: Hall, rec
     own = sends(service, recording)
     service.come(*CAMERAS)
     for unit in flashing(recording):
-        service.intake.video(video(A, unit))
+        service.ingest.video(video(A, unit))
     choice = ObjectChoice(1, A, None, away=False)
     decisions = [GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON) for gop in range(GOPS)]
-    service.board.put(decisions[0])
+    service.decision_state.put(decisions[0])
     service.splicer.publish_decision(decisions[0])
     answer = await loud.session.get("/objects/1/best.mp4?overlay=1")
     assert answer.status == 200, await answer.text()
@@ -250,13 +250,13 @@ async def test_chromium_plays_both_to_the_end_where_either_is_missing(loud: Hall
     for camera in CAMERAS:
         for unit in flashing(recording):
             if unit.pulse not in range(30, 45):
-                service.intake.video(video(camera, unit))
+                service.ingest.video(video(camera, unit))
 
     def show(gop: int) -> None:
         decide(service, gop, CAMERAS[gop % 2])
 
     decide(service, 0, A)
-    parameters = service.agreement.parameters
+    parameters = service.stream_format.parameters
     assert parameters is not None
     seen = await seen_in_chromium(
         *(loud.port, service.splicer, GOPS, show),
@@ -274,7 +274,7 @@ async def test_a_recording_has_the_sound_from_its_first_picture_to_its_last(
     service.come(*CAMERAS)
     for camera in CAMERAS:
         for unit in flashing(recording):
-            service.intake.video(video(camera, unit))
+            service.ingest.video(video(camera, unit))
     decide(service, 0, A)
     decide(service, 1, A)
     recorded = asyncio.create_task(client.record(f"http://127.0.0.1:{loud.port}/", 1, out, seconds=3.3))

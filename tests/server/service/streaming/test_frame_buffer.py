@@ -33,8 +33,8 @@ def test_a_gop_is_the_fragments_of_its_frames_in_order() -> None:
 
 
 def test_other_parameters_are_refused_and_leave_no_trace() -> None:
-    agreement = StreamFormat()
-    first, second = FrameBuffer(FPS, 10, agreement), FrameBuffer(FPS, 10, agreement)
+    stream_format = StreamFormat()
+    first, second = FrameBuffer(FPS, 10, stream_format), FrameBuffer(FPS, 10, stream_format)
     put(first, encoded(0)[0])
     with pytest.raises(ParameterMismatchError, match="differ from the other cameras'"):
         put(second, encoded(1, crf=40)[0])

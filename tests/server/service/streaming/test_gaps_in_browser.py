@@ -39,7 +39,7 @@ async def test_media_source_extensions_play_over_what_is_missing_to_the_end(hall
         splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     show(0)
-    parameters = hall.service.agreement.parameters
+    parameters = hall.service.stream_format.parameters
     assert parameters is not None
     seen = await seen_in_chromium(
         *(hall.port, splicer, GOPS, show),

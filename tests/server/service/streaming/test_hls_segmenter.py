@@ -27,9 +27,11 @@ class Site:
     """A splicer whose decisions a test makes; cameras have all frames but those of the GOPs in ``silent``."""
 
     def __init__(self, silent: frozenset[int] = frozenset(), begin: int = 0) -> None:
-        self.agreement = StreamFormat()
-        self.frame_buffers = {camera: FrameBuffer(FPS, GOPS * GOP, self.agreement) for camera in CAMERAS}
-        self.splicer = Splicer(self.frame_buffers, self.agreement, small_config(http={"hls_segment_s": 0.41}))
+        self.stream_format = StreamFormat()
+        self.frame_buffers = {camera: FrameBuffer(FPS, GOPS * GOP, self.stream_format) for camera in CAMERAS}
+        self.splicer = Splicer(
+            self.frame_buffers, self.stream_format, small_config(http={"hls_segment_s": 0.41})
+        )
         for seed, camera in enumerate(CAMERAS):
             for unit in encoded(seed, GOPS * GOP):
                 if unit.pulse // GOP not in silent and unit.pulse // GOP >= begin:
@@ -47,8 +49,8 @@ class Site:
 
     def decoded(self, segments: list[HlsSegment]) -> list[tuple[float, float, NDArray[np.uint8]]]:
         """Return when each picture is shown and until when, in pulses, and the picture."""
-        assert self.agreement.parameters is not None
-        head = init_segment(self.agreement.parameters, WIDTH, HEIGHT)
+        assert self.stream_format.parameters is not None
+        head = init_segment(self.stream_format.parameters, WIDTH, HEIGHT)
         with av.open(io.BytesIO(head + b"".join(it.data for it in segments))) as container:
             return [
                 (

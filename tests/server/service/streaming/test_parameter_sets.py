@@ -29,19 +29,19 @@ from server.service.streaming.subscriber_queue import Chunk
 
 async def spliced(config: Config) -> tuple[bytes, bytes]:
     """Return a stream that changes camera at every GOP, as MP4 and as MPEG-TS."""
-    agreement = stream_format_for(
+    stream_format = stream_format_for(
         config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
     )
-    frame_buffers = {camera: FrameBuffer(FPS, GOPS * GOP, agreement) for camera in MAKES}
+    frame_buffers = {camera: FrameBuffer(FPS, GOPS * GOP, stream_format) for camera in MAKES}
     put(frame_buffers)
-    splicer, pieces, viewer = Splicer(frame_buffers, agreement, config), list[Chunk](), None
+    splicer, pieces, viewer = Splicer(frame_buffers, stream_format, config), list[Chunk](), None
     for gop in range(GOPS):
         splicer.publish_decision(decision(gop))
         viewer = viewer or splicer.persons[1].subscribe()
     splicer.close()
     assert viewer is not None
     pieces = [piece async for piece in viewer.chunks()]
-    head = agreement.head(config.site.size, config.site.fps)
+    head = stream_format.head(config.site.size, config.site.fps)
     assert head is not None
     ts = b"".join(piece.mpegts for piece in pieces if isinstance(piece, MediaChunk))
     return head + b"".join(piece.data for piece in pieces), ts
@@ -129,12 +129,12 @@ async def test_chromium_shows_the_chosen_cameras_pictures() -> None:
 
 
 async def _played(hall: Hall) -> dict[str, Any]:
-    splicer, agreement = hall.service.splicer, hall.service.agreement
+    splicer, stream_format = hall.service.splicer, hall.service.stream_format
     put(hall.service.frame_buffers)
     splicer.publish_decision(decision(0))
-    assert agreement.codec is not None
-    assert agreement.codec.startswith("avc3.")
+    assert stream_format.codec is not None
+    assert stream_format.codec.startswith("avc3.")
     return await seen_in_chromium(
         *(hall.port, splicer, GOPS, lambda gop: splicer.publish_decision(decision(gop))),
-        *(LOOK, "/objects/1/best.mp4", f'video/mp4; codecs="{agreement.codec}"', WIDTH, HEIGHT),
+        *(LOOK, "/objects/1/best.mp4", f'video/mp4; codecs="{stream_format.codec}"', WIDTH, HEIGHT),
     )

@@ -23,12 +23,12 @@ class Site:
     """Two cameras whose pictures are all there; a test says whom the first one sees, GOP by GOP."""
 
     def __init__(self) -> None:
-        agreement = StreamFormat()
-        self.frame_buffers = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
+        stream_format = StreamFormat()
+        self.frame_buffers = {camera: FrameBuffer(FPS, 40, stream_format) for camera in CAMERAS}
         for seed, camera in enumerate(CAMERAS):
             for unit in encoded(seed):
                 self.frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
-        self.splicer = Splicer(self.frame_buffers, agreement, small_config())
+        self.splicer = Splicer(self.frame_buffers, stream_format, small_config())
         self.gops = 0
 
     def decide(self, frames_seen: int, number: int = 1, merged: dict[int, int] | None = None) -> None:

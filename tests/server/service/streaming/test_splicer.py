@@ -18,12 +18,12 @@ A, B = CAMERAS
 
 
 def filled() -> tuple[Splicer, dict[str, FrameBuffer]]:
-    agreement = StreamFormat()
-    frame_buffers = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
+    stream_format = StreamFormat()
+    frame_buffers = {camera: FrameBuffer(FPS, 40, stream_format) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed):
             frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
-    return Splicer(frame_buffers, agreement, small_config()), frame_buffers
+    return Splicer(frame_buffers, stream_format, small_config()), frame_buffers
 
 
 def decision(

@@ -88,9 +88,9 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
     wishes: list[str | None],
     preset: str,
 ) -> None:
-    agreement = StreamFormat()
-    frame_buffers = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
-    splicer = Splicer(frame_buffers, agreement, small_config())
+    stream_format = StreamFormat()
+    frame_buffers = {camera: FrameBuffer(FPS, FRAMES, stream_format) for camera in CAMERAS}
+    splicer = Splicer(frame_buffers, stream_format, small_config())
     sent = {camera: taken(seed, missed, preset) for seed, camera in enumerate(CAMERAS)}
     own = {camera: alone(units) for camera, units in sent.items()}
     live = {camera: splicer.cameras[camera].subscribe() for camera in CAMERAS}
@@ -109,9 +109,9 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
         splicer.publish_decision(GopDecision(number * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
         best = best or splicer.persons[1].subscribe()
     assert best is not None
-    if agreement.parameters is None:
+    if stream_format.parameters is None:
         return
-    head = init_segment(agreement.parameters, WIDTH, HEIGHT)
+    head = init_segment(stream_format.parameters, WIDTH, HEIGHT)
     for viewer, cameras in [(best, CAMERAS), *((live[camera], (camera,)) for camera in CAMERAS)]:
         pieces = asyncio.run(received(viewer))
         if not pieces:
@@ -129,13 +129,13 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
 
 
 def splicing() -> tuple[Splicer, dict[str, FrameBuffer], bytes]:
-    agreement = StreamFormat()
-    frame_buffers = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
-    splicer = Splicer(frame_buffers, agreement, small_config())
+    stream_format = StreamFormat()
+    frame_buffers = {camera: FrameBuffer(FPS, 40, stream_format) for camera in CAMERAS}
+    splicer = Splicer(frame_buffers, stream_format, small_config())
     for unit in taken(0, frozenset(), "ultrafast"):
         frame_buffers["c0"].put(unit.pulse, 1, unit.data, key=unit.key)
-    assert agreement.parameters is not None
-    return splicer, frame_buffers, init_segment(agreement.parameters, WIDTH, HEIGHT)
+    assert stream_format.parameters is not None
+    return splicer, frame_buffers, init_segment(stream_format.parameters, WIDTH, HEIGHT)
 
 
 def decide(splicer: Splicer, gop: int, camera: str | None) -> None:

@@ -23,7 +23,7 @@ from fakes.service.scripted_cameras import (
     word,
 )
 from server.messaging.messages import Box
-from server.service.decision_state import Board, reason
+from server.service.decision_state import DecisionState, reason
 from server.service.view_selection.decider import GopDecision, ViewDecider
 
 Seen = Mapping[str, Mapping[int, Box | None]]
@@ -162,7 +162,7 @@ def test_the_same_epochs_give_the_same_decisions_and_none_shows_what_is_missing(
 
 def test_a_cut_is_told_once_with_both_cameras() -> None:
     it = decider(has=lambda camera, pulse: (camera, pulse // GOP) != (A, 1))
-    board = Board(25.0)
+    board = DecisionState(25.0)
     told = [board.put(decision) for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19)]
     assert [[(cut.from_camera, cut.to_camera, cut.pulse) for cut in it.cuts] for it in told] == [
         [],
@@ -171,15 +171,15 @@ def test_a_cut_is_told_once_with_both_cameras() -> None:
         [],
     ]
     assert board.cuts == 2
-    assert board.standings[1].since == 2 * GOP
-    assert board.standings[1].cameras == (A,)
+    assert board.selected_views[1].since == 2 * GOP
+    assert board.selected_views[1].cameras == (A,)
     assert told[0].choices == {1: A}
     assert told[0].boxes[A][0] == [(1, *LARGE)]
 
 
 def test_after_a_hole_the_same_camera_is_no_cut() -> None:
     it = decider(has=lambda _camera, pulse: pulse // GOP != 1)
-    board = Board(25.0)
+    board = DecisionState(25.0)
     for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19):
         board.put(decision)
     assert board.cuts == 0

@@ -50,7 +50,7 @@ def test_every_gop_is_decided_once_in_order_and_by_frames_that_are_known(
     decided: list[GopDecision] = []
     for number in range(45):
         if number in changes:
-            decider.choose_by(looking(config.view, max(gop, changes[number])))
+            decider.apply_view_settings(looking(config.view, max(gop, changes[number])))
         one, other = (SMALL, LARGE) if number // 3 % 2 else (LARGE, SMALL)
         epoch = epoch_of(number, word(A, number, {1: one}), word(B, number, {1: other}))
         new = decider.step(epoch)
@@ -74,7 +74,7 @@ def test_a_look_ahead_that_was_changed_and_settled_chooses_as_if_it_had_always_b
         for number in range(30):
             for epoch, frames in changes:
                 if epoch == number:
-                    decider.choose_by(looking(config.view, frames))
+                    decider.apply_view_settings(looking(config.view, frames))
             boxes = {A: {1: LARGE if number < 20 else SMALL}, B: {1: SMALL if number < 20 else LARGE}}
             decided += decider.step(epoch_of(number, *(word(it, number, boxes[it]) for it in CAMERAS)))
         return decided
@@ -100,7 +100,7 @@ def test_streams_are_the_chosen_cameras_gops_without_a_hole(changes: Changes) ->
     viewer = None
     for epoch in range(EPOCHS):
         if epoch in changes:
-            service.choose_by(looking(service.config.view, changes[epoch]))
+            service.apply_view_settings(looking(service.config.view, changes[epoch]))
         one, other = (SMALL, LARGE) if epoch // 3 % 2 else (LARGE, SMALL)
         service.feed(epoch, {A: {1: one}, B: {1: other}})
         if viewer is None and 1 in service.splicer.persons:
@@ -154,8 +154,8 @@ def test_what_is_kept_reaches_as_far_as_can_be_looked_ahead() -> None:
         config, fps = service.config, service.config.site.fps
         kept = service.frame_buffers[A]._max_frames
         late = round(config.view.late_after_s * fps) + round(config.track.backlog_s * fps)
-        assert service.most_lookahead >= config.view.lookahead
-        assert service.most_lookahead + late + STRIDE + GOP <= kept
+        assert service.max_lookahead >= config.view.lookahead
+        assert service.max_lookahead + late + STRIDE + GOP <= kept
         with pytest.raises(UserError):
-            service.choose_by(looking(config.view, service.most_lookahead + 1))
+            service.apply_view_settings(looking(config.view, service.max_lookahead + 1))
         service.close()

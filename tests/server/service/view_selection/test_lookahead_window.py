@@ -87,7 +87,7 @@ def test_it_holds_every_view_once_and_compares_it_with_the_best(
     config = small_config()
     people = Drifting(config.view.identity, CAMERAS, dict.fromkeys(CAMERAS), (64, 48), lag=0)
     people._registry = TrackNumbers()  # type: ignore[assignment]
-    sight = ViewQualityBuffer(config, dict.fromkeys(CAMERAS), people.fits)
+    sight = ViewQualityBuffer(config, dict.fromkeys(CAMERAS), people.letterboxes)
     epochs = [
         epoch_of(number, *(long_word(camera, number, boxes) for camera, boxes in said.items()))
         for number, said in enumerate(story)

@@ -1,0 +1,76 @@
+"""The best-view service's connection to the bus: messages from the cameras in, choices and commands out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import msgspec
+
+from server.config.pulse_access import bestview_client_name
+from server.config.site_config import Config
+from server.messaging.bus import Bus
+from server.messaging.bus_access import access_control_of
+from server.messaging.inbox import Inbox, Message
+from server.messaging.messages import GopChoices, ZenohKeys
+
+MessageHandler = Callable[[Message], None]
+
+
+class BusConnection:
+    """Opens the bus and carries the service's messages. Until it is opened, nothing is sent."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._index = config.view.share.index
+        self._keys = ZenohKeys(config.site.name)
+        self._bus: Bus | None = None
+        self.inboxes: list[Inbox[Message]] = []
+        """Messages that wait for the event loop."""
+
+    def open(
+        self,
+        camera_handlers: Mapping[str, MessageHandler],
+        on_audio: MessageHandler | None,
+        on_alive: Callable[[str, bool], None],
+    ) -> None:
+        """Open the bus: the first service of a site is its router, further ones connect to it.
+
+        Args:
+            camera_handlers: by the last part of a camera's key.
+            on_audio: handles the site's audio; None at a site without.
+            on_alive: called with a camera's key when its liveliness token comes (True) or goes (False).
+
+        Raises:
+            UserError: the address is in use, or a password file cannot be read.
+        """
+        if self._index:
+            bus = Bus.second(self._config.zenoh, bestview_client_name(self._index))
+        else:
+            bus = Bus.router(self._config.zenoh, access_control_of(self._config))
+        self._bus = bus
+        for what, handler in camera_handlers.items():
+            self.inboxes.append(bus.subscribe(self._keys.camera("*", what), handler))
+        if on_audio is not None:
+            self.inboxes.append(bus.subscribe(self._keys.sound, on_audio))
+        bus.watch_alive(self._keys.camera("*", "alive"), on_alive)
+        bus.declare_alive(self._keys.bestview("alive", self._index))
+
+    @property
+    def has_waiting_messages(self) -> bool:
+        """Whether a message waits in any inbox."""
+        return any(inbox.waiting for inbox in self.inboxes)
+
+    def send_to_camera(self, what: str, camera: str, payload: bytes) -> None:
+        """Send a camera a message under the key that ends with ``what``."""
+        if self._bus is not None:
+            self._bus.publish(self._keys.camera(camera, what), payload)
+
+    def publish_choices(self, choices: GopChoices) -> None:
+        """Publish the choices of a GOP."""
+        if self._bus is not None:
+            self._bus.publish(self._keys.bestview("choices", self._index), msgspec.json.encode(choices))
+
+    def close(self) -> None:
+        """Close the bus."""
+        if self._bus is not None:
+            self._bus.close()
