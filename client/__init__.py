@@ -1,10 +1,10 @@
-"""The viewer: MyView over HTTP from Python, and (in ``page/``) from a browser."""
+"""The Python client of MyView's HTTP interface; ``page/`` is the browser's."""
 
 from client.api import cameras, choice, objects, past, site, spans
 from client.events import events
 from client.http import AwayError, ClientError, ContractError, HttpSettings, NotFoundError, RefusedError
 from client.model import Box, Camera, Cameras, Choice, Cut, Event, Flag, Gop, Objects, SeenObject, Site, Span
-from client.player import Watched, record, watch
+from client.player import WatchResult, record, watch
 from client.session import Progress
 from client.status.model import CameraNow, PersonNow, ServiceNow, SiteNow
 from client.status.query import status
@@ -33,7 +33,7 @@ __all__ = [
     "Site",
     "SiteNow",
     "Span",
-    "Watched",
+    "WatchResult",
     "cameras",
     "choice",
     "events",

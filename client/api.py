@@ -1,4 +1,4 @@
-"""What is known on the server, asked once: site, objects, cameras, why this view."""
+"""Single requests: the site, objects, cameras, the choice of a view, and the past."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ _DEFAULT = HttpSettings()
 
 
 async def site(url: str, settings: HttpSettings = _DEFAULT) -> Site:
-    """Return what holds for all cameras.
+    """Return the properties that all cameras share.
 
     Raises:
         ValueError: ``url`` is no address.
-        ClientError: the server cannot be reached or is no MyView.
+        ClientError: the server cannot be reached or is not MyView.
     """
     return await get_json(server_url(url) / "api/site", Site, settings)
 
 
 async def objects(url: str, settings: HttpSettings = _DEFAULT) -> tuple[SeenObject, ...]:
-    """Return everything that is or was tracked, as the server lists it; errors as ``site``."""
+    """Return the objects that are or were tracked, in the server's order; errors as ``site``."""
     return (await get_json(server_url(url) / "api/objects", Objects, settings)).objects
 
 
 async def cameras(url: str, settings: HttpSettings = _DEFAULT) -> tuple[Camera, ...]:
-    """Return how each camera does; errors as ``site``."""
+    """Return the state of each camera; errors as ``site``."""
     return (await get_json(server_url(url) / "api/cameras", Cameras, settings)).cameras
 
 
@@ -36,31 +36,30 @@ async def choice(
 ) -> Choice:
     """Return which camera shows object ``number`` and what every camera would cost; errors as ``site``.
 
-    ``at`` is a moment of the last minute, as in ``past``; what was before the first question about an object
-    is not kept.
+    ``at`` is a moment of the last minute, as in ``past``, but not before the first request for the object.
 
     Raises:
-        NotFoundError: there is no such object, or nothing is kept of that moment.
-        RefusedError: it is not a time.
+        NotFoundError: the object is unknown, or the moment is not recorded.
+        RefusedError: ``at`` is not a time.
     """
     address = server_url(url) / f"api/objects/{number}/choice"
     return await get_json(address if at is None else address.with_query({"at": at}), Choice, settings)
 
 
 async def spans(url: str, number: int, settings: HttpSettings = _DEFAULT) -> tuple[Span, ...]:
-    """Return what can be seen again of object ``number``; errors as ``choice``."""
+    """Return the recorded spans of object ``number``; errors as ``choice``."""
     return (await get_json(server_url(url) / f"api/objects/{number}/past", Past, settings)).spans
 
 
 async def past(
     url: str, start: str, end: str | None = None, settings: HttpSettings = _DEFAULT
 ) -> AsyncIterator[Gop]:
-    """Yield what was said from one moment to another, or up to now; errors as ``site``.
+    """Yield the events ``gop`` from one moment to another, or up to now; errors as ``site``.
 
     Moments are seconds back (``-60``), pulses (``p1250``) or times (ISO 8601).
 
     Raises:
-        RefusedError: they are none.
+        RefusedError: ``start`` or ``end`` is not a time.
     """
     query = {"from": start} if end is None else {"from": start, "to": end}
     async with get(

@@ -1,4 +1,4 @@
-"""A file that ends with something whole also where the disk takes no more."""
+"""Writes that a full disk leaves undone as a whole."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Protocol
 
 
 class Sink(Protocol):
-    """Takes bytes one after the other."""
+    """A destination of bytes."""
 
     def write(self, data: bytes, /) -> object:
-        """Append all of it.
+        """Append all of ``data``.
 
         Raises:
             OSError: it cannot be written.
@@ -18,22 +18,22 @@ class Sink(Protocol):
         ...
 
 
-class WholeWriter:
-    """Appends to an unbuffered file; of what the disk does not take whole, nothing stays."""
+class AtomicWriter:
+    """Appends to an unbuffered file: each write is complete, or leaves the file unchanged."""
 
     def __init__(self, file: FileIO) -> None:
         self._file = file
 
     def write(self, data: bytes) -> None:
-        """Append all of it.
+        """Append all of ``data``.
 
         Raises:
-            OSError: the disk does not take it; the file is as it was.
+            OSError: it cannot be written whole; the file is unchanged.
         """
-        begin, rest = self._file.tell(), memoryview(data)
+        begin, remaining = self._file.tell(), memoryview(data)
         try:
-            while rest:  # a disk takes what it has room for, and says why no more the next time
-                rest = rest[self._file.write(rest) :]
+            while remaining:  # a full disk takes a part, and fails at the next write
+                remaining = remaining[self._file.write(remaining) :]
         except OSError:
             self._file.truncate(begin)
             self._file.seek(begin)

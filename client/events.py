@@ -15,15 +15,15 @@ _DEFAULT = HttpSettings()
 
 
 async def events(url: str, settings: HttpSettings = _DEFAULT) -> AsyncIterator[Event]:
-    """Yield Site, Objects, Cameras, Gop and Flag events, for ever; events of other names are passed over.
+    """Yield Site, Objects, Cameras, Gop and Flag events without end; events of other names are ignored.
 
-    When the server goes away the client connects again; the server then says anew how things stand, so that
-    an event may come twice.
+    When the connection is lost the client connects again. The server then sends its state once more, so an
+    event may come twice.
 
     Raises:
         ValueError: ``url`` is no address.
-        AwayError: ``settings.retries`` attempts in a row brought nothing.
-        ClientError: the server refuses, or what it says is not understood.
+        AwayError: ``settings.retries`` attempts in a row brought no event.
+        ClientError: the server refuses the request, or an event is invalid.
     """
     address = server_url(url) / "api/events"
     backoff = settings.backoff()
@@ -46,11 +46,11 @@ async def _once(address: URL, settings: HttpSettings) -> AsyncIterator[Event]:
     async with get(address, settings, "text/event-stream") as answer:
         async for data in answer.content.iter_any():
             try:
-                sent = parser.feed(data)
+                sent_events = parser.feed(data)
             except EventStreamError as error:
                 raise ContractError(f"{address.origin()}: {error}") from error
-            for one in sent:
-                event = _decode(one)
+            for sent_event in sent_events:
+                event = _decode(sent_event)
                 if event is not None:
                     yield event
 

@@ -28,43 +28,43 @@ _ANSWER = TypeVar("_ANSWER")
 
 
 class ClientError(Exception):
-    """The server did not give what was asked for: one line for people."""
+    """A request has failed; the message is one line for people."""
 
 
 class NotFoundError(ClientError):
-    """The server does not know it."""
+    """The server knows no such object, camera or moment (404)."""
 
 
 class RefusedError(ClientError):
-    """The server refuses the request: asking again will not help."""
+    """The server refuses the request (4xx); repeating it will not help."""
 
 
 class AwayError(ClientError):
-    """The server cannot be reached, or not any more."""
+    """The server cannot be reached, or the connection is lost."""
 
 
 class ContractError(ClientError):
-    """What answers is not a MyView server, or one of another version."""
+    """The response is not that of a MyView server of this version."""
 
 
 @dataclass(frozen=True, slots=True)
 class HttpSettings:
-    """How patient the client is."""
+    """Timeouts, retries and the token of the client."""
 
     connect_timeout: float = 5.0
-    """Seconds until a connection must stand."""
+    """Seconds to connect."""
     read_timeout: float = 15.0
-    """Seconds without a byte until the server is taken for gone."""
+    """Seconds without a byte until the connection counts as lost."""
     answer_timeout: float = 60.0
-    """Seconds until an answer must have begun; and until one that is read as a whole must be there."""
+    """Seconds until a response must have begun, and until one that is read whole must be complete."""
     retries: int = 26
-    """Attempts in a row that bring nothing until a stream is given up; 0: no second attempt."""
+    """Failed attempts in a row before a stream is given up, after the first; 0: no second attempt."""
     backoff_first: float = 0.25
-    """Seconds before the first further attempt; doubled each time."""
+    """Seconds before the second attempt; doubled each time."""
     backoff_most: float = 1.0
-    """Seconds between attempts at most: a server that is back is seen again by then."""
+    """Maximum of the seconds between attempts."""
     token: str | None = field(default=None, repr=False)
-    """What lets in, where the server asks for it."""
+    """Bearer token, for a server that requires one."""
 
     def backoff(self) -> Backoff:
         """Return the delays between attempts at one thing."""
@@ -72,15 +72,15 @@ class HttpSettings:
 
 
 def server_url(text: str) -> URL:
-    """Return the server's address from what a user types or pastes: the page's link will do.
+    """Parse a server's address as typed or pasted; a link to its page works too.
 
     Raises:
-        ValueError: it is no HTTP address.
+        ValueError: ``text`` is not an HTTP address.
     """
-    # What was typed is not repeated: there may be a token or a password in it.
+    # Errors do not repeat the text: it may contain a token or a password.
     typed = text if "://" in text else f"http://{text}"
     _, *beyond = re.split("[/?#]", typed.partition("://")[2])
-    if any("@" in part for part in beyond):  # what looks like the host may be the login's beginning
+    if any("@" in part for part in beyond):  # the apparent host may be part of a password
         raise ValueError(
             "the address has an @ behind its host: in a name or password / ? # and @ are %2F %3F %23 and %40"
         )
@@ -89,16 +89,16 @@ def server_url(text: str) -> URL:
     except ValueError:
         url = URL()
     if url.scheme not in {"http", "https"} or not url.host:
-        raise ValueError("what is given is not an address like http://host:port")
+        raise ValueError("this is not an address like http://host:port")
     return url.with_query(None).with_fragment(None)
 
 
 @asynccontextmanager
 async def get(url: URL, settings: HttpSettings, accept: str) -> AsyncIterator[aiohttp.ClientResponse]:
-    """Open an answer for reading; what goes wrong with it inside the block is an AwayError too.
+    """Open a response for reading; a network error inside the block is an AwayError too.
 
     Raises:
-        NotFoundError, RefusedError, AwayError: with the server's own words where it gave some.
+        NotFoundError, RefusedError, AwayError: with the server's error text if it sent one.
     """
     async with get_any(url, settings, accept) as answer:
         await _check(answer, settings)
@@ -107,10 +107,10 @@ async def get(url: URL, settings: HttpSettings, accept: str) -> AsyncIterator[ai
 
 @asynccontextmanager
 async def get_any(url: URL, settings: HttpSettings, accept: str) -> AsyncIterator[aiohttp.ClientResponse]:
-    """Open an answer for reading, a refusal too.
+    """Open a response of any status for reading.
 
     Raises:
-        AwayError: there is none, or something goes wrong with it inside the block.
+        AwayError: there is no response, or a network error occurs inside the block.
     """
     timeout = aiohttp.ClientTimeout(
         total=None, sock_connect=settings.connect_timeout, sock_read=settings.read_timeout
@@ -122,7 +122,7 @@ async def get_any(url: URL, settings: HttpSettings, accept: str) -> AsyncIterato
             async with opening as answer:
                 yield answer
     except aiohttp.TooManyRedirects as error:
-        raise AwayError(f"{url.origin()}: leads on and on, and nowhere") from error
+        raise AwayError(f"{url.origin()}: too many redirects") from error
     except aiohttp.ClientError as error:
         raise AwayError(f"{url.origin()}: {_why_away(error)}") from error
     except TimeoutError as error:
@@ -130,21 +130,21 @@ async def get_any(url: URL, settings: HttpSettings, accept: str) -> AsyncIterato
 
 
 async def get_body(url: URL, settings: HttpSettings, accept: str) -> bytes:
-    """Get an answer as a whole.
+    """Fetch a whole body.
 
     Raises:
-        ClientError: it cannot be had, or is larger than MAX_BODY.
+        ClientError: the request fails, or the body is larger than MAX_BODY.
     """
     async with get(url, settings, accept) as answer:
         return await read_body(answer, settings)
 
 
 async def read_body(answer: aiohttp.ClientResponse, settings: HttpSettings, most: int = MAX_BODY) -> bytes:
-    """Read an answer as a whole.
+    """Read a whole body.
 
     Raises:
         ContractError: it is larger than ``most`` bytes.
-        TimeoutError: it takes longer than ``settings.answer_timeout``.
+        TimeoutError: reading takes longer than ``settings.answer_timeout``.
     """
     body = bytearray()
     async with asyncio.timeout(settings.answer_timeout):
@@ -156,7 +156,7 @@ async def read_body(answer: aiohttp.ClientResponse, settings: HttpSettings, most
 
 
 async def read_lines(answer: aiohttp.ClientResponse, most: int) -> AsyncIterator[bytes]:
-    """Read an answer line by line, without the line ends; what is no whole line at its end is dropped.
+    """Yield the lines of a body without their line ends; an incomplete last line is dropped.
 
     Raises:
         ContractError: a line is larger than ``most`` bytes.
@@ -173,10 +173,10 @@ async def read_lines(answer: aiohttp.ClientResponse, most: int) -> AsyncIterator
 
 
 async def get_json(url: URL, kind: type[_ANSWER], settings: HttpSettings) -> _ANSWER:
-    """Get an answer of the interface.
+    """Fetch and decode JSON.
 
     Raises:
-        ClientError: it cannot be had, or is not of that kind.
+        ClientError: the request fails, or the body is not of type ``kind``.
     """
     body = await get_body(url, settings, "application/json")
     try:
@@ -186,15 +186,15 @@ async def get_json(url: URL, kind: type[_ANSWER], settings: HttpSettings) -> _AN
 
 
 def decoded(text: bytes | str, kind: type[_ANSWER]) -> _ANSWER:
-    """Read JSON.
+    """Decode JSON.
 
     Raises:
-        ValueError: it is none, or not of that kind.
+        ValueError: the text is not JSON, or not of type ``kind``.
     """
     try:
         return msgspec.json.decode(text, type=kind)
     except RecursionError as error:
-        raise ValueError("it is nested beyond all measure") from error
+        raise ValueError("it is nested too deeply") from error
 
 
 def _headers(settings: HttpSettings, accept: str) -> dict[str, str]:
@@ -222,7 +222,7 @@ class _ErrorBody(msgspec.Struct):
 
 
 def _error_text(body: bytes) -> str | None:
-    """Return the first line of the server's own words."""
+    """Return the first line of the server's error text; None without one."""
     try:
         words = decoded(body, _ErrorBody).error
     except ValueError:
@@ -231,12 +231,12 @@ def _error_text(body: bytes) -> str | None:
 
 
 def _why_away(error: aiohttp.ClientError) -> str:
-    """Return in one line why there is no answer: the library's words may be several, and quote what came."""
+    """Return in one line why there is no response; aiohttp's text may be long and quote what was received."""
     words = error.message if isinstance(error, aiohttp.ClientResponseError) else str(error)
     if isinstance(error, aiohttp.ClientConnectorError) and not isinstance(error, aiohttp.ClientSSLError):
-        number, told = error.os_error.errno, error.os_error.strerror
-        # A name that is not known has a number below 0, and words of its own.
-        words = (os.strerror(number) if number and number > 0 else told) or words
-    if isinstance(error, aiohttp.InvalidURL):  # it repeats the address, with all that is in it
-        words = "leads to what is no HTTP address"
+        number, text = error.os_error.errno, error.os_error.strerror
+        # The resolver's errors have numbers below 0, and texts of their own.
+        words = (os.strerror(number) if number and number > 0 else text) or words
+    if isinstance(error, aiohttp.InvalidURL):  # its text repeats the address, secrets included
+        words = "redirects to an address that is not HTTP"
     return " ".join(words.split())[:_MAX_SHOWN] or type(error).__name__

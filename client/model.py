@@ -1,4 +1,4 @@
-"""What the HTTP interface answers, as frozen structs; fields that a later server adds are passed over."""
+"""The responses and events of the HTTP interface; fields that a later server adds are ignored."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Annotated
 import msgspec
 
 Moment = Annotated[float, msgspec.Meta(ge=0, le=1e11)]
-"""Unix seconds that a calendar has."""
+"""Unix seconds within the range of a calendar."""
 
 
 class Site(msgspec.Struct, frozen=True):
-    """``/api/site``: what holds for all cameras."""
+    """``/api/site``: the properties that all cameras share."""
 
     name: str
     fps: Annotated[float, msgspec.Meta(gt=0)]
@@ -20,18 +20,18 @@ class Site(msgspec.Struct, frozen=True):
     gop: int
     """Frames per group of pictures: views are cut at multiples of it."""
     lookahead_frames: int
-    """Frames by which the best view is behind the cameras."""
+    """Frames by which the best view lags behind the cameras."""
     codec: str | None
-    """Of every stream (RFC 6381); None before the first picture."""
+    """Codec string of every stream (RFC 6381); None before the first picture."""
     pulse0: float | None
     """When pulse 0 was due (unix seconds); None before the first."""
     now: Moment
     """The server's clock (unix seconds)."""
     cameras: tuple[str, ...]
     container: str = "mp4"
-    """What streams are in: mp4, or webm where the codec is vp8."""
+    """Container of the streams: mp4, or webm if the codec is vp8."""
     sound: str | None = None
-    """The codec of the sound beside the pictures; None: the site has none."""
+    """Audio codec; None: the site has no sound."""
 
 
 class SeenObject(msgspec.Struct, frozen=True):
@@ -44,15 +44,15 @@ class SeenObject(msgspec.Struct, frozen=True):
     """Pulse number."""
     visible: bool
     camera: str | None
-    """The view that is shown of it now; None if there is none."""
+    """The camera that shows it now; None if none does."""
     cameras: tuple[str, ...]
-    """Who sees it now."""
+    """The cameras that see it now."""
     thumbnail: str | None
     """A path on the server."""
     aliases: tuple[int, ...] = ()
-    """Other numbers that this person once had; they go on to work."""
+    """Earlier numbers of this person, which remain valid."""
     name: str | None = None
-    """What the operator calls them."""
+    """The name that an operator gave."""
 
 
 class Camera(msgspec.Struct, frozen=True):
@@ -62,9 +62,9 @@ class Camera(msgspec.Struct, frozen=True):
     state: str
     """live, gone, ended, starting or refused."""
     pulse: int | None
-    """Its last frame."""
+    """Pulse of its last frame."""
     late: int
-    """Windows of tracks that came too late to count."""
+    """Windows of tracks that came too late to be used."""
     fps: float
     message: str
 
@@ -78,31 +78,31 @@ class Choice(msgspec.Struct, frozen=True):
     frames: int
     camera: str | None
     since: int | None
-    """Pulse since which this camera is shown."""
+    """Pulse from which on this camera is shown."""
     costs: dict[str, float | None]
     """By camera; None: it cannot be shown."""
     switch_cost: float
-    """What a cut costs, in frames of not seeing the object."""
+    """Cost of a cut, in frames of not seeing the object."""
     reason: str
     seen: dict[str, float] = {}
     """By camera: the share of the look-ahead in which it sees the object."""
     quality: dict[str, float | None] = {}
     """By camera: how well it shows the object, 0 to 1; None: it does not see it."""
     terms: dict[str, dict[str, float]] = {}
-    """By camera: what the quality is made of, 0 to 1 each."""
+    """By camera: the terms of the quality, 0 to 1 each."""
     undetected: dict[str, float] = {}
-    """By camera: the share of the look-ahead in which it does not find the object, which stands before it as
-    others know."""
+    """By camera: the share of the look-ahead in which it does not detect the object, although by the other
+    cameras' detections the object is in its picture."""
     undetected_quality: dict[str, float | None] = {}
-    """By camera: what such a view is taken to be worth, 0 to 1; None: there is none."""
+    """By camera: the quality assumed for such a view, 0 to 1; None: no such view."""
     weights: dict[str, float] = {}
-    """By term: the share of a view's worth that is lost where the term is 0."""
+    """By term: the share of a view's quality that is lost if the term is 0."""
     before: str | None = None
-    """The camera of the GOP before."""
+    """The camera of the previous GOP."""
     stay: float | None = None
-    """What the look-ahead costs with that camera, in the unit of `switch_cost`; None: it cannot be shown."""
+    """Cost of the look-ahead with that camera, in the unit of `switch_cost`; None: it cannot be shown."""
     cut: float | None = None
-    """What it costs with the best other camera, the cut included; None: there is none."""
+    """Cost with the best other camera, the cut included; None: there is no other."""
     cut_to: str | None = None
 
 
@@ -133,7 +133,7 @@ class Merged(msgspec.Struct, frozen=True):
 
 
 class Split(msgspec.Struct, frozen=True):
-    """Whom a camera showed as ``kept`` turned out to be ``new_object``, somebody else."""
+    """The person whom a camera tracked as ``kept`` turned out to be another, ``new_object``."""
 
     kept: int
     new_object: int
@@ -141,7 +141,7 @@ class Split(msgspec.Struct, frozen=True):
 
 
 class Gop(msgspec.Struct, frozen=True):
-    """Event ``gop``: what is shown in frames ``first`` to ``first + frames - 1``."""
+    """Event ``gop``: the views of frames ``first`` to ``first + frames - 1``."""
 
     first: int
     frames: int
@@ -151,18 +151,18 @@ class Gop(msgspec.Struct, frozen=True):
     """By camera: for each frame, the boxes in it."""
     cuts: tuple[Cut, ...]
     merged: tuple[Merged, ...] = ()
-    """What has turned out about numbers since the GOP before, as ``split``."""
+    """Corrections of object numbers since the previous GOP, as ``split``."""
     split: tuple[Split, ...] = ()
 
 
 class Flag(msgspec.Struct, frozen=True):
-    """Event ``flag``: what an operator is asked to look at, as it is now."""
+    """Event ``flag``: a risk that an operator should look at, in its present state."""
 
     id: int
     objects: tuple[int, ...]
-    """Whom it is about."""
+    """The objects concerned."""
     cameras: tuple[str, ...]
-    """Where it is foreseen."""
+    """The cameras in which it is expected."""
     reason: str
     """crossing, id_switch, track_loss or optimality_gap."""
     pulse: int
@@ -170,35 +170,35 @@ class Flag(msgspec.Struct, frozen=True):
     raised: int
     """The newest pulse when it was raised."""
     margin: float
-    """How sure the tracker is, as a cost: 0 is undecided."""
+    """The tracker's certainty, as a cost: 0 is undecided."""
     state: str
     """raised, followed, answered or expired."""
 
 
 class Span(msgspec.Struct, frozen=True):
-    """Frames that can be seen again."""
+    """Recorded frames."""
 
     first: int
     frames: int
     begins: str | None
-    """When that was (ISO 8601, UTC); None before the first pulse."""
+    """ISO 8601, UTC; None before the first pulse."""
     ends: str | None
 
 
 class Past(msgspec.Struct, frozen=True):
-    """``/api/objects/{k}/past``: what can be seen again."""
+    """``/api/objects/{k}/past``: what is recorded of an object."""
 
     spans: tuple[Span, ...]
 
 
 class Objects(msgspec.Struct, frozen=True):
-    """Event ``objects``, and the answer of ``/api/objects``."""
+    """Event ``objects``, and the response of ``/api/objects``."""
 
     objects: tuple[SeenObject, ...]
 
 
 class Cameras(msgspec.Struct, frozen=True):
-    """Event ``cameras``, and the answer of ``/api/cameras``."""
+    """Event ``cameras``, and the response of ``/api/cameras``."""
 
     cameras: tuple[Camera, ...]
 

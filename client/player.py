@@ -12,17 +12,17 @@ from client.recording import Recording, recording
 from client.session import Report, Session
 from client.sidecar import write_sidecars
 from client.spool import Spool
-from client.stream_events import Commentary, following
+from client.stream_events import ViewHistory, following
 
 _DEFAULT = HttpSettings()
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
-    """What came of it."""
+class WatchResult:
+    """What was watched or recorded."""
 
     out: Path | None
-    """The file; None if nothing was to be recorded."""
+    """The file; None if nothing was recorded."""
     seconds: float
     """Media seconds."""
     bytes: int
@@ -30,7 +30,7 @@ class Watched:
     cuts: int
     reconnections: int
     complete: bool
-    """All the seconds asked for are there; False if the server went away for good before."""
+    """Whether all of the requested seconds came; False if the server went away for good before."""
 
 
 async def watch(
@@ -43,7 +43,7 @@ async def watch(
     start: str | None = None,
     end: str | None = None,
     settings: HttpSettings = _DEFAULT,
-) -> Watched:
+) -> WatchResult:
     """Follow the best view of object ``number`` for ``seconds`` of media time (None: until cancelled).
 
     ``start`` and ``end`` are moments: seconds back (``-60``), pulses (``p1250``) or times (ISO 8601); without
@@ -57,28 +57,28 @@ async def watch(
 
     Raises:
         ValueError: ``url`` is no address.
-        NotFoundError: there is no such object.
-        RefusedError: ``start`` or ``end`` is not a time, or nothing is kept of that time.
+        NotFoundError: the object is unknown.
+        RefusedError: ``start`` or ``end`` is not a time, or that time is not recorded.
         AwayError: the server could not be reached at all, or never sent any media.
-        ContractError: what comes is not such a stream.
+        ContractError: the response is not such a stream.
         OSError: the file cannot be written.
     """
     server = server_url(url)
     container = await _container(url, out, settings)
     record: Recording | None = None
     with closing(Spool(Path() if out is None else out.parent)) as spool:
-        commentary = Commentary(number, keep=None if out is None else spool)
+        history = ViewHistory(number, spool=None if out is None else spool)
         try:
             with recording(out, seconds, container) as record:
-                async with following(url, commentary, settings, start, end):
-                    session = Session(record, commentary, progress, start, end)
+                async with following(url, history, settings, start, end):
+                    session = Session(record, history, progress, start, end)
                     complete = await session.run(server / f"objects/{number}/best.{container}", settings)
                     if out is not None and record.media_time is not None:
-                        await commentary.reach(record.media_time)
-        finally:  # the film is there first
+                        await history.reach(record.media_time)
+        finally:  # after the film itself
             if record is not None:
-                _write_beside(out, record, commentary)
-    return Watched(
+                _write_sidecars(out, record, history)
+    return WatchResult(
         out,
         record.seconds,
         record.bytes,
@@ -91,24 +91,24 @@ async def watch(
 
 async def record(
     url: str, number: int, out: Path, seconds: float | None = None, settings: HttpSettings = _DEFAULT
-) -> Watched:
+) -> WatchResult:
     """Record the best view of object ``number`` to ``out``: ``watch`` without a report."""
     return await watch(url, number, out, seconds, settings=settings)
 
 
 async def _container(url: str, out: Path | None, settings: HttpSettings) -> str:
-    """Return which stream to ask for: the file's name says it, or else the server."""
+    """Return the container to request: that of the file's name, or else the site's."""
     if out is not None:
         return "webm" if out.suffix.lower() == ".webm" else "mp4"
     try:
         return (await site(url, settings)).container
     except ClientError:
-        return "mp4"  # whatever is wrong will be said of the stream
+        return "mp4"  # the request for the stream will report the error
 
 
-def _write_beside(out: Path | None, record: Recording, commentary: Commentary) -> None:
-    site = commentary.site
+def _write_sidecars(out: Path | None, record: Recording, history: ViewHistory) -> None:
+    site = history.site
     if out is None or site is None or record.begin is None or record.media_time is None:
         return
     first, last = round(record.begin * site.fps), round(record.media_time * site.fps)
-    write_sidecars(out, commentary.frames(first, last), first, commentary.number, site)
+    write_sidecars(out, history.frames(first, last), first, history.number, site)

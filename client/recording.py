@@ -1,4 +1,4 @@
-"""A stream on its way into a file: whole fragments only, and the file appears when it is finished."""
+"""The recording of a stream: whole fragments into a ``.part`` file, which is remuxed at the end."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from client.atomic_writer import Sink, WholeWriter
+from client.atomic_writer import AtomicWriter, Sink
 from client.fmp4 import Mp4Reader
 from client.media_stream import FormatChangedError, Fragment, InitSegment, MediaStreamError
 from client.remux import remux
@@ -52,15 +52,15 @@ class Recording:
         return None if self._first is None else self._last / self._timescale
 
     def connection(self) -> Callable[[bytes], Iterator[bool]]:
-        """Return what takes the bytes of a new connection; it yields as :meth:`take` returns.
+        """Return a function that takes the bytes of a new connection; it yields the results of :meth:`take`.
 
-        The end of a connection drops what has not come whole.
+        An incomplete part at the end of a connection is dropped.
         """
         reader = _READERS[self.container]()
         return lambda data: map(self.take, reader.feed(data))
 
     def take(self, part: InitSegment | Fragment) -> bool:
-        """Take the next part; False when ``seconds`` are full: it is not taken.
+        """Take the next part; return False, without taking it, when ``seconds`` are full.
 
         Raises:
             FormatChangedError: the format has changed.
@@ -102,10 +102,9 @@ class Recording:
 def recording(out: Path | None, seconds: float | None, container: str = "mp4") -> Iterator[Recording]:
     """Record into ``out.part``, which is remuxed into ``out`` at the end, however it ends, if it has media.
 
-    An interrupted recording is whole up to its last fragment, hence kept, also on a full disk; an empty one
-    leaves nothing.
-    ``out`` is a progressive MP4 or an indexed WebM; where the disk has no room for both, it is the fragments
-    as they came.
+    An interrupted recording, or one on a full disk, is whole up to its last fragment and is kept; an empty
+    one leaves no file. ``out`` is a progressive MP4 or an indexed WebM; if the disk has no room to write it
+    beside ``out.part``, it is the fragments as received.
 
     Raises:
         OSError: the file cannot be written.
@@ -117,7 +116,7 @@ def recording(out: Path | None, seconds: float | None, container: str = "mp4") -
     record = None
     try:
         with part.open("wb", buffering=0) as file:
-            record = Recording(WholeWriter(file), seconds, container)
+            record = Recording(AtomicWriter(file), seconds, container)
             yield record
     finally:
         if record is not None and record.fragments:
@@ -131,7 +130,7 @@ def _finish(part: Path, out: Path, container: str) -> None:
     try:
         remux(part, remuxed, container)
     except (OSError, MediaStreamError) as error:
-        _log.warning("%s: is left in fragments: %s", out, error)
+        _log.warning("%s: cannot be remuxed and stays fragmented: %s", out, error)
         remuxed.unlink(missing_ok=True)
         part.replace(out)
     else:

@@ -11,22 +11,22 @@ from yarl import URL
 from client.http import AwayError, ContractError, HttpSettings, NotFoundError, RefusedError, get
 from client.media_stream import FormatChangedError, MediaStreamError
 from client.recording import Recording
-from client.stream_events import Commentary
+from client.stream_events import ViewHistory
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a recording is."""
+    """Progress of a recording."""
 
     seconds: float
     """Media seconds so far."""
     bytes: int
     camera: str | None
-    """Which camera is shown; None as long as it is not known."""
+    """The camera shown; None while it is unknown."""
     cuts: int
-    """Changes of the camera so far, as far as they are known."""
+    """Known changes of the camera so far."""
     reconnections: int
-    """How many times the stream had to be opened again."""
+    """Times that the stream was opened again."""
 
 
 Report = Callable[[Progress], None]
@@ -38,14 +38,14 @@ class Session:
     def __init__(
         self,
         record: Recording,
-        commentary: Commentary,
+        history: ViewHistory,
         report: Report | None,
         start: str | None,
         end: str | None,
     ) -> None:
         self._start, self._end = start, end
         self._record = record
-        self._commentary = commentary
+        self._history = history
         self._report = report
         self._camera: str | None = None
         self.cuts = 0
@@ -57,31 +57,31 @@ class Session:
         while True:
             before = self._record.fragments
             try:
-                if await self._connection(self._asking(address), settings):
+                if await self._connection(self._resume_address(address), settings):
                     return True
                 if self._end is not None and self._record.fragments:
                     return True
-                problem = AwayError(f"{address.origin()}: the stream has ended")
+                failure = AwayError(f"{address.origin()}: the stream has ended")
             except FormatChangedError:
                 return False
             except (AwayError, NotFoundError, RefusedError) as error:
                 # A server that has just been restarted does not know its objects yet, nor their past.
                 if not isinstance(error, AwayError) and not self._record.fragments:
                     raise
-                problem = AwayError(str(error))
+                failure = AwayError(str(error))
             if self._record.fragments > before:
                 backoff.reset()
             if backoff.failures >= settings.retries:
                 if self._record.fragments:
                     return False
-                raise problem
+                raise failure
             await asyncio.sleep(backoff.next())
             self.reconnections += 1
 
-    def _asking(self, address: URL) -> URL:
-        """Return where to begin and to end: after an interruption, with the frame after the last one."""
+    def _resume_address(self, address: URL) -> URL:
+        """Return the address of the rest of the stream: from the frame after the last one on."""
         query = {} if self._end is None else {"to": self._end}
-        at, site = self._record.media_time, self._commentary.site
+        at, site = self._record.media_time, self._history.site
         if at is not None and site is not None and self._start is not None:
             return address.with_query({"from": f"p{round(at * site.fps) + 1}", **query})
         if self._start is not None:
@@ -114,16 +114,16 @@ class Session:
                 noted = self._record.fragments
                 self._note_camera()
         if self._record.fragments > before:
-            self._tell()
+            self._report_progress()
         return more
 
     def _note_camera(self) -> None:
-        camera = self._commentary.camera_at(self._record.media_time)
+        camera = self._history.camera_at(self._record.media_time)
         if camera is not None and camera != self._camera:
             self.cuts += self._camera is not None
             self._camera = camera
 
-    def _tell(self) -> None:
+    def _report_progress(self) -> None:
         if self._report is not None:
             self._report(
                 Progress(

@@ -1,4 +1,4 @@
-"""The boxes beside a recorded film: as metadata for programs (WebVTT) and drawn, for people (ASS)."""
+"""Sidecar files with the boxes of a recorded film: metadata (WebVTT), and drawn subtitles (ASS)."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ Format: Layer, Start, End, Style, Name, MarginL, MarginR, MarginV, Effect, Text
 
 
 def sidecars(film: Path) -> tuple[Path, Path]:
-    """Name the files beside a film: WebVTT, ASS."""
+    """Return the paths of a film's sidecar files: WebVTT, ASS."""
     return film.with_suffix(".vtt"), film.with_suffix(".ass")
 
 
 def write_sidecars(film: Path, frames: Iterable[Frame], first: int, number: int, site: Site) -> None:
-    """Write who is where in a film whose time 0 is pulse ``first``; ``number`` is whom it shows.
+    """Write the boxes of a film of object ``number`` whose time 0 is pulse ``first``.
 
-    Frame by frame, as they are taken from ``frames``: a film may be of a day.
+    ``frames`` is consumed one by one: a film may last a day.
 
     Raises:
-        OSError: they cannot be written; then neither is there, nor one of before.
+        OSError: they cannot be written; both files, also earlier ones, are then removed.
     """
     try:
         _write(film, frames, first, number, site)
@@ -77,19 +77,19 @@ def _vtt_head(number: int, site: Site) -> str:
 
 
 def _cue(frame: Frame, first: int, site: Site) -> str:
-    """Return a frame of a metadata track: its pulse as the name, JSON as the text (W3C WebVTT)."""
+    """Return a frame's cue: its pulse as the identifier, JSON as the text (W3C WebVTT)."""
     times = " --> ".join(_clock((at - first) / site.fps, 3) for at in (frame.pulse, frame.pulse + 1))
-    told = {"camera": frame.camera, "boxes": [_rounded(it) for it in frame.boxes]}
-    return f"p{frame.pulse}\n{times}\n{msgspec.json.encode(told).decode()}"
+    text = {"camera": frame.camera, "boxes": [_rounded(it) for it in frame.boxes]}
+    return f"p{frame.pulse}\n{times}\n{msgspec.json.encode(text).decode()}"
 
 
 def _rounded(box: Box) -> Box:
-    """Return a box to a tenth of a pixel: nobody finds people more exactly."""
+    """Return a box rounded to a tenth of a pixel, which is finer than any detector."""
     return Box(box.object, *(round(side, 1) for side in (box.left, box.top, box.right, box.bottom)))
 
 
 def _lines(frame: Frame, first: int, number: int, site: Site) -> Iterator[str]:
-    """Yield subtitles that are a frame's boxes (Advanced SubStation Alpha, drawn by libass)."""
+    """Yield the subtitles that draw a frame's boxes (Advanced SubStation Alpha, for libass)."""
     begin, end = (_clock((at - first) / site.fps, 2) for at in (frame.pulse, frame.pulse + 1))
     for box in frame.boxes:
         yield from _drawn(box, begin, end, "Shown" if box.object == number else "Other")
@@ -105,7 +105,7 @@ def _drawn(box: Box, begin: str, end: str, style: str) -> tuple[str, str]:
 
 
 def _clock(seconds: float, decimals: int) -> str:
-    """Return hours, minutes and seconds, to so many decimals."""
+    """Format a time as ``hh:mm:ss`` with the given decimals."""
     units = round(seconds * 10**decimals)
     whole, part = divmod(units, 10**decimals)
     minutes, second = divmod(whole, 60)

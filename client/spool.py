@@ -1,4 +1,4 @@
-"""What is kept until the end of a recording, on the disk: memory must not grow with its length."""
+"""Temporary storage on the disk until a recording ends, so that memory does not grow with its length."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from typing import IO
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where something is in the spool."""
+    """An entry's position in the spool."""
 
     offset: int
     length: int
 
 
 class Spool:
-    """Bytes in a file without a name in ``folder``, which goes with the process. It is there when needed."""
+    """Bytes in an unnamed file in ``folder``, made at the first ``put``; it vanishes with the process."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._file: IO[bytes] | None = None
 
     def put(self, data: bytes) -> Place:
-        """Keep something.
+        """Store bytes.
 
         Raises:
-            OSError: the disk does not take it.
+            OSError: they cannot be written.
         """
         if self._file is None:
             self._file = TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115 — see close
@@ -39,10 +39,10 @@ class Spool:
         return Place(offset, len(data))
 
     def get(self, place: Place) -> bytes:
-        """Return back what was kept.
+        """Return stored bytes.
 
         Raises:
-            OSError: it cannot be read.
+            OSError: they cannot be read.
         """
         if self._file is None:
             return b""
@@ -50,7 +50,7 @@ class Spool:
         return self._file.read(place.length)
 
     def close(self) -> None:
-        """Forget all of it."""
+        """Delete everything."""
         if self._file is not None:
             self._file.close()
             self._file = None

@@ -8,12 +8,12 @@ MAX_EVENT = 4_000_000  # bytes: a gop event with the boxes of a crowd has some h
 
 
 class EventStreamError(ValueError):
-    """The stream is not one of events, or an event is beyond all measure."""
+    """An event or a line is too large."""
 
 
 @dataclass(frozen=True, slots=True)
 class SentEvent:
-    """One event: its name ("message" if it has none), its data, the last id seen."""
+    """One event: its name ("message" by default), its data, the last id."""
 
     name: str
     data: str
@@ -21,7 +21,7 @@ class SentEvent:
 
 
 class SseParser:
-    """Takes a stream piece by piece, however it is cut."""
+    """Parses a stream that arrives in pieces."""
 
     def __init__(self) -> None:
         self._rest = b""
@@ -38,11 +38,11 @@ class SseParser:
             EventStreamError: an event is larger than MAX_EVENT.
         """
         buffer = self._rest + data
-        # A CR at the end may be half of a CR LF: it waits for what follows.
-        held = b"\r" if buffer.endswith(b"\r") else b""
-        whole = buffer.removesuffix(b"\r") if held else buffer
+        # A CR at the end may be half of a CR LF: it waits for the next byte.
+        last_cr = b"\r" if buffer.endswith(b"\r") else b""
+        whole = buffer.removesuffix(b"\r") if last_cr else buffer
         *lines, rest = whole.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
-        self._rest = rest + held
+        self._rest = rest + last_cr
         if len(self._rest) > MAX_EVENT:
             raise EventStreamError(f"a line is larger than {MAX_EVENT} bytes")
         events = (self._line(line.decode("utf-8", "replace")) for line in lines)
@@ -61,7 +61,7 @@ class SseParser:
         elif field == "id" and "\0" not in value:
             self._last_id = value
         elif field == "data":
-            self._size += len(value) + 1  # the line end, too: lines of nothing are something to keep
+            self._size += len(value) + 1  # with the line end: empty lines take memory too
             if self._size > MAX_EVENT:
                 raise EventStreamError(f"an event is larger than {MAX_EVENT} bytes")
             self._data.append(value)

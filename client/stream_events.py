@@ -1,4 +1,4 @@
-"""Which camera a stream shows and who is where in it, from the events beside it."""
+"""Which camera a stream shows, and the boxes in its pictures, from the server's events."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from client.model import Box, Event, Gop, Site
 from client.spool import Place, Spool
 
 _log = logging.getLogger(__name__)
-_GOPS = 64  # remembered where nothing is recorded: far more than the picture is behind the events
-_PATIENCE_S = 1.0
+_MAX_GOPS = 64  # remembered if nothing is recorded: far more than the stream lags behind the events
+_TIMEOUT_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What is known of one frame of a stream."""
+    """One frame of a stream: its camera and its boxes."""
 
     pulse: int
     camera: str
@@ -36,33 +36,30 @@ class _Shown:
     frames: int
     camera: str | None
     boxes: Place | None
-    """Packed: 38 bytes a box and frame. None: they are not known, or not kept."""
+    """In MessagePack, 38 bytes a box and frame; None if unknown or not stored."""
 
 
-class Commentary:
-    """Remembers the choices for one object: the last ones, or all of them and the boxes in its pictures.
+class ViewHistory:
+    """The views of one object: the last ones, or with a ``spool`` all of them and their boxes."""
 
-    ``keep`` is where the boxes are put; None: only the last choices are remembered.
-    """
-
-    def __init__(self, number: int, *, keep: Spool | None = None) -> None:
+    def __init__(self, number: int, *, spool: Spool | None = None) -> None:
         self.number = number
         self.site: Site | None = None
-        self._keep = keep
+        self._spool = spool
         self._firsts: list[int] = []
         self._shown: dict[int, _Shown] = {}
-        self._heard = asyncio.Event()
+        self._updated = asyncio.Event()
 
     def take(self, event: Event) -> None:
-        """Take what an event says about the object."""
+        """Take an event."""
         if isinstance(event, Site):
             self.site = event
         elif isinstance(event, Gop):
             self._take_gop(event)
-        self._heard.set()
+        self._updated.set()
 
     def camera_at(self, media_time: float | None) -> str | None:
-        """Return the camera shown at ``media_time`` (seconds: pulse / fps); None if it is not known."""
+        """Return the camera shown at ``media_time`` (seconds: pulse / fps); None if unknown."""
         if media_time is None or self.site is None:
             return None
         pulse = round(media_time * self.site.fps)
@@ -73,90 +70,90 @@ class Commentary:
         shown = self._shown[first]
         return shown.camera if pulse < first + shown.frames else None
 
-    async def begin(self) -> None:
-        """Wait for the next word."""
-        self._heard.clear()
-        await self._heard.wait()
+    async def next_event(self) -> None:
+        """Wait for the next event."""
+        self._updated.clear()
+        await self._updated.wait()
 
     async def reach(self, media_time: float) -> None:
-        """Wait a moment for what is said about ``media_time``: it comes by a connection of its own."""
+        """Wait up to a second for the event about ``media_time``, which comes over another connection."""
         if self.site is None:
-            return  # there are no events
+            return  # no event has come
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(_PATIENCE_S):
+            async with asyncio.timeout(_TIMEOUT_S):
                 while self.camera_at(media_time) is None:
-                    self._heard.clear()
-                    await self._heard.wait()
+                    self._updated.clear()
+                    await self._updated.wait()
 
     def frames(self, first: int, last: int) -> Iterator[Frame]:
-        """Yield what is known of the frames from one pulse to another, both included, in order.
+        """Yield the known frames from one pulse to another, both included, in order.
 
         Raises:
-            OSError: what was kept cannot be read.
+            OSError: the spool cannot be read.
         """
         for begin in self._firsts:
             shown = self._shown[begin]
             outside = begin > last or begin + shown.frames <= first
-            if self._keep is None or shown.camera is None or shown.boxes is None or outside:
+            if self._spool is None or shown.camera is None or shown.boxes is None or outside:
                 continue
-            boxes = msgspec.msgpack.decode(self._keep.get(shown.boxes), type=tuple[tuple[Box, ...], ...])
-            for pulse, some in enumerate(boxes, start=begin):
+            boxes = msgspec.msgpack.decode(self._spool.get(shown.boxes), type=tuple[tuple[Box, ...], ...])
+            for pulse, frame_boxes in enumerate(boxes, start=begin):
                 if first <= pulse <= last:
-                    yield Frame(pulse, shown.camera, some)
+                    yield Frame(pulse, shown.camera, frame_boxes)
 
     def _take_gop(self, gop: Gop) -> None:
         camera = gop.choices.get(self.number)
-        boxes = None if camera is None else self._kept(gop.boxes.get(camera, ()))
+        boxes = None if camera is None else self._store(gop.boxes.get(camera, ()))
         if gop.first not in self._shown:
             insort(self._firsts, gop.first)
         self._shown[gop.first] = _Shown(gop.frames, camera, boxes)
-        if self._keep is None and len(self._firsts) > _GOPS:
+        if self._spool is None and len(self._firsts) > _MAX_GOPS:
             del self._shown[self._firsts.pop(0)]
 
-    def _kept(self, boxes: Sequence[Sequence[Box]]) -> Place | None:
-        if self._keep is None:
+    def _store(self, boxes: Sequence[Sequence[Box]]) -> Place | None:
+        if self._spool is None:
             return None
         try:
-            return self._keep.put(msgspec.msgpack.encode(boxes))
-        except OSError as error:  # the disk that the film is on: the recording will say so
-            _log.debug("boxes are not kept: %s", error)
+            return self._spool.put(msgspec.msgpack.encode(boxes))
+        except OSError as error:  # the recording on the same disk will report it
+            _log.debug("boxes are not stored: %s", error)
             return None
 
 
 @contextlib.asynccontextmanager
 async def following(
     url: str,
-    commentary: Commentary,
+    history: ViewHistory,
     settings: HttpSettings,
     start: str | None = None,
     end: str | None = None,
 ) -> AsyncIterator[None]:
-    """Follow the events inside the block; that they cannot be had does not disturb who watches.
+    """Feed the server's events to ``history`` inside the block; without events the stream still plays.
 
-    Where there is a ``start``, what was said since then is taken first. The block is entered when the
-    server has begun to tell: of pictures that are fetched inside it nothing remains untold.
+    With a ``start``, the past events since then are taken first. The block is entered after the first
+    event or a second, so that pictures requested inside it have their events.
 
     Raises:
-        ClientError: it cannot be had.
+        ClientError: the past events cannot be fetched.
     """
 
     async def follow() -> None:
         try:
             async for event in events(url, settings):
-                commentary.take(event)
+                history.take(event)
         except ClientError as error:
             _log.info("no events: %s", error)
 
     if start is not None:
-        commentary.take(await site(url, settings))
+        history.take(await site(url, settings))
         async for gop in past(url, start, end, settings):
-            commentary.take(gop)
-    told = asyncio.create_task(follow())
-    begun = asyncio.create_task(commentary.begin())
+            history.take(gop)
+    follower = asyncio.create_task(follow())
+    first_event = asyncio.create_task(history.next_event())
     try:
-        await asyncio.wait({told, begun}, timeout=_PATIENCE_S, return_when=asyncio.FIRST_COMPLETED)
+        await asyncio.wait({follower, first_event}, timeout=_TIMEOUT_S, return_when=asyncio.FIRST_COMPLETED)
         yield
     finally:
-        told.cancel()
-        begun.cancel()
-        await asyncio.gather(told, begun, return_exceptions=True)
+        follower.cancel()
+        first_event.cancel()
+        await asyncio.gather(follower, first_event, return_exceptions=True)

@@ -1,4 +1,4 @@
-"""How a site is at one moment, as frozen structs."""
+"""The status of a site at one moment."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import msgspec
 
 
 class CameraNow(msgspec.Struct, frozen=True):
-    """One camera. What only ``/metrics`` says is None where that may not be read."""
+    """One camera. Fields that only ``/metrics`` has are None if the token does not allow to read it."""
 
     camera: str
     state: str
@@ -17,15 +17,15 @@ class CameraNow(msgspec.Struct, frozen=True):
     shed: int
     late: int
     synchronized: bool
-    """It follows the pulse server, and does not count by itself."""
+    """Whether it follows the pulse server instead of counting by itself."""
     sync_error_s: float | None = None
-    """Median: how long after its pulse a frame was taken lately."""
+    """Recent median of a frame's delay after its pulse."""
     tracking_delay_s: float | None = None
-    """Median: how long after their pulse tracks were there lately."""
+    """Recent median of the tracks' delay after their pulse."""
     certified: float | None = None
-    """Share of the windows whose answer is proven to be the best, 0 to 1, since the service began."""
+    """Share of the windows with a proven optimum, 0 to 1, since the service began."""
     waiting: int | None = None
-    """Frames that wait to be searched."""
+    """Frames that wait for detection."""
 
 
 class PersonNow(msgspec.Struct, frozen=True):
@@ -35,31 +35,31 @@ class PersonNow(msgspec.Struct, frozen=True):
     name: str | None
     visible: bool
     camera: str | None
-    """Who shows them."""
+    """The camera that shows them."""
     since_s: float | None
-    """For how long already, in seconds of video; None: not asked, or not known."""
+    """Seconds of video since that camera was chosen; None: not requested, or unknown."""
     cameras: tuple[str, ...]
-    """Who sees them."""
+    """The cameras that see them."""
 
 
 class ServiceNow(msgspec.Struct, frozen=True):
-    """The best-view service: what ``/metrics`` says of it."""
+    """The best-view service, from ``/metrics``."""
 
     began: float
-    """Unix seconds; another value is another run."""
+    """Unix seconds; it differs for each run."""
     viewers: dict[str, int]
-    """By kind."""
+    """By kind of stream."""
     recording: bool
     recorded_bytes: int
     decided_pulse: int
     delay_s: float | None
-    """Mean from a GOP's first pulse to its being sent, since the service began; None: none was."""
+    """Mean delay from a GOP's first pulse to its sending, since the service began; None before the first."""
     lag_s: float | None
-    """Mean that its event loop is late by."""
+    """Mean lag of its event loop."""
     waiting: dict[str, int]
-    """What waits, by queue."""
+    """Queue lengths, by queue."""
     sent_bytes: int
-    """Over HTTP since it began."""
+    """Sent over HTTP since it began."""
     cpu_s: float
     """Processor seconds since it began."""
     memory_bytes: int
@@ -72,12 +72,12 @@ class SiteNow(msgspec.Struct, frozen=True):
     now: float
     """The server's clock, unix seconds."""
     ready: bool
-    """A best view can be served."""
+    """Whether a best view can be served."""
     why: str
-    """In one line: why it cannot, or how many cameras there are."""
+    """In one line: why it cannot, or the number of cameras."""
     pulse: int | None
-    """The newest one; None: not known, or there was none."""
+    """The newest pulse; None if unknown, or before the first."""
     cameras: tuple[CameraNow, ...]
     people: tuple[PersonNow, ...]
     service: ServiceNow | None
-    """None: whoever asks may not read ``/metrics``."""
+    """None if the token does not allow to read ``/metrics``."""

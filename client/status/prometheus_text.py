@@ -1,4 +1,4 @@
-"""Reading ``/metrics``: numbers by name and labels."""
+"""Parsing ``/metrics``: values by name and labels."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from client.status.model import ServiceNow
 
 
 class Metrics:
-    """The samples of one answer.
+    """The samples of one response.
 
     Raises:
-        ContractError: it is none.
+        ContractError: the text is not in Prometheus' format.
     """
 
     def __init__(self, text: str) -> None:
@@ -23,21 +23,21 @@ class Metrics:
             for family in text_string_to_metric_families(text):
                 for it in family.samples:
                     if not math.isfinite(it.value):
-                        continue  # nothing that MyView says of itself
+                        continue  # MyView exports none
                     self._values[it.name, frozenset(it.labels.items())] = it.value
         except ValueError as error:
             raise ContractError(f"/metrics is not understood: {error}") from error
 
     def get(self, name: str, **labels: str) -> float | None:
-        """Return one value; None: it is not there."""
+        """Return a value; None if it is missing."""
         return self._values.get((name, frozenset(labels.items())))
 
     def count(self, name: str, **labels: str) -> int:
-        """Return a whole number; 0 where it is not there."""
+        """Return an integer; 0 if it is missing."""
         return int(self.get(name, **labels) or 0)
 
     def by(self, name: str, label: str) -> dict[str, int]:
-        """Return whole numbers by the value of a label."""
+        """Return integers by the value of a label."""
         return {
             dict(labels)[label]: int(value)
             for (known, labels), value in self._values.items()
@@ -45,18 +45,18 @@ class Metrics:
         }
 
     def mean(self, name: str, **labels: str) -> float | None:
-        """Return the mean of a histogram; None: nothing was counted."""
+        """Return the mean of a histogram; None if it is empty."""
         count = self.get(f"{name}_count", **labels)
         return (self.get(f"{name}_sum", **labels) or 0.0) / count if count else None
 
     def share(self, part: str, whole: str, **labels: str) -> float | None:
-        """Return the quotient of two counters; None: there is nothing of the whole."""
+        """Return the quotient of two counters; None if the whole is 0 or missing."""
         of = self.get(whole, **labels)
         return (self.get(part, **labels) or 0.0) / of if of else None
 
 
 def service_of(metrics: Metrics) -> ServiceNow:
-    """Put together what is known of the service."""
+    """Return the status of the service."""
     return ServiceNow(
         began=metrics.get("process_start_time_seconds") or 0.0,
         viewers=metrics.by("myview_viewers_by_kind", "kind"),

@@ -1,4 +1,4 @@
-"""How a site is now: what several addresses say, put together."""
+"""The status of a site, from several requests."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from client.status.model import CameraNow, PersonNow, SiteNow
 from client.status.prometheus_text import Metrics, service_of
 
 _DEFAULT = HttpSettings()
-_ASKED_MOST = 12
-"""People of whom it is asked since when their camera shows them."""
-_WORDS_MOST = 64_000
-"""Bytes of the line that says whether a best view can be served."""
+_MAX_CHOICES = 12
+"""People for whom the choice of their view is requested."""
+_MAX_READYZ = 64_000
+"""Bytes of the response of ``/readyz``."""
 
 
 async def status(url: str, settings: HttpSettings = _DEFAULT) -> SiteNow:
-    """Return how a site is.
+    """Return the status of a site.
 
     Raises:
         ValueError: ``url`` is no address.
-        RefusedError: the server asks for a token, or for another.
-        ClientError: it cannot be reached or is no MyView.
+        RefusedError: the token is missing or wrong.
+        ClientError: the server cannot be reached or is not MyView.
     """
     base = server_url(url)
     site = await get_json(base / "api/site", Site, settings)
@@ -56,9 +56,9 @@ async def status(url: str, settings: HttpSettings = _DEFAULT) -> SiteNow:
 
 
 async def _ready(base: URL, settings: HttpSettings) -> tuple[bool, str]:
-    """Ask whether a best view can be served: 503 is an answer, too."""
+    """Return whether a best view can be served, and why not; a 503 is a valid response."""
     async with get_any(base / "readyz", settings, "text/plain") as answer:
-        return answer.ok, " ".join(_text(await read_body(answer, settings, _WORDS_MOST)).split())
+        return answer.ok, " ".join(_text(await read_body(answer, settings, _MAX_READYZ)).split())
 
 
 async def _metrics(base: URL, settings: HttpSettings) -> Metrics | None:
@@ -102,8 +102,8 @@ def _measured(camera: CameraNow, metrics: Metrics | None) -> CameraNow:
 async def _people(
     url: str, people: tuple[SeenObject, ...], fps: float, settings: HttpSettings
 ) -> tuple[PersonNow, ...]:
-    asked = await asyncio.gather(*(_since(url, it, fps, settings) for it in people[:_ASKED_MOST]))
-    since = [*asked, *[None] * len(people)]
+    known = await asyncio.gather(*(_since(url, it, fps, settings) for it in people[:_MAX_CHOICES]))
+    since = [*known, *[None] * len(people)]
     return tuple(
         PersonNow(it.object, it.name, it.visible, it.camera, seconds, it.cameras)
         for it, seconds in zip(people, since, strict=False)
@@ -113,7 +113,9 @@ async def _people(
 async def _since(url: str, person: SeenObject, fps: float, settings: HttpSettings) -> float | None:
     """Return the seconds for which a person's camera shows them already."""
     try:
-        told = await choice(url, person.object, settings)
+        decision = await choice(url, person.object, settings)
     except NotFoundError:
         return None  # gone meanwhile
-    return None if told.since is None else (told.first + told.frames - told.since) / fps
+    if decision.since is None:
+        return None
+    return (decision.first + decision.frames - decision.since) / fps

@@ -18,7 +18,7 @@ from client.fmp4 import BoxReader, decode_time
 from client.http import server_url
 from client.recording import Recording
 from client.session import Session
-from client.stream_events import Commentary
+from client.stream_events import ViewHistory
 
 _TICKS = 90_000
 _AGAIN_S = 0.2
@@ -91,7 +91,7 @@ class Viewer:
         while True:
             self.tapes.append(Tape())
             record = Recording(cast("io.BufferedWriter", self.tapes[-1]), None)
-            self._sessions.append(Session(record, Commentary(self.number), None, None, None))
+            self._sessions.append(Session(record, ViewHistory(self.number), None, None, None))
             with contextlib.suppress(ClientError):
                 await self._sessions[-1].run(self._address, _SETTINGS)
             self.given_up += 1

@@ -13,7 +13,7 @@ import client
 from client.model import Box, Gop, Site
 from client.sidecar import sidecars, write_sidecars
 from client.spool import Spool
-from client.stream_events import Commentary, Frame
+from client.stream_events import Frame, ViewHistory
 from fakes.service.fed_site import Hall, opened
 from fakes.service.scripted_cameras import CAMERAS, GOP, LARGE, SMALL
 from fakes.service.scripted_recordings import A, B
@@ -80,16 +80,16 @@ def told(gop: int) -> Gop:
 def held(folder: Path, gops: int) -> int:
     """Return the bytes of memory that stay when so much has been said."""
     spool = Spool(folder)
-    commentary = Commentary(1, keep=spool)
-    commentary.take(told(0))
+    history = ViewHistory(1, spool=spool)
+    history.take(told(0))
     tracemalloc.start()
     try:
         for gop in range(gops):
-            commentary.take(told(gop))
+            history.take(told(gop))
         kept = tracemalloc.get_traced_memory()[0]
     finally:
         tracemalloc.stop()
-    assert sum(1 for _ in commentary.frames(0, gops * GOP)) == gops * GOP
+    assert sum(1 for _ in history.frames(0, gops * GOP)) == gops * GOP
     spool.close()
     return kept
 
@@ -102,12 +102,12 @@ def test_boxes_wait_on_the_disk_for_the_end(tmp_path: Path) -> None:
 
 def test_what_is_said_again_counts_and_what_comes_late_is_in_its_place(tmp_path: Path) -> None:
     spool = Spool(tmp_path)
-    commentary = Commentary(1, keep=spool)
+    history = ViewHistory(1, spool=spool)
     for gop in (2, 0, 1):
-        commentary.take(told(gop))
+        history.take(told(gop))
     again = tuple((BOX,) for _ in range(GOP))
-    commentary.take(Gop(first=GOP, frames=GOP, choices={1: "c1"}, boxes={"c1": again}, cuts=()))
-    frames = list(commentary.frames(0, 3 * GOP))
+    history.take(Gop(first=GOP, frames=GOP, choices={1: "c1"}, boxes={"c1": again}, cuts=()))
+    frames = list(history.frames(0, 3 * GOP))
     assert [it.pulse for it in frames] == list(range(3 * GOP))
     assert [len(it.boxes) for it in frames] == [5] * GOP + [1] * GOP + [5] * GOP
     assert frames[GOP].camera == "c1"
@@ -115,11 +115,11 @@ def test_what_is_said_again_counts_and_what_comes_late_is_in_its_place(tmp_path:
 
 
 def test_where_boxes_cannot_be_kept_the_choices_are(tmp_path: Path) -> None:
-    commentary = Commentary(1, keep=Spool(tmp_path / "none"))
-    commentary.take(SITE)
-    commentary.take(told(0))
-    assert commentary.camera_at(0.1) == "c0"
-    assert list(commentary.frames(0, GOP)) == []
+    history = ViewHistory(1, spool=Spool(tmp_path / "none"))
+    history.take(SITE)
+    history.take(told(0))
+    assert history.camera_at(0.1) == "c0"
+    assert list(history.frames(0, GOP)) == []
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ async def hall() -> AsyncIterator[Hall]:
         yield it
 
 
-async def watched(hall: Hall, out: Path) -> client.Watched:
+async def watched(hall: Hall, out: Path) -> client.WatchResult:
     url = f"http://127.0.0.1:{hall.port}"
     return await client.watch(url, 1, out, start=f"p{FIRST}", end="p28")
 
