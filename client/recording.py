@@ -10,7 +10,6 @@ from pathlib import Path
 from client.atomic_writer import AtomicWriter, Sink
 from client.fmp4 import Mp4Reader
 from client.media_stream import FormatChangedError, Fragment, InitSegment, MediaStreamError
-from client.remux import remux
 from client.webm import WebmReader
 
 _log = logging.getLogger(__name__)
@@ -126,6 +125,8 @@ def recording(out: Path | None, seconds: float | None, container: str = "mp4") -
 
 
 def _finish(part: Path, out: Path, container: str) -> None:
+    from client.remux import remux  # noqa: PLC0415 — it loads FFmpeg, which the best-view process does without
+
     remuxed = out.with_name(out.name + ".remuxed")
     try:
         remux(part, remuxed, container)

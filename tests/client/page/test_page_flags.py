@@ -87,7 +87,10 @@ async def test_what_is_over_is_seen_again_to_point_at_it_and_then_what_happens_n
         await visit.until("/ [0-9] s ago/.test(document.querySelector('#flag-when').textContent)")
         await visit.page.locator("#flag-point").click()
         await visit.playing(2)
-        await visit.until(f"myview.camera === '{CAMERAS[2]}' && myview.pulse < {over['pulse']}")
+        went_back = "(it, place, all) => place && it.pulse < all[place - 1].pulse - 2 * 25"
+        before = f"(it) => it.pulse < {over['pulse']}"
+        await visit.until(f"myview.delays.filter({went_back}).some({before})")
+        await visit.until(f"myview.camera === '{CAMERAS[2]}'")
         await expect(visit.page.locator("#live")).to_be_visible()
         there, down, *_ = await middle(visit, 2)
         await visit.page.mouse.move(there, down)
