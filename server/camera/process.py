@@ -86,7 +86,7 @@ class CameraProcess:
         if self._pipeline.passes:
             log.info("camera %s: its own H.264 passes through", camera_id)
         elif self._pipeline.why_encoded:
-            log.warning("camera %s is encoded: its own H.264: %s", camera_id, self._pipeline.why_encoded)
+            log.warning("camera %s is re-encoded: its own H.264: %s", camera_id, self._pipeline.why_encoded)
         self._video = ThreadPoolExecutor(1, "video")
         self._tracking = ThreadPoolExecutor(1, "tracking")
         fps = config.site.fps

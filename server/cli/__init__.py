@@ -5,7 +5,7 @@ import signal
 import sys
 
 # One process per camera already uses the cores; matrices here are small, and threads only get in the way.
-# It must be said before NumPy is imported.
+# This must be set before NumPy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # What runs until it is told to end may be told while it still loads, which takes a second on a busy machine:

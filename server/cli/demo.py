@@ -36,10 +36,10 @@ def demo_fps(there: float) -> float:
 async def run_demo(
     port: int | None, seconds: float | None, *, open_browser: bool, fps: float | None = None
 ) -> None:
-    """Run the demo until it is told to end, or for so many seconds; ``fps``: not what the machine can do.
+    """Run the demo until it is cancelled, or for so many seconds; ``fps``: overrides the machine's rate.
 
     Raises:
-        UserError: the port was asked for and is taken.
+        UserError: the requested port is in use.
     """
     if port is not None:
         check_port_free("127.0.0.1", port, "--port")

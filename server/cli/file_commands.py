@@ -97,11 +97,11 @@ def _track_templates(
 
     if video is None or det is not None:
         raise UserError("--template: needs a video, and no --det")
-    found = boxes_from(boxes)
+    templates = boxes_from(boxes)
     with bar("frames") as progress:
         task = progress.add_task("tracking", total=total_frames([video]))
         count = track_templates(
-            video, found, out, config, solver, lambda done: progress.update(task, completed=done)
+            video, templates, out, config, solver, lambda done: progress.update(task, completed=done)
         )
     typer.echo(f"{out}: {count} objects")
 

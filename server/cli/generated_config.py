@@ -99,8 +99,8 @@ def _site_like(videos: Sequence[Path]) -> dict[str, Any]:
         (first.fps, *(read_video_info(it).fps for it in videos[1:])) if first.fps is None else (first.fps,)
     )
     rate = next((fps for fps in rates if fps is not None), None)
-    said = {} if rate is None else {"fps": rate}
-    return {**said, "width": width - width % 2, "height": height - height % 2}
+    site = {} if rate is None else {"fps": rate}
+    return {**site, "width": width - width % 2, "height": height - height % 2}
 
 
 def demo_config(folder: Path, port: int, fps: float) -> tuple[Path, Config]:

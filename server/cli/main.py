@@ -30,7 +30,7 @@ app = typer.Typer(
 )
 
 
-def _say_version(wanted: bool) -> None:
+def _print_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"myview {version_of('myview')}")
         raise typer.Exit
@@ -40,7 +40,7 @@ def _say_version(wanted: bool) -> None:
 def _myview(
     version: Annotated[
         bool,
-        typer.Option("--version", help="Print the version.", callback=_say_version, is_eager=True),
+        typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
     """Accept the options that precede a command."""
@@ -66,14 +66,14 @@ for run in (
 
 _BAD_INPUT = UserError.code
 _INTERRUPTED = 130
-_NO_WAY = {errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP}
+_PATH_ERRORS = {errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP}
 _TERMINATED = 143
-_told: list[int] = []
-"""SIGTERM, once it has come."""
+_sigterms: list[int] = []
+"""SIGTERM, once it was received."""
 
 
-def _end(number: int, _: object) -> None:
-    _told.append(number)
+def _on_sigterm(number: int, _: object) -> None:
+    _sigterms.append(number)
     sys.exit(_TERMINATED)
 
 
@@ -88,24 +88,24 @@ def _was_cut_short(error: BaseException | None) -> bool:
 
 def main() -> None:
     """Run the command line; no traceback for bad input."""
-    # All memory goes with the process: to look for cycles in a thousand modules first takes half a second.
+    # Collecting cycles of a thousand modules at exit takes half a second, for nothing.
     atexit.register(gc.freeze)
     raise_descriptor_limit()
     if os.environ.get(SUPERVISED_VARIABLE):
         terminate_with_parent()
-    # So that what is half-written is tidied away; what runs until it is told to end writes nothing before it
-    # has its own handler, and until then ends at once.
+    # Signals raise, so that half-written files are removed. Services write nothing before they have their own
+    # handlers, and until then end at once.
     if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
-        signal.signal(signal.SIGTERM, _end)
+        signal.signal(signal.SIGTERM, _on_sigterm)
     try:
         app()
     except KeyboardInterrupt:
         sys.exit(_INTERRUPTED)
-    except Exception as error:  # noqa: BLE001 — said, or raised again
+    except Exception as error:  # noqa: BLE001 — printed, or raised again
         if _was_cut_short(error):
-            sys.exit(_TERMINATED if _told else _INTERRUPTED)
+            sys.exit(_TERMINATED if _sigterms else _INTERRUPTED)
         _fail(error)
 
 
@@ -114,11 +114,11 @@ def _fail(error: Exception) -> None:
     if isinstance(error, UserError):
         say_failure(str(error))
         sys.exit(error.code)
-    if isinstance(error, BrokenPipeError):  # whoever read our output has gone, as by `… | head`
+    if isinstance(error, BrokenPipeError):  # the reader of our output has gone, as in `… | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
-    if isinstance(error, OSError) and error.filename is not None and error.errno in _NO_WAY:
-        # Of a path that leads nowhere, wherever it is first looked into.
+    if isinstance(error, OSError) and error.filename is not None and error.errno in _PATH_ERRORS:
+        # A path that cannot be followed, wherever it is used first.
         say_failure(f"{redact_address(str(error.filename))}: {error.strerror}")
         sys.exit(_BAD_INPUT)
     raise error

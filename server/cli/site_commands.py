@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")]
 _UP_LETS_GO_S = 1.9
-"""Those that it has started end before."""
+"""Longer than its child processes take to end."""
 LogFolder = Annotated[
     Path | None, typer.Option("--out", help="Write tracks and camera choices into this new folder.")
 ]
 
 
 def _read(config: Path) -> ActiveConfig:
-    """Read the configuration that a process runs by, which may be asked for again from then on.
+    """Read a process's configuration; from then on SIGHUP asks to reload it.
 
     Raises:
         UserError: it cannot be read, or something in it is wrong.
@@ -65,7 +65,7 @@ def camera(
         )
 
     def run() -> Coroutine[Any, Any, None]:
-        lower_own_priority(running.now.site.niceness)  # a supervisor has seen to that before
+        lower_own_priority(running.now.site.niceness)  # no-op under a supervisor, which has done so
         return camera_process(running, camera_id)
 
     run_process(run)

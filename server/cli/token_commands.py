@@ -37,8 +37,8 @@ def token(
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
-        said = first["msg"].removeprefix("Value error, ")
-        raise UserError(f"token: {f'{place}: ' if place else ''}{said}") from error
+        reason = first["msg"].removeprefix("Value error, ")
+        raise UserError(f"token: {f'{place}: ' if place else ''}{reason}") from error
     written = yaml.safe_dump(
         content, default_flow_style=True, sort_keys=False, width=1000, allow_unicode=True
     )

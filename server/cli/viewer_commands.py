@@ -1,4 +1,4 @@
-"""The commands that watch somebody else's site.
+"""The commands that watch a site over HTTP.
 
 Each imports what it runs only when it runs, so that a process loads no more than it needs.
 """
@@ -31,7 +31,7 @@ def watch(
         typer.Option(envvar="MYVIEW_TOKEN", show_envvar=True, help="Access token, if the server needs one."),
     ] = None,
 ) -> None:
-    """List who is there, or watch or record somebody's best view."""
+    """List people, or watch or record a person's best view."""
     from server.cli.watch import run_watch
 
     asyncio.run(run_until_signal(lambda: run_watch(url, number, out, seconds, start, end, token)))

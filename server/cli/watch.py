@@ -1,4 +1,4 @@
-"""``myview watch``: who is there, or somebody's best view, shown as it comes or recorded."""
+"""``myview watch``: list people, or watch or record a person's best view."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from client import ClientError, HttpSettings, Progress, objects, watch
 from server.system.atomic_write import check_new_file
 from server.system.errors import UnavailableError, UserError
 
-_TELL_EVERY_S = 1.0
+_PRINT_EVERY_S = 1.0
 
 
 async def run_watch(
@@ -27,11 +27,11 @@ async def run_watch(
     end: str | None = None,
     token: str | None = None,
 ) -> None:
-    """List who is there, or follow somebody.
+    """List people, or watch one.
 
     Raises:
         UnavailableError: the server cannot be reached.
-        UserError: it does not know them, or the file cannot be written.
+        UserError: there is no such person, or the file cannot be written.
     """
     if number is None and (out or seconds is not None or start or end):
         raise UserError("watch: --out, --seconds, --from and --to need --object")
@@ -42,14 +42,16 @@ async def run_watch(
         if number is None:
             await _list(url, settings)
             return
-        watched = await watch(url, number, out, seconds, _Teller(), start=start, end=end, settings=settings)
+        watched = await watch(
+            url, number, out, seconds, _ProgressPrinter(), start=start, end=end, settings=settings
+        )
     except ServerAway as error:
         raise UnavailableError(f"watch: {error}") from error
     except (ClientError, ValueError) as error:
         raise UserError(f"watch: {error}") from error
     except OSError as error:
-        kept = "; the recording up to then is kept" if _file_at(out) != before else ""
-        raise UserError(f"{out}: cannot write there: {error.strerror}{kept}") from error
+        suffix = "; the recording up to then is kept" if _file_at(out) != before else ""
+        raise UserError(f"{out}: cannot write there: {error.strerror}{suffix}") from error
     where = f" in {out}" if out else ""
     typer.echo(f"object {number}: {watched.seconds:.1f} s, {watched.cuts} cuts{where}")
     if not watched.complete:
@@ -57,7 +59,7 @@ async def run_watch(
 
 
 def _file_at(out: Path | None) -> int | None:
-    """Return what the disk knows a file by; None where there is none."""
+    """Return a file's inode number; None: it does not exist."""
     return out.stat().st_ino if out is not None and out.exists() else None
 
 
@@ -69,16 +71,16 @@ async def _list(url: str, settings: HttpSettings) -> None:
     Console().print(table)
 
 
-class _Teller:
+class _ProgressPrinter:
     """Prints progress to standard error once a second."""
 
     def __init__(self) -> None:
-        self._told = 0.0
+        self._printed = 0.0
 
     def __call__(self, progress: Progress) -> None:
         now = time.monotonic()
-        if now - self._told >= _TELL_EVERY_S:
-            self._told = now
+        if now - self._printed >= _PRINT_EVERY_S:
+            self._printed = now
             typer.echo(
                 f"{progress.seconds:6.1f} s  {progress.bytes / 1e6:6.2f} MB  "
                 f"camera {progress.camera or '-'}  {progress.cuts} cuts",

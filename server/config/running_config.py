@@ -18,7 +18,7 @@ from server.system.file_state import FileState, file_state
 ACTIVE_CONFIG_VARIABLE = "MYVIEW_IN_FORCE"
 """In the environment of what `myview up` starts: where it keeps the configuration that the site runs by.
 
-A process that has to be started again must not go by a file that nobody has said is to be in force.
+A restarted process must not use a changed file that was not reloaded yet.
 """
 
 
@@ -56,10 +56,10 @@ class ActiveConfig:
         Raises:
             UserError: it cannot be read, or something in it is wrong.
         """
-        kept = os.environ.get(ACTIVE_CONFIG_VARIABLE)
-        if kept is None or not is_owned_by_this_user(Path(kept)):
+        active_file = os.environ.get(ACTIVE_CONFIG_VARIABLE)
+        if active_file is None or not is_owned_by_this_user(Path(active_file)):
             return load_config(self.path)
-        return build_config(read_content(Path(kept)), where=str(self.path), folder=self.path.parent)
+        return build_config(read_content(Path(active_file)), where=str(self.path), folder=self.path.parent)
 
     def on_disk(self) -> ConfigFileState:
         """Compare the file with the active configuration; it is read again only when it has changed.
@@ -83,10 +83,10 @@ class ActiveConfig:
 def is_owned_by_this_user(path: Path) -> bool:
     """Return whether a file or folder exists and belongs to this process's user."""
     try:
-        found = path.lstat()
+        status = path.lstat()
     except OSError:
         return False
-    return found.st_uid == os.geteuid() and not stat.S_ISLNK(found.st_mode)
+    return status.st_uid == os.geteuid() and not stat.S_ISLNK(status.st_mode)
 
 
 def serialize_config(config: Config, folder: Path) -> str:

@@ -75,8 +75,8 @@ class Config(BaseSettings):
     ) -> tuple[PydanticBaseSettingsSource, ...]:
         """Return the settings' sources by precedence: environment variables, where set, override the file."""
         del settings_cls, dotenv_settings, file_secret_settings
-        told = any(name.upper().startswith(PREFIX) for name in os.environ)
-        return (env_settings, init_settings) if told else (init_settings,)
+        is_overridden = any(name.upper().startswith(PREFIX) for name in os.environ)
+        return (env_settings, init_settings) if is_overridden else (init_settings,)
 
     @model_validator(mode="after")
     def _cameras_have_different_names(self) -> Self:
@@ -115,7 +115,7 @@ class Config(BaseSettings):
             )
 
     @model_validator(mode="after")
-    def _nobody_is_settled_untold(self) -> Self:
+    def _settled_after_published(self) -> Self:
         identity = self.view.identity
         least = identity.publish_after + 2 * identity.clustering_interval
         if identity.settle_after < least:

@@ -1,4 +1,4 @@
-"""The best-view service's process. Recorded or live sites: no codec is even loaded here."""
+"""The best-view service's process; no codec is loaded in it."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     """Run the best-view service with its page, streams and API.
 
     Raises:
-        UserError: a port or the output folder cannot be had, or strangers could come in.
-        UnavailableError: it lost the pulses for good.
+        UserError: a port or the output folder is unavailable, or the site is open by accident.
+        UnavailableError: the pulses are lost for good.
     """
     config = running.now
     check_viewers(config)
     if config.view.share.index == 0:
-        check_bus(config)  # the others are no router
+        check_bus(config)  # the other shards are not the router
     pipeline = BestViewPipeline(add_scene_ground(config), out)
     following = asyncio.create_task(_follow(running, pipeline), name="reload")
     try:
@@ -48,7 +48,7 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
 
 
 async def _follow(running: ActiveConfig, pipeline: BestViewPipeline) -> None:
-    """Go by a configuration that is read again, as far as a running service can."""
+    """Apply reloaded configurations, as far as a running service can."""
     async for reload in reloads(running):
         try:
             pipeline.apply_config(reload.now)

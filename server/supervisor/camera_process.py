@@ -26,23 +26,23 @@ _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
 
 
 async def camera_process(running: ActiveConfig, camera_id: str) -> None:
-    """Run one camera; when a configuration that is read again changes what it goes by, it begins anew.
+    """Run one camera; restart it when a reload changes its settings.
 
-    A network camera or device that does not answer yet is waited for.
+    Waits for a network camera or device that does not answer yet.
 
     Raises:
         UserError: its source cannot be opened.
-        UnavailableError: it lost the pulses for good, or cannot begin anew.
+        UnavailableError: the pulses are lost for good, or the restart failed.
     """
     if source_kind(running.now.camera(camera_id).source) is SourceKind.STREAM:
-        signal_started()  # opening it is mostly waiting for a network or a device, which keeps no processor
-    anew = asyncio.Event()
-    following = asyncio.create_task(_follow(running, camera_id, anew), name="reload")
+        signal_started()  # opening it mostly waits for a network or a device, without load
+    restart = asyncio.Event()
+    following = asyncio.create_task(_follow(running, camera_id, restart), name="reload")
     try:
-        camera = await _made(running, camera_id, anew, begun=False)
+        camera = await _create(running, camera_id, restart, begun=False)
         signal_started()
-        while not await _run(camera, anew):
-            camera = await _made(running, camera_id, anew, begun=True)
+        while not await _run(camera, restart):
+            camera = await _create(running, camera_id, restart, begun=True)
     except SyncError as error:
         raise UnavailableError(f"camera {camera_id}: {error}") from error
     finally:
@@ -50,17 +50,19 @@ async def camera_process(running: ActiveConfig, camera_id: str) -> None:
         await asyncio.gather(following, return_exceptions=True)
 
 
-async def _made(running: ActiveConfig, camera_id: str, anew: asyncio.Event, *, begun: bool) -> CameraProcess:
-    """Make it as soon as its source can be opened, by what is in force then; ``anew`` says that this changed.
+async def _create(
+    running: ActiveConfig, camera_id: str, restart: asyncio.Event, *, begun: bool
+) -> CameraProcess:
+    """Create the camera as soon as its source opens, by the settings in force; ``restart``: they changed.
 
-    To end instead, and be started again, would load all libraries each time. Once the site has begun, as it
-    does while a camera is waited for, what is wrong with one camera ends that one alone.
+    Ending the process instead would load all libraries again each time. ``begun``: the site has started, so
+    errors of this camera end it alone.
     """
     away, backoff = LogThrottle(quiet_s=0.0), Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
     while True:
-        anew.clear()
+        restart.clear()
         try:
-            camera = await asyncio.to_thread(_opened, running.now, camera_id)
+            camera = await asyncio.to_thread(_open, running.now, camera_id)
         except UnavailableError as error:
             if (more := away.record(str(error))) is not None:
                 log.warning("%s%s; retrying", error, more)
@@ -68,35 +70,35 @@ async def _made(running: ActiveConfig, camera_id: str, anew: asyncio.Event, *, b
         except UserError as error:
             if not begun:
                 raise
-            raise UnavailableError(str(error)) from error  # whoever looks after this process starts it again
+            raise UnavailableError(str(error)) from error  # the supervisor restarts this process
         else:
             if ended := away.end():
                 log.info("camera %s answers, after %.0f s", camera_id, ended.seconds)
             return camera
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(anew.wait(), backoff.next())
+            await asyncio.wait_for(restart.wait(), backoff.next())
 
 
-def _opened(config: Config, camera_id: str) -> CameraProcess:
+def _open(config: Config, camera_id: str) -> CameraProcess:
     return CameraProcess(fill_in_password(config, camera_id), camera_id)
 
 
-async def _run(camera: CameraProcess, anew: asyncio.Event) -> bool:
-    """Run until the recording is over, which is said, or until the camera has to begin anew."""
-    run, waiting = asyncio.create_task(camera.run()), asyncio.create_task(anew.wait())
+async def _run(camera: CameraProcess, restart: asyncio.Event) -> bool:
+    """Run until the recording is over (True) or the camera has to restart (False)."""
+    run, waiting = asyncio.create_task(camera.run()), asyncio.create_task(restart.wait())
     try:
         await asyncio.wait({run, waiting}, return_when=asyncio.FIRST_COMPLETED)
         if run.done():
             run.result()
         return run.done()
     finally:
-        anew.clear()
+        restart.clear()
         for task in (run, waiting):
             task.cancel()
         await asyncio.gather(run, waiting, return_exceptions=True)
 
 
-async def _follow(running: ActiveConfig, camera_id: str, anew: asyncio.Event) -> None:
+async def _follow(running: ActiveConfig, camera_id: str, restart: asyncio.Event) -> None:
     def check(_: Config, reload: ReloadPlan) -> None:
         if camera_id in reload.cameras:
             check_recording(reload.now, camera_id)
@@ -105,6 +107,6 @@ async def _follow(running: ActiveConfig, camera_id: str, anew: asyncio.Event) ->
         running.now = reload.now
         if camera_id in reload.cameras:
             log.info("configuration reloaded: this camera restarts")
-            anew.set()
+            restart.set()
         else:
             log.info("configuration reloaded: this camera is unchanged")

@@ -14,10 +14,10 @@ _AUTHORITY = re.compile(r"[a-z]+/(?P<host>[^\s?#]+):[0-9]+")
 
 
 def check_viewers(config: Config) -> None:
-    """Refuse to serve other machines without tokens, unless the site is said to be open to all.
+    """Refuse to serve other machines without tokens, unless `access.open_to_all` is set.
 
     Raises:
-        UserError: `http.host` is not of this machine alone; or the file of tokens cannot be read.
+        UserError: `http.host` is not a loopback address; or the token file cannot be read.
     """
     if config.access.tokens is not None:
         read_tokens(config.access.tokens)
@@ -30,10 +30,10 @@ def check_viewers(config: Config) -> None:
 
 
 def check_pulses(config: Config) -> None:
-    """Refuse to send pulses to other machines, unless they log in over TLS, or are trusted.
+    """Refuse to send pulses to other machines, unless they log in over TLS, or the network is trusted.
 
     Raises:
-        UserError: `sync.bind` is not of this machine alone.
+        UserError: `sync.bind` is not a loopback address.
     """
     sync = config.sync
     if (sync.users is None or sync.tls.key is None) and not is_loopback(sync.bind):
@@ -42,10 +42,10 @@ def check_pulses(config: Config) -> None:
 
 
 def check_bus(config: Config) -> None:
-    """Refuse to be other machines' router, unless the bus asks who comes, or their network is trusted.
+    """Refuse to be other machines' router, unless the bus has users and TLS, or the network is trusted.
 
     Raises:
-        UserError: `zenoh.listen` is not of this machine alone.
+        UserError: `zenoh.listen` is not a loopback address.
     """
     zenoh = config.zenoh
     if zenoh.users is not None and zenoh.listen.startswith("tls/"):
@@ -57,7 +57,7 @@ def check_bus(config: Config) -> None:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether nobody but this machine can reach a host that is listened on."""
+    """Return whether only this machine can reach a host."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

@@ -2,11 +2,10 @@
 
     python -m server.supervisor.healthcheck sync | bestview | camera ID
 
-It ends with 0 if so; else with 1, and one line that the engine keeps. It starts every few seconds beside
-each process, so it loads nothing but what it asks with: no configuration, only the environment that the
-compose files set. ``MYVIEW_HEALTH_URL`` is where the best view answers, ``MYVIEW_HEALTH_CERTIFICATE`` the
-file of the certificate by which it is known, and ``MYVIEW_HEALTH_TOKEN`` (a file) or ``MYVIEW_TOKEN`` what
-lets in.
+Exit code 0: healthy; 1: not, and one line says why, which the engine keeps. It runs every few seconds beside
+each process, so it loads little: no configuration, only the environment that the compose files set.
+``MYVIEW_HEALTH_URL`` is the best view's address, ``MYVIEW_HEALTH_CERTIFICATE`` the file of its certificate,
+and ``MYVIEW_HEALTH_TOKEN`` (a file) or ``MYVIEW_TOKEN`` the token.
 """
 
 from __future__ import annotations
@@ -32,18 +31,18 @@ class UnhealthyError(Exception):
 
 
 def check_pulses() -> None:
-    """Check whether the pulse server greets.
+    """Check whether the pulse server sends its greeting.
 
     Raises:
         UnhealthyError: it does not.
-        OSError: nobody is there.
+        OSError: the server does not answer.
     """
     address = "127.0.0.1", int(os.environ.get("MYVIEW_SYNC__PORT", _SYNC_PORT))
     with contextlib.ExitStack() as opened:
         server = opened.enter_context(socket.create_connection(address, timeout=_TIMEOUT_S))
         if authority := os.environ.get("MYVIEW_SYNC__TLS__AUTHORITY"):
             tls = ssl.create_default_context(cafile=authority)
-            tls.check_hostname = False  # the certificate names the host at which other machines connect
+            tls.check_hostname = False  # the certificate names the public host
             server = opened.enter_context(tls.wrap_socket(server))
         if not server.recv(64).startswith((b"MYVIEW-SYNC", b"LOGIN-REQUIRED")):
             raise UnhealthyError("the answer is not a pulse server's")
@@ -59,7 +58,7 @@ def check_service() -> None:
 
 
 def check_camera(camera: str) -> None:
-    """Check whether the best view gets a camera's frames: all the way from its source to the viewers' side.
+    """Check whether a camera's frames arrive at the best view.
 
     Raises:
         UnhealthyError: it does not.
@@ -80,7 +79,7 @@ def _get(path: str) -> bytes:
     token = _token()
     if token:
         request.add_header("Authorization", f"Bearer {token}")
-    # No proxy, though an engine may hand one to all containers: it knows none of a site's own names.
+    # No proxy, even if the engine sets one for all containers: it does not know a site's own names.
     opener = urllib.request.build_opener(
         urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=_trust())
     )
@@ -95,7 +94,7 @@ def _token() -> str:
 
 
 def _trust() -> ssl.SSLContext | None:
-    """Know the service by its very certificate, which is for the name that browsers use, not for ours."""
+    """Trust exactly the service's certificate: it names the public host, not the one used here."""
     file = os.environ.get("MYVIEW_HEALTH_CERTIFICATE")
     if not file:
         return None
@@ -106,7 +105,7 @@ def _trust() -> ssl.SSLContext | None:
 
 
 def check(words: Sequence[str]) -> None:
-    """Check what is asked for.
+    """Run the check that the arguments name.
 
     Raises:
         UnhealthyError, OSError, ValueError, KeyError, TypeError, http.client.HTTPException: the check failed.

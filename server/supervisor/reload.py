@@ -10,16 +10,16 @@ from server.config.sections import LIVE_VIEW_SETTINGS, CameraSettings, TrackSett
 from server.config.site_config import Config
 
 _LIVE = tuple(f"view.{name}" for name in LIVE_VIEW_SETTINGS)
-"""The best view takes these over from one GOP to the next."""
+"""Settings that the best view applies at the next GOP."""
 _OF_A_CAMERA = ("source", "password", "offset", "at_end", "h264", "options", "ignore", "detections")
 """Settings that only the camera's own process uses."""
 _TRACK = tuple(name for name in TrackSettings.model_fields if name != "backlog_s")
 _OF_CAMERAS = ("detect", *(f"track.{name}" for name in _TRACK))
 """Settings that all camera processes use, and no other."""
 _EPOCHS = ("track.window.window", "track.window.stride")
-"""But the best view lines windows up by these."""
+"""Of these, settings by which the best view aligns windows: they wait for a restart."""
 _BY_LAG = ("tracker", "temporal")
-"""And these may say how late a frame is final, which it goes by as well."""
+"""Of these, settings that may change when frames are final: then they wait, too."""
 _OF_THE_BEST_VIEW = ("view", "http", "access", "record")
 
 
@@ -28,9 +28,9 @@ class ReloadPlan:
     """The effects of a changed configuration.
 
     Attributes:
-        now: what to run by from now on: the old one, with what can be changed in a running site.
-        live: settings that the best view takes over without a break.
-        cameras: cameras whose processes have to begin anew.
+        now: the configuration to run by: the old one with all settings that can change while running.
+        live: settings that the best view applies without a break.
+        cameras: cameras whose processes have to restart.
         best_view: settings that wait for a restart of the best view, which ends streams.
         site: settings that wait for a restart of all processes.
     """
@@ -43,7 +43,7 @@ class ReloadPlan:
 
     @property
     def line(self) -> str:
-        """All of it in one line."""
+        """The plan in one log line."""
         parts = {
             "in force now": self.live,
             "these cameras restart": self.cameras,
@@ -61,14 +61,14 @@ def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
     live = _of(keys, _LIVE)
     try:
         running.check_lookahead(view)
-    except ValueError:  # what makes a shorter one possible waits itself
+    except ValueError:  # the settings that allow a shorter one wait for a restart
         view = view.model_copy(update={"lookahead": running.view.lookahead})
         live = tuple(key for key in live if key != "view.lookahead")
     unchanged = _deferred_track_settings(running, wanted, keys)
     shared = tuple(
         key for key in _of(keys, _OF_CAMERAS) if not _of((key,), [f"track.{it}" for it in unchanged])
     )
-    # Whose H.264 can pass depends on the site's codec: with another one, that waits, too.
+    # Pass-through depends on the site's codec: if that changes, h264 waits, too.
     names_of_own = tuple(it for it in _OF_A_CAMERA if not (it == "h264" and "encode.codec" in keys))
     own_changes = {
         it: _of(keys, [f"cameras.{it}.{name}" for name in names_of_own]) for it in running.camera_ids
@@ -94,12 +94,12 @@ def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
 
 
 def _of(keys: Sequence[str], sections: Sequence[str]) -> tuple[str, ...]:
-    """Return those of the keys that are one of the sections, or in one."""
+    """Return the keys that are in one of the sections."""
     return tuple(key for key in keys if any(f"{key}.".startswith(f"{section}.") for section in sections))
 
 
 def _deferred_track_settings(running: Config, wanted: Config, keys: Sequence[str]) -> tuple[str, ...]:
-    """Name what of `track` has to stay as it is, since it changes when windows end or frames are final."""
+    """Return settings of `track` that must wait, since they change when windows end or frames are final."""
     fps = running.site.fps
     apart = running.track.model_copy(update={name: getattr(wanted.track, name) for name in _BY_LAG})
     late = _BY_LAG if apart.lag(fps) != running.track.lag(fps) else ()
@@ -107,13 +107,13 @@ def _deferred_track_settings(running: Config, wanted: Config, keys: Sequence[str
 
 
 def _track(running: Config, wanted: Config, unchanged: Sequence[str]) -> TrackSettings:
-    """Take over how people are followed, but not when windows end and frames are final."""
+    """Return the new `track` section, without the settings that must wait."""
     names = [name for name in _TRACK if name not in unchanged]
     return running.track.model_copy(update={name: getattr(wanted.track, name) for name in names})
 
 
 def _camera(running: Config, wanted: Config, camera_id: str, names: Sequence[str]) -> CameraSettings:
-    """Take over what only the camera's own process goes by."""
+    """Return a camera's section with the new values of the settings that only its own process uses."""
     before = running.camera(camera_id)
     if running.camera_ids != wanted.camera_ids:
         return before

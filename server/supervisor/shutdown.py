@@ -17,11 +17,11 @@ from server.system.child_process import TERMINATION_SIGNALS
 log = logging.getLogger(__name__)
 
 SUPERVISED_VARIABLE = "MYVIEW_SUPERVISED"
-"""Set in the environment of a process that a supervisor looks after."""
+"""Set in the environment of a supervised process."""
 EXIT_FINISHED = 4
-"""The code by which such a process says that nothing is left to do; 0 is that of one told to end."""
+"""Exit code of a supervised process that has nothing left to do; 0: it was terminated."""
 _LET_GO_S = 1.2
-"""How long a process has to let go of everything; a camera that is silent is waited for longer."""
+"""How long a process may take to release everything; a silent camera would block it for longer."""
 
 
 async def run_until_signal(
@@ -30,12 +30,12 @@ async def run_until_signal(
     *,
     hang_up: bool = True,
 ) -> bool:
-    """Run a coroutine until it is over or a signal asks to end, when ``told`` is called first.
+    """Run a coroutine until it is done, or until a signal cancels it after calling ``on_signal``.
+
+    ``hang_up``: SIGHUP cancels it, too.
 
     Returns:
-        Whether it was over by itself.
-
-    ``hang_up``: SIGHUP asks for that, too.
+        Whether it was done by itself.
     """
     task = asyncio.create_task(main())
     loop = asyncio.get_running_loop()
@@ -59,10 +59,10 @@ def run_process(
 ) -> None:
     """Run a process's coroutine until it is over, or SIGTERM or SIGINT comes.
 
-    ``hang_up``: SIGHUP ends it, too; else it looks after that itself.
+    ``hang_up``: SIGHUP ends it, too; else the coroutine handles it.
 
-    Who is told to end has so many seconds to let go of everything. Then the process ends all the same: a
-    thread may be held up by a camera that says nothing, and whoever stops a site would wait for that, too.
+    After a signal the process has so many seconds to release everything, then exits: a thread may be blocked
+    by a silent camera.
     """
     over = asyncio.run(run_until_signal(main, lambda: _end_after(let_go_s), hang_up=hang_up))
     if over and os.environ.get(SUPERVISED_VARIABLE):
@@ -71,7 +71,7 @@ def run_process(
 
 def _end_after(seconds: float) -> None:
     def end() -> None:
-        log.info("told to end: what is held up is left as it is")
+        log.info("shutting down: blocked threads are abandoned")
         os._exit(0)
 
     timer = threading.Timer(seconds, end)

@@ -18,29 +18,29 @@ from server.system.errors import UserError
 log = logging.getLogger(__name__)
 
 Check = Callable[[Config, ReloadPlan], None]
-"""Looks whether what is wanted can be; raises UserError where it cannot."""
+"""Checks whether a new configuration can be applied; raises UserError if not."""
 
 _early: list[int] = []
-"""The signals that came before anybody waited for them."""
+"""Signals received before :func:`sighups` runs."""
 
 
 def record_early_sighups() -> None:
     """Record each SIGHUP from now on, for :func:`sighups`; only in the main thread.
 
-    Called before the configuration is read: what is written while the process starts is then read again.
+    Called before the configuration is read, so that changes while the process starts are reloaded.
     """
     signal.signal(signal.SIGHUP, lambda number, _: _early.append(number))
 
 
 async def sighups() -> AsyncGenerator[None, None]:
-    """Return a turn for each time that SIGHUP has come; those that come meanwhile are one.
+    """Yield once per SIGHUP; several in between count as one.
 
-    When it came because the terminal was closed, the process is told to end instead.
+    If it came because the terminal was closed, the process gets SIGTERM instead.
     """
     came = asyncio.Event()
     at_terminal = _has_terminal()
     asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, came.set)
-    if _early:  # only now: what comes from here on sets it by itself
+    if _early:  # only now: later signals set the event themselves
         _early.clear()
         came.set()
     while True:
@@ -53,10 +53,10 @@ async def sighups() -> AsyncGenerator[None, None]:
 
 
 async def reloads(running: ActiveConfig, check: Check = lambda *_: None) -> AsyncIterator[ReloadPlan]:
-    """Read the configuration again whenever SIGHUP comes, and give what it changes.
+    """Reload the configuration at each SIGHUP; yield what it changes.
 
-    What is wrong is said in one line, and leaves in force what is. Whoever is given a change sets
-    ``running.now`` once it is in force.
+    An invalid one is logged in one line and ignored. The caller sets ``running.now`` once a change is in
+    force.
     """
     async for _ in sighups():
         try:
@@ -77,7 +77,7 @@ def _read(running: ActiveConfig, check: Check) -> ReloadPlan:
 
 
 def _has_terminal() -> bool:
-    """Return whether what is said goes to a terminal that is there."""
+    """Return whether standard error is an open terminal."""
     try:
         termios.tcgetattr(sys.stderr.fileno())
     except (termios.error, OSError, ValueError):

@@ -27,7 +27,7 @@ from server.system.errors import UserError
 log = logging.getLogger(__name__)
 
 _APART_S = 4.0
-"""Between two cameras that begin anew, so that the others show whom the first one showed."""
+"""Seconds between two camera restarts, so that the other cameras show the first one's people."""
 
 
 async def run_up(running: ActiveConfig, environment: Mapping[str, str], out: Path | None) -> None:
@@ -38,7 +38,7 @@ async def run_up(running: ActiveConfig, environment: Mapping[str, str], out: Pat
     """
     with _folder() as folder:
         active_file, write_failures = Path(folder) / "site.yaml", LogThrottle()
-        # Anew each time: what is old and temporary may be tidied away, and sites run for months.
+        # Rewritten each time: old temporary files may be deleted, and sites run for months.
         supervisor = Supervisor(
             running.path,
             running.now,
@@ -58,10 +58,10 @@ async def run_up(running: ActiveConfig, environment: Mapping[str, str], out: Pat
 
 
 def check_exposure(config: Config) -> None:
-    """Refuse a site that is open to others by accident.
+    """Refuse a site that other machines can reach by accident.
 
     Raises:
-        UserError: it is.
+        UserError: they can.
     """
     for check in (check_viewers, check_pulses, check_bus):
         check(config)
@@ -81,7 +81,7 @@ async def _follow(running: ActiveConfig, supervisor: Supervisor, write_config: C
 
 
 def _folder() -> tempfile.TemporaryDirectory[str]:
-    """Make a folder that nobody else can look into: cameras have passwords.
+    """Make a private folder: cameras have passwords.
 
     Raises:
         UserError: it cannot be made.
@@ -100,11 +100,11 @@ def _check(wanted: Config, reload: ReloadPlan) -> None:
 
 
 def _write_active_config(running: ActiveConfig, path: Path, failures: LogThrottle) -> None:
-    """Write down what the site runs by, for processes that begin: all of it or nothing."""
+    """Write the configuration in force, atomically, for processes that start."""
     new = path.with_suffix(".new")
     try:
         path.parent.mkdir(mode=0o700, exist_ok=True)
-        if not is_owned_by_this_user(path.parent):  # it was tidied away, and somebody else took the name
+        if not is_owned_by_this_user(path.parent):  # it was deleted, and another user took the name
             raise PermissionError(errno.EACCES, "its folder belongs to another user")
         new.write_text(serialize_config(running.now, running.path.parent), encoding="utf-8")
         new.replace(path)

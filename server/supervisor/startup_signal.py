@@ -1,7 +1,7 @@
 """The signal by which a started process reports that it has loaded, so that the next one can start.
 
 A process loads for a second of a processor's time or two. Forty that do so together keep each other, and
-whoever is to answer meanwhile, from getting anywhere.
+those that have to answer meanwhile.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class StartupPipe:
     given: int
 
     async def ended(self, within_s: float) -> None:
-        """Wait until nobody has the other end any more, but no longer than so many seconds."""
+        """Wait until all other ends are closed, at most so many seconds."""
         ended = asyncio.Event()
         loop = asyncio.get_running_loop()
         loop.add_reader(self.own, ended.set)
@@ -51,7 +51,7 @@ class StartupPipe:
 
 @contextmanager
 def open_startup_pipe() -> Iterator[StartupPipe]:
-    """Open a pipe; its supervisor's end is closed with the block, the other one by whoever hands it on."""
+    """Open a pipe; its supervisor's end is closed with the block, the other one by its caller."""
     own, given = os.pipe()
     try:
         yield StartupPipe(own, given)

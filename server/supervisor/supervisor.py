@@ -24,11 +24,11 @@ log = logging.getLogger(__name__)
 
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.2, 10.0
 _SETTLED_S = 10.0
-"""A process that ran this long has started well: its next restart is quick again."""
+"""After running so long a process restarts quickly again."""
 _STARTS_WITHIN_S = 10.0
-"""How long a process that loads keeps others from being started: it may hang, and never say that it has."""
+"""How long a loading process delays the start of others: it may hang."""
 _END_S = 1.6
-"""How long processes have to end before they are killed; they end by themselves a little sooner."""
+"""How long processes have to end before they are killed; they give up a little sooner themselves."""
 
 
 @dataclass(slots=True)
@@ -38,26 +38,26 @@ class Child:
     name: str
     arguments: Sequence[str]
     awaits: Sequence[Child] = ()
-    """Those that must have started before it is."""
+    """Processes that must have started first."""
     nicer: int = 0
-    """By how much it yields to the supervisor, and to those that are started as the supervisor is."""
+    """Its niceness above the supervisor's."""
     process: asyncio.subprocess.Process | None = None
     restarts: int = 0
     dies: LogThrottle = field(default_factory=LogThrottle)
     started: asyncio.Event = field(default_factory=asyncio.Event)
-    """It has loaded once, or had the time to."""
+    """It has loaded once, or timed out."""
     done: asyncio.Event = field(default_factory=asyncio.Event)
-    """It has ended by itself with nothing left to do."""
+    """It has ended with nothing left to do."""
 
 
 class Supervisor:
     """Starts one process each for the pulses, every camera and the best view; restarts what dies.
 
-    A camera whose recording is over says so (`EXIT_FINISHED`) and stays so; when the best-view service does,
-    everything is over. ``before_start`` is called whenever a process is about to be started.
+    A camera whose recording is over exits with `EXIT_FINISHED` and is not restarted; when the best-view
+    service does, the whole site ends. ``before_start`` is called whenever a process is about to be started.
 
-    The best view and the pulses come first and never wait. Then the cameras, no more of which load at a time
-    than there are processors: a site answers while they come.
+    The best view and the pulse server start first. Then the cameras, of which only as many load at a time as
+    there are processors: the site answers meanwhile.
     """
 
     def __init__(
@@ -72,8 +72,8 @@ class Supervisor:
         self._environment = {**os.environ, **environment, SUPERVISED_VARIABLE: "1"}
         path = str(config_path)
         self._out = out
-        self._places = asyncio.Semaphore(max(1, int(available_processors())))
-        """For cameras that load."""
+        self._load_slots = asyncio.Semaphore(max(1, int(available_processors())))
+        """Slots for cameras that are loading."""
         first = [Child("bestview", ["bestview", path]), Child("sync", ["sync", path])]
         cameras = [Child(it, ["camera", path, it], first, config.site.niceness) for it in config.camera_ids]
         self.children = [*first, *cameras]
@@ -82,7 +82,7 @@ class Supervisor:
         """Run everything until the best-view service has nothing left to do, or this task is cancelled.
 
         Raises:
-            UserError: a process refused its input; what it said stands in the log above.
+            UserError: a process refused its input; its error is in the log above.
         """
         watchers = [asyncio.create_task(self._watch(child), name=child.name) for child in self.children]
         try:
@@ -90,7 +90,7 @@ class Supervisor:
             finished, _ = await asyncio.wait([over, *watchers], return_when=asyncio.FIRST_COMPLETED)
             while over not in finished:
                 for watcher in finished:
-                    watcher.result()  # raises what a process refused
+                    watcher.result()  # raises UserError if a process refused its input
                 pending = [watcher for watcher in watchers if not watcher.done()]
                 finished, _ = await asyncio.wait([over, *pending], return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -108,7 +108,7 @@ class Supervisor:
         for other in child.awaits:
             await other.started.wait()
         while True:
-            async with self._places if child.awaits else contextlib.nullcontext():
+            async with self._load_slots if child.awaits else contextlib.nullcontext():
                 started = loop.time()
                 process = await self._start(child)
             code = await process.wait()
@@ -127,7 +127,7 @@ class Supervisor:
             child.restarts += 1
 
     async def _start(self, child: Child) -> asyncio.subprocess.Process:
-        """Start a process, and give it once it has loaded, has died, or takes too long for others to wait."""
+        """Start a process; return it once it has loaded, has died, or takes too long."""
         with open_startup_pipe() as pipe:
             try:
                 self._before_start()
@@ -144,7 +144,7 @@ class Supervisor:
         return process
 
     def _arguments(self, child: Child) -> Sequence[str]:
-        """Return a process's arguments; what a restarted best view decides is in files of its own."""
+        """Return a process's arguments; a restarted best view writes to files of its own."""
         if self._out is None or child is not self.children[0]:
             return child.arguments
         out = self._out / f"restart-{child.restarts}" if child.restarts else self._out

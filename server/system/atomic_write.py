@@ -13,7 +13,7 @@ from pathlib import Path
 from server.system.errors import UserError
 
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
-"""What a disk says that takes no more, whoever writes."""
+"""Errors of a full disk."""
 
 
 def check_new_folder(out: Path) -> None:
@@ -71,7 +71,7 @@ def atomic_file(out: Path, *read: Path | None) -> Iterator[Path]:
     ``read`` are the files that are read meanwhile: none of them is replaced.
 
     Raises:
-        UserError: there cannot be a file ``out``; this is found out before anything else is done.
+        UserError: there cannot be a file ``out``; checked before anything else.
     """
     check_new_file(out, *read)
     target = out.resolve()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 
 _TIME_ERROR = 5
-"""What adjtimex(2) returns where nobody keeps the clock: also after somebody has set it by hand."""
+"""Returned by adjtimex(2) if the clock is not synchronized, as after it was set by hand."""
 _TIMEX_BYTES = 512
 """More than struct timex has."""
 

@@ -89,7 +89,7 @@ def is_json() -> bool:
 
 
 def _subjects(record: logging.LogRecord) -> dict[str, object]:
-    """Return whom a record is about: what its template names, and what was put there."""
+    """Return the camera and object of a record: the names in its template with their values."""
     if not isinstance(record.args, tuple) or not isinstance(record.msg, str):
         return {}
     values = iter(record.args)

@@ -1,4 +1,4 @@
-"""Files and folders that nobody but their owner can read, whatever the umask."""
+"""Files and folders that only their owner can read, whatever the umask."""
 
 from __future__ import annotations
 

@@ -24,9 +24,9 @@ def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> l
     Raises:
         UserError: the file is no such file, or its points contradict each other.
     """
-    asked = None if unit is None else _checked("--unit", unit)
+    chosen_unit = None if unit is None else _checked("--unit", unit)
     given = read_points(points)
-    unit = asked or _checked(f"{points}: unit", given.unit or _UNNAMED)
+    unit = chosen_unit or _checked(f"{points}: unit", given.unit or _UNNAMED)
     with refusing(points):
         fits = fit_cameras(given.cameras)
     views = [

@@ -35,7 +35,7 @@ class VideoFormat:
 def read_walks(
     given: Sequence[Path], config: Path | None, picture: VideoFormat, progress: Callable[[str], None]
 ) -> RecordedWalk:
-    """Read tracks, or track people in videos; ``progress`` is told which video is on.
+    """Read tracks, or track people in videos; ``progress`` is called with the current video.
 
     Raises:
         UserError: some are tracks and some videos, or as the two functions below.
@@ -58,7 +58,7 @@ def walks_from_tracks(given: Sequence[Path], picture: VideoFormat) -> RecordedWa
     """Read files of tracks, MOTChallenge text; each camera is called like its file.
 
     Raises:
-        UserError: a file cannot be read or has nobody in it, or two have one name.
+        UserError: a file cannot be read or has no people in it, or two have one name.
     """
     files = [file for path in given for file in (_files(path) if path.is_dir() else [path])]
     names = [camera_name(Path(file.name.removesuffix(".gz"))) for file in files]
@@ -79,16 +79,16 @@ def walks_from_videos(
     """Track people in each video first, as `myview track` does; the configuration's offsets are left out.
 
     Raises:
-        UserError: a video cannot be opened, nobody is in it, two have one name, or their rates differ.
+        UserError: a video cannot be opened or shows no people, two have one name, or their rates differ.
     """
     names = [camera_name(video) for video in videos]
     _check_names(names)
-    # All that can be wrong is found out before the first of them is tracked, which takes a while.
+    # Everything is checked before the first is tracked, which takes a while.
     seen = [read_video_info(video) for video in videos]
     loaded = [config_for_video(video, None, config) for video in videos]
     # Tracks are counted by the site's rate, which is a video's own where the configuration has none.
-    told = {name: one.site.fps for name, one, it in zip(names, loaded, seen, strict=True) if it.fps}
-    fps = picture.fps or _rate(told)
+    rates = {name: one.site.fps for name, one, it in zip(names, loaded, seen, strict=True) if it.fps}
+    fps = picture.fps or _rate(rates)
     offsets = [it.cameras[0].offset for it in loaded]
     walks = []
     with TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""One camera, tried out: its source is opened, and some frames go the way that they go when the site runs."""
+"""Probe of one camera: opens its source and runs some frames through the live pipeline."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from server.config.source_address import SourceKind, source_kind
 from server.system.errors import UserError
 
 _FRAMES_S = 3.0
-"""Seconds of frames that are tried at most."""
+"""Seconds of frames that are run at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,14 +22,14 @@ class CameraProbe:
     """The result of a probe.
 
     Attributes:
-        problem: why the camera cannot run; empty: it can.
-        sent: what a network camera sends; None: it is none.
+        problem: why the camera cannot run; empty if it can.
+        sent: statistics of a network camera's stream; None for other sources.
         size: width and height of its own pictures.
-        recorded_fps: pictures a second of a video file, as it says; None: it is none.
+        recorded_fps: stated frame rate of a video file; None for other sources.
         passes: its own H.264 passes through.
-        why_encoded: why it does not, where it could have.
-        frames: how many frames were tried.
-        kbps: what they take as the site streams them.
+        why_encoded: why it does not, if configured to.
+        frames: how many frames were run.
+        kbps: bit rate as the site streams them.
         cores: processor cores that this camera takes at the site's rate.
     """
 
@@ -45,7 +45,7 @@ class CameraProbe:
 
 
 def probe_camera(config: Config, camera_id: str, seconds: float) -> CameraProbe:
-    """Try a camera for so many seconds, after it has answered."""
+    """Probe a camera for so many seconds, after it has answered."""
     sent = None
     try:
         config = fill_in_password(config, camera_id)
@@ -57,13 +57,15 @@ def probe_camera(config: Config, camera_id: str, seconds: float) -> CameraProbe:
     except UserError as error:
         return CameraProbe(str(error).removeprefix(f"camera {camera_id}: "), sent)
     try:
-        tried = _tried(config, pipeline, sent, time.monotonic() + seconds / 2)
-        return replace(tried, recorded_fps=file_fps(camera.source) if kind is SourceKind.FILE else None)
+        probe = _run_frames(config, pipeline, sent, time.monotonic() + seconds / 2)
+        return replace(probe, recorded_fps=file_fps(camera.source) if kind is SourceKind.FILE else None)
     finally:
         pipeline.close()
 
 
-def _tried(config: Config, pipeline: CameraPipeline, sent: StreamStats | None, until: float) -> CameraProbe:
+def _run_frames(
+    config: Config, pipeline: CameraPipeline, sent: StreamStats | None, until: float
+) -> CameraProbe:
     fps, size = config.site.fps, pipeline.source.size
     live = not pipeline.source.recorded
     frames = units = 0

@@ -1,4 +1,4 @@
-"""All cameras tried at once, each for so long; and what to say of each."""
+"""Checks of the cameras and the sound: probes all cameras in parallel and reports on each."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from server.system.errors import UserError
 _GRACE_S = 3.0
 """Seconds that a busy machine may take beyond a camera's time limit."""
 _SAME_SPEED = 0.01
-"""Part by which a recording's rate may be off the site's without a word: 29.97 for 30."""
+"""Relative difference between a recording's rate and the site's that is not reported: 29.97 for 30."""
 _SAME_RATE = 0.1
-"""Part by which a camera's rate may be off the site's without a word."""
+"""Relative difference between a camera's rate and the site's that is not reported."""
 
 
 def probe_cameras(config: Config, seconds: float) -> dict[str, CameraProbe]:
-    """Try all cameras in parallel; one that has not answered in time says so."""
+    """Probe all cameras in parallel; report those that do not answer in time."""
     probes: dict[str, CameraProbe] = {}
 
     def run(camera: str) -> None:
@@ -32,10 +32,10 @@ def probe_cameras(config: Config, seconds: float) -> dict[str, CameraProbe]:
             probes[camera] = probe_camera(config, camera, seconds)
         except OSError as error:
             probes[camera] = CameraProbe(reason_of(error))
-        except Exception as error:  # noqa: BLE001 — of one camera; the others are still to be told of
+        except Exception as error:  # noqa: BLE001 — the other cameras are still reported
             probes[camera] = CameraProbe(describe_bug(error))
 
-    # Daemons: what hangs in a driver must not keep the doctor from ending.
+    # Daemons: a thread that hangs in a driver must not keep the doctor from ending.
     threads = [threading.Thread(target=run, args=(it,), daemon=True) for it in config.camera_ids]
     for thread in threads:
         thread.start()
@@ -156,7 +156,11 @@ def _quality_findings(config: Config, check: str, probe: CameraProbe) -> list[Fi
         )
     if probe.why_encoded:
         findings.append(
-            warning(check, f"is encoded anew: {probe.why_encoded}", "set the camera so, or h264: encode")
+            warning(
+                check,
+                f"is re-encoded: {probe.why_encoded}",
+                "change the camera's settings, or set h264: encode",
+            )
         )
     return findings
 

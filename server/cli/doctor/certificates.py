@@ -1,4 +1,4 @@
-"""For how long a certificate is good, and for whom, as TLS itself sees it: by a handshake in this process."""
+"""Checks of certificates: validity and hosts, by a TLS handshake within this process."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def router_finding(check: str, certificate: Path, key: Path, authority: Path, ho
         text = f"{certificate}: clients that connect to {host} and trust {authority} refuse it: {why}"
         return bad(check, text, "use one that this authority has signed for this host: docs/how-to/secure.md")
     except (ssl.SSLError, OSError, ValueError):
-        pass  # which is said of the files
+        pass  # reported by the check of the files
     return None
 
 
@@ -63,10 +63,10 @@ def authority_finding(check: str, authority: Path) -> Finding:
 
 
 def handshake(certificate: Path, key: Path, trusted: Path, host: str | None = None) -> dict[str, Any]:
-    """Return what a client that trusts somebody, and looks for a host (None: whoever), learns of a server.
+    """Return the server certificate that a client accepts that trusts `trusted` and expects `host`.
 
     Raises:
-        ssl.SSLCertVerificationError: it does not go on.
+        ssl.SSLCertVerificationError: the client refuses the certificate.
         ssl.SSLError, OSError, ValueError: the files are not a certificate and its key.
     """
     server = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)

@@ -1,4 +1,4 @@
-"""``myview doctor``: a configuration against reality, before it is needed at night."""
+"""``myview doctor``: checks a configuration against reality before the site starts."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _MEND = "fix the configuration; configs/demo.yaml explains every setting"
 
 
 def run_doctor(path: Path, seconds: float, *, as_json: bool) -> bool:
-    """Check a configuration, print what is found as it is found; return whether nothing is bad."""
+    """Check a configuration and print each finding at once; return whether nothing is bad."""
     return asyncio.run(_check_and_report(path, seconds, as_json=as_json)).well
 
 
@@ -88,7 +88,7 @@ def _read(path: Path, findings: list[Finding]) -> Config | None:
 
 
 async def run_checks(config: Config, seconds: float) -> AsyncIterator[Finding]:
-    """Return all findings about a configuration, as they are found."""
+    """Yield all findings about a configuration, as soon as they are known."""
     findings: list[Finding] = []
     runs, probes = False, {it: CameraProbe("not tried") for it in config.camera_ids}
     with report_failure("ports", findings):
@@ -111,14 +111,14 @@ async def run_checks(config: Config, seconds: float) -> AsyncIterator[Finding]:
 
 
 async def _run_detached(work: Callable[[], T]) -> T:
-    """Run in a thread that nobody waits for where the doctor is told to end: it may hang in a driver."""
+    """Run in a daemon thread, which cancellation abandons: it may hang in a driver."""
     loop = asyncio.get_running_loop()
     result: asyncio.Future[T] = loop.create_future()
 
     def run() -> None:
         try:
             value = work()
-        except Exception as error:  # noqa: BLE001 — goes to whoever waits
+        except Exception as error:  # noqa: BLE001 — passed to the caller
             done = partial(result.set_exception, error)
         else:
             done = partial(result.set_result, value)
@@ -132,7 +132,7 @@ async def _run_detached(work: Callable[[], T]) -> T:
 def _camera_dependent_findings(
     config: Config, probes: dict[str, CameraProbe], *, runs: bool
 ) -> list[Finding]:
-    """Return the findings that are known once the cameras were tried."""
+    """Return the findings that need the cameras' probes."""
     checks: Sequence[tuple[str, Callable[[], list[Finding]]]] = (
         ("cameras", lambda: camera_findings(config, probes, runs=runs)),
         ("sound", lambda: sound_findings(config)),
@@ -148,7 +148,7 @@ def _camera_dependent_findings(
 
 
 def _with_scene_ground(config: Config) -> Config:
-    """Return the configuration with its scenes' floors; where there is no such scene, the camera says so."""
+    """Return the configuration with its scenes' floors; an unknown scene is reported by its camera."""
     try:
         return add_scene_ground(config)
     except (UserError, OSError):

@@ -27,7 +27,7 @@ def disk_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[Fin
     try:
         there = _nearest_existing(folder)
         with tempfile.TemporaryFile(dir=there):
-            pass  # it has no name, so that nothing is left whatever happens
+            pass  # it has no name, so nothing can be left behind
     except OSError as error:
         text = f"{_place(folder, error)}: cannot write there: {error.strerror}"
         return [bad("record.folder", text, "use another folder, or let this user write there")]
@@ -40,7 +40,7 @@ def disk_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[Fin
 def _writable_finding(folder: Path) -> Finding:
     """Report that a folder can be written, and whether other users can list it."""
     text = f"{folder} can be written"
-    with suppress(OSError):  # it is not there yet, and is made for one user alone
+    with suppress(OSError):  # it does not exist yet, and will be private
         if mode := rights_of_others(folder):
             text += f", but has mode {mode}: others on this machine may see when it was recorded, not what"
             return warning("record.folder", text, f"chmod 700 {folder}")
@@ -85,9 +85,9 @@ def needed_mb(config: Config, probes: Mapping[str, CameraProbe]) -> float:
 
 
 def _kbps(config: Config, camera: str, probe: CameraProbe) -> float | None:
-    """Return what a camera takes: at most `encode.max_kbps`, or else as much as when it was tried.
+    """Return a camera's bit rate: `encode.max_kbps`, or else as probed.
 
-    None: it was not, and its rate may be its own.
+    None: it was not probed, and passes its own H.264 through.
     """
     cap = config.encode.max_kbps
     if probe.problem:
@@ -100,10 +100,10 @@ def _hours(seconds: float) -> str:
 
 
 def _nearest_existing(folder: Path) -> Path:
-    """Return a folder, or where it will be made: the first above it that is there.
+    """Return a folder, or its nearest existing parent.
 
     Raises:
-        OSError: nobody can tell.
+        OSError: a folder on the way cannot be read.
     """
     for it in (folder.absolute(), *folder.absolute().parents):
         with suppress(FileNotFoundError, NotADirectoryError):
@@ -113,7 +113,7 @@ def _nearest_existing(folder: Path) -> Path:
 
 
 def _place(folder: Path, error: OSError) -> Path:
-    """Return where writing fails: the first on the way that is closed, or else the folder that was tried."""
+    """Return where writing fails: the first parent without access, else the nearest existing folder."""
     if isinstance(error, PermissionError):
         for it in reversed(folder.absolute().parents):
             if not os.access(it, os.X_OK):
@@ -124,7 +124,7 @@ def _place(folder: Path, error: OSError) -> Path:
 
 
 def _folder_bytes(folder: Path) -> int:
-    """Add up all files in a folder, but those that a running site removes meanwhile."""
+    """Return the size of all files in a folder; ignore those that a running site removes meanwhile."""
     total = 0
     for inside, _, names in os.walk(folder):
         for name in names:

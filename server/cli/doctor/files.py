@@ -1,4 +1,4 @@
-"""The files that a configuration names: who may come, by which certificates, and where cameras stand."""
+"""Checks of the files that a configuration names: tokens, passwords, certificates and homographies."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def _private(check: str, path: Path) -> list[Finding]:
     try:
         open_to_others = path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO)
     except OSError:
-        return []  # that it cannot be read is said already
+        return []  # reported already
     if not open_to_others:
         return []
     return [warning(check, f"others may read {path}, which is secret", f"chmod 600 {path}")]

@@ -36,7 +36,7 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 class Findings(msgspec.Struct, frozen=True):
-    """All of it: what ``--json`` prints."""
+    """All findings, as ``--json`` prints them."""
 
     well: bool
     """Nothing is bad."""
@@ -70,7 +70,7 @@ def report_failure(check: str, findings: list[Finding]) -> Iterator[None]:
         yield
     except (OSError, UserError) as error:
         findings.append(bad(check, reason_of(error), "fix that, then try again"))
-    except Exception as error:  # noqa: BLE001 — a mistake in one check is no reason to say nothing of the others
+    except Exception as error:  # noqa: BLE001 — a bug in one check must not hide the others
         findings.append(bad(check, describe_bug(error), "please report it"))
 
 

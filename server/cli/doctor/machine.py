@@ -25,7 +25,7 @@ _SERVICE_CORES = 0.3
 _FULL = 0.8
 """Share of the cores above which a machine has nothing left for a busy scene."""
 _PROCESS_MB = 250
-"""A process without its pictures: its libraries, and what a tracker holds."""
+"""Memory of a process without its pictures: libraries and tracker."""
 
 
 async def clock_findings(config: Config) -> list[Finding]:
@@ -47,7 +47,7 @@ async def clock_findings(config: Config) -> list[Finding]:
 
 
 def machine_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[Finding]:
-    """Compare what these cameras take with what this machine has, as if all of them ran here."""
+    """Compare the load of all cameras with this machine, as if all ran here."""
     cores = available_processors()
     untried = [camera for camera, it in probes.items() if it.problem]
     takes = sum(it.cores for it in probes.values()) + _SERVICE_CORES
@@ -113,7 +113,7 @@ def _ntp_finding(config: Config) -> Finding:
 
 
 async def _clock_offset(host: str, port: int, tls: ssl.SSLContext | None) -> float | None:
-    """Return the pulse server's clock minus ours, in seconds, by its first line; None where none comes."""
+    """Return the pulse server's clock minus ours, in seconds, by its first line; None: no answer."""
     try:
         async with asyncio.timeout(_ANSWER_S):
             sent = time.time()

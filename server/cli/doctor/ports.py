@@ -63,12 +63,12 @@ async def port_findings(config: Config) -> tuple[list[Finding], bool]:
 
 
 def _overlap(one: tuple[str, int], other: tuple[str, int]) -> bool:
-    """Return whether two cannot be listened on by two processes of one machine."""
+    """Return whether two processes cannot listen on both."""
     return one[1] == other[1] and (one[0] == other[0] or not _ALL.isdisjoint({one[0], other[0]}))
 
 
 def _taken(host: str, port: int, check: str) -> bool | str | None:
-    """Return None where a port is free, True where somebody has it, and else why it cannot be had."""
+    """Return None if a port is free, True if it is in use, else why it cannot be bound."""
     try:
         check_port_free(host, port, check)
     except UserError as error:
@@ -79,7 +79,7 @@ def _taken(host: str, port: int, check: str) -> bool | str | None:
 
 
 async def _is_this_site(config: Config, check: str) -> bool:
-    """Ask whoever has a port whether it is this site."""
+    """Return whether the process that uses a port is this site."""
     if check == "sync.port":
         host, credentials = _connect_host(config.sync.bind), _credentials(config)
         try:
@@ -114,5 +114,5 @@ def _credentials(config: Config) -> Credentials | None:
 
 
 def _connect_host(host: str) -> str:
-    """Return where somebody who listens on all addresses is reached from here."""
+    """Return the address at which a listener on this host is reached from here."""
     return {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 — it is not listened on

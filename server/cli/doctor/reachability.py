@@ -75,11 +75,11 @@ def _is_of_this_machine(address: str) -> bool:
 
 
 async def _covers(host: str, addresses: set[str]) -> bool:
-    """Return whether who listens at a host is reached by one of the addresses."""
+    """Return whether a listener at a host is reached by one of the addresses."""
     try:
         return host in _ANYWHERE or not addresses.isdisjoint(await _addresses(host))
     except (socket.gaierror, TimeoutError, UnicodeError):
-        return False  # which is said of the port
+        return False  # reported by the check of the port
 
 
 async def _refusal(there: Place) -> str:

@@ -12,7 +12,7 @@ from av.video.frame import VideoFrame
 from server.camera.sources.opening import OpenedVideo, open_video
 
 _LEAST = 5
-"""Pictures without which no rate is told."""
+"""Fewest pictures from which a rate is computed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class StreamStats:
 
     Attributes:
         size: width and height in pixels.
-        fps: pictures a second, by their own times where they have some; None: too few came.
+        fps: frames per second, by their time stamps if any; None: too few frames.
         pictures: how many could be decoded.
         damaged: how many packets could not.
         cpu_s: processor seconds for decoding one picture.
@@ -35,7 +35,7 @@ class StreamStats:
 
 
 def measure_stream(url: str, options: Mapping[str, str], seconds: float, open_s: float) -> StreamStats:
-    """Decode what comes for so many seconds.
+    """Decode a stream for so many seconds.
 
     Raises:
         UserError: it cannot be opened.
@@ -48,7 +48,7 @@ def measure_stream(url: str, options: Mapping[str, str], seconds: float, open_s:
 
 
 def file_fps(file: str) -> float:
-    """Return the pictures a second of a recording, as it says.
+    """Return a recording's stated frame rate.
 
     Raises:
         UserError: it cannot be opened.

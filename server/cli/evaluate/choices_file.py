@@ -1,4 +1,4 @@
-"""Reading which camera was chosen for whom."""
+"""Reader of ``choices.csv``: the camera chosen for each person in each frame."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class EvaluateOptions:
 
 
 def evaluate(options: EvaluateOptions) -> None:
-    """Score tracks, choices of views, or both; print, and write what is asked for.
+    """Score tracks, choices of views, or both; print the scores and write the files of the options.
 
     Raises:
         UserError: something is missing or malformed; nothing is written then.

@@ -1,4 +1,4 @@
-"""The frames around each cut of somebody's best view, as the paper's Figs. 23 to 25 show them."""
+"""The frames around each cut of a person's best view, as in the paper's Figs. 23 to 25."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class _Strip:
 def plot_strips(
     folder: Path, truth: SceneTruth, judged: ViewEvaluation, facts: SiteInfo, videos: Mapping[str, Path]
 ) -> None:
-    """Write `person-K.png` for everybody whose best view is cut; boxes are the ground truth's.
+    """Write `person-K.png` for each person whose best view is cut; boxes are the ground truth's.
 
     Raises:
         UserError: a video cannot be read.

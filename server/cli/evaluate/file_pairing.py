@@ -30,7 +30,7 @@ class _OptionFiles:
     option: str
     files: tuple[Path, ...]
     folder: bool
-    """Some of the files were not named themselves but found in a folder."""
+    """Some of the files are from a named folder."""
 
     @property
     def names(self) -> list[str]:
@@ -48,11 +48,11 @@ def pair_files(tracks: Sequence[Path], truth: Sequence[Path]) -> list[FilePair]:
 
     Each of the two is some files, or a folder of one file per camera: the folder may be one that `myview
     render` has written, whose tracks are in `tracks/`, or one with a folder `gt/`. Of folders, cameras that
-    only one of the two has are left out; a file that is named has to have a partner. A pair is called like
-    its tracks, or like its truth where tracks of several cameras have one name.
+    only one of the two has are skipped; a named file must have a partner. A pair is named after its tracks,
+    or after its truth where tracks of several cameras have one name.
 
     Raises:
-        UserError: something is not there, there are no pairs, or a file has no partner.
+        UserError: a file is missing, there are no pairs, or a file has no partner.
     """
     tracked, labeled = _given("--tracks", tracks, "tracks"), _given("--gt", truth, "gt")
     if set(tracked.names) & set(labeled.names) or tracked.folder or labeled.folder:
@@ -76,7 +76,7 @@ def files_by_camera(option: str, paths: Sequence[Path], inner: str) -> dict[str,
     """Return the files that an option names, or those of the folder that it names, by camera.
 
     Raises:
-        UserError: something is not there, or two files have one name.
+        UserError: a file is missing, or two files have one name.
     """
     given = _given(option, paths, inner)
     _check_names(given)

@@ -26,9 +26,9 @@ class SceneTruth:
     Attributes:
         people: their K numbers in the ground truth, in order.
         cameras: the names of C cameras.
-        boxes: (K, N, C, 4) left, top, right, bottom in pixels; NaN where somebody is not in the picture. Row
-            n is frame n + 1 of the files.
-        views: what each camera shows of whom, (K, N, C).
+        boxes: (K, N, C, 4) left, top, right, bottom in pixels; NaN where the person is not in the
+            picture. Row n is frame n + 1 of the files.
+        views: (K, N, C) costs and visibility of each view.
     """
 
     people: tuple[int, ...]
@@ -45,7 +45,7 @@ def build_truth(
     Rows of confidence 0 do not count, as in `tracking.evaluation`.
 
     Raises:
-        UserError: somebody is twice in one frame of a camera.
+        UserError: a person is twice in one frame of a camera.
     """
     counted = {
         camera: [row for row in camera_rows if row.confidence != 0.0] for camera, camera_rows in rows.items()
@@ -69,7 +69,7 @@ def build_truth(
 def people_of_objects(
     people: Sequence[int], recordings: Mapping[str, TruthAndTracks], least_iou: float
 ) -> dict[int, int]:
-    """Return the person that each object stands for, for objects that stand for somebody.
+    """Return the person of each object, for objects that match one.
 
     Raises:
         ValueError: an id is twice in one frame of a camera, which the message names.

@@ -56,7 +56,7 @@ def _plot_person(
     best: NDArray[np.int64],
     fps: float,
 ) -> None:
-    """Draw where (N, C) cameras see somebody, and the (N,) cameras chosen and best."""
+    """Draw where (N, C) cameras see the person, and the (N,) cameras chosen and best."""
     for camera in range(visible.shape[1]):
         _bars(axis, visible[:, camera], camera - 0.35, 0.7, _SEEN, fps)
         _bars(axis, best == camera, camera - _ABOVE - 0.1, 0.2, _BEST, fps)

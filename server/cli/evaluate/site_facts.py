@@ -43,12 +43,12 @@ def videos_by_camera(videos: Sequence[Path], cameras: Sequence[str]) -> dict[str
 def collect_site_info(
     choices: Path, cameras: Sequence[str], videos: Mapping[str, Path], options: SiteOptions
 ) -> SiteInfo:
-    """Return the facts; options go before videos, and these before the file that a rendering has of itself.
+    """Return the site's facts: from options, then videos, then `site.json` beside the choices.
 
-    The rate is the rendering's before it is the videos': that is what its frames are counted by.
+    The rate of `site.json` precedes the videos': the choices' frames are counted by it.
 
     Raises:
-        UserError: the rate or a size is not known, or makes no sense.
+        UserError: the rate or a size is unknown or invalid.
     """
     beside = choices.with_name(SITE_FILE)
     rendering = read_site(beside) if beside.exists() else None

@@ -81,7 +81,7 @@ def rows_of(path: Path) -> list[MotRow]:
 
 
 def _check(recording: TruthAndTracks, tracks: Path, truth: Path) -> None:
-    """Refuse truth that says nothing, and files of different frames."""
+    """Refuse empty ground truth, and files without a common frame."""
     truth_frames = {row.frame for row in recording.truth if row.confidence != 0.0}
     track_frames = {row.frame for row in recording.tracks}
     if not truth_frames:

@@ -49,7 +49,7 @@ Outbox: TypeAlias = "Queue[EpochBatch | WorkerFailure]"
 
 
 class CameraWorkers:
-    """One process per camera; gives their batches in turn, so that all are at the same pulse.
+    """One process per camera; yields their batches in turn, so that all stay at the same pulse.
 
     Raises:
         UserError: while iterating, when a camera's recording cannot be read.
@@ -91,7 +91,7 @@ class CameraWorkers:
         while True:
             alive = self._processes[
                 camera
-            ].is_alive()  # before looking: its last word may still be on the way
+            ].is_alive()  # checked first: its last batch may still be in the queue
             try:
                 item = self._outboxes[camera].get(timeout=_POLL_S)
             except queue.Empty:
@@ -109,7 +109,7 @@ def _work(config: Config, camera: str, outbox: Outbox, others: PeerPipes) -> Non
     try:
         pipeline = CameraPipeline(config, camera)
         if pipeline.why_encoded:
-            log.warning("camera %s is encoded: its own H.264: %s", camera, pipeline.why_encoded)
+            log.warning("camera %s is re-encoded: its own H.264: %s", camera, pipeline.why_encoded)
         for batch in run_camera(pipeline, camera, others):
             outbox.put(batch)
     except UserError as error:
@@ -122,8 +122,10 @@ def run_camera(pipeline: CameraPipeline, camera: str, others: PeerLink | None = 
     """Run a recording through a camera's pipeline, epoch by epoch, in step with the others."""
     run = CameraRun(pipeline, camera)
     while not run.ended:
-        word = run.search()
-        batch = run.follow(others.exchange(word) if others is not None and word is not None else ())
+        detections = run.search()
+        batch = run.follow(
+            others.exchange(detections) if others is not None and detections is not None else ()
+        )
         if batch is not None:
             yield batch
 
@@ -132,10 +134,10 @@ def run_cameras(pipelines: Mapping[str, CameraPipeline]) -> Iterator[EpochBatch]
     """Run all cameras' recordings in this process, in step."""
     runs = {camera: CameraRun(pipeline, camera) for camera, pipeline in pipelines.items()}
     while runs:
-        words = {camera: run.search() for camera, run in runs.items()}
+        detections = {camera: run.search() for camera, run in runs.items()}
         for camera, run in list(runs.items()):
-            said = [word for other, word in words.items() if other != camera and word is not None]
-            batch = run.follow(said)
+            peer_detections = [it for other, it in detections.items() if other != camera and it is not None]
+            batch = run.follow(peer_detections)
             if batch is not None:
                 yield batch
             if run.ended:
@@ -143,7 +145,7 @@ def run_cameras(pipelines: Mapping[str, CameraPipeline]) -> Iterator[EpochBatch]
 
 
 class CameraRun:
-    """One camera's recording, frame by frame: it is searched, and then everybody is followed."""
+    """One camera's recording, frame by frame: detection, then tracking."""
 
     def __init__(self, pipeline: CameraPipeline, camera: str) -> None:
         self._pipeline, self._camera = pipeline, camera
@@ -164,15 +166,15 @@ class CameraRun:
         self._searched = self._pipeline.search(self._pulse, image)
         return self._searched.word
 
-    def follow(self, words: Sequence[FrameDetections]) -> EpochBatch | None:
-        """Follow everybody into it, by what the others found, too; return what an epoch's end brings.
+    def follow(self, peer_detections: Sequence[FrameDetections]) -> EpochBatch | None:
+        """Track people in the frame, with the peers' detections; return a batch at the end of an epoch.
 
         Raises:
-            UserError: the recording is over, and there was not one picture in it.
+            UserError: the recording is over and had no pictures.
         """
         if self._searched is None:
             return self._finish()
-        tracks = self._pipeline.follow(self._searched, PeerDetections(tuple(words)))
+        tracks = self._pipeline.follow(self._searched, PeerDetections(tuple(peer_detections)))
         self._pulse += 1
         if tracks is None:
             return None

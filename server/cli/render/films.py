@@ -25,16 +25,16 @@ class _Film:
     showing: GopSequencer
     origin: int
     """The pulse that is at time 0."""
-    wanted: int
-    """Bytes up to the end of the last GOP in which the person was about."""
+    trimmed_size: int
+    """Bytes up to the end of the last GOP in which the person was present."""
     until: int
     """The pulse after it."""
 
 
 class FilmWriter:
-    """Writes ``object-1.mp4`` (or ``.webm``) and so on; the fragments of the streams, begun at time 0.
+    """Writes ``object-1.mp4`` (or ``.webm``) and so on: the fragments of the streams, rebased to time 0.
 
-    ``sound`` is None where there is none.
+    ``sound``: None if the site has none.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class FilmWriter:
         sound: AudioBuffer | None = None,
     ) -> None:
         folder.mkdir()
-        self._folder, self._shelves, self._stream_format, self._site = (
+        self._folder, self._frame_buffers, self._stream_format, self._site = (
             folder,
             frame_buffers,
             stream_format,
@@ -57,28 +57,30 @@ class FilmWriter:
 
     @property
     def numbers(self) -> list[int]:
-        """Everybody who has a film."""
+        """Numbers of all people who have a film."""
         return sorted(self._films)
 
     def write(self, decision: GopDecision) -> None:
-        """Append one GOP to everybody's film."""
-        gop = GopAssembler(self._shelves, decision.first, decision.frames, self._site.fps, 0, self._sound)
+        """Append one GOP to all films."""
+        gop = GopAssembler(
+            self._frame_buffers, decision.first, decision.frames, self._site.fps, 0, self._sound
+        )
         for choice in decision.choices:
             film = self._films.get(choice.number)
             if film is None and choice.camera is None:
                 continue
             if film is None:
                 film = self._films[choice.number] = self._begin(choice.number, decision)
-            for footage in film.showing.show(choice.camera, gop):
-                self._write(film, footage)
+            for chunk in film.showing.show(choice.camera, gop):
+                self._write(film, chunk)
             if not choice.away:
-                film.wanted, film.until = film.file.tell(), decision.first + decision.frames
+                film.trimmed_size, film.until = film.file.tell(), decision.first + decision.frames
 
     def close(self) -> None:
-        """Cut off what was shown after a person had left for good, and close the files."""
+        """Truncate each film after its person has left for good, and close the files."""
         for film in self._films.values():
             if not film.file.closed:
-                film.file.truncate(film.wanted)
+                film.file.truncate(film.trimmed_size)
                 film.file.seek(0)
                 film.file.write(self._head(film.until - film.origin))
                 film.file.close()
@@ -89,10 +91,10 @@ class FilmWriter:
         showing = GopSequencer(GaplessTimeline(self._stream_format, self._site.fps, decision.frames))
         return _Film(file, showing, decision.first, file.tell(), decision.first)
 
-    def _write(self, film: _Film, footage: MediaChunk) -> None:
-        if footage.audio is not None:
-            film.file.write(_begun_at(film.origin, footage.audio, self._site.fps))
-        for picture in footage.pictures:
+    def _write(self, film: _Film, chunk: MediaChunk) -> None:
+        if chunk.audio is not None:
+            film.file.write(_rebased_audio(film.origin, chunk.audio, self._site.fps))
+        for picture in chunk.pictures:
             film.file.write(self._stream_format.begun_at(film.origin, picture.fragment, self._site.fps))
 
     def _head(self, pulses: int) -> bytes:
@@ -100,10 +102,10 @@ class FilmWriter:
         return self._stream_format.head(self._site.size, self._site.fps, sound, pulses=pulses) or b""
 
 
-def _begun_at(origin: int, heard: AudioChunk, fps: float) -> bytes:
+def _rebased_audio(origin: int, audio: AudioChunk, fps: float) -> bytes:
     """Return an audio fragment with times relative to the film's first pulse; earlier frames are dropped."""
-    form = heard.format
+    form = audio.format
     sample = round(origin * form.rate / fps)
-    early = max(0, -((heard.first * form.samples - sample) // form.samples))
-    first, frames = heard.first + early, heard.frames[early:]
+    dropped = max(0, -((audio.first * form.samples - sample) // form.samples))
+    first, frames = audio.first + dropped, audio.frames[dropped:]
     return audio_fragment(form, frames, first, sample) if frames else b""

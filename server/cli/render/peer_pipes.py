@@ -28,59 +28,59 @@ class PeerLink(Protocol):
 class PeerPipes:
     """One camera's ends of the pipes, in the order of the configuration.
 
-    Nobody gets ahead of another by more than one frame, and two words fit into a pipe: telling never
-    waits for somebody who tells, too.
+    No camera gets ahead of another by more than one frame, and two messages fit into a pipe: sending never
+    blocks on a peer that is sending, too.
     """
 
-    tell: dict[str, Connection] = field(default_factory=dict)
-    hear: dict[str, Connection] = field(default_factory=dict)
+    outgoing: dict[str, Connection] = field(default_factory=dict)
+    incoming: dict[str, Connection] = field(default_factory=dict)
 
     def exchange(self, detections: FrameDetections) -> Sequence[FrameDetections]:
         """Send this camera's detections in a frame; return those of the peers that have not ended."""
         data = msgspec.json.encode(detections)
-        for camera, connection in list(self.tell.items()):
+        for camera, connection in list(self.outgoing.items()):
             try:
                 connection.send_bytes(data)
             except OSError:  # it has ended, and closed its pipes
-                del self.tell[camera]
+                del self.outgoing[camera]
         if detections.ended:
             return ()
-        return [received for camera in list(self.hear) if (received := self._hear(camera)) is not None]
+        return [received for camera in list(self.incoming) if (received := self._receive(camera)) is not None]
 
-    def _hear(self, camera: str) -> FrameDetections | None:
+    def _receive(self, camera: str) -> FrameDetections | None:
         try:
-            word = _DECODER.decode(self.hear[camera].recv_bytes())
-        except EOFError:  # it failed: whoever started it will say so
-            word = None
-        if word is None or word.ended:
-            del self.hear[camera]
+            detections = _DECODER.decode(self.incoming[camera].recv_bytes())
+        except EOFError:  # it failed, which its starter reports
+            detections = None
+        if detections is None or detections.ended:
+            del self.incoming[camera]
             return None
-        return word
+        return detections
 
 
 class PeerPipeFactory:
-    """Lays the pipes between cameras that are started one after the other.
+    """Creates the pipes between cameras that are started one after the other.
 
-    Open are only those that somebody still has to be given: of very many cameras all would be too many.
+    Only pipes that are not handed over yet are open here: all pipes of very many cameras would be too many.
     """
 
     def __init__(self, others: Mapping[str, Sequence[str]]) -> None:
         self._others = others
-        self._laid: dict[str, PeerPipes] = {camera: PeerPipes() for camera in others}
-        self._given: set[str] = set()
+        self._pipes: dict[str, PeerPipes] = {camera: PeerPipes() for camera in others}
+        self._handed_over: set[str] = set()
 
     @contextmanager
     def of(self, camera: str) -> Iterator[PeerPipes]:
-        """Return the ends of a camera's pipes, while its process starts; they are its own from then on."""
-        own = self._laid[camera]
+        """Yield the ends of a camera's pipes while its process starts; they are closed here afterwards."""
+        own = self._pipes[camera]
         for other in self._others[camera]:
-            if other not in self._given:
-                peer = self._laid[other]
-                own.hear[other], peer.tell[camera] = multiprocessing.Pipe(duplex=False)
-                peer.hear[camera], own.tell[other] = multiprocessing.Pipe(duplex=False)
+            if other not in self._handed_over:
+                peer = self._pipes[other]
+                own.incoming[other], peer.outgoing[camera] = multiprocessing.Pipe(duplex=False)
+                peer.incoming[camera], own.outgoing[other] = multiprocessing.Pipe(duplex=False)
         try:
             yield own
         finally:
-            self._given.add(camera)
-            for connection in (*own.tell.values(), *own.hear.values()):
+            self._handed_over.add(camera)
+            for connection in (*own.outgoing.values(), *own.incoming.values()):
                 connection.close()

@@ -35,17 +35,21 @@ class Renderer:
         stream_format = stream_format_for(
             config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
         )
-        self._shelves = {camera: FrameBuffer(config.site.fps, frames, stream_format) for camera in cameras}
+        self._frame_buffers = {
+            camera: FrameBuffer(config.site.fps, frames, stream_format) for camera in cameras
+        }
         self._aligner = EpochAligner(cameras, config.track.window.stride, grace=0)
         for camera in cameras:
             self._aligner.camera_connected(camera)
         self._decider = ViewDecider(
-            config, camera_homographies(config), lambda camera, pulse: self._shelves[camera].has(pulse)
+            config, camera_homographies(config), lambda camera, pulse: self._frame_buffers[camera].has(pulse)
         )
         self._recorder = DecisionWriter(folder, cameras, self._decider.people.letterboxes)
         self._soundtrack = Soundtrack(config)
         frame_buffer = self._soundtrack.frame_buffer
-        self._films = FilmWriter(folder / "best", self._shelves, stream_format, config.site, frame_buffer)
+        self._films = FilmWriter(
+            folder / "best", self._frame_buffers, stream_format, config.site, frame_buffer
+        )
         self._sizes: dict[str, Size] = {}
         self.ended: dict[str, int] = {}
         """The last pulse of each camera whose recording is over."""
@@ -54,7 +58,7 @@ class Renderer:
     def take(self, batch: EpochBatch) -> None:
         """Add a camera's batch, and decide what can be decided."""
         for unit in batch.units:
-            self._shelves[batch.camera].put(unit.pulse, _BOOT, unit.data, key=unit.key)
+            self._frame_buffers[batch.camera].put(unit.pulse, _BOOT, unit.data, key=unit.key)
             self._aligner.frame_received(batch.camera, _BOOT, unit.pulse)
             self.frames += 1
         if batch.tracks is not None:
@@ -67,7 +71,7 @@ class Renderer:
                 self._write(decision)
 
     def finish(self) -> list[int]:
-        """Decide and write the rest; give everybody's number."""
+        """Decide and write the rest; return all people's numbers."""
         for decision in self._decider.finish(max(self.ended.values())):
             self._write(decision)
         self.close()
@@ -89,7 +93,7 @@ class Renderer:
 
 
 def render(config: Config, folder: Path, progress: Callable[[int], None]) -> list[int]:
-    """Render into an existing folder; ``progress`` is told the frames done, all cameras together.
+    """Render into an existing folder; ``progress`` is called with the frames done in all cameras.
 
     Raises:
         UserError: a recording cannot be read.

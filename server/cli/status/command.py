@@ -23,66 +23,66 @@ _EVERY_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class SiteReport:
-    """One look at a site: how it is, or why nobody can tell."""
+    """The status of a site at one time, or why it is not known."""
 
     now: SiteNow | None
     away: str = ""
 
 
 async def status_once(url: str, token: str | None, *, as_json: bool) -> bool:
-    """Print how a site is; return whether it is ready.
+    """Print a site's status; return whether it is ready.
 
     Raises:
-        UserError: the server refuses, or is none.
+        UserError: the server refuses, or is not MyView's.
         UnavailableError: it cannot be reached.
     """
-    look = await _look(url, HttpSettings(token=token))
-    if look.now is None:
-        raise UnavailableError(f"status: {look.away}")
+    report = await _report(url, HttpSettings(token=token))
+    if report.now is None:
+        raise UnavailableError(f"status: {report.away}")
     if as_json:
-        typer.echo(msgspec.json.encode(look.now))
+        typer.echo(msgspec.json.encode(report.now))
     else:
-        Console().print(render_status(look.now, Rates()))
-    return look.now.ready
+        Console().print(render_status(report.now, Rates()))
+    return report.now.ready
 
 
 async def status_live(url: str, token: str | None, *, as_json: bool) -> None:
-    """Show how a site is until told to end; a server that goes away is waited for.
+    """Show a site's status until cancelled; wait for a server that goes away.
 
     Raises:
-        UserError: the server refuses, or is none.
+        UserError: the server refuses, or is not MyView's.
     """
-    looks = _looks(url, HttpSettings(token=token, connect_timeout=2.0, read_timeout=5.0))
+    reports = _reports(url, HttpSettings(token=token, connect_timeout=2.0, read_timeout=5.0))
     if as_json:
-        async for look in looks:
-            typer.echo(msgspec.json.encode(look.now if look.now is not None else {"away": look.away}))
+        async for report in reports:
+            typer.echo(msgspec.json.encode(report.now if report.now is not None else {"away": report.away}))
         return
     before: SiteNow | None = None
     restarted = ""
     with Live(Text("asking the server"), auto_refresh=False, console=Console()) as live:
-        async for look in looks:
-            if look.now is None:
-                notice = f"{look.away}; trying again"
+        async for report in reports:
+            if report.now is None:
+                notice = f"{report.away}; trying again"
                 shown = (
                     Text(printable(notice), style="red")
                     if before is None
                     else render_status(before, Rates(), notice)
                 )
             else:
-                if before is not None and _is_another_run(before, look.now):
+                if before is not None and _is_another_run(before, report.now):
                     restarted = "the service was restarted"
-                shown = render_status(look.now, Rates.between(before, look.now), restarted)
-                before = look.now
+                shown = render_status(report.now, Rates.between(before, report.now), restarted)
+                before = report.now
             live.update(shown, refresh=True)
 
 
-async def _looks(url: str, settings: HttpSettings) -> AsyncIterator[SiteReport]:
+async def _reports(url: str, settings: HttpSettings) -> AsyncIterator[SiteReport]:
     while True:
-        yield await _look(url, settings)
+        yield await _report(url, settings)
         await asyncio.sleep(_EVERY_S)
 
 
-async def _look(url: str, settings: HttpSettings) -> SiteReport:
+async def _report(url: str, settings: HttpSettings) -> SiteReport:
     try:
         return SiteReport(await status(url, settings))
     except ServerAway as error:

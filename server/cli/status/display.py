@@ -94,7 +94,7 @@ def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
         )
         step = "" if it.synchronized or it.state != "live" else "not synchronized"
         words += [
-            Text(printable(f"{it.camera}: {said}"), style="yellow") for said in (it.message, step) if said
+            Text(printable(f"{it.camera}: {text}"), style="yellow") for text in (it.message, step) if text
         ]
     return Group(table, *words)
 

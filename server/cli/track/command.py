@@ -121,8 +121,8 @@ def detect_frames(config: Config) -> Iterator[DetectedFrame]:
     detector = warm_up_detector(config, camera, source, fit)
     for number, image in read_frames(source):
         if image is not None:
-            found = detector.detect(fit.image(image), number)
-            yield DetectedFrame(number, replace(found, boxes=fit.boxes_to_own(found.boxes)), image)
+            detections = detector.detect(fit.image(image), number)
+            yield DetectedFrame(number, replace(detections, boxes=fit.boxes_to_own(detections.boxes)), image)
     source.close()
 
 

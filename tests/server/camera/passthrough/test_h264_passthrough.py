@@ -185,7 +185,7 @@ def test_other_codecs_and_orders_do_not_fit(tmp_path: Path, codec: str, b_frames
     ("h264", "gop", "said"),
     [
         ("auto", GOP, "camera c0: its own H.264 passes through"),
-        ("auto", 4, "camera c0 is encoded: its own H.264: frame 4 does not begin a GOP"),
+        ("auto", 4, "camera c0 is re-encoded: its own H.264: frame 4 does not begin a GOP"),
         ("encode", GOP, ""),
     ],
 )
