@@ -21,7 +21,7 @@ from server.camera.encoding.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import FragmentSample, fragment
 from server.media.h264.annexb import join_sample, nal_units
-from server.media.rendering_messages import Canvas
+from server.media.rendering_messages import RenderSettings
 from server.service.rendering.decided_boxes import GopOverlay, first_pulse
 from server.service.rendering.mjpeg_streams import MjpegVariant
 from server.service.rendering.rendered_stream import RenderedStream
@@ -77,7 +77,7 @@ class Stage:
         ]
         self._encoder = Encoder(site, encode)
         self._pulse = 0
-        self.canvas = Canvas(
+        self.settings = RenderSettings(
             width=site.width,
             height=site.height,
             fps=site.fps,
@@ -108,11 +108,11 @@ class Stage:
 async def measure(stage: Stage, wish: Wish, gops: int) -> Cost:
     """Let a process draw; every GOP is given when the one before is done."""
     stream = Broadcaster()
-    source = RenderedStream("the room", stream, stage.told, stage.canvas, live=True, queue_gops=8)
+    source = RenderedStream("the room", stream, stage.told, stage.settings, live=True, queue_gops=8)
     source.use()
-    source.film.wanted = wish.films
-    viewers = [source.film.channel.subscribe() for _ in range(wish.films)]
-    viewers += [source.series.join(series) for series in wish.series]
+    source.video.users = wish.films
+    viewers = [source.video.broadcaster.subscribe() for _ in range(wish.films)]
+    viewers += [source.mjpeg.subscribe(series) for series in wish.series]
     readers = [asyncio.create_task(_read(viewer)) for viewer in viewers]
     chunks = [stage.next_gop() for _ in range(gops + 1)]
     run, began = asyncio.create_task(source.run()), time.perf_counter()

@@ -76,7 +76,7 @@ async def judge(frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings
     chosen = schedule(frames // encode.gop, cuts, seed)
     pieces, cut = await _watch(made, chosen, encode)
     own = [_own(film, encode.codec) for film in made]
-    head = cut.stream_format.head(_SITE.size, _SITE.fps)
+    head = cut.stream_format.init_segment(_SITE.size, _SITE.fps)
     assert head is not None  # noqa: S101 — key pictures have come
     contained = head + b"".join(piece.data for piece in pieces)
     has_ts = cut.stream_format.container == "mp4"

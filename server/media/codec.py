@@ -1,4 +1,4 @@
-"""The stream format of a site, by its codec."""
+"""Selects the stream format of a site by its codec."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ Codec = Literal["h264", "vp8"]
 
 
 def stream_format_for(codec: Codec, size: tuple[int, int], *, own_parameters: bool = False) -> StreamFormat:
-    """Return the stream format of a site, before any picture has come.
+    """Return the stream format of a site.
 
-    ``size``: width and height of its pictures. ``own_parameters``: each camera may have H.264 parameter sets
-    of its own.
+    ``size`` is (width, height) in pixels. ``own_parameters``: each camera may have H.264 parameter sets of
+    its own.
     """
     if codec == "vp8":
         return Vp8StreamFormat(*size)

@@ -1,4 +1,4 @@
-"""Pictures from the colours of a codec to BGR, and back."""
+"""Converts decoded pictures to BGR, and BGR pictures to YUV for encoding."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from av.video.reformatter import Colorspace, VideoReformatter
 from numpy.typing import NDArray
 
 
-class _Kept(threading.local):
-    """What converts, kept from picture to picture: to set it up takes as long as many a picture does."""
+class _Reformatters(threading.local):
+    """FFmpeg's converters of one thread: setting one up takes as long as converting many pictures."""
 
     def __init__(self) -> None:
         self.to_bgr, self.to_yuv = VideoReformatter(), VideoReformatter()
 
 
-_kept = _Kept()
+_reformatters = _Reformatters()
 _THREADS = 1
-"""FFmpeg would take one for each core, for a fraction of a millisecond's work."""
+"""FFmpeg would start a thread per core, for a fraction of a millisecond's work."""
 
 
 def to_bgr(picture: VideoFrame) -> NDArray[np.uint8]:
     """Return a decoded picture as ``(height, width, 3)`` BGR.
 
-    One that names colours which FFmpeg cannot convert (ITU-T H.273, 8.3: half of the numbers there are) is
-    shown by BT.601: whoever names them mostly did not mean to.
+    A picture with a color space that FFmpeg cannot convert (half of the codes of ITU-T H.273, 8.3) is
+    converted by BT.601: such a code is mostly a mistake.
     """
     try:
-        found = _kept.to_bgr.reformat(picture, format="bgr24", threads=_THREADS)
+        converted = _reformatters.to_bgr.reformat(picture, format="bgr24", threads=_THREADS)
     except av.FFmpegError:
-        found = _kept.to_bgr.reformat(
+        converted = _reformatters.to_bgr.reformat(
             picture, format="bgr24", threads=_THREADS, src_colorspace=Colorspace.ITU601
         )
-    return np.asarray(found.to_ndarray(), dtype=np.uint8)
+    return np.asarray(converted.to_ndarray(), dtype=np.uint8)
 
 
 def to_yuv(image: NDArray[np.uint8]) -> VideoFrame:
-    """Return a picture, ``(height, width, 3)`` BGR, as it is encoded: colour at half the size."""
+    """Return a picture, ``(height, width, 3)`` BGR, as YUV 4:2:0 for an encoder."""
     picture = VideoFrame.from_ndarray(image, format="bgr24")
-    return _kept.to_yuv.reformat(picture, format="yuv420p", threads=_THREADS)
+    return _reformatters.to_yuv.reformat(picture, format="yuv420p", threads=_THREADS)

@@ -1,4 +1,4 @@
-"""What bridges a hole in a stream: pictures that show the one before them again."""
+"""Fills a gap in a stream with pictures that repeat the one before it."""
 
 from __future__ import annotations
 
@@ -8,75 +8,77 @@ from typing import Protocol
 
 from server.media.containers.fmp4 import FragmentSample, fragment
 from server.media.h264.annexb import ParameterSets
-from server.media.h264.repeat_picture import SliceHeadFormat
+from server.media.h264.repeat_picture import SliceHeaderFormat
 from server.media.picture import EncodedPicture
 
 Span = tuple[int, int]
-"""A pulse, and for how many a picture is shown."""
+"""The pulse of a picture, and the number of pulses it is shown for."""
 
-NO_CAMERAS = -1
-"""As a boot."""
-_NUMBERS_TOLD = 15
-"""Pictures that may be missing before frame_num, at least four bits of it, has come round."""
+NO_BOOT = -1
+"""The boot of a picture that no camera has encoded."""
+_MAX_COUNTED_LOSS = 15
+"""Missing pictures that frame_num, which has at least four bits, counts without wrapping around."""
 
 
 class GapFiller(Protocol):
     """Makes pictures that repeat the last one; how depends on the codec."""
 
     def can_follow(self, picture: EncodedPicture) -> bool:
-        """Return whether what this picture says of itself can be read, as all the other methods do."""
+        """Return whether the other methods can read this picture."""
 
     def after(self, newest: EncodedPicture, spans: Sequence[Span]) -> list[EncodedPicture]:
-        """Repeat the newest picture; only a key picture can follow."""
+        """Return repetitions of the newest picture; only a keyframe can be decoded after them."""
 
     def before(self, picture: EncodedPicture, span: Span) -> list[EncodedPicture]:
-        """Repeat what is before a picture that was not taken, so that this one can be decoded after it."""
+        """Return a repetition of the last picture, after which the given picture can still be decoded."""
 
     def is_lost_between(self, newest: EncodedPicture, picture: EncodedPicture, missing: int) -> bool:
-        """Return whether of the missing ones something was encoded that the picture is decoded by.
+        """Return whether a reference of the picture is among the ``missing`` pulses after the newest one.
 
-        Both are of one GOP of one run of a camera.
+        Both pictures are in one GOP of one run of a camera.
         """
 
 
 @dataclass(frozen=True, slots=True)
 class H264GapFiller:
-    """Pictures in which every macroblock is skipped (:mod:`server.media.h264.repeat_picture`)."""
+    """Repeats pictures by P pictures of skipped macroblocks (:mod:`server.media.h264.repeat_picture`)."""
 
-    how: SliceHeadFormat
+    header_format: SliceHeaderFormat
     fps: float
     parameters: ParameterSets | None = None
     """As of :class:`EncodedPicture`."""
 
     def can_follow(self, picture: EncodedPicture) -> bool:
-        """Return whether it has a number."""
+        """Return whether the picture has a frame_num."""
         try:
-            self.how.frame_num(picture.sample)
+            self.header_format.frame_num(picture.sample)
         except ValueError:
             return False
         return True
 
     def after(self, newest: EncodedPicture, spans: Sequence[Span]) -> list[EncodedPicture]:
-        """Count on from the newest picture."""
-        number, made = self.how.frame_num(newest.sample), []
+        """Return repetitions whose frame_num counts on from the newest picture's."""
+        number, pictures = self.header_format.frame_num(newest.sample), []
         for span in spans:
-            number = self.how.next_num(number)
-            made.append(self._made(self.how.repeat(number, reference=True), span))
-        return made
+            number = self.header_format.next_num(number)
+            pictures.append(self._picture(self.header_format.repeat(number, reference=True), span))
+        return pictures
 
     def before(self, picture: EncodedPicture, span: Span) -> list[EncodedPicture]:
-        """Return one picture with the number of the next, so it is no reference, and only one."""
-        return [self._made(self.how.repeat(self.how.frame_num(picture.sample), reference=False), span)]
+        """Return one non-reference picture with the frame_num of the given picture."""
+        number = self.header_format.frame_num(picture.sample)
+        return [self._picture(self.header_format.repeat(number, reference=False), span)]
 
     def is_lost_between(self, newest: EncodedPicture, picture: EncodedPicture, missing: int) -> bool:
-        """Return whether pictures were lost between two, by ``frame_num``, which counts encoded pictures."""
-        if missing == 0 or missing >= _NUMBERS_TOLD:
+        """Return whether pictures were lost between two, by frame_num, which counts encoded pictures."""
+        if missing == 0 or missing >= _MAX_COUNTED_LOSS:
             return missing > 0
-        return self.how.frame_num(picture.sample) != self.how.next_num(self.how.frame_num(newest.sample))
+        number = self.header_format.frame_num(picture.sample)
+        return number != self.header_format.next_num(self.header_format.frame_num(newest.sample))
 
-    def _made(self, data: bytes, span: Span) -> EncodedPicture:
-        pulse, lasts = span
-        made = fragment([FragmentSample(data, key=False, lasts=lasts)], pulse, self.fps)
+    def _picture(self, data: bytes, span: Span) -> EncodedPicture:
+        pulse, duration = span
+        packed = fragment([FragmentSample(data, key=False, duration=duration)], pulse, self.fps)
         return EncodedPicture(
-            pulse, key=False, fragment=made, boot=NO_CAMERAS, lasts=lasts, parameters=self.parameters
+            pulse, key=False, fragment=packed, boot=NO_BOOT, duration=duration, parameters=self.parameters
         )

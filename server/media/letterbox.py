@@ -1,4 +1,4 @@
-"""Fitting a camera's own picture into the site's, and coordinates back and forth."""
+"""Letterboxing: scales a camera's picture to the site's size, and maps coordinates both ways."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Image = NDArray[np.uint8]
 
 
 class Letterbox:
-    """Scales a picture to the site's size without distorting it; what is left over stays black.
+    """Scales a picture to the site's size with its aspect ratio; the rest stays black.
 
     Sizes are (width, height) in pixels.
     """
@@ -29,11 +29,11 @@ class Letterbox:
 
     @property
     def size(self) -> tuple[int, int]:
-        """The site's."""
+        """The site's picture size."""
         return self._site
 
     def image(self, own: Image) -> Image:
-        """Return the site-sized picture of a camera's own one."""
+        """Return the site-sized picture of a camera's own picture."""
         if self._exact and own.shape[1::-1] == self._site:
             return own
         shrinking = self.scale < 1

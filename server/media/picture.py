@@ -1,4 +1,4 @@
-"""One picture of a stream."""
+"""An encoded picture of a stream, packed for its container."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from server.media.h264.annexb import ParameterSets
 
 @dataclass(frozen=True, slots=True)
 class EncodedPicture:
-    """One encoded picture, ready to be sent."""
+    """One encoded picture, packed for its container."""
 
     pulse: int
     key: bool
     fragment: bytes
-    """Of MP4, or a cluster of WebM."""
+    """An MP4 fragment, or a WebM cluster."""
     boot: int
-    """Which run of the camera's process it is from; pictures of two runs do not build on each other."""
-    lasts: int = 1
-    """Pulses that it is shown for."""
+    """The run of the camera's process; a picture never refers to one of another run."""
+    duration: int = 1
+    """The number of pulses it is shown for."""
     after: int | None = None
-    """The pulse of the one that it is decoded by; None: it is not known, or none."""
+    """The pulse of its reference picture; None: not known, or it has none."""
     parameters: ParameterSets | None = None
-    """Those that it is decoded by, if they are not the same in all streams of the site."""
+    """Its parameter sets; None where all streams of the site share theirs."""
 
     @property
     def until(self) -> int:
-        """The first pulse after it."""
-        return self.pulse + self.lasts
+        """The pulse after its last."""
+        return self.pulse + self.duration
 
     @property
     def sample(self) -> bytes:
-        """Its NAL units, each behind its length; of a fragment of MP4."""
+        """Its length-prefixed NAL units, if the fragment is MP4."""
         return sample_of(self.fragment)

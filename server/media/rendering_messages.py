@@ -1,7 +1,8 @@
-"""What the best-view service and a drawing process say to each other, over the process's pipes.
+"""Messages between the service and a render worker, over the worker's pipes.
 
-One request, one answer, each a msgpack message behind its length. The first message is :class:`Canvas`; its
-answer is :data:`READY`. This module does not load the configuration: a drawing process must start at once.
+Each request has one answer; both are length-prefixed msgpack messages. The first message is
+:class:`RenderSettings`; its answer is :data:`READY`. This module does not import the configuration: a worker
+must start fast.
 """
 
 from __future__ import annotations
@@ -11,23 +12,23 @@ from typing import Literal
 import msgspec
 
 Boxes = list[list[tuple[int, float, float, float, float]]]
-"""For every frame of a GOP: object, left, top, right, bottom; as in ``GopChoices``."""
+"""By frame of a GOP: (object, left, top, right, bottom), as in ``GopChoices``."""
 
-Still = Literal["plain", "boxed"]
+StillKind = Literal["plain", "boxed"]
 
 LENGTH_BYTES = 4
-"""The length before every message, big-endian."""
+"""Bytes of the length before every message, big-endian."""
 READY = bytes(LENGTH_BYTES)
-"""What a drawing process writes when it has loaded its libraries: an empty message."""
+"""Written by a worker that has loaded its libraries: an empty message."""
 TIMESCALE = 90_000
-"""Ticks a second in fragments of MP4: divisible by 24, 25, 30 and 50 frames a second."""
+"""Ticks per second in MP4 fragments: divisible by 24, 25, 30 and 50 frames per second."""
 
 
-class Canvas(msgspec.Struct, frozen=True, kw_only=True):
-    """What all pictures of a site share; all that shapes the parameter sets of H.264 is the cameras' own."""
+class RenderSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """Size, rate and encoder settings of a site's pictures; the worker encodes H.264 as the cameras do."""
 
     codec: Literal["h264", "vp8"] = "h264"
-    """Of the frames to decode; what is encoded is H.264."""
+    """The codec of the frames to decode; the worker always encodes H.264."""
     width: int
     height: int
     fps: float
@@ -40,37 +41,37 @@ class Canvas(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RenderRequest(msgspec.Struct, frozen=True, kw_only=True):
-    """Frames to decode, and what to make of them."""
+    """Frames to decode, and the outputs to make of them."""
 
     fragments: bytes = b""
-    """Fragments (or clusters) of consecutive frames; of the first request, they begin with a key frame."""
+    """MP4 fragments or WebM clusters of consecutive frames; the first request begins with a keyframe."""
     first: int = 0
-    """The pulse that ``boxes`` begin with."""
+    """The pulse of the first entry in ``boxes``."""
     boxes: Boxes = []
     chosen: int | None = None
-    """The object whose box stands out."""
-    film: bool = False
-    """Wanted: the frames with boxes, encoded."""
+    """The object whose box is highlighted."""
+    video: bool = False
+    """Whether to encode the frames with boxes."""
     plain: list[float] = []
-    """Wanted: JPEG at these rates, a second (:func:`is_in_series`)."""
+    """Rates, in pictures per second, at which to make JPEG pictures (:func:`is_at_rate`)."""
     boxed: list[float] = []
-    """Wanted: JPEG with boxes, likewise."""
-    still: Still | None = None
-    """Wanted: JPEG of the last frame that was decoded, in this request or before."""
+    """Rates for JPEG pictures with boxes."""
+    still: StillKind | None = None
+    """The kind of JPEG picture to make of the last decoded frame, of this request or an earlier one."""
 
 
 class EncodedFrame(msgspec.Struct, frozen=True):
-    """One encoded frame, Annex B; a key one carries SPS and PPS."""
+    """One encoded frame, Annex B; a keyframe carries SPS and PPS."""
 
     pulse: int
     key: bool
     data: bytes
-    lasts: int = 1
-    """Pulses that it is shown for."""
+    duration: int = 1
+    """The number of pulses it is shown for."""
 
 
 class JpegPicture(msgspec.Struct, frozen=True):
-    """One JPEG."""
+    """One JPEG picture."""
 
     pulse: int
     data: bytes
@@ -80,23 +81,23 @@ class RenderResult(msgspec.Struct, frozen=True, kw_only=True):
     """The answer to :class:`RenderRequest`."""
 
     newest: int
-    """The last frame that was decoded, now or before; -1: none."""
-    film: list[EncodedFrame] = []
+    """The pulse of the last decoded frame, of this request or an earlier one; -1: none."""
+    video: list[EncodedFrame] = []
     plain: list[JpegPicture] = []
     boxed: list[JpegPicture] = []
     still: JpegPicture | None = None
 
 
-def is_in_series(pulse: int, rate: float, fps: float) -> bool:
-    """Return whether a frame belongs to a series of ``rate`` pictures a second out of ``fps``.
+def is_at_rate(pulse: int, rate: float, fps: float) -> bool:
+    """Return whether a frame is among the ``rate`` pictures per second taken out of ``fps``.
 
-    It depends on the pulse alone, so that series share pictures, and a slower one is part of a faster one
-    whose rate is a multiple.
+    It depends on the pulse alone, so that streams of one rate share pictures, and the pictures of a rate are
+    among those of its multiples.
     """
     return rate >= fps or pulse * rate // fps != (pulse - 1) * rate // fps
 
 
 def encode_message(message: msgspec.Struct) -> bytes:
-    """Encode a message behind its length, as it goes through a pipe."""
+    """Return a message encoded for the pipe, behind its length."""
     body = msgspec.msgpack.encode(message)
     return len(body).to_bytes(LENGTH_BYTES, "big") + body

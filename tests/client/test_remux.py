@@ -36,7 +36,7 @@ def write_stream(part: Path, source: Path, lost: range = range(0), early: int = 
     frames = packets(source.read_bytes())
     count = PICTURES * RATE // FPS // SAMPLES
     frames = [frames[number % len(frames)] for number in range(early + count + late)]
-    head = stream_format.head((64, 48), FPS, sound)
+    head = stream_format.init_segment((64, 48), FPS, sound)
     assert head is not None
     pictures = [stream_format.pack(it.data, START + it.pulse, FPS, key=it.key) for it in units]
     kept = [picture for number, picture in enumerate(pictures) if number not in lost]

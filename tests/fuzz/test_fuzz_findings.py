@@ -244,7 +244,7 @@ def test_a_playlist_of_a_time_that_no_calendar_has_is_written_without_it(tmp_pat
 def test_a_recording_whose_times_leave_all_bounds_becomes_a_film_from_time_0(tmp_path: Path) -> None:
     stream_format, (unit, *_) = StreamFormat(), pictures(0, 1)
     stream_format.accept(unit.data)
-    head = stream_format.head(site().site.size, site().site.fps, AudioFormat(48_000, 2)) or b""
+    head = stream_format.init_segment(site().site.size, site().site.fps, AudioFormat(48_000, 2)) or b""
     form = AudioFormat(48_000, 2)
     sound = audio_fragment(form, [form.silence] * 3, 0)
     picture = bytearray(stream_format.pack(unit.data, 0, 25.0, key=True))

@@ -109,9 +109,11 @@ class Runs(Scripts):
             self.messages += 1
             (self._run / name).write_bytes(content)
         service = self._service
-        past = Recorder(self._config, service.frame_buffers, service.stream_format, 10, service.audio_buffer)
-        past.pulse0 = _PULSE0
-        store = past.folder
+        recorder = Recorder(
+            self._config, service.frame_buffers, service.stream_format, 10, service.audio_buffer
+        )
+        recorder.pulse0 = _PULSE0
+        store = recorder.folder
         assert store is not None
         store.open()
         lot = zlib.crc32(data)
@@ -120,7 +122,7 @@ class Runs(Scripts):
             found = bool(store.earlier)
             if found:
                 store.session = store.earlier.pop()
-                asked = bool(self._loop.run_until_complete(self._asked(past, lot // _DROPS_EVERY)))
+                asked = bool(self._loop.run_until_complete(self._asked(recorder, lot // _DROPS_EVERY)))
             if drops:
                 size = sum(run.size for run in (*store.earlier, *([store.session] if store.session else [])))
                 for bounds in (
@@ -142,13 +144,13 @@ class Runs(Scripts):
         return found and asked
 
     @staticmethod
-    async def _asked(past: Recorder, lot: int) -> int:
+    async def _asked(recorder: Recorder, lot: int) -> int:
         """Ask what is told of all; play one camera and one person: to play everybody takes twice as long."""
-        assert past.session is not None
-        lines = [it async for it in read_decision_lines(past, 0, _FAR)]
+        assert recorder.session is not None
+        lines = [it async for it in read_decision_lines(recorder, 0, _FAR)]
         sources: tuple[PlaybackSource, ...] = (
-            CameraPlayback(past, CAMERAS[lot % 2]),
-            PersonPlayback(past, (1 + lot // 2 % 2,)),
+            CameraPlayback(recorder, CAMERAS[lot % 2]),
+            PersonPlayback(recorder, (1 + lot // 2 % 2,)),
         )
         for source in sources:
             available_ranges(source, 0, _FAR)
@@ -161,7 +163,7 @@ class Runs(Scripts):
                 if count == _MOST_GOPS:
                     break
             await last_gop_before(source, 12)
-        recorded_audio(past)
+        recorded_audio(recorder)
         return len(lines)
 
     def close(self) -> None:

@@ -33,8 +33,8 @@ def stream(codec: Literal["h264", "vp8"], frames: int = 10) -> bytes:
     if stream_format is None:
         found = StreamFormat()
         found.accept(units[0].data)
-        head = found.head((WIDTH, HEIGHT), FPS, form) or b""
+        head = found.init_segment((WIDTH, HEIGHT), FPS, form) or b""
         sound = audio_fragment(form, [form.silence] * 9, 0)
         return head + sound + b"".join(found.pack(it.data, it.pulse, FPS, key=it.key) for it in units)
-    head = stream_format.head((WIDTH, HEIGHT), FPS)
+    head = stream_format.init_segment((WIDTH, HEIGHT), FPS)
     return head + b"".join(stream_format.pack(it.data, it.pulse, FPS, key=it.key) for it in units)

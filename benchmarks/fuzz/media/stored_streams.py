@@ -10,7 +10,7 @@ from benchmarks.fuzz.engine.fed_site import FPS, HEIGHT, STRIDE, WIDTH
 from benchmarks.fuzz.engine.target import Target, folder
 from benchmarks.fuzz.media.damaged_media import stream, wrong
 from server.media.audio.audio_format import AudioFormat
-from server.media.rendering_messages import Canvas, RenderRequest
+from server.media.rendering_messages import RenderRequest, RenderSettings
 from server.service.recording.media_files import read_gops
 from server.service.recording.playlist_file import RecordingPlaylist
 from server.service.rendering.worker.stream_renderer import StreamRenderer
@@ -36,7 +36,7 @@ class Drawing(Target):
 
     def feed(self, data: bytes) -> bool:
         """Draw them."""
-        canvas = Canvas(
+        settings = RenderSettings(
             width=WIDTH,
             height=HEIGHT,
             fps=FPS,
@@ -47,9 +47,9 @@ class Drawing(Target):
             jpeg_quality=80,
         )
         boxes = [[(1, 2.0, 3.0, 20.0, 40.0)]] * _DRAWN
-        film = zlib.crc32(data) % _FILMED_EVERY == 0
-        drawn = StreamRenderer(canvas).draw(
-            RenderRequest(fragments=data, boxes=boxes, film=film, boxed=[2.0], still="plain")
+        video = zlib.crc32(data) % _FILMED_EVERY == 0
+        drawn = StreamRenderer(settings).render(
+            RenderRequest(fragments=data, boxes=boxes, video=video, boxed=[2.0], still="plain")
         )
         return drawn.newest >= 0
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import av
 from av.video.codeccontext import VideoCodecContext
 
-from server.media.rendering_messages import Canvas
+from server.media.rendering_messages import RenderSettings
 
 if TYPE_CHECKING:  # a drawing process encodes too, and has no second to load the configuration's libraries
     from server.config.sections import EncodeSettings, SiteSettings
@@ -21,7 +21,7 @@ _BITS_TO_SPARE = 1_000_000_000
 """A rate that VP8 never reaches: the quantizer alone says how many bits there are."""
 
 
-def x264(site: SiteSettings | Canvas, settings: EncodeSettings | Canvas) -> VideoCodecContext:
+def x264(site: SiteSettings | RenderSettings, settings: EncodeSettings | RenderSettings) -> VideoCodecContext:
     """Return an encoder of H.264."""
     context = _opened_by("libx264", site)
     context.max_b_frames = 0
@@ -54,7 +54,7 @@ def libvpx(site: SiteSettings, settings: EncodeSettings) -> VideoCodecContext:
     return context
 
 
-def _opened_by(name: str, site: SiteSettings | Canvas) -> VideoCodecContext:
+def _opened_by(name: str, site: SiteSettings | RenderSettings) -> VideoCodecContext:
     context = av.CodecContext.create(name, "w")
     assert isinstance(context, VideoCodecContext)  # noqa: S101 — tells mypy what an encoder is
     context.width, context.height, context.pix_fmt = site.width, site.height, "yuv420p"
@@ -66,7 +66,7 @@ def _opened_by(name: str, site: SiteSettings | Canvas) -> VideoCodecContext:
     return context
 
 
-def _cap(site: SiteSettings | Canvas, settings: EncodeSettings | Canvas) -> str:
+def _cap(site: SiteSettings | RenderSettings, settings: EncodeSettings | RenderSettings) -> str:
     """Return x264 a leaky bucket (H.264, annex C) that lets no more than the cap through in any second.
 
     A bucket that fills at a rate and holds so many seconds of it lets both through at once. It holds a GOP,

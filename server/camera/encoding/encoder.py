@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from server.camera.encoding.codecs import CLOCK, libvpx, x264
 from server.media.color_conversion import to_yuv
-from server.media.rendering_messages import Canvas
+from server.media.rendering_messages import RenderSettings
 
 if TYPE_CHECKING:  # a drawing process encodes too, and has no second to load the configuration's libraries
     from server.config.sections import EncodeSettings, SiteSettings
@@ -35,11 +35,17 @@ class Encoder:
     decoder takes a cut between cameras for an ordinary GOP boundary. What is drawn on a canvas is H.264.
     """
 
-    def __init__(self, site: SiteSettings | Canvas, settings: EncodeSettings | Canvas) -> None:
+    def __init__(
+        self, site: SiteSettings | RenderSettings, settings: EncodeSettings | RenderSettings
+    ) -> None:
         self._gop = settings.gop
         self._fps = site.fps
         self._last: int | None = None
-        if isinstance(site, Canvas) or isinstance(settings, Canvas) or settings.codec == "h264":
+        if (
+            isinstance(site, RenderSettings)
+            or isinstance(settings, RenderSettings)
+            or settings.codec == "h264"
+        ):
             self._context = x264(site, settings)
         else:
             self._context = libvpx(site, settings)

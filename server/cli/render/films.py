@@ -95,11 +95,11 @@ class FilmWriter:
         if chunk.audio is not None:
             film.file.write(_rebased_audio(film.origin, chunk.audio, self._site.fps))
         for picture in chunk.pictures:
-            film.file.write(self._stream_format.begun_at(film.origin, picture.fragment, self._site.fps))
+            film.file.write(self._stream_format.rebase(film.origin, picture.fragment, self._site.fps))
 
     def _head(self, pulses: int) -> bytes:
         sound = None if self._sound is None else self._sound.format
-        return self._stream_format.head(self._site.size, self._site.fps, sound, pulses=pulses) or b""
+        return self._stream_format.init_segment(self._site.size, self._site.fps, sound, pulses=pulses) or b""
 
 
 def _rebased_audio(origin: int, audio: AudioChunk, fps: float) -> bytes:

@@ -23,7 +23,7 @@ from server.service.facade.rendering import (
     PersonView,
     PictureTimeoutError,
     RenderPoolFullError,
-    Still,
+    StillKind,
     Subject,
     multipart_part,
 )
@@ -92,13 +92,13 @@ async def best_with_boxes(request: web.Request) -> web.StreamResponse:
     _check_slot(request, subject)
     rendering = request.app[SERVICE].rendering
     with viewer_slot(request, _slot_name(subject)), rendering.using(subject) as source:
-        film = source.film
-        film.wanted += 1
+        video = source.video
+        video.users += 1
         try:
-            head = await source.film_head()
-            return await send_stream(request, film.channel, head, headers, MP4.packed)
+            head = await source.video_head()
+            return await send_stream(request, video.broadcaster, head, headers, MP4.packed)
         finally:
-            film.wanted -= 1
+            video.users -= 1
 
 
 async def _mjpeg(request: web.Request, subject: Subject) -> web.StreamResponse:
@@ -111,11 +111,11 @@ async def _mjpeg(request: web.Request, subject: Subject) -> web.StreamResponse:
     rendering = request.app[SERVICE].rendering
     with viewer_slot(request, _slot_name(subject)), rendering.using(subject) as source:
         first = await source.still(_kind(request), pulse)
-        viewer = source.series.join(variant)
+        viewer = source.mjpeg.subscribe(variant)
         try:
             return await send_viewer(request, viewer, FIRST_BOUNDARY + multipart_part(first), headers)
         finally:
-            source.series.leave(variant, viewer)
+            source.mjpeg.unsubscribe(variant, viewer)
 
 
 async def _still(request: web.Request, subject: Subject) -> web.StreamResponse:
@@ -162,7 +162,7 @@ def _newest(request: web.Request, subject: Subject) -> int:
     return pulse
 
 
-def _kind(request: web.Request) -> Still:
+def _kind(request: web.Request) -> StillKind:
     return "boxed" if wants_boxes(request) else "plain"
 
 
@@ -185,7 +185,7 @@ def _slot_name(subject: Subject) -> str:
 
 
 def _check_slot(request: web.Request, subject: Subject) -> None:
-    source = request.app[SERVICE].rendering.sources.get(subject)
+    source = request.app[SERVICE].rendering.streams.get(subject)
     viewers = 0 if source is None else source.viewers
     refused = refuse_viewer(request, viewers, (_slot_name(subject),))
     if refused is not None:

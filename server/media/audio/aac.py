@@ -1,12 +1,12 @@
-"""Advanced Audio Coding (ISO/IEC 14496-3), with low complexity: its headers, and silence."""
+"""AAC Low Complexity (ISO/IEC 14496-3): headers, and a silent frame."""
 
 from __future__ import annotations
 
 SAMPLES = 1024
-"""In a frame."""
+"""Samples per frame."""
 
 RATES = (96_000, 88_200, 64_000, 48_000, 44_100, 32_000, 24_000, 22_050, 16_000, 12_000, 11_025, 8_000, 7_350)
-"""samplingFrequencyIndex (1.6.3.3)."""
+"""By samplingFrequencyIndex (1.6.3.3)."""
 
 _LOW_COMPLEXITY = 2
 """audioObjectType."""
@@ -18,12 +18,12 @@ _END = "111"
 
 
 def audio_specific_config(rate: int, channels: int) -> bytes:
-    """Return AudioSpecificConfig (1.6.2.1): all that a decoder has to be told."""
+    """Return AudioSpecificConfig (1.6.2.1), the decoder's configuration."""
     return (_LOW_COMPLEXITY << 11 | RATES.index(rate) << 7 | channels << 3).to_bytes(2, "big")
 
 
 def silent_frame(channels: int) -> bytes:
-    """Return a frame in which there is nothing to hear."""
+    """Return a frame of silence."""
     gain = "00000000"
     if channels == 1:
         bits = "000" + "0000" + gain + _ICS_INFO + _QUIET
@@ -35,7 +35,7 @@ def silent_frame(channels: int) -> bytes:
 
 
 def adts(rate: int, channels: int, size: int) -> bytes:
-    """Return what comes before a frame of ``size`` bytes in a transport stream (1.A.2)."""
+    """Return the ADTS header of a frame of ``size`` bytes (1.A.2)."""
     whole = size + 7
     return bytes(
         (

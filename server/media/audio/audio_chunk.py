@@ -1,4 +1,4 @@
-"""Some of a site's sound."""
+"""Consecutive frames of a site's audio."""
 
 from __future__ import annotations
 
@@ -24,5 +24,5 @@ class AudioChunk:
 
     @cached_property
     def fragment(self) -> bytes:
-        """The frames as a fragment of MP4; nothing where there are none."""
+        """The frames as an MP4 fragment; empty if there are none."""
         return audio_fragment(self.format, self.frames, self.first) if self.frames else b""

@@ -1,7 +1,7 @@
-"""Fragmented MP4 by hand (ISO/IEC 14496-12 and -15): the header, and pictures in fragments that stand alone.
+"""Fragmented MP4 muxer (ISO/IEC 14496-12 and -15): the init segment, and independent fragments of frames.
 
-A library's muxer keeps a fragment back until it knows the next packet, and builds every stream anew. Here a
-fragment is made once per camera and frame, and every stream is a list of references to such fragments.
+A library's muxer holds a fragment back until the next packet, and muxes every stream again. Here a fragment
+is made once per camera and frame, and every stream is a list of references to such fragments.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from server.media.audio.audio_format import AudioFormat
-from server.media.containers.mp4_audio import SOUND_TRACK, audio_track
-from server.media.containers.mp4_boxes import box, full, moof_mdat, movie_head, track, track_defaults
+from server.media.containers.mp4_audio import AUDIO_TRACK, audio_track
+from server.media.containers.mp4_boxes import box, full_box, moof_mdat, movie_head, track, track_defaults
 from server.media.h264.annexb import ParameterSets
 from server.media.rendering_messages import TIMESCALE
 
@@ -23,7 +23,7 @@ _SYNC_SAMPLE = 0x02000000
 _OTHER_SAMPLE = 0x01010000
 """sample_depends_on = 1, sample_is_non_sync_sample."""
 _TFDT_AT = 8 + 16 + 8 + 16 + 12
-"""Where a fragment's decode time stands: behind the heads of moof, mfhd, traf, tfhd and tfdt."""
+"""The offset of a fragment's decode time: behind the headers of moof, mfhd, traf, tfhd and tfdt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,22 +31,22 @@ class FragmentSample:
     """One frame ready for a fragment."""
 
     data: bytes
-    """NAL units behind their lengths."""
+    """Length-prefixed NAL units."""
     key: bool
-    lasts: int = 1
-    """Pulses that it is shown for."""
+    duration: int = 1
+    """The number of pulses it is shown for."""
 
 
 def ticks(pulse: int, fps: float) -> int:
-    """Return the presentation time of a pulse: the media time of a frame is exactly pulse / fps."""
+    """Return the presentation time of a pulse in ticks: pulse / fps seconds, rounded."""
     return round(pulse * TIMESCALE / fps)
 
 
 def init_segment(
-    parameters: ParameterSets, width: int, height: int, sound: AudioFormat | None = None
+    parameters: ParameterSets, width: int, height: int, audio: AudioFormat | None = None
 ) -> bytes:
-    """Return ``ftyp`` and ``moov``, which players need before the first fragment; all streams share it."""
-    last = _TRACK if sound is None else SOUND_TRACK
+    """Return the init segment, ``ftyp`` and ``moov``, of streams with and without audio."""
+    last = _TRACK if audio is None else AUDIO_TRACK
     return box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6avc1mp41") + box(
         "moov",
         movie_head(last),
@@ -54,29 +54,29 @@ def init_segment(
             _TRACK,
             TIMESCALE,
             b"vide",
-            full("vmhd", 0, 1, bytes(8)),
+            full_box("vmhd", 0, 1, bytes(8)),
             _entry(parameters, width, height),
             size=(width, height),
         ),
-        b"" if sound is None else audio_track(sound),
+        b"" if audio is None else audio_track(audio),
         box("mvex", *(track_defaults(number + 1) for number in range(last))),
     )
 
 
 def fragment(samples: Sequence[FragmentSample], first: int, fps: float) -> bytes:
-    """Return ``moof`` and ``mdat`` of consecutive frames, the first of them shown at pulse ``first``."""
-    pulses = accumulate((sample.lasts for sample in samples), initial=first)
+    """Return ``moof`` and ``mdat`` of consecutive frames, the first of which is shown at pulse ``first``."""
+    pulses = accumulate((sample.duration for sample in samples), initial=first)
     return _fragment(samples, first, [ticks(pulse, fps) for pulse in pulses])
 
 
 def still_fragment(samples: Sequence[FragmentSample], first: int, until: int, fps: float) -> bytes:
-    """Return a fragment that shows the last of some frames: those before it pass in a tick each."""
+    """Return a fragment that shows its last frame in ``first … until - 1``; the others last a tick each."""
     begin = ticks(first, fps)
     return _fragment(samples, first, [*(begin + place for place in range(len(samples))), ticks(until, fps)])
 
 
 def _fragment(samples: Sequence[FragmentSample], first: int, edges: Sequence[int]) -> bytes:
-    """Return the fragment of samples, each shown from its edge to the next, in ticks."""
+    """Return the fragment of samples, each shown from its edge (ticks) to the next."""
     entries = b"".join(
         struct.pack(
             ">3I",
@@ -86,7 +86,7 @@ def _fragment(samples: Sequence[FragmentSample], first: int, edges: Sequence[int
         )
         for number, sample in enumerate(samples)
     )
-    track_head = full("tfhd", 0, 0x020000, struct.pack(">I", _TRACK))
+    track_head = full_box("tfhd", 0, 0x020000, struct.pack(">I", _TRACK))
     return moof_mdat(first, track_head, edges[0], 0x000701, entries, [it.data for it in samples])
 
 
@@ -106,12 +106,12 @@ def _entry(parameters: ParameterSets, width: int, height: int) -> bytes:
 
 
 def shift_fragment(frame: bytes, by: int) -> bytes:
-    """Move a fragment of :func:`fragment` in time by ``by`` ticks."""
+    """Return a fragment of :func:`fragment` moved in time by ``by`` ticks."""
     (time,) = struct.unpack_from(">Q", frame, _TFDT_AT)
     return frame[:_TFDT_AT] + struct.pack(">Q", time + by) + frame[_TFDT_AT + 8 :]
 
 
 def sample_of(frame: bytes) -> bytes:
-    """Return the sample of a fragment of :func:`fragment` that has one."""
+    """Return the sample of a fragment of :func:`fragment` with a single sample."""
     (moof_bytes,) = struct.unpack_from(">I", frame)
     return frame[moof_bytes + 8 :]

@@ -1,4 +1,4 @@
-"""Boxes of MP4 (ISO/IEC 14496-12), and those that tracks of all kinds share."""
+"""Builders of MP4 boxes (ISO/IEC 14496-12) that video and audio tracks share."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import struct
 from collections.abc import Sequence
 
 _MATRIX = struct.pack(">9I", 0x10000, 0, 0, 0, 0x10000, 0, 0, 0, 0x40000000)
-"""Neither turned nor scaled."""
+"""The unity matrix: no rotation, no scaling."""
 
 
 def box(kind: str, *parts: bytes) -> bytes:
@@ -15,20 +15,20 @@ def box(kind: str, *parts: bytes) -> bytes:
     return struct.pack(">I", 8 + len(body)) + kind.encode("ascii") + body
 
 
-def full(kind: str, version: int, flags: int, body: bytes) -> bytes:
-    """Return a box that says its version and has flags (4.2)."""
+def full_box(kind: str, version: int, flags: int, body: bytes) -> bytes:
+    """Return a FullBox, which has version and flags (4.2)."""
     return box(kind, struct.pack(">I", version << 24 | flags), body)
 
 
 def movie_head(last: int) -> bytes:
-    """Return ``mvhd`` of a film whose tracks are numbered up to ``last``."""
+    """Return ``mvhd`` of a movie whose tracks are numbered up to ``last``."""
     head = struct.pack(">5I", 0, 0, 1000, 0, 0x10000) + struct.pack(">H", 0x100) + bytes(10)
-    return full("mvhd", 0, 0, head + _MATRIX + bytes(24) + struct.pack(">I", last + 1))
+    return full_box("mvhd", 0, 0, head + _MATRIX + bytes(24) + struct.pack(">I", last + 1))
 
 
 def track_defaults(track: int) -> bytes:
-    """Return ``trex`` of a track whose fragments say everything themselves."""
-    return full("trex", 0, 0, struct.pack(">5I", track, 1, 0, 0, 0))
+    """Return ``trex`` of a track whose fragments rely on no defaults."""
+    return full_box("trex", 0, 0, struct.pack(">5I", track, 1, 0, 0, 0))
 
 
 def track(
@@ -43,29 +43,29 @@ def track(
 ) -> bytes:
     """Return ``trak`` of a track whose samples are all in fragments.
 
-    ``head`` is the box of its kind (``vmhd``, ``smhd``), ``entry`` its sample entry; ``size`` is in pixels.
+    ``head`` is the media header box (``vmhd``, ``smhd``), ``entry`` the sample entry; ``size`` is in pixels.
     """
     width, height = size
     return box(
         "trak",
-        full("tkhd", 0, 3, struct.pack(">5I", 0, 0, number, 0, 0) + bytes(8)
+        full_box("tkhd", 0, 3, struct.pack(">5I", 0, 0, number, 0, 0) + bytes(8)
               + struct.pack(">4H", 0, 0, volume, 0) + _MATRIX
               + struct.pack(">2I", width << 16, height << 16)),
         box(
             "mdia",
-            full("mdhd", 0, 0, struct.pack(">4I2H", 0, 0, timescale, 0, 0x55C4, 0)),
-            full("hdlr", 0, 0, bytes(4) + handler + bytes(12) + b"MyView\x00"),
+            full_box("mdhd", 0, 0, struct.pack(">4I2H", 0, 0, timescale, 0, 0x55C4, 0)),
+            full_box("hdlr", 0, 0, bytes(4) + handler + bytes(12) + b"MyView\x00"),
             box(
                 "minf",
                 head,
-                box("dinf", full("dref", 0, 0, struct.pack(">I", 1) + full("url ", 0, 1, b""))),
+                box("dinf", full_box("dref", 0, 0, struct.pack(">I", 1) + full_box("url ", 0, 1, b""))),
                 box(
                     "stbl",
-                    full("stsd", 0, 0, struct.pack(">I", 1) + entry),
-                    full("stts", 0, 0, bytes(4)),
-                    full("stsc", 0, 0, bytes(4)),
-                    full("stsz", 0, 0, bytes(8)),
-                    full("stco", 0, 0, bytes(4)),
+                    full_box("stsd", 0, 0, struct.pack(">I", 1) + entry),
+                    full_box("stts", 0, 0, bytes(4)),
+                    full_box("stsc", 0, 0, bytes(4)),
+                    full_box("stsz", 0, 0, bytes(8)),
+                    full_box("stco", 0, 0, bytes(4)),
                 ),
             ),
         ),
@@ -75,14 +75,14 @@ def track(
 def moof_mdat(
     first: int, track_head: bytes, time: int, flags: int, entries: bytes, samples: Sequence[bytes]
 ) -> bytes:
-    """Return a fragment: ``moof``, and its samples in ``mdat``.
+    """Return a fragment: ``moof``, and the samples in ``mdat``.
 
-    ``first`` is the first sample's number, ``time`` its time, and ``track_head`` is ``tfhd``. ``flags`` and
-    ``entries`` are those of ``trun``: what is told of each sample, and that.
+    ``first`` is the first sample's number, ``time`` its decode time; ``track_head`` is ``tfhd``. ``flags``
+    and ``entries`` are those of ``trun``: the fields of each sample, and their values.
     """
-    # The sequence number only has to grow; taken from the sample's, a fragment fits into any stream.
-    header = full("mfhd", 0, 0, struct.pack(">I", (first + 1) & 0xFFFFFFFF))
-    of_track = track_head + full("tfdt", 1, 0, struct.pack(">Q", time))
+    # The sequence number only has to grow: taken from the sample's number, it fits into any stream.
+    header = full_box("mfhd", 0, 0, struct.pack(">I", (first + 1) & 0xFFFFFFFF))
+    of_track = track_head + full_box("tfdt", 1, 0, struct.pack(">Q", time))
     moof_bytes = 8 + len(header) + 8 + len(of_track) + 8 + 4 + 4 + 4 + len(entries)
-    run = full("trun", 0, flags, struct.pack(">Ii", len(samples), moof_bytes + 8) + entries)
+    run = full_box("trun", 0, flags, struct.pack(">Ii", len(samples), moof_bytes + 8) + entries)
     return box("moof", header, box("traf", of_track, run)) + box("mdat", *samples)

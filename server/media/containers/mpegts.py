@@ -1,9 +1,8 @@
-"""MPEG transport stream by hand (ISO/IEC 13818-1): one program, a video, perhaps a sound, on one clock.
+"""MPEG transport stream muxer (ISO/IEC 13818-1): one program with video and perhaps audio, on one clock.
 
-Each packet counts on from the one before of its stream (continuity_counter, modulo 16). So that a GOP is
-packed once however many watch, and any GOP can follow any other, each GOP is stretched by stuffing to a
-multiple of 16 packets: then all begin at 0. That is 7.5 packets a GOP on average, and no stream has bytes of
-its own.
+The packets of a PID are counted modulo 16 (continuity_counter). So that a GOP is packed once for all viewers,
+and any GOP can follow any other, each is stuffed to a multiple of 16 packets, so that all begin at 0. That
+costs 7.5 packets per GOP on average.
 """
 
 from __future__ import annotations
@@ -20,26 +19,26 @@ from server.media.rendering_messages import TIMESCALE
 
 PACKET_BYTES = 188
 COUNTERS = 16
-"""Packets after which the continuity counter begins anew."""
+"""Packets after which the continuity counter wraps around."""
 
-_PAT_PID, _PMT_PID, _VIDEO_PID, _SOUND_PID = 0x0000, 0x1000, 0x0100, 0x0101
+_PAT_PID, _PMT_PID, _VIDEO_PID, _AUDIO_PID = 0x0000, 0x1000, 0x0100, 0x0101
 _H264, _AAC = 0x1B, 0x0F
 """stream_type."""
 _CLOCK = 1 << 33
 """Time stamps are modulo this (2.4.3.7)."""
 _DELAY = TIMESCALE // 5
-"""How long before it is shown a picture is on its way: the time reference is as far behind."""
+"""How far the program clock reference is behind the presentation time: the decoder's buffering delay."""
 _PCR_EVERY = TIMESCALE // 10
-"""The time reference comes at least that often (2.7.2)."""
+"""The longest interval of the program clock reference (2.7.2)."""
 _PAYLOAD = PACKET_BYTES - 4
 _PCR_FIELD = 8
-"""Bytes of an adaptation field with a time reference."""
+"""Bytes of an adaptation field with a program clock reference."""
 _AUD = b"\x00\x00\x00\x01\x09\xf0"
 """Access unit delimiter: begins every picture in a transport stream (2.14.1)."""
 _START_CODE = b"\x00\x00\x00\x01"
 _PES_HEAD = 14
 _FRAMES_AT_ONCE = 6
-"""Frames of sound in a PES packet, which has to say how long it is: in 16 bits."""
+"""Audio frames per PES packet, whose length field has 16 bits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,40 +47,40 @@ class ContinuityCounters:
 
     tables: int = 0
     video: int = 0
-    sound: int = 0
+    audio: int = 0
     whole: bool = True
-    """Stretch it to a multiple of 16 packets, so that any other can follow."""
+    """Whether to stuff to a multiple of 16 packets, so that any GOP can follow."""
 
 
 def count_packets(picture: EncodedPicture) -> int:
-    """Return how many packets with content a picture becomes; packing it is not needed for that."""
+    """Return the number of packets of a picture, without those of stuffing alone; nothing is packed."""
     return _packets(_PES_HEAD + len(_AUD) + len(picture.sample))
 
 
-def count_audio_packets(heard: AudioChunk) -> int:
-    """Return how many packets with content some sound becomes; there is none of Opus here."""
-    return sum(_plain_packets(len(content)) for content in _sound_pes(heard))
+def count_audio_packets(audio: AudioChunk) -> int:
+    """Return the number of packets of some audio; 0 for Opus, which is left out."""
+    return sum(_plain_packets(len(content)) for content in _audio_pes(audio))
 
 
 def pack(
     pictures: Sequence[EncodedPicture],
     fps: float,
     counters: ContinuityCounters,
-    heard: AudioChunk | None = None,
+    audio: AudioChunk | None = None,
 ) -> bytes:
-    """Return consecutive pictures as packets, behind what is to be heard with them, if that is AAC.
+    """Return consecutive pictures as packets, behind their audio if that is AAC.
 
-    The tables come before each whole GOP and each key picture.
+    The tables precede each whole GOP and each keyframe.
     """
     out: list[bytes] = []
-    heard = heard if heard is not None and heard.format.coding == "aac" else None
+    audio = audio if audio is not None and audio.format.coding == "aac" else None
     if counters.whole or pictures[0].key:
         out += [
             _table(_PAT_PID, _PAT, counters.tables),
-            _table(_PMT_PID, _PMT if heard is None else _PMT_WITH_SOUND, counters.tables),
+            _table(_PMT_PID, _PMT if audio is None else _PMT_WITH_AUDIO, counters.tables),
         ]
-    if heard is not None:
-        out += _pack_sound(heard, counters)
+    if audio is not None:
+        out += _pack_audio(audio, counters)
     counter = counters.video
     for place, picture in enumerate(pictures):
         content = _pes(picture, fps)
@@ -89,34 +88,34 @@ def pack(
         if counters.whole and place == len(pictures) - 1:
             count += -(counter + count) % COUNTERS
         time = ticks(picture.pulse, fps)
-        out += _split(_VIDEO_PID, content, count, counter, _reference(time, key=picture.key))
+        out += _split(_VIDEO_PID, content, count, counter, _clock_reference(time, key=picture.key))
         counter = (counter + count) % COUNTERS
         for later in range(time + _PCR_EVERY, ticks(picture.until, fps), _PCR_EVERY):
-            out.append(_packet(_VIDEO_PID, counter - 1, b"", _reference(later)))
+            out.append(_packet(_VIDEO_PID, counter - 1, b"", _clock_reference(later)))
     return b"".join(out)
 
 
-def _pack_sound(heard: AudioChunk, counters: ContinuityCounters) -> Iterator[bytes]:
-    counter, contents = counters.sound, _sound_pes(heard)
+def _pack_audio(audio: AudioChunk, counters: ContinuityCounters) -> Iterator[bytes]:
+    counter, contents = counters.audio, _audio_pes(audio)
     for place, content in enumerate(contents):
         count = _plain_packets(len(content))
         if counters.whole and place == len(contents) - 1:
             count += -(counter + count) % COUNTERS
-        yield from _split(_SOUND_PID, content, count, counter, b"")
+        yield from _split(_AUDIO_PID, content, count, counter, b"")
         counter = (counter + count) % COUNTERS
 
 
-def _sound_pes(heard: AudioChunk) -> list[bytes]:
-    """Return sound as PES packets, each frame behind its ADTS head."""
-    form, made = heard.format, list[bytes]()
-    for place in range(0, len(heard.frames) if form.coding == "aac" else 0, _FRAMES_AT_ONCE):
-        stamp = _stamp(round((heard.first + place) * form.samples * TIMESCALE / form.rate) % _CLOCK)
-        frames = heard.frames[place : place + _FRAMES_AT_ONCE]
+def _audio_pes(audio: AudioChunk) -> list[bytes]:
+    """Return audio as PES packets, each frame behind its ADTS header."""
+    form, packets = audio.format, list[bytes]()
+    for place in range(0, len(audio.frames) if form.coding == "aac" else 0, _FRAMES_AT_ONCE):
+        stamp = _stamp(round((audio.first + place) * form.samples * TIMESCALE / form.rate) % _CLOCK)
+        frames = audio.frames[place : place + _FRAMES_AT_ONCE]
         content = b"".join(form.adts(len(frame)) + frame for frame in frames)
-        made.append(
+        packets.append(
             struct.pack(">IHBBB", 0x1C0, 3 + len(stamp) + len(content), 0x84, 0x80, 5) + stamp + content
         )
-    return made
+    return packets
 
 
 def _plain_packets(content: int) -> int:
@@ -128,12 +127,12 @@ def _packets(content: int) -> int:
 
 
 def _pes(picture: EncodedPicture, fps: float) -> bytes:
-    """Return a picture as a PES packet (2.4.3.6) with its time, and with its length where that fits."""
+    """Return a picture as a PES packet (2.4.3.6) with its time, and its length if that fits."""
     time = ticks(picture.pulse, fps) % _CLOCK
     stamp = _stamp(time)
     content = _AUD + b"".join(_annex_b(picture.sample))
     length = 3 + len(stamp) + len(content)
-    # 0x84: the access unit begins right here; 0x80: it is decoded when it is shown.
+    # 0x84: data_alignment_indicator; 0x80: a PTS, but no DTS.
     head = struct.pack(">IHBBB", 0x1E0, length if length < 1 << 16 else 0, 0x84, 0x80, len(stamp))
     return head + stamp + content
 
@@ -148,17 +147,17 @@ def _annex_b(sample: bytes) -> Iterator[bytes]:
         yield unit
 
 
-def _reference(time: int, *, key: bool = False) -> bytes:
-    """Return an adaptation field's flags and time reference (2.4.3.4)."""
+def _clock_reference(time: int, *, key: bool = False) -> bytes:
+    """Return an adaptation field's flags and program clock reference (2.4.3.4)."""
     base = (time - _DELAY) % _CLOCK
     return struct.pack(">BIH", 0x10 | 0x40 * key, base >> 1, (base & 1) << 15 | 0x7E00)
 
 
-def _split(pid: int, content: bytes, count: int, counter: int, reference: bytes) -> Iterator[bytes]:
-    """Spread the content over so many packets: full ones first, and at least a byte in each."""
+def _split(pid: int, content: bytes, count: int, counter: int, clock_reference: bytes) -> Iterator[bytes]:
+    """Yield ``count`` packets of the content: full ones first, and at least one byte in each."""
     at = 0
     for place in range(count):
-        field = reference if place == 0 else b""
+        field = clock_reference if place == 0 else b""
         room = _PAYLOAD - (1 + len(field) if field else 0)
         size = min(room, len(content) - at - (count - 1 - place))
         yield _packet(pid, counter + place, content[at : at + size], field, begins=place == 0)
@@ -201,4 +200,4 @@ def _crc(data: bytes) -> int:
 _PAT = _section(0, 1, struct.pack(">HH", 1, 0xE000 | _PMT_PID))
 _STREAMS = struct.pack(">HHBHH", 0xE000 | _VIDEO_PID, 0xF000, _H264, 0xE000 | _VIDEO_PID, 0xF000)
 _PMT = _section(2, 1, _STREAMS)
-_PMT_WITH_SOUND = _section(2, 1, _STREAMS + struct.pack(">BHH", _AAC, 0xE000 | _SOUND_PID, 0xF000))
+_PMT_WITH_AUDIO = _section(2, 1, _STREAMS + struct.pack(">BHH", _AAC, 0xE000 | _AUDIO_PID, 0xF000))

@@ -1,7 +1,7 @@
-"""WebM by hand (RFC 9559, in EBML, RFC 8794): a header without an end, and clusters that stand alone.
+"""WebM muxer (RFC 9559, in EBML, RFC 8794): a header of unknown length, and one cluster per frame.
 
-Every frame is a cluster of its own, which costs some twenty bytes. In return it carries its own time, as a
-fragment of MP4 does, and any can follow any: a cluster that holds a GOP would have to know what is in it.
+A cluster costs some twenty bytes. In return each frame carries its own time, as an MP4 fragment does, and can
+follow any other.
 """
 
 from __future__ import annotations
@@ -9,28 +9,28 @@ from __future__ import annotations
 import struct
 
 TICKS = 1000
-"""Ticks a second: WebM counts in milliseconds."""
+"""Ticks per second: WebM counts in milliseconds."""
 
 _UNKNOWN = b"\x01" + b"\xff" * 7
-"""A size that is not known (RFC 8794, 6.2): a live stream has no end."""
+"""The unknown size (RFC 8794, 6.2), of a live stream."""
 CLUSTER = b"\x1f\x43\xb6\x75"
-"""What each frame begins with."""
+"""The element ID of a cluster."""
 _SEGMENT = b"\x18\x53\x80\x67"
 _TIMESTAMP, _SIMPLE_BLOCK, _BLOCK_GROUP, _BLOCK = b"\xe7", b"\xa3", b"\xa0", b"\xa1"
 _BLOCK_DURATION, _REFERENCE = b"\x9b", b"\xfb"
 _TRACK = b"\x81"
 _KEY = 0x80
 _TIME_AT = len(CLUSTER) + 4 + len(_TIMESTAMP) + 1
-"""Where the time stands: behind the heads of the cluster and of the time itself."""
+"""The offset of the time: behind the headers of the cluster and of the time itself."""
 
 
 def ticks(pulse: int, fps: float) -> int:
-    """Return the presentation time of a pulse; from it the pulse can be told up to 500 frames a second."""
+    """Return the presentation time of a pulse in ticks, unique up to 500 frames per second."""
     return round(pulse * TICKS / fps)
 
 
 def header(width: int, height: int, fps: float, frames: int | None = None) -> bytes:
-    """Return what a player needs before the first cluster; ``frames`` is how many there will be, if known."""
+    """Return the initialization segment; ``frames`` is the length of a file, None for a live stream."""
     info = _number(b"\x2a\xd7\xb1", 1_000_000_000 // TICKS) + _text(b"\x4d\x80", "MyView")
     info += _text(b"\x57\x41", "MyView")
     if frames is not None:
@@ -57,17 +57,17 @@ def header(width: int, height: int, fps: float, frames: int | None = None) -> by
     ))  # fmt: skip
 
 
-def cluster(frame: bytes, pulse: int, fps: float, *, key: bool, lasts: int = 1) -> bytes:
-    """Return a frame as a cluster; one that lasts for more than a pulse says so."""
+def cluster(frame: bytes, pulse: int, fps: float, *, key: bool, duration: int = 1) -> bytes:
+    """Return a frame as a cluster; ``duration`` in pulses is stated if it is more than one."""
     time = ticks(pulse, fps)
-    head = _TRACK + struct.pack(">h", 0)  # of the track, at the cluster's own time
-    if lasts == 1:
+    head = _TRACK + struct.pack(">h", 0)  # at the cluster's own time
+    if duration == 1:
         block = _element(_SIMPLE_BLOCK, head + bytes([_KEY * key]) + frame)
     else:
         inside = _element(_BLOCK, head + b"\x00" + frame)
-        inside += _number(_BLOCK_DURATION, ticks(pulse + lasts, fps) - time)
+        inside += _number(_BLOCK_DURATION, ticks(pulse + duration, fps) - time)
         if not key:
-            inside += _element(_REFERENCE, struct.pack(">b", -1))  # the frame before, whenever that was
+            inside += _element(_REFERENCE, struct.pack(">b", -1))  # any earlier time means the frame before
         block = _element(_BLOCK_GROUP, inside)
     return CLUSTER + _size(8 + 2 + len(block)) + _TIMESTAMP + b"\x88" + struct.pack(">Q", time) + block
 
@@ -79,7 +79,7 @@ def pulse_of(frame: bytes, fps: float) -> int:
 
 
 def shift_cluster(frame: bytes, by: int) -> bytes:
-    """Move a cluster of :func:`cluster` in time by so many ticks."""
+    """Return a cluster of :func:`cluster` moved in time by ``by`` ticks."""
     (time,) = struct.unpack_from(">Q", frame, _TIME_AT)
     return frame[:_TIME_AT] + struct.pack(">Q", time + by) + frame[_TIME_AT + 8 :]
 
@@ -97,5 +97,5 @@ def _text(name: bytes, value: str) -> bytes:
 
 
 def _size(size: int) -> bytes:
-    """Return a size in four bytes, always: so the time of a cluster stands at one place."""
+    """Return a size, always in four bytes, so that the time of a cluster has a fixed offset."""
     return (size | 1 << 28).to_bytes(4, "big")

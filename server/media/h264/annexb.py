@@ -1,4 +1,4 @@
-"""As much of H.264's byte stream as splicing needs (ITU-T H.264, Annex B)."""
+"""NAL units of H.264 in byte streams and MP4 samples (ITU-T H.264, Annex B; ISO/IEC 14496-15)."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ NAL_PPS = 8
 NAL_AUD = 9
 
 _SPS_MIN_BYTES = 4
-"""NAL header, profile, constraint flags and level: what a decoder's configuration record repeats."""
-_SET_MOST_BYTES = 0xFFFF
-"""What the record can say of a set's length."""
+"""NAL header, profile, constraint flags and level, which the decoder configuration record repeats."""
+_SET_MAX_BYTES = 0xFFFF
+"""The record's length field has 16 bits."""
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterSets:
-    """What a decoder must know before the first picture."""
+    """Sequence and picture parameter sets, which a decoder needs before the first picture."""
 
     sps: bytes
     pps: bytes
     may_change: bool = False
-    """A stream that begins with these may go on with others, which stand in its key pictures."""
+    """Whether the stream may change to others, which its keyframes carry."""
 
     @property
     def entry(self) -> str:
@@ -53,13 +53,13 @@ def nal_units(access_unit: bytes) -> list[bytes]:
     return [unit for unit in units if unit]
 
 
-def split_sample(join_sample: bytes) -> list[bytes]:
-    """Split an MP4 sample into its NAL units; what is no whole one is left out."""
+def split_sample(sample: bytes) -> list[bytes]:
+    """Split an MP4 sample into its NAL units; an incomplete one is left out."""
     units, at = [], 0
-    while at + 4 <= len(join_sample):
-        end = at + 4 + int.from_bytes(join_sample[at : at + 4], "big")
-        if at + 4 < end <= len(join_sample):
-            units.append(join_sample[at + 4 : end])
+    while at + 4 <= len(sample):
+        end = at + 4 + int.from_bytes(sample[at : at + 4], "big")
+        if at + 4 < end <= len(sample):
+            units.append(sample[at + 4 : end])
         at = end
     return units
 
@@ -70,17 +70,17 @@ def nal_type(unit: bytes) -> int:
 
 
 def parameter_sets(units: list[bytes]) -> ParameterSets | None:
-    """Find the sequence and picture parameter sets among NAL units, or None where one is missing."""
+    """Return the parameter sets among NAL units; None if one is missing or invalid."""
     sps = next((unit for unit in units if nal_type(unit) == NAL_SPS), None)
     pps = next((unit for unit in units if nal_type(unit) == NAL_PPS), None)
-    if sps is None or pps is None or len(sps) < _SPS_MIN_BYTES or max(len(sps), len(pps)) > _SET_MOST_BYTES:
+    if sps is None or pps is None or len(sps) < _SPS_MIN_BYTES or max(len(sps), len(pps)) > _SET_MAX_BYTES:
         return None
     return ParameterSets(sps, pps)
 
 
 def join_sample(units: list[bytes]) -> bytes:
-    """Return the units as an MP4 sample: each behind its length (ISO/IEC 14496-15, 5.3.2).
+    """Return NAL units as an MP4 sample, length-prefixed (ISO/IEC 14496-15, 5.3.2).
 
-    Parameter sets stay in the sample: they cost some bytes a GOP, and a decoder that joins at a cut is right.
+    Parameter sets stay in the sample: a decoder that joins at a cut needs them.
     """
     return b"".join(len(unit).to_bytes(4, "big") + unit for unit in units if nal_type(unit) != NAL_AUD)

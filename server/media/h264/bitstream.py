@@ -1,4 +1,4 @@
-"""Bits of H.264's syntax, read and written (ITU-T H.264, 7.2, 7.4.1 and 9.1)."""
+"""Reads and writes bits of H.264 syntax (ITU-T H.264, 7.2, 7.4.1 and 9.1)."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ _TO_ESCAPE = re.compile(b"\x00\x00(?=[\x00-\x03])")
 
 
 def unescape_payload(unit: bytes) -> bytes:
-    """Return a NAL unit's payload: without its head, and without the bytes that keep start codes out."""
+    """Return a NAL unit's payload, without header and emulation prevention bytes."""
     return _ESCAPED.sub(b"\x00\x00", unit[1:])
 
 
 def escape_payload(head: int, payload: bytes) -> bytes:
-    """Return the NAL unit of a payload, escaped so that no start code is in it."""
+    """Return the NAL unit of a payload, with emulation prevention bytes."""
     return bytes([head]) + _TO_ESCAPE.sub(b"\x00\x00\x03", payload)
 
 
 class BitReader:
-    """Reads a payload from its first bit on.
+    """Reads a payload bit by bit.
 
     Raises:
-        ValueError: in every method, when the bits are at an end.
+        ValueError: in every method, at the end of the bits.
     """
 
     def __init__(self, payload: bytes) -> None:
@@ -30,18 +30,18 @@ class BitReader:
         self._at = 0
 
     def u(self, count: int) -> int:
-        """Read an unsigned number of so many bits."""
-        taken = self._bits[self._at : self._at + count]
-        if len(taken) < count:
-            raise ValueError("the bits are at an end")
+        """Read an unsigned number of ``count`` bits."""
+        bits = self._bits[self._at : self._at + count]
+        if len(bits) < count:
+            raise ValueError("no bits are left")
         self._at += count
-        return int(taken, 2) if count else 0
+        return int(bits, 2) if count else 0
 
     def ue(self) -> int:
         """Read an unsigned Exp-Golomb number."""
         one = self._bits.find("1", self._at)
         if one < 0:
-            raise ValueError("the bits are at an end")
+            raise ValueError("no bits are left")
         zeros = one - self._at
         self._at = one
         return self.u(zeros + 1) - 1
@@ -60,18 +60,18 @@ class BitWriter:
         self._count = 0
 
     def u(self, count: int, value: int) -> None:
-        """Write an unsigned number in so many bits."""
+        """Write an unsigned number in ``count`` bits."""
         self._bits.append(f"{value:0{count}b}")
         self._count += count
 
     def copy(self, text: str) -> None:
-        """Write bits that are zeros and ones in a text."""
+        """Write bits given as text of zeros and ones."""
         self._bits.append(text)
         self._count += len(text)
 
     @property
     def text(self) -> str:
-        """The bits so far, as zeros and ones."""
+        """The bits so far, as text of zeros and ones."""
         return "".join(self._bits)
 
     def ue(self, value: int) -> None:
@@ -87,7 +87,7 @@ class BitWriter:
         while self._count % 8:
             self.u(1, bit)
 
-    def done(self) -> bytes:
-        """Return all whole bytes; call :meth:`align` before."""
+    def to_bytes(self) -> bytes:
+        """Return the bytes; call :meth:`align` before."""
         bits = self.text
         return bytes(int(bits[at : at + 8], 2) for at in range(0, len(bits), 8))

@@ -1,4 +1,4 @@
-"""Written in H.264's arithmetic code (9.3.4): slices of nothing but skipped macroblocks, or grey ones."""
+"""CABAC encoder (ITU-T H.264, 9.3.4) for slices of skipped macroblocks, or of gray ones."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from functools import lru_cache
 from server.media.h264.bitstream import BitWriter
 
 SLICE_QP = 51
-"""The quantiser at which being skipped is what the code thinks likeliest from the start."""
+"""The quantizer at which the initial context makes skipping most probable."""
 _SKIPPED = (23, 33)
 """m and n of mb_skip_flag with cabac_init_idc 0 (table 9-13)."""
 # m and n of an I slice: mb_type (table 9-12), mb_qp_delta, intra_chroma_pred_mode and coded_block_flag of the
 # luma's DC (tables 9-17 and 9-18).
 _MB_TYPE = ((20, -15), (2, 54), (3, 74))
-"""By how many neighbours, left and above, are predicted as a whole."""
+"""By the number of I_16x16 neighbors, left and above."""
 _LUMA_AC, _CHROMA, _MODE_HIGH, _MODE_LOW = (-28, 127), (-23, 104), (-1, 54), (7, 51)
 _QP_DELTA, _CHROMA_MODE = (0, 41), (-9, 83)
 _LUMA_DC = ((-17, 123), (-12, 115), (-16, 122), (-11, 115))
-"""By 1 for no neighbour on the left, and 2 for none above."""
+"""By 1 for no neighbor on the left, plus 2 for none above."""
 _STATES = 64
 # rangeTabLPS (table 9-44), by pStateIdx.
 _RANGE_LPS = (
@@ -51,13 +51,13 @@ _HALF, _QUARTER = 0x200, 0x100
 
 @lru_cache(maxsize=4)
 def skipped_slice(macroblocks: int) -> str:
-    """Encode ``count`` skipped macroblocks, the end of the slice and rbsp_stop_one_bit, byte-aligned.
+    """Return the slice data of skipped macroblocks, with the end of the slice and rbsp_stop_one_bit.
 
-    They are the same in every picture of a size; coding them takes milliseconds.
+    It is the same in every picture of a size, and cached: coding takes milliseconds.
     """
     bits = BitWriter()
     coder = _Coder(bits)
-    skipped = _Context(_SKIPPED)  # neighbours are skipped too, so there is one context only
+    skipped = _Context(_SKIPPED)  # neighbors are skipped, too: there is only one context
     for left in range(macroblocks - 1, -1, -1):
         coder.put(1, skipped)
         coder.terminate(end=left == 0)
@@ -65,11 +65,11 @@ def skipped_slice(macroblocks: int) -> str:
 
 
 @lru_cache(maxsize=4)
-def grey_slice(width: int, height: int) -> str:
-    """Return the slice data of an I slice of a mid-grey picture, likewise; sides in macroblocks.
+def gray_slice(width: int, height: int) -> str:
+    """Return the slice data of an I slice of a mid-gray picture; sides in macroblocks.
 
-    Every macroblock is I_16x16 predicted by the mean of its neighbours (mode 2), without a residue: where
-    there are no neighbours that is mid-grey, and so it is everywhere (8.3.3.3).
+    Every macroblock is I_16x16 with DC prediction and no residual: mid-gray where there are no neighbors, and
+    thus everywhere (8.3.3.3).
     """
     bits = BitWriter()
     coder = _Coder(bits)
@@ -92,12 +92,12 @@ def grey_slice(width: int, height: int) -> str:
 
 
 class _Context:
-    """What the code thinks of one kind of bit: which value is likely, and how much."""
+    """The probability model of one kind of bit: its more probable value, and the state."""
 
     __slots__ = ("likely", "state")
 
     def __init__(self, begin: tuple[int, int]) -> None:
-        """Begin with m and n of the tables, at :data:`SLICE_QP` (9.3.1.1)."""
+        """Initialize from m and n of the tables, at :data:`SLICE_QP` (9.3.1.1)."""
         start = min(max(1, (begin[0] * SLICE_QP >> 4) + begin[1]), 2 * _STATES - 2)
         self.likely = int(start >= _STATES)
         self.state = start - _STATES if self.likely else _STATES - 1 - start
@@ -108,7 +108,7 @@ def _contexts(begin: Sequence[tuple[int, int]]) -> list[_Context]:
 
 
 class _Coder:
-    """The encoder of 9.3.4.2."""
+    """The arithmetic encoder of 9.3.4.2."""
 
     def __init__(self, bits: BitWriter) -> None:
         self._bits = bits
@@ -116,7 +116,7 @@ class _Coder:
         self._first, self._outstanding = True, 0
 
     def put(self, bit: int, context: _Context) -> None:
-        """Code a bit, and learn from it."""
+        """Encode a bit, and update its context."""
         unlikely = _RANGE_LPS[context.state][self._range >> 6 & 3]
         self._range -= unlikely
         if bit == context.likely:
@@ -127,21 +127,21 @@ class _Coder:
             if context.state == 0:
                 context.likely = 1 - context.likely
             context.state = _AFTER_UNLIKELY[context.state]
-        self._renormalise()
+        self._renormalize()
 
     def terminate(self, *, end: bool) -> None:
-        """Code end_of_slice_flag, or that a macroblock is not I_PCM."""
+        """Encode end_of_slice_flag, or that a macroblock is not I_PCM."""
         self._range -= 2
         if not end:
-            self._renormalise()
+            self._renormalize()
             return
         self._low += self._range
         self._range = 2
-        self._renormalise()
+        self._renormalize()
         self._put(self._low >> 9 & 1)
         self._bits.u(2, self._low >> 7 & 3 | 1)
 
-    def _renormalise(self) -> None:
+    def _renormalize(self) -> None:
         while self._range < _QUARTER:
             if self._low < _QUARTER:
                 self._put(0)

@@ -1,7 +1,7 @@
-"""A picture that repeats the one before it, written by hand: for where no camera can be shown.
+"""Writes an H.264 picture that repeats the one before it, to fill a gap in a stream.
 
 It is a P picture in which every macroblock is skipped (ITU-T H.264, 7.3.4): some ten bytes, pixel for pixel
-the picture before. The parameter sets say how it must be written.
+the picture before. The parameter sets determine the format of its slice header.
 """
 
 from __future__ import annotations
@@ -14,32 +14,32 @@ from server.media.h264.annexb import NAL_IDR, NAL_SLICE, ParameterSets, nal_type
 from server.media.h264.bitstream import BitReader, BitWriter, escape_payload, unescape_payload
 
 _HIGH_PROFILES = frozenset({44, 83, 86, 100, 110, 118, 122, 128, 134, 135, 138, 139, 244})
-"""Those whose sequence parameter set says more of colours (7.3.2.1.1)."""
+"""Profiles whose sequence parameter set has chroma_format_idc and more (7.3.2.1.1)."""
 _LENGTH_BYTES = 4
 _SLICE_P = 5
 """slice_type of a picture all of whose slices are P."""
 _REFERENCE = 0x40 | NAL_SLICE
-"""NAL head with nal_ref_idc 2."""
+"""NAL header with nal_ref_idc 2."""
 _ORDER_BY_NUMBERS, _ORDER_BY_DECODING = 0, 2
-"""pic_order_cnt_type: each picture says its place, or, of an encoder without B pictures, need not."""
-_MOST_MACROBLOCKS = 139_264
-"""Of a picture at the highest level there is (table A-1); writing a picture takes time for each."""
-_MOST_FRAME_NUM_BITS = 16
-"""Also of pic_order_cnt_lsb."""
+"""pic_order_cnt_type: explicit in each picture, or the decoding order (no B pictures)."""
+_MAX_MACROBLOCKS = 139_264
+"""Macroblocks of a picture at the highest level (table A-1): bounds the time to write one."""
+_MAX_FRAME_NUM_BITS = 16
+"""Also the limit of pic_order_cnt_lsb."""
 
 
 class UnsupportedParametersError(Exception):
-    """Pictures of these parameter sets cannot be repeated: they use what a site's cameras never do."""
+    """The parameter sets are damaged or use features that are not supported here."""
 
 
 @dataclass(frozen=True, slots=True)
-class SliceHeadFormat:
-    """The format of a slice header, by the parameter sets.
+class SliceHeaderFormat:
+    """The fields of slice headers, according to the parameter sets.
 
     Attributes:
         width, height: of a picture, in macroblocks.
-        order_bits: of pic_order_cnt_lsb; 0: pictures are shown in the order in which they are decoded.
-        order_of_fields: the second field's place is said as well.
+        order_bits: bits of pic_order_cnt_lsb; 0: the output order is the decoding order.
+        order_of_fields: bottom_field_pic_order_in_frame_present_flag.
     """
 
     pps_id: int
@@ -56,14 +56,14 @@ class SliceHeadFormat:
 
     @property
     def macroblocks(self) -> int:
-        """How many macroblocks a picture has."""
+        """The number of macroblocks of a picture."""
         return self.width * self.height
 
     def frame_num(self, sample: bytes) -> int:
-        """Return frame_num of a picture, length-prefixed NAL units.
+        """Return frame_num of a sample, length-prefixed NAL units.
 
         Raises:
-            ValueError: there is no picture in it.
+            ValueError: it contains no picture.
         """
         at = 0
         while at + _LENGTH_BYTES < len(sample):
@@ -77,14 +77,14 @@ class SliceHeadFormat:
         raise ValueError("a sample without a picture")
 
     def next_num(self, frame_num: int) -> int:
-        """Return the frame_num that follows."""
+        """Return the frame_num after this one."""
         return (frame_num + 1) % (1 << self.frame_num_bits)
 
     def repeat(self, frame_num: int, *, reference: bool) -> bytes:
-        """Return a sample that shows the picture before again; it is number ``frame_num``.
+        """Return a sample that shows the previous picture again, with this ``frame_num``.
 
-        One that is no ``reference`` leaves the number to the next picture as well: it can be slipped in
-        between two pictures of a camera, but not two of them in a row (8.2.1.3).
+        A non-reference picture shares the number with the picture after it: one, but not two in a row, can be
+        inserted between two pictures of a camera (8.2.1.3).
         """
         bits = BitWriter()
         for value in (0, _SLICE_P, self.pps_id):
@@ -92,13 +92,13 @@ class SliceHeadFormat:
         bits.u(self.frame_num_bits, frame_num)
         if self.redundant:
             bits.ue(0)
-        bits.u(1, 1)  # num_ref_idx_active_override_flag: there is one reference, the newest picture
+        bits.u(1, 1)  # num_ref_idx_active_override_flag: one reference, the newest picture
         bits.ue(0)
         bits.u(1, 0)
         if self.weighted:
             for value in (0, 0):
                 bits.ue(value)
-            bits.u(2, 0)  # as if there were no weights
+            bits.u(2, 0)  # no weights
         if reference:
             bits.u(1, 0)
         if self.cabac:
@@ -113,28 +113,28 @@ class SliceHeadFormat:
             bits.ue(self.macroblocks)  # mb_skip_run
             bits.u(1, 1)
         bits.align(0)
-        unit = escape_payload(_REFERENCE if reference else NAL_SLICE, bits.done())
+        unit = escape_payload(_REFERENCE if reference else NAL_SLICE, bits.to_bytes())
         return len(unit).to_bytes(_LENGTH_BYTES, "big") + unit
 
 
-def parse_repeatable(parameters: ParameterSets) -> SliceHeadFormat:
-    """Parse the parameter sets of streams whose last picture can be repeated.
+def parse_repeatable(parameters: ParameterSets) -> SliceHeaderFormat:
+    """Parse the slice header format of streams whose last picture can be repeated.
 
     Raises:
-        UnsupportedParametersError: they are damaged, or use what x264 without B pictures does not.
+        UnsupportedParametersError: they are damaged, or use features that x264 without B pictures does not.
     """
-    found = parse_slice_head_format(parameters)
-    if found.order_bits:
-        raise UnsupportedParametersError("pictures may be shown in another order than they are decoded in")
-    return found
+    header_format = parse_slice_header_format(parameters)
+    if header_format.order_bits:
+        raise UnsupportedParametersError("the output order may differ from the decoding order")
+    return header_format
 
 
 @lru_cache(maxsize=8)
-def parse_slice_head_format(parameters: ParameterSets) -> SliceHeadFormat:
+def parse_slice_header_format(parameters: ParameterSets) -> SliceHeaderFormat:
     """Parse the format of slice headers from the parameter sets.
 
     Raises:
-        UnsupportedParametersError: they are damaged, or use what hardly any camera does.
+        UnsupportedParametersError: they are damaged, or use rare features.
     """
     try:
         sps = _read_sps(BitReader(unescape_payload(parameters.sps)))
@@ -144,8 +144,8 @@ def parse_slice_head_format(parameters: ParameterSets) -> SliceHeadFormat:
 
 
 @dataclass(frozen=True, slots=True)
-class _Sequence:
-    """What the sequence parameter set says; as in :class:`SliceHeadFormat`."""
+class _SequenceParameters:
+    """Fields of the sequence parameter set, as in :class:`SliceHeaderFormat`."""
 
     frame_num_bits: int
     width: int
@@ -153,39 +153,39 @@ class _Sequence:
     order_bits: int
 
 
-def _read_sps(bits: BitReader) -> _Sequence:
+def _read_sps(bits: BitReader) -> _SequenceParameters:
     profile = bits.u(8)
     bits.u(16)
     bits.ue()
     if profile in _HIGH_PROFILES:
-        colour, depth, chroma_depth = bits.ue(), bits.ue(), bits.ue()
-        if (colour, depth, chroma_depth) != (1, 0, 0):
+        chroma_format, depth, chroma_depth = bits.ue(), bits.ue(), bits.ue()
+        if (chroma_format, depth, chroma_depth) != (1, 0, 0):
             raise ValueError("not 8 bit 4:2:0")
         bits.u(1)
         if bits.u(1):
-            raise ValueError("with scaling lists")
+            raise ValueError("scaling lists")
     frame_num_bits = bits.ue() + 4
     order = bits.ue()
     if order not in (_ORDER_BY_NUMBERS, _ORDER_BY_DECODING):
-        raise ValueError("pictures are put in order by a rule")
+        raise ValueError("pic_order_cnt_type 1")
     order_bits = bits.ue() + 4 if order == _ORDER_BY_NUMBERS else 0
     bits.ue()
     bits.u(1)
     width, height = bits.ue() + 1, bits.ue() + 1
     if not bits.u(1):
         raise ValueError("interlaced")
-    if width * height > _MOST_MACROBLOCKS or max(frame_num_bits, order_bits) > _MOST_FRAME_NUM_BITS:
-        raise ValueError("beyond every level")
-    return _Sequence(frame_num_bits, width, height, order_bits)
+    if width * height > _MAX_MACROBLOCKS or max(frame_num_bits, order_bits) > _MAX_FRAME_NUM_BITS:
+        raise ValueError("beyond the highest level")
+    return _SequenceParameters(frame_num_bits, width, height, order_bits)
 
 
-def _read_pps(bits: BitReader, sps: _Sequence) -> SliceHeadFormat:
+def _read_pps(bits: BitReader, sps: _SequenceParameters) -> SliceHeaderFormat:
     pps_id = bits.ue()
     bits.ue()
     arithmetic = bool(bits.u(1))
     order_of_fields = bool(bits.u(1))
     if bits.ue():
-        raise ValueError("with slice groups")
+        raise ValueError("slice groups")
     bits.ue()
     bits.ue()
     weighted = bool(bits.u(1))
@@ -196,7 +196,7 @@ def _read_pps(bits: BitReader, sps: _Sequence) -> SliceHeadFormat:
     deblocking_control = bool(bits.u(1))
     bits.u(1)
     redundant = bool(bits.u(1))
-    return SliceHeadFormat(
+    return SliceHeaderFormat(
         pps_id=pps_id,
         frame_num_bits=sps.frame_num_bits,
         width=sps.width,

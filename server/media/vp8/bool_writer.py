@@ -1,19 +1,18 @@
-"""Bits of VP8's syntax, written."""
+"""Writes the entropy-coded bits of VP8."""
 
 from __future__ import annotations
 
-_AHEAD = 32
-"""Bits."""
+_PADDING_BITS = 32
 
 
 class BoolWriter:
-    """The boolean entropy encoder (RFC 6386, 7.3), on whole numbers of any length."""
+    """The boolean entropy encoder (RFC 6386, 7.3), on integers of any length."""
 
     def __init__(self) -> None:
         self._bottom, self._range, self._bits = 0, 255, 0
 
     def put(self, bit: int, probability: int) -> None:
-        """Write a bit that is 0 with a probability out of 256."""
+        """Write a bit; ``probability``, out of 256, is that of 0."""
         split = 1 + ((self._range - 1) * probability >> 8)
         if bit:
             self._bottom += split
@@ -26,13 +25,13 @@ class BoolWriter:
         self._bits += shift
 
     def number(self, bits: int, value: int) -> None:
-        """Write an unsigned number of so many bits, the highest first."""
+        """Write an unsigned number in ``bits`` bits, the highest first."""
         for place in reversed(range(bits)):
             self.put(value >> place & 1, 128)
 
-    def done(self) -> bytes:
-        """Return all bytes, and some more: decoders read ahead, and some take the end of it for damage."""
-        self.number(_AHEAD, 0)
+    def to_bytes(self) -> bytes:
+        """Return the bytes, padded: decoders read ahead, and some take the end of the data for damage."""
+        self.number(_PADDING_BITS, 0)
         bits = self._bits + 8
         spare = -bits % 8
         return (self._bottom << spare).to_bytes((bits + spare) // 8, "big")

@@ -1,7 +1,7 @@
-"""A VP8 picture that repeats the one before it, written by hand: for where no camera can be shown.
+"""Writes a VP8 frame that repeats the one before it, to fill a gap in a stream.
 
-It is an inter frame in which every macroblock is the last frame's, at the same place, without a residue
-(RFC 6386, 9 and 19). It changes nothing that another frame is decoded by.
+It is an inter frame in which every macroblock is the last frame's at the same place, without residual
+(RFC 6386, 9 and 19). It leaves the decoder's state as it is.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from functools import lru_cache
 from server.media.vp8.bool_writer import BoolWriter
 
 BLOCK = 16
-"""Pixels of a macroblock's side."""
+"""The side of a macroblock in pixels."""
 _HEADER_BITS = (
     (1, 0),  # segmentation_enabled
     (1, 0),  # filter_type
@@ -32,12 +32,12 @@ _HEADER_BITS = (
 SELDOM, OFTEN = 1, 255
 """Probabilities, out of 256, that a bit is 0."""
 _ZERO_MV = {0: 7, 2: 135, 5: 234}
-"""By how many neighbours have no motion, the nearer ones counted twice: that this block has none (8.3.3)."""
+"""The probability of a block without motion, by its still neighbors; near ones count twice (8.3.3)."""
 NO_TOKENS = bytes(4)
-"""The second partition, from which no bit is read: some decoders want it not to be empty."""
+"""The second partition, of which nothing is read; some decoders reject an empty one."""
 
-# Of each token probability, that it is not updated (13.4): a line for a plane's band, of its three contexts
-# the first numbers; what follows up to the eleventh is 255.
+# The probabilities that token probabilities are not updated (13.4): a line per plane and band, with the first
+# numbers of its three contexts; the rest, up to the eleventh, are 255.
 _COEFFICIENT_UPDATES = """
 ,,
 176 246,223 241 252,249 253 253
@@ -77,12 +77,12 @@ _MOTION_UPDATES = (
     *(237, 246, 253, 253, 254, 254, 254, 254, 254, 254, 254, 254, 254, 254, 250, 250, 252, 254, 254),
     *(231, 243, 245, 253, 254, 254, 254, 254, 254, 254, 254, 254, 254, 254, 251, 251, 254, 254, 254),
 )
-"""Of each probability of motion vectors, that it is not updated (17.2)."""
+"""The probabilities that motion vector probabilities are not updated (17.2)."""
 
 
 @lru_cache(maxsize=4)
 def repeat_frame(width: int, height: int) -> bytes:
-    """Return a frame of this size in pixels that shows the one before it again."""
+    """Return a frame of this size in pixels that shows the previous one again."""
     bits = frame_header(_HEADER_BITS)
     for probability in (SELDOM, SELDOM, OFTEN, OFTEN):  # prob_skip_false, _intra, _last, _gf
         bits.number(8, probability)
@@ -96,15 +96,15 @@ def repeat_frame(width: int, height: int) -> bytes:
             bits.put(0, OFTEN)  # mb_ref_frame_sel1: the last frame
             near = 2 * (row > 0) + 2 * (column > 0) + (row > 0 and column > 0)
             bits.put(0, _ZERO_MV[near])
-    first = bits.done()
-    # Not a key frame, version 0, shown; then the size of the first partition (9.1).
+    first = bits.to_bytes()
+    # Not a keyframe, version 0, shown; then the size of the first partition (9.1).
     return (1 | 1 << 4 | len(first) << 5).to_bytes(3, "little") + first + NO_TOKENS
 
 
 def frame_header(fields: Sequence[tuple[int, int]]) -> BoolWriter:
-    """Write a frame's header up to the token probabilities, which stay, and that macroblocks may be skipped.
+    """Write a frame header up to mb_no_skip_coeff; the token probabilities stay as they are.
 
-    ``fields`` are the number of bits and the value of each.
+    ``fields``: (number of bits, value) of each.
     """
     bits = BoolWriter()
     for count, value in fields:
@@ -116,7 +116,7 @@ def frame_header(fields: Sequence[tuple[int, int]]) -> BoolWriter:
 
 
 def _coefficient_updates() -> list[int]:
-    """Return of each token probability, in order, that it is not updated."""
+    """Return the probabilities that token probabilities are not updated, in order."""
     lines = _COEFFICIENT_UPDATES.strip().splitlines()
     contexts = [context.split() for line in lines for context in line.split(",")]
     return [int(it) for some in contexts for it in (some + ["255"] * _PER_CONTEXT)[:_PER_CONTEXT]]

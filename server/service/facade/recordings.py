@@ -144,29 +144,31 @@ class RecordingService:
     """Queries about what is kept."""
 
     def __init__(self, pipeline: BestViewPipeline) -> None:
-        self._pipeline, self._past = pipeline, pipeline.recorder
+        self._pipeline, self._recorder = pipeline, pipeline.recorder
 
     @property
     def end(self) -> int:
         """The pulse after the newest decided frame."""
-        return self._past.recent.end
+        return self._recorder.recent.end
 
     @property
     def status(self) -> RecordingStatus:
         """Whether streams are recorded to disk."""
-        writer = self._past.writer
+        writer = self._recorder.writer
         return RecordingStatus(writer is not None, "" if writer is None else writer.problem)
 
     def of_person(self, number: int, *, scoped: bool) -> RecordedStream:
         """Return what is kept of a person, ``scoped``: blanked where nobody saw them."""
-        pipeline, past = self._pipeline, self._past
+        pipeline, recorder = self._pipeline, self._recorder
         now = pipeline.decision_state.resolve(number)
         numbers = (number,) if number == now else (now, number)
         presence = None
         if scoped:
             fps = pipeline.config.site.fps
-            presence = PresenceHistory(past, numbers, round(pipeline.config.access.hide_after_s * fps), fps)
-        return RecordedStream(pipeline, PersonPlayback(past, numbers, presence), f"object {number}")
+            presence = PresenceHistory(
+                recorder, numbers, round(pipeline.config.access.hide_after_s * fps), fps
+            )
+        return RecordedStream(pipeline, PersonPlayback(recorder, numbers, presence), f"object {number}")
 
     def of_camera(self, camera: str) -> RecordedStream:
         """Return what is kept of a camera.
@@ -176,11 +178,11 @@ class RecordingService:
         """
         if camera not in self._pipeline.frame_buffers:
             raise UnknownCameraError(camera, self._pipeline.frame_buffers)
-        return RecordedStream(self._pipeline, CameraPlayback(self._past, camera), f"camera {camera}")
+        return RecordedStream(self._pipeline, CameraPlayback(self._recorder, camera), f"camera {camera}")
 
     def decisions(self, start: int, end: int) -> AsyncIterator[bytes]:
         """Return the choices about pulses ``start … end - 1``, each a line of JSON."""
-        return read_decision_lines(self._past, start, end)
+        return read_decision_lines(self._recorder, start, end)
 
     def pulse_at(self, moment: str, now: int) -> int:
         """Return the pulse that a text names: ``-60`` (seconds before pulse ``now``), ``p1250`` or ISO 8601.
@@ -199,12 +201,12 @@ class RecordingService:
     @property
     def viewers(self) -> int:
         """How many streams are watched in the past; those that have reached the present are not counted."""
-        return self._past.viewers
+        return self._recorder.viewers
 
     def viewer_joined(self) -> None:
         """Count a viewer of the past."""
-        self._past.viewers += 1
+        self._recorder.viewers += 1
 
     def viewer_left(self) -> None:
         """Count a viewer of the past no more."""
-        self._past.viewers -= 1
+        self._recorder.viewers -= 1

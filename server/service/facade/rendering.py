@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.media.rendering_messages import Still
+from server.media.rendering_messages import StillKind
 from server.service.rendering.mjpeg_streams import (
     CONTENT_TYPE,
     FIRST_BOUNDARY,
@@ -29,7 +29,7 @@ __all__ = [
     "PictureTimeoutError",
     "RenderPool",
     "RenderPoolFullError",
-    "Still",
+    "StillKind",
     "Subject",
     "multipart_part",
 ]

@@ -64,12 +64,14 @@ class StreamService:
     def init_segment(self) -> bytes | None:
         """Return the MP4 init segment that all streams share; None before the first keyframe."""
         config = self._pipeline.config
-        return self._pipeline.stream_format.head(config.site.size, config.site.fps, config.sound.format)
+        return self._pipeline.stream_format.init_segment(
+            config.site.size, config.site.fps, config.sound.format
+        )
 
     def webm_header(self) -> bytes | None:
         """Return the header of all WebM streams of a VP8 site; None before the first keyframe."""
         site = self._pipeline.config.site
-        return self._pipeline.stream_format.head(site.size, site.fps)
+        return self._pipeline.stream_format.init_segment(site.size, site.fps)
 
     @property
     def segment_plan(self) -> SegmentLayout:

@@ -84,8 +84,8 @@ class ServiceCollector(Collector):
         )
 
     def _recording(self) -> Iterable[Metric]:
-        past = self._pipeline.recorder
-        size, writer = past.folder.bytes if past.folder else 0, past.writer
+        recorder = self._pipeline.recorder
+        size, writer = recorder.folder.bytes if recorder.folder else 0, recorder.writer
         well = writer is not None and not writer.problem
         yield GaugeMetricFamily("myview_recording", "What is streamed is being recorded.", value=float(well))
         yield GaugeMetricFamily("myview_recorded_bytes", "Recorded, on the disk.", value=size)
@@ -109,7 +109,7 @@ class RenderingCollector(Collector):
         """Return all metrics as they are now."""
         rendering = self._rendering
         yield GaugeMetricFamily(
-            "myview_pictures", "People and cameras that are decoded now.", value=len(rendering.sources)
+            "myview_pictures", "People and cameras that are decoded now.", value=len(rendering.streams)
         )
         yield GaugeMetricFamily(
             "myview_pictures_viewers", "Streams of pictures being watched.", value=rendering.viewers

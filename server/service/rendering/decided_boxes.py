@@ -1,4 +1,4 @@
-"""The boxes of decided GOPs, to be drawn over their frames."""
+"""The boxes of the newest decided GOPs, for drawing them over the frames."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ class GopOverlay:
     """The boxes to draw over one GOP of one camera."""
 
     first: int
+    """The pulse of the first entry in ``boxes``."""
     boxes: Boxes
     chosen: int | None = None
+    """The person whose box is highlighted."""
 
 
 NO_OVERLAY = GopOverlay(0, [])
@@ -36,44 +38,44 @@ def first_pulse(fragments: bytes, fps: float) -> int:
 
 
 class DecidedBoxes:
-    """Keeps the newest ``gops`` decisions; ``resolve`` gives the number that a merged one goes by now."""
+    """Keeps the newest ``gops`` decisions; ``resolve`` returns the present number of a merged one."""
 
     def __init__(self, resolve: Callable[[int], int], fps: float, gops: int) -> None:
         self._resolve, self._fps = resolve, fps
-        self._kept: deque[GopChoices] = deque(maxlen=gops)
+        self._decisions: deque[GopChoices] = deque(maxlen=gops)
 
     def put(self, choices: GopChoices) -> None:
-        """Take a decision in."""
-        self._kept.append(choices)
+        """Add a decision."""
+        self._decisions.append(choices)
 
     @property
     def newest(self) -> int | None:
         """The last decided frame; None before the first decision."""
-        return self._kept[-1].first + self._kept[-1].frames - 1 if self._kept else None
+        return self._decisions[-1].first + self._decisions[-1].frames - 1 if self._decisions else None
 
-    def of_camera(self, camera: str, fragments: bytes) -> GopOverlay:
+    def overlay_of_camera(self, camera: str, fragments: bytes) -> GopOverlay:
         """Return all boxes in a camera's GOP."""
-        choices = self._of(fragments)
+        choices = self._decision_of(fragments)
         return NO_OVERLAY if choices is None else GopOverlay(choices.first, choices.boxes.get(camera, []))
 
-    def of_person(self, number: int, fragments: bytes, *, alone: bool = False) -> GopOverlay:
-        """Return all boxes in a GOP of a person's stream, and the person's number in it.
+    def overlay_of_person(self, number: int, fragments: bytes, *, scoped: bool = False) -> GopOverlay:
+        """Return all boxes in a GOP of a person's stream, and the number that the person had in it.
 
-        ``alone``: give no box but theirs, by any of their numbers.
+        ``scoped``: only the person's own boxes, by any of their numbers.
         """
-        choices = self._of(fragments)
+        choices = self._decision_of(fragments)
         if choices is None:
             return NO_OVERLAY
-        there = number if number in choices.choices else self._resolve(number)
-        camera = choices.choices.get(there)
+        chosen = number if number in choices.choices else self._resolve(number)
+        camera = choices.choices.get(chosen)
         if camera is None:
             return NO_OVERLAY
         boxes = choices.boxes.get(camera, [])
-        if alone:
+        if scoped:
             person = self._resolve(number)
             boxes = [[box for box in frame if self._resolve(box[0]) == person] for frame in boxes]
-        return GopOverlay(choices.first, boxes, there)
+        return GopOverlay(choices.first, boxes, chosen)
 
-    def _of(self, fragments: bytes) -> GopChoices | None:
+    def _decision_of(self, fragments: bytes) -> GopChoices | None:
         pulse = first_pulse(fragments, self._fps)
-        return next((it for it in self._kept if it.first <= pulse < it.first + it.frames), None)
+        return next((it for it in self._decisions if it.first <= pulse < it.first + it.frames), None)

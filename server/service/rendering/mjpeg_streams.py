@@ -1,37 +1,38 @@
-"""Series of JPEG: each picture at its moment, to whoever watches at a rate that it belongs to."""
+"""MJPEG streams: publishes JPEG pictures in real time, to the viewers at each rate."""
 
 from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
 
-from server.media.rendering_messages import Canvas, JpegPicture, RenderResult, is_in_series
+from server.media.rendering_messages import JpegPicture, RenderResult, RenderSettings, is_at_rate
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.subscriber_queue import BytesChunk, Subscriber
 
 
 class PicturePacer:
-    """Paces pictures; ``most`` is the longest a picture is held back, in seconds."""
+    """Paces pictures; ``max_delay_s`` is the longest time a picture is held back."""
 
-    def __init__(self, fps: float, most: float) -> None:
-        self._fps, self._most = fps, most
+    def __init__(self, fps: float, max_delay_s: float) -> None:
+        self._fps, self._max_delay_s = fps, max_delay_s
         self._zero: float | None = None
+        """When pulse 0 was due."""
 
     def due(self, pulse: int, now: float) -> float:
         """Return when to show a picture, in seconds of the clock of ``now``, at the rate of the pulses.
 
-        A picture that comes too late is shown now, and what follows is later by as much. What would have to
-        wait too long, since what lay between did not come, is shown now, and what follows is earlier.
+        A picture that is late is shown now, and later ones are delayed as much. One that would have to wait
+        too long, after a gap, is shown now, and later ones are that much earlier.
         """
-        after = pulse / self._fps
-        if self._zero is None or not now <= self._zero + after <= now + self._most:
-            self._zero = now - after
-        return self._zero + after
+        offset = pulse / self._fps
+        if self._zero is None or not now <= self._zero + offset <= now + self._max_delay_s:
+            self._zero = now - offset
+        return self._zero + offset
 
 
 CONTENT_TYPE = "multipart/x-mixed-replace; boundary=picture"
 FIRST_BOUNDARY = b"--picture\r\n"
-"""What the answer begins with."""
+"""The first line of the response body."""
 PULSE_HEADER = "X-MyView-Pulse"
 
 
@@ -45,24 +46,24 @@ def multipart_part(picture: JpegPicture) -> bytes:
     return "\r\n".join([*head, "", ""]).encode("ascii") + picture.data + b"\r\n" + FIRST_BOUNDARY
 
 
-_NEWEST = 1
-"""A viewer has one picture waiting at the most: the newest."""
-_KEPT_GOPS = 2
-"""So much is kept back at the most, to be shown in pace."""
+_QUEUE_PICTURES = 1
+"""At most one picture, the newest, waits for a viewer."""
+_MAX_DELAY_GOPS = 2
+"""How far pictures are held back at most to be shown in real time."""
 
 
 @dataclass(frozen=True, slots=True)
 class MjpegVariant:
-    """Pictures at one rate."""
+    """A rate, with or without boxes."""
 
     rate: float
-    """A second."""
+    """Pictures per second."""
     boxed: bool
 
 
 @dataclass(frozen=True, slots=True)
 class _ScheduledPicture:
-    """A picture and its moment."""
+    """A picture and the time to show it."""
 
     at: float
     picture: JpegPicture
@@ -70,61 +71,61 @@ class _ScheduledPicture:
 
 
 class MjpegStreams:
-    """All series of one stream. ``live`` pictures are shown as they come, others in pace."""
+    """All MJPEG variants of one stream. ``live`` pictures are shown as they arrive, others in real time."""
 
-    def __init__(self, canvas: Canvas, *, live: bool) -> None:
-        self._fps, self._live = canvas.fps, live
-        self._pace = PicturePacer(canvas.fps, _KEPT_GOPS * canvas.gop / canvas.fps)
-        self._waiting: deque[_ScheduledPicture] = deque(
-            maxlen=4 * _KEPT_GOPS * canvas.gop
-        )  # more than the pace keeps
-        self._channels: dict[MjpegVariant, Broadcaster] = {}
-        self._last = -1
+    def __init__(self, settings: RenderSettings, *, live: bool) -> None:
+        self._fps, self._live = settings.fps, live
+        self._pacer = PicturePacer(settings.fps, _MAX_DELAY_GOPS * settings.gop / settings.fps)
+        self._scheduled: deque[_ScheduledPicture] = deque(
+            maxlen=4 * _MAX_DELAY_GOPS * settings.gop
+        )  # more than the pacer holds back
+        self._broadcasters: dict[MjpegVariant, Broadcaster] = {}
+        self._newest = -1
         self._closed = False
 
     @property
     def viewers(self) -> int:
-        """How many are watching."""
-        return sum(channel.viewers for channel in self._channels.values())
+        """The number of viewers."""
+        return sum(broadcaster.viewers for broadcaster in self._broadcasters.values())
 
-    def join(self, series: MjpegVariant) -> Subscriber:
-        """Let a viewer in; call :meth:`leave` in the end."""
-        channel = self._channels.setdefault(series, Broadcaster(queue_gops=_NEWEST))
+    def subscribe(self, variant: MjpegVariant) -> Subscriber:
+        """Return a new subscriber; call :meth:`unsubscribe` in the end."""
+        broadcaster = self._broadcasters.setdefault(variant, Broadcaster(queue_gops=_QUEUE_PICTURES))
         if self._closed:
-            channel.close()
-        return channel.subscribe()
+            broadcaster.close()
+        return broadcaster.subscribe()
 
-    def leave(self, series: MjpegVariant, viewer: Subscriber) -> None:
-        """Let a viewer go."""
-        self._channels[series].unsubscribe(viewer)
-        if not self._channels[series].viewers:
-            del self._channels[series]
+    def unsubscribe(self, variant: MjpegVariant, subscriber: Subscriber) -> None:
+        """Remove a subscriber."""
+        self._broadcasters[variant].unsubscribe(subscriber)
+        if not self._broadcasters[variant].viewers:
+            del self._broadcasters[variant]
 
     def rates(self, *, boxed: bool) -> list[float]:
         """Return the rates that have viewers."""
-        return sorted({series.rate for series in self._channels if series.boxed is boxed})
+        return sorted({variant.rate for variant in self._broadcasters if variant.boxed is boxed})
 
-    def put(self, drawn: RenderResult, now: float) -> None:
-        """Take in what was drawn; ``now`` is in seconds by a clock that never steps."""
-        pictures = [(it, False) for it in drawn.plain] + [(it, True) for it in drawn.boxed]
+    def put(self, result: RenderResult, now: float) -> None:
+        """Schedule the pictures of a result; ``now`` is in seconds of a monotonic clock."""
+        pictures = [(it, False) for it in result.plain] + [(it, True) for it in result.boxed]
         for picture, boxed in sorted(pictures, key=lambda it: it[0].pulse):
-            if picture.pulse > self._last:
-                at = now if self._live else self._pace.due(picture.pulse, now)
-                self._waiting.append(_ScheduledPicture(at, picture, boxed))
-        self._last = max(self._last, drawn.newest)
+            if picture.pulse > self._newest:
+                at = now if self._live else self._pacer.due(picture.pulse, now)
+                self._scheduled.append(_ScheduledPicture(at, picture, boxed))
+        self._newest = max(self._newest, result.newest)
 
-    def show(self, now: float) -> float | None:
-        """Pass on what is due; give the moment of the next picture, None where none waits."""
-        while self._waiting and self._waiting[0].at <= now:
-            due = self._waiting.popleft()
+    def publish_due(self, now: float) -> float | None:
+        """Publish the pictures that are due; return when the next one is, None if there is none."""
+        while self._scheduled and self._scheduled[0].at <= now:
+            due = self._scheduled.popleft()
             chunk = BytesChunk(multipart_part(due.picture), random_access=True)
-            for series, channel in self._channels.items():
-                if series.boxed is due.boxed and is_in_series(due.picture.pulse, series.rate, self._fps):
-                    channel.publish(chunk)
-        return self._waiting[0].at if self._waiting else None
+            for variant, broadcaster in self._broadcasters.items():
+                if variant.boxed is due.boxed and is_at_rate(due.picture.pulse, variant.rate, self._fps):
+                    broadcaster.publish(chunk)
+        return self._scheduled[0].at if self._scheduled else None
 
     def close(self) -> None:
-        """End all of them for everybody."""
+        """End the streams for all viewers."""
         self._closed = True
-        for channel in self._channels.values():
-            channel.close()
+        for broadcaster in self._broadcasters.values():
+            broadcaster.close()

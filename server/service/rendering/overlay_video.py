@@ -1,4 +1,4 @@
-"""The film with boxes: encoded once for all viewers, at the pulses' times, with the site's sound."""
+"""The video with boxes burnt in: encoded once for all viewers, on the site's timeline, with its audio."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import pairwise
 from server.media.containers.fmp4 import FragmentSample, fragment, init_segment
 from server.media.h264.annexb import join_sample, nal_units, parameter_sets
 from server.media.picture import EncodedPicture
-from server.media.rendering_messages import Canvas, EncodedFrame
+from server.media.rendering_messages import EncodedFrame, RenderSettings
 from server.media.stream_format import StreamFormat
 from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
 from server.service.streaming.broadcaster import Broadcaster
@@ -18,71 +18,72 @@ from server.service.streaming.media_chunk import TsContinuity
 
 
 class OverlayVideo:
-    """Takes frames as they are encoded. Processes come and go: its time has no hole and never goes back.
+    """Publishes encoded frames without gaps, also when the encoding process is replaced.
 
-    ``sound`` is None at a site without; ``silent_holes``: it is not heard while a hole is bridged.
+    ``audio_buffer`` is None at a site without audio; ``mute_gaps``: the audio is muted while a gap is filled.
     """
 
     def __init__(
         self,
-        canvas: Canvas,
+        settings: RenderSettings,
         queue_gops: int,
-        sound: AudioBuffer | None = None,
+        audio_buffer: AudioBuffer | None = None,
         *,
-        silent_holes: bool = False,
+        mute_gaps: bool = False,
     ) -> None:
-        self._canvas, self._tally = canvas, TsContinuity(canvas.fps)
-        self._format = None if sound is None else sound.format
-        self._sound = None if sound is None else AudioFollower(sound)
-        self._silent_holes = silent_holes
+        self._settings, self._ts = settings, TsContinuity(settings.fps)
+        self._audio_format = None if audio_buffer is None else audio_buffer.format
+        self._audio = None if audio_buffer is None else AudioFollower(audio_buffer)
+        self._mute_gaps = mute_gaps
         self._stream_format = StreamFormat()
-        self._time = GaplessTimeline(self._stream_format, canvas.fps, canvas.gop)
+        self._timeline = GaplessTimeline(self._stream_format, settings.fps, settings.gop)
         self._process = 0
-        self.channel = Broadcaster(queue_gops=queue_gops)
-        self.wanted = 0
-        """How many watch, or wait for its beginning."""
+        self.broadcaster = Broadcaster(queue_gops=queue_gops)
+        self.users = 0
+        """The number of viewers, including those that wait for the first picture."""
         self.head: bytes | None = None
-        """The init segment; None before the first key frame."""
-        self.begun = asyncio.Event()
-        """There is a head, or there will never be one."""
+        """The init segment; None before the first keyframe."""
+        self.head_settled = asyncio.Event()
+        """Set when there is an init segment, or will never be one."""
 
-    def put(self, units: Sequence[EncodedFrame], *, silent: bool = False) -> None:
-        """Pass on encoded frames of one request, after what bridges a hole before them.
+    def put(self, frames: Sequence[EncodedFrame], *, is_muted: bool = False) -> None:
+        """Publish the encoded frames of one request, behind the filler of a gap before them.
 
-        Where they are ``silent``, the site's sound is not heard meanwhile.
+        ``is_muted``: with silence in place of the site's audio.
         """
-        pictures = [shown for unit in units for shown in self._time.push(self._picture(unit))]
+        pictures = [shown for frame in frames for shown in self._timeline.push(self._picture(frame))]
         for gop in _gops(pictures):
-            heard = None if self._sound is None else self._sound.next_audio(gop[0].pulse, gop[-1].until)
-            bridged = gop[0].pulse < units[0].pulse
-            if heard is not None and (silent or (self._silent_holes and bridged)):
-                heard = heard.silenced
-            self.channel.publish(self._tally.chunk(gop, heard))
+            audio = None if self._audio is None else self._audio.next_audio(gop[0].pulse, gop[-1].until)
+            is_filler = gop[0].pulse < frames[0].pulse
+            if audio is not None and (is_muted or (self._mute_gaps and is_filler)):
+                audio = audio.silenced
+            self.broadcaster.publish(self._ts.chunk(gop, audio))
 
-    def interrupted(self) -> None:
-        """Another process goes on from here: what it encodes builds on nothing that was before."""
+    def note_new_process(self) -> None:
+        """Note that another process encodes the following frames: they do not refer to earlier ones."""
         self._process += 1
 
     def close(self) -> None:
-        """End it for everybody."""
-        self.channel.close()
-        self.begun.set()
+        """End the video for all viewers."""
+        self.broadcaster.close()
+        self.head_settled.set()
 
-    def _picture(self, unit: EncodedFrame) -> EncodedPicture:
-        units, canvas = nal_units(unit.data), self._canvas
-        if unit.key:
+    def _picture(self, frame: EncodedFrame) -> EncodedPicture:
+        units, settings = nal_units(frame.data), self._settings
+        if frame.key:
             self._stream_format.check(parameter_sets(units))
         if self.head is None and self._stream_format.parameters is not None:
             self.head = init_segment(
-                self._stream_format.parameters, canvas.width, canvas.height, self._format
+                self._stream_format.parameters, settings.width, settings.height, self._audio_format
             )
-            self.begun.set()
-        made = fragment([FragmentSample(join_sample(units), unit.key, unit.lasts)], unit.pulse, canvas.fps)
-        return EncodedPicture(unit.pulse, unit.key, made, self._process, unit.lasts)
+            self.head_settled.set()
+        sample = FragmentSample(join_sample(units), frame.key, frame.duration)
+        packed = fragment([sample], frame.pulse, settings.fps)
+        return EncodedPicture(frame.pulse, frame.key, packed, self._process, frame.duration)
 
 
 def _gops(pictures: Sequence[EncodedPicture]) -> Iterator[Sequence[EncodedPicture]]:
-    """Part pictures where key frames are: a viewer may begin there."""
+    """Yield the pictures split at keyframes, where a viewer may join."""
     starts = [place for place, picture in enumerate(pictures) if picture.key or not place]
     for start, end in pairwise([*starts, len(pictures)]):
         yield pictures[start:end]

@@ -1,4 +1,4 @@
-"""The pool of render processes: one rendered stream per person or camera that is watched as pictures."""
+"""The pool of rendered streams: one worker process per person or camera that is watched as pictures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from logthrottle import LogThrottle
-from server.media.rendering_messages import Canvas
+from server.media.rendering_messages import RenderSettings
 from server.service.pipeline import BestViewPipeline
 from server.service.rendering.decided_boxes import NO_OVERLAY, DecidedBoxes, GopOverlay
 from server.service.rendering.rendered_stream import RenderedStream
@@ -18,29 +18,29 @@ from server.service.rendering.rendered_stream import RenderedStream
 log = logging.getLogger(__name__)
 
 _LINGER_S = 5.0
-"""How long a process is kept after its last use, for who comes back or asks for one still after another."""
-_BESIDE = 2
-"""Decisions kept besides those whose frames can still wait for a drawing process."""
+"""How long an unused worker stays: a client may return, or poll for still pictures."""
+_EXTRA_DECISIONS = 2
+"""Decisions kept in addition to those whose frames can be queued for a worker."""
 
 
 class RenderPoolFullError(Exception):
-    """As many pictures as this server makes are being made."""
+    """All rendered streams that ``http.pictures_max`` permits are in use."""
 
 
 @dataclass(frozen=True, slots=True)
 class PersonView:
-    """The best view of somebody; or, scoped, what of it somebody is shown who may see nobody else."""
+    """A person's best view; ``scoped``: for viewers with access to that person alone."""
 
     number: int
     scoped: bool = False
 
     def __str__(self) -> str:
-        return f"object {self.number}{' alone' * self.scoped}"
+        return f"object {self.number}{' scoped' * self.scoped}"
 
 
 @dataclass(frozen=True, slots=True)
 class CameraView:
-    """A camera, live; or, decided, with everybody's boxes and as late as a best view."""
+    """A camera's live stream; ``decided``: with all boxes, and as late as a best view."""
 
     camera: str
     decided: bool = False
@@ -54,20 +54,20 @@ Subject = PersonView | CameraView
 
 @dataclass(slots=True)
 class _RunningStream:
-    source: RenderedStream
+    stream: RenderedStream
     task: asyncio.Task[None]
     expiry: asyncio.TimerHandle | None = None
 
 
 class RenderPool:
-    """Starts what is wanted and lets it end when nobody wants it; at most ``http.pictures_max`` at once."""
+    """Starts rendered streams on demand and ends unused ones; at most ``http.pictures_max`` run at once."""
 
     def __init__(self, service: BestViewPipeline, linger_s: float = _LINGER_S) -> None:
         self._service, self._linger_s = service, linger_s
         config = service.config
-        self._queue = config.http.viewer_queue_gops
-        self._most = config.http.pictures_max
-        self._canvas = Canvas(
+        self._queue_gops = config.http.viewer_queue_gops
+        self._max_streams = config.http.pictures_max
+        self._settings = RenderSettings(
             codec=config.encode.codec,
             width=config.site.width,
             height=config.site.height,
@@ -78,53 +78,54 @@ class RenderPool:
             max_kbps=config.encode.max_kbps,
             jpeg_quality=config.http.jpeg_quality,
         )
-        self._decided = DecidedBoxes(service.decision_state.resolve, config.site.fps, self._queue + _BESIDE)
+        decisions = self._queue_gops + _EXTRA_DECISIONS
+        self._decided = DecidedBoxes(service.decision_state.resolve, config.site.fps, decisions)
         service.on_decision.append(self._decided.put)
         self._running: dict[Subject, _RunningStream] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        """Those of sources that are running, or ending."""
+        """The tasks of streams that are running or ending."""
         self._restarts = self._lost = 0
         self._failing = LogThrottle()
 
     @property
-    def sources(self) -> dict[Subject, RenderedStream]:
-        """What is drawn now."""
-        return {subject: running.source for subject, running in self._running.items()}
+    def streams(self) -> dict[Subject, RenderedStream]:
+        """The running streams."""
+        return {subject: running.stream for subject, running in self._running.items()}
 
     @property
     def viewers(self) -> int:
-        """How many streams of pictures are being watched."""
-        return sum(source.viewers for source in self.sources.values())
+        """The number of viewers of all rendered streams."""
+        return sum(stream.viewers for stream in self.streams.values())
 
     @property
     def restarts(self) -> int:
-        """How many processes died and were replaced."""
-        return self._restarts + sum(source.restarts for source in self.sources.values())
+        """The number of workers that died and were replaced."""
+        return self._restarts + sum(stream.restarts for stream in self.streams.values())
 
     @property
     def lost(self) -> int:
-        """How many GOPs were not drawn because a process was too slow."""
-        return self._lost + sum(source.lost for source in self.sources.values())
+        """The number of GOPs that were not rendered because a worker was too slow."""
+        return self._lost + sum(stream.lost for stream in self.streams.values())
 
     @contextmanager
     def using(self, subject: Subject) -> Iterator[RenderedStream]:
-        """Use a source while inside; the subject must be there.
+        """Return the rendered stream of a subject, started if it does not run; it stays while inside.
 
         Raises:
-            RenderPoolFullError: there is none, and no place for another.
-            KeyError: nobody has this number, or no camera this name.
+            RenderPoolFullError: it does not run, and all permitted streams are in use.
+            KeyError: there is no such person or camera.
         """
         running = self._running.get(subject)
         if running is None:
             running = self._start(subject)
         if running.expiry is not None:
             running.expiry.cancel()
-        running.source.use()
+        running.stream.use()
         try:
-            yield running.source
+            yield running.stream
         finally:
-            running.source.release()
-            if not running.source.users:
+            running.stream.release()
+            if not running.stream.users:
                 loop = asyncio.get_running_loop()
                 running.expiry = loop.call_later(self._linger_s, self._end, subject, running)
 
@@ -132,7 +133,7 @@ class RenderPool:
         """Return the newest frame of a subject; None: it cannot be shown now.
 
         Raises:
-            KeyError: nobody has this number, or no camera this name.
+            KeyError: there is no such person or camera.
         """
         service = self._service
         if isinstance(subject, PersonView):
@@ -145,52 +146,58 @@ class RenderPool:
         return service.frame_buffers[subject.camera].newest
 
     async def close(self) -> None:
-        """End all sources and their processes."""
+        """End all streams and their workers."""
         tasks = list(self._tasks)
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
     def _start(self, subject: Subject) -> _RunningStream:
-        if len(self._running) >= self._most:
-            self._make_place()
-        source = self._source(subject)
-        task = asyncio.create_task(source.run(), name=f"draw {subject}")
+        if len(self._running) >= self._max_streams:
+            self._end_unused()
+        stream = self._new_stream(subject)
+        task = asyncio.create_task(stream.run(), name=f"render {subject}")
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        running = self._running[subject] = _RunningStream(source, task)
+        running = self._running[subject] = _RunningStream(stream, task)
         task.add_done_callback(lambda _: self._ended(subject, running))
         return running
 
-    def _make_place(self) -> None:
-        """End one that nobody uses."""
+    def _end_unused(self) -> None:
+        """End a stream without users.
+
+        Raises:
+            RenderPoolFullError: all have users.
+        """
         for subject, running in self._running.items():
-            if not running.source.users:
+            if not running.stream.users:
                 self._end(subject, running)
                 return
         raise RenderPoolFullError
 
-    def _source(self, subject: Subject) -> RenderedStream:
+    def _new_stream(self, subject: Subject) -> RenderedStream:
         splicer, decided = self._service.splicer, self._decided
-        told: Callable[[bytes], GopOverlay]
+        overlay_of: Callable[[bytes], GopOverlay]
         match subject:
             case PersonView(number, scoped):
-                stream = (splicer.scoped_persons if scoped else splicer.persons)[number]
-                told = partial(decided.of_person, number, alone=scoped)
+                broadcaster = (splicer.scoped_persons if scoped else splicer.persons)[number]
+                overlay_of = partial(decided.overlay_of_person, number, scoped=scoped)
             case CameraView(camera, decided=True):
-                stream, told = splicer.decided_cameras[camera], partial(decided.of_camera, camera)
+                broadcaster = splicer.decided_cameras[camera]
+                overlay_of = partial(decided.overlay_of_camera, camera)
             case CameraView(camera):
-                stream, told = splicer.cameras[camera], _nothing
+                broadcaster, overlay_of = splicer.cameras[camera], _no_overlay
         live = isinstance(subject, CameraView) and not subject.decided
         return RenderedStream(
             str(subject),
-            stream,
-            told,
-            self._canvas,
+            broadcaster,
+            overlay_of,
+            self._settings,
             live=live,
-            queue_gops=self._queue,
-            sound=self._service.audio_buffer,
-            silent_holes=isinstance(subject, PersonView) and subject.scoped,  # what was there is not known
+            queue_gops=self._queue_gops,
+            audio_buffer=self._service.audio_buffer,
+            # The person may not have been present in a gap.
+            mute_gaps=isinstance(subject, PersonView) and subject.scoped,
         )
 
     def _end(self, subject: Subject, running: _RunningStream) -> None:
@@ -200,19 +207,19 @@ class RenderPool:
     def _ended(self, subject: Subject, running: _RunningStream) -> None:
         error = None if running.task.cancelled() else running.task.exception()
         if error is not None and (more := self._failing.record(repr(error))) is not None:
-            log.error("drawing %s failed%s", subject, more, exc_info=error)
+            log.error("rendering %s failed%s", subject, more, exc_info=error)
         self._forget(subject, running)
 
     def _forget(self, subject: Subject, running: _RunningStream) -> None:
-        """Let go of one that is ending; another of the same subject may have begun since."""
+        """Remove a stream that is ending, unless its subject has a new one already."""
         if self._running.get(subject) is not running:
             return
         del self._running[subject]
-        self._restarts += running.source.restarts
-        self._lost += running.source.lost
+        self._restarts += running.stream.restarts
+        self._lost += running.stream.lost
 
 
-def _nothing(fragments: bytes) -> GopOverlay:
-    """Frames that are not decided yet have no boxes."""
+def _no_overlay(fragments: bytes) -> GopOverlay:
+    """Return no boxes: live frames are not decided yet."""
     del fragments
     return NO_OVERLAY

@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from expbackoff import Backoff
 from logthrottle import LogThrottle
-from server.media.rendering_messages import Canvas, JpegPicture, RenderRequest, Still
+from server.media.rendering_messages import JpegPicture, RenderRequest, RenderSettings, StillKind
 from server.service.rendering.decided_boxes import GopOverlay
 from server.service.rendering.mjpeg_streams import MjpegStreams
 from server.service.rendering.overlay_video import OverlayVideo
@@ -25,197 +25,199 @@ from server.service.streaming.subscriber_queue import Chunk, Subscriber
 @dataclass(slots=True)
 class _StillRequest:
     pulse: int
-    given: asyncio.Event
+    answered: asyncio.Event
     picture: JpegPicture | None = None
 
 
 class StillRequests:
-    """Who waits for a picture with boxes or without, and from which frame on it is new enough."""
+    """Pending requests for a still picture, by kind, with the oldest frame that satisfies them."""
 
     def __init__(self) -> None:
-        self._wishes: dict[Still, _StillRequest] = {}
-        self.asked = asyncio.Event()
-        """A request came since it was cleared."""
+        self._requests: dict[StillKind, _StillRequest] = {}
+        self.changed = asyncio.Event()
+        """Set when a request arrives or a new frame may answer one; the reader clears it."""
         self._closed = False
 
-    async def get(self, kind: Still, pulse: int) -> JpegPicture | None:
-        """Wait for a picture of this frame or a newer one; None: there will be none."""
+    async def get(self, kind: StillKind, pulse: int) -> JpegPicture | None:
+        """Return a picture of this frame or a newer one, once there is one; None: the stream has ended."""
         while not self._closed:
-            wish = self._wishes.get(kind)
-            if wish is None:
-                wish = self._wishes[kind] = _StillRequest(pulse, asyncio.Event())
-            self.asked.set()
-            await wish.given.wait()
-            if wish.picture is None or wish.picture.pulse >= pulse:
-                return wish.picture  # an older picture answered an earlier request
+            request = self._requests.get(kind)
+            if request is None:
+                request = self._requests[kind] = _StillRequest(pulse, asyncio.Event())
+            self.changed.set()
+            await request.answered.wait()
+            if request.picture is None or request.picture.pulse >= pulse:
+                return request.picture  # an older picture answered an earlier request
         return None
 
-    def possible(self, newest: int) -> list[Still]:
+    def answerable(self, newest: int) -> list[StillKind]:
         """Return the kinds that can be answered when ``newest`` is the newest frame."""
-        return [kind for kind, wish in self._wishes.items() if wish.pulse <= newest]
+        return [kind for kind, request in self._requests.items() if request.pulse <= newest]
 
-    def give(self, kind: Still, picture: JpegPicture | None) -> None:
+    def answer(self, kind: StillKind, picture: JpegPicture | None) -> None:
         """Answer all requests of a kind."""
-        wish = self._wishes.pop(kind)
-        wish.picture = picture
-        wish.given.set()
+        request = self._requests.pop(kind)
+        request.picture = picture
+        request.answered.set()
 
     def close(self) -> None:
-        """Answer all requests, and those to come: there will be no picture."""
+        """Answer all pending and later requests with None."""
         self._closed = True
-        for kind in list(self._wishes):
-            self.give(kind, None)
+        for kind in list(self._requests):
+            self.answer(kind, None)
 
 
 log = logging.getLogger(__name__)
 
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.1, 5.0
-_PATIENCE_S = 8.0
-"""How long a request waits for its first picture once a process is ready, which may be replaced meanwhile."""
+_PICTURE_TIMEOUT_S = 8.0
+"""How long a request waits for its first picture once a worker is ready, even if that is replaced."""
 
 
 class PictureTimeoutError(Exception):
-    """No picture came in time."""
+    """No picture was rendered in time."""
 
 
 class RenderedStream:
-    """Decodes one stream while somebody uses it; what is made of it outlives the process that makes it.
+    """Renders one stream while it has users; its outputs outlive the worker, which may be replaced.
 
-    A slow process is a slow viewer: it loses whole GOPs, and nobody waits for it. ``told`` gives the boxes of
-    fragments. ``live`` pictures are shown as they come, others in pace. ``sound`` goes under the film, with
-    ``silent_holes`` only where there are pictures.
+    A slow worker loses whole GOPs, like a slow viewer, and delays nothing else. ``overlay_of`` returns the
+    boxes of fragments. ``live`` pictures are shown as they arrive, others in real time. ``audio_buffer`` and
+    ``mute_gaps`` are those of :class:`OverlayVideo`.
     """
 
     def __init__(
         self,
         name: str,
-        stream: Broadcaster,
-        told: Callable[[bytes], GopOverlay],
-        canvas: Canvas,
+        broadcaster: Broadcaster,
+        overlay_of: Callable[[bytes], GopOverlay],
+        settings: RenderSettings,
         *,
         live: bool,
         queue_gops: int,
-        sound: AudioBuffer | None = None,
-        silent_holes: bool = False,
+        audio_buffer: AudioBuffer | None = None,
+        mute_gaps: bool = False,
     ) -> None:
-        self._name, self._stream, self._told, self._canvas = name, stream, told, canvas
-        self._live, self._queue_gops, self._sound = live, queue_gops, sound
-        self._silent_holes = silent_holes
-        self._begin()
+        self._name, self._broadcaster, self._overlay_of = name, broadcaster, overlay_of
+        self._settings, self._live, self._queue_gops = settings, live, queue_gops
+        self._audio_buffer, self._mute_gaps = audio_buffer, mute_gaps
+        self._reset_outputs()
         self._stills = StillRequests()
-        self._used = asyncio.Event()
-        self._shown = asyncio.Event()
-        self._ready = asyncio.Event()
-        """Set while a process has loaded its libraries."""
+        self._has_users = asyncio.Event()
+        self._has_pictures = asyncio.Event()
+        self._is_ready = asyncio.Event()
+        """Set while a worker has loaded its libraries."""
         self.newest = -1
-        """The last frame that the present process has drawn."""
-        self._answered = False
+        """The last frame that the present worker has rendered."""
+        self._has_rendered = False
         self.users = 0
         self.restarts = 0
-        self._viewer: Subscriber | None = None
+        self._subscriber: Subscriber | None = None
         self._lost = 0
-        self._dies = LogThrottle()
+        self._deaths = LogThrottle()
         self.pid: int | None = None
-        """The process that draws now."""
+        """The process id of the present worker."""
 
     @property
     def viewers(self) -> int:
-        """How many streams of it are being watched."""
-        return self.film.channel.viewers + self.series.viewers
+        """The number of viewers of its video and MJPEG streams."""
+        return self.video.broadcaster.viewers + self.mjpeg.viewers
 
     @property
     def lost(self) -> int:
-        """How many GOPs the process was too slow for."""
-        return self._lost + (0 if self._viewer is None else self._viewer.lost_gops)
+        """The number of GOPs for which the worker was too slow."""
+        return self._lost + (0 if self._subscriber is None else self._subscriber.lost_gops)
 
     def use(self) -> None:
-        """Somebody uses it."""
+        """Add a user."""
         self.users += 1
-        self._used.set()
+        self._has_users.set()
 
     def release(self) -> None:
-        """Somebody does not use it any more."""
+        """Remove a user."""
         self.users -= 1
         if not self.users:
-            self._used.clear()
-            self._begin()
+            self._has_users.clear()
+            self._reset_outputs()
 
-    async def still(self, kind: Still, pulse: int) -> JpegPicture:
+    async def still(self, kind: StillKind, pulse: int) -> JpegPicture:
         """Return a picture of this frame or a newer one.
 
         Raises:
-            PictureTimeoutError: none came in time.
+            PictureTimeoutError: none was rendered in time.
         """
         with contextlib.suppress(TimeoutError):
             await self._wait_until_ready()
-            async with asyncio.timeout(_PATIENCE_S):
+            async with asyncio.timeout(_PICTURE_TIMEOUT_S):
                 picture = await self._stills.get(kind, pulse)
                 if picture is not None:
                     return picture
         raise PictureTimeoutError
 
-    async def film_head(self) -> bytes:
-        """Return the init segment of the overlay video, as soon as there is one.
+    async def video_head(self) -> bytes:
+        """Return the init segment of the video, as soon as there is one.
 
         Raises:
-            PictureTimeoutError: none came in time.
+            PictureTimeoutError: no picture was rendered in time.
         """
         with contextlib.suppress(TimeoutError):
             await self._wait_until_ready()
-            await asyncio.wait_for(self.film.begun.wait(), _PATIENCE_S)
-        if self.film.head is None:
+            await asyncio.wait_for(self.video.head_settled.wait(), _PICTURE_TIMEOUT_S)
+        if self.video.head is None:
             raise PictureTimeoutError
-        return self.film.head
+        return self.video.head
 
     async def _wait_until_ready(self) -> None:
         async with asyncio.timeout(START_S):
-            await self._ready.wait()
+            await self._is_ready.wait()
 
     async def run(self) -> None:
-        """Draw until the stream ends; a process that dies is replaced."""
+        """Render until the stream ends; a worker that dies is replaced."""
         try:
-            async with asyncio.TaskGroup() as both:
-                show = both.create_task(self._show(), name=f"show {self._name}")
-                await self._draw_on()
-                show.cancel()
+            async with asyncio.TaskGroup() as tasks:
+                publishing = tasks.create_task(self._publish_pictures(), name=f"publish {self._name}")
+                await self._run_workers()
+                publishing.cancel()
         finally:
             self.close()
 
-    async def _draw_on(self) -> None:
+    async def _run_workers(self) -> None:
         backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
         while True:
             try:
-                await self._run_process()
+                await self._run_worker()
             except WorkerDiedError as error:
-                if self._answered:
+                if self._has_rendered:
                     backoff.reset()
-                if (more := self._dies.record(str(error))) is not None:
-                    told = "drawing %s: the process %s%s; starting another"
-                    log.warning(told, self._name, error, more)
+                if (more := self._deaths.record(str(error))) is not None:
+                    text = "rendering %s: the worker %s%s; starting another"
+                    log.warning(text, self._name, error, more)
                 self.restarts += 1
-                self.film.interrupted()
+                self.video.note_new_process()
                 await asyncio.sleep(backoff.next())
             else:
                 return
 
     def close(self) -> None:
-        """End what is made of it for everybody."""
-        self.film.close()
-        self.series.close()
+        """End all outputs for all viewers."""
+        self.video.close()
+        self.mjpeg.close()
         self._stills.close()
-        self._ready.set()
+        self._is_ready.set()
 
-    def _begin(self) -> None:
-        """Begin anew what is made of it: whoever comes must not be shown what others saw before."""
-        self.film = OverlayVideo(self._canvas, self._queue_gops, self._sound, silent_holes=self._silent_holes)
-        self.series = MjpegStreams(self._canvas, live=self._live)
+    def _reset_outputs(self) -> None:
+        """Create new outputs: a later viewer must not receive what earlier ones saw."""
+        self.video = OverlayVideo(
+            self._settings, self._queue_gops, self._audio_buffer, mute_gaps=self._mute_gaps
+        )
+        self.mjpeg = MjpegStreams(self._settings, live=self._live)
 
-    async def _run_process(self) -> None:
-        self.newest, self._answered = -1, False
-        process = await RenderWorker.start(self._canvas)
-        self.pid = process.pid
-        works = (self._feed(process), self._give_stills(process), self._watch(process))
-        tasks = [asyncio.create_task(work) for work in works]
+    async def _run_worker(self) -> None:
+        self.newest, self._has_rendered = -1, False
+        worker = await RenderWorker.start(self._settings)
+        self.pid = worker.pid
+        jobs = (self._feed(worker), self._answer_stills(worker), self._watch(worker))
+        tasks = [asyncio.create_task(job) for job in jobs]
         try:
             finished, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in finished:
@@ -226,66 +228,66 @@ class RenderedStream:
             try:
                 await asyncio.gather(*tasks, return_exceptions=True)
             finally:
-                self._ready.clear()
-                await process.end()
+                self._is_ready.clear()
+                await worker.end()
                 self.pid = None
 
-    async def _watch(self, process: RenderWorker) -> NoReturn:
-        """Let requests know when the process is ready, and wait until it dies."""
-        await process.wait_until_ready()
-        self._ready.set()
-        await process.watch()
+    async def _watch(self, worker: RenderWorker) -> NoReturn:
+        """Notify requests when the worker is ready, and wait until it dies."""
+        await worker.wait_until_ready()
+        self._is_ready.set()
+        await worker.watch()
 
-    async def _feed(self, process: RenderWorker) -> None:
-        """Draw the stream's chunks while the stream has users, until it ends."""
+    async def _feed(self, worker: RenderWorker) -> None:
+        """Render the stream's chunks while there are users, until the stream ends."""
         while True:
-            await self._used.wait()
-            viewer = self._viewer = self._stream.subscribe()
+            await self._has_users.wait()
+            subscriber = self._subscriber = self._broadcaster.subscribe()
             try:
-                async for piece in viewer.chunks():
-                    await self._draw(process, piece)
+                async for chunk in subscriber.chunks():
+                    await self._render(worker, chunk)
                     if not self.users:
                         break
                 else:
                     return
             finally:
-                self._stream.unsubscribe(viewer)
-                self._lost, self._viewer = self.lost, None
+                self._broadcaster.unsubscribe(subscriber)
+                self._lost, self._subscriber = self.lost, None
 
-    async def _draw(self, process: RenderWorker, piece: Chunk) -> None:
-        fragments = piece.data
-        told = self._told(fragments)
-        drawn = await process.ask(
+    async def _render(self, worker: RenderWorker, chunk: Chunk) -> None:
+        fragments = chunk.data
+        overlay = self._overlay_of(fragments)
+        result = await worker.render(
             RenderRequest(
                 fragments=fragments,
-                first=told.first,
-                boxes=told.boxes,
-                chosen=told.chosen,
-                film=self.film.wanted > 0,
-                plain=self.series.rates(boxed=False),
-                boxed=self.series.rates(boxed=True),
+                first=overlay.first,
+                boxes=overlay.boxes,
+                chosen=overlay.chosen,
+                video=self.video.users > 0,
+                plain=self.mjpeg.rates(boxed=False),
+                boxed=self.mjpeg.rates(boxed=True),
             )
         )
-        self.newest, self._answered = drawn.newest, True
-        self.film.put(drawn.film, silent=isinstance(piece, MediaChunk) and piece.is_muted)
-        self.series.put(drawn, asyncio.get_running_loop().time())
-        self._shown.set()
-        self._stills.asked.set()
+        self.newest, self._has_rendered = result.newest, True
+        self.video.put(result.video, is_muted=isinstance(chunk, MediaChunk) and chunk.is_muted)
+        self.mjpeg.put(result, asyncio.get_running_loop().time())
+        self._has_pictures.set()
+        self._stills.changed.set()
 
-    async def _give_stills(self, process: RenderWorker) -> None:
+    async def _answer_stills(self, worker: RenderWorker) -> None:
         while True:
-            await self._stills.asked.wait()
-            self._stills.asked.clear()
-            for kind in self._stills.possible(self.newest):
-                drawn = await process.ask(RenderRequest(still=kind))
-                self._stills.give(kind, drawn.still)
+            await self._stills.changed.wait()
+            self._stills.changed.clear()
+            for kind in self._stills.answerable(self.newest):
+                result = await worker.render(RenderRequest(still=kind))
+                self._stills.answer(kind, result.still)
 
-    async def _show(self) -> None:
-        """Pass pictures on, each at its moment."""
+    async def _publish_pictures(self) -> None:
+        """Publish MJPEG pictures when they are due."""
         loop = asyncio.get_running_loop()
         while True:
-            self._shown.clear()
-            following = self.series.show(loop.time())
-            timeout = None if following is None else max(0.0, following - loop.time())
+            self._has_pictures.clear()
+            next_due = self.mjpeg.publish_due(loop.time())
+            timeout = None if next_due is None else max(0.0, next_due - loop.time())
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._shown.wait(), timeout)
+                await asyncio.wait_for(self._has_pictures.wait(), timeout)

@@ -11,18 +11,18 @@ import msgspec
 from server.media.rendering_messages import (
     LENGTH_BYTES,
     READY,
-    Canvas,
     RenderRequest,
     RenderResult,
+    RenderSettings,
     encode_message,
 )
 from server.system.child_process import start_worker
 
 START_S = 30.0
-"""How long a process may take to load its libraries, on a busy machine as well."""
+"""How long a worker may take to load its libraries, even on a busy machine."""
 _ANSWER_S = 5.0
-"""A worker that takes longer to answer hangs."""
-_PART_BYTES = 1 << 16
+"""A worker that takes longer to answer counts as hung."""
+_READ_BYTES = 1 << 16
 
 
 class WorkerDiedError(Exception):
@@ -30,43 +30,43 @@ class WorkerDiedError(Exception):
 
 
 class RenderWorker:
-    """A running process. Whoever started it calls :meth:`end`."""
+    """A running worker process; the caller of :meth:`start` calls :meth:`end`."""
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         assert process.stdin is not None  # noqa: S101 — tells mypy that there are pipes
         assert process.stdout is not None  # noqa: S101
         self._process, self._requests, self._answers = process, process.stdin, process.stdout
-        self._turn = asyncio.Lock()
+        self._lock = asyncio.Lock()
         self._is_ready = False
         self._decoder = msgspec.msgpack.Decoder(RenderResult)
 
     @classmethod
-    async def start(cls, canvas: Canvas) -> Self:
-        """Start a process; :meth:`wait_until_ready` waits for it.
+    async def start(cls, settings: RenderSettings) -> Self:
+        """Start a worker; :meth:`wait_until_ready` waits for it.
 
         Raises:
-            WorkerDiedError: the system does not let it start.
+            WorkerDiedError: the process cannot be started.
         """
         try:
             process = await start_worker("server.service.rendering.worker")
         except OSError as error:
             raise WorkerDiedError(f"cannot be started: {error.strerror}") from error
         started = cls(process)
-        started._requests.write(encode_message(canvas))
+        started._requests.write(encode_message(settings))
         return started
 
     @property
     def pid(self) -> int:
-        """Its number in the system."""
+        """The process id."""
         return self._process.pid
 
     async def wait_until_ready(self) -> None:
-        """Wait until the process has loaded its libraries and answers requests.
+        """Wait until the worker has loaded its libraries and answers requests.
 
         Raises:
             WorkerDiedError: it died, or took longer than :data:`START_S`.
         """
-        async with self._turn:
+        async with self._lock:
             if self._is_ready:
                 return
             try:
@@ -78,16 +78,16 @@ class RenderWorker:
                 raise WorkerDiedError("died") from error
             self._is_ready = True
 
-    async def ask(self, request: RenderRequest) -> RenderResult:
+    async def render(self, request: RenderRequest) -> RenderResult:
         """Send a request and return the answer; requests are answered one at a time.
 
-        A caller that is cancelled must end the process: the next caller would read its answer.
+        A caller that is cancelled must end the worker: the next caller would read its answer.
 
         Raises:
-            WorkerDiedError: no answer came; the process must be replaced.
+            WorkerDiedError: there is no valid answer; the worker must be replaced.
         """
         await self.wait_until_ready()
-        async with self._turn:
+        async with self._lock:
             try:
                 async with asyncio.timeout(_ANSWER_S):
                     self._requests.write(encode_message(request))
@@ -102,10 +102,10 @@ class RenderWorker:
                 raise WorkerDiedError(f"sent an invalid answer: {error}") from error
 
     async def watch(self) -> NoReturn:
-        """Wait until the process dies by itself, which may be long before its next request.
+        """Wait until the worker dies by itself, which may be long before its next request.
 
         Raises:
-            WorkerDiedError: it has died.
+            WorkerDiedError: always.
         """
         await self._process.wait()
         raise WorkerDiedError("died")
@@ -115,7 +115,7 @@ class RenderWorker:
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
         self._requests.close()
-        # `wait()` returns only when the pipe is closed, and that stays open until a long answer was read.
-        while await self._answers.read(_PART_BYTES):
+        # `wait()` returns only when the pipe is closed, which needs a long answer to be read.
+        while await self._answers.read(_READ_BYTES):
             pass
         await self._process.wait()

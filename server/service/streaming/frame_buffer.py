@@ -14,7 +14,7 @@ class UndecodableFrameError(ValueError):
 class FrameBuffer:
     """Keeps the last ``frames`` frames of one camera; each is packed into a fragment once, when it arrives.
 
-    All frame buffers of a site share one ``agreement``, the format of its streams.
+    All frame buffers of a site share one stream format.
     """
 
     def __init__(self, fps: float, frames: int, stream_format: StreamFormat) -> None:
@@ -38,8 +38,8 @@ class FrameBuffer:
             self._parameters = self._stream_format.accept(access_unit)
         fragment = self._stream_format.pack(access_unit, pulse, self._fps, key=key)
         picture = EncodedPicture(pulse, key, fragment, boot, parameters=self._parameters, after=after)
-        bridge = self._stream_format.bridge(picture, self._fps)
-        if bridge is not None and not bridge.can_follow(picture):
+        gap_filler = self._stream_format.gap_filler(picture, self._fps)
+        if gap_filler is not None and not gap_filler.can_follow(picture):
             raise UndecodableFrameError(f"no picture can be read in the access unit of pulse {pulse}")
         self._pictures[pulse] = picture
         self.newest = max(self.newest, pulse)

@@ -62,11 +62,11 @@ class GaplessTimeline:
 
     def fill(self, until: int) -> list[EncodedPicture]:
         """Return repetitions of the last picture up to a pulse; none before the first picture."""
-        bridge, missing = self._bridge(), until - self._until
-        if bridge is None or self._newest is None or not 0 < missing <= LONGEST_GAP_S * self._fps:
+        gap_filler, missing = self._gap_filler(), until - self._until
+        if gap_filler is None or self._newest is None or not 0 < missing <= LONGEST_GAP_S * self._fps:
             return []
         each = 1 if missing <= _PER_PULSE_S * self._fps else missing
-        filler = bridge.after(self._newest, [(pulse, each) for pulse in range(self._until, until, each)])
+        filler = gap_filler.after(self._newest, [(pulse, each) for pulse in range(self._until, until, each)])
         self._newest, self._until, self._is_broken = filler[-1], until, True
         return filler
 
@@ -80,13 +80,17 @@ class GaplessTimeline:
             return []
         if picture.key:
             return self.fill(picture.pulse)
-        bridge = self._bridge()
-        return [] if bridge is None else bridge.before(picture, (self._until, picture.pulse - self._until))
+        gap_filler = self._gap_filler()
+        return (
+            []
+            if gap_filler is None
+            else gap_filler.before(picture, (self._until, picture.pulse - self._until))
+        )
 
     def _reference_is_lost(self, picture: EncodedPicture) -> bool:
         """Return whether a reference of a picture is missing."""
-        bridge, newest = self._bridge(), self._newest
-        if bridge is None or newest is None:
+        gap_filler, newest = self._gap_filler(), self._newest
+        if gap_filler is None or newest is None:
             return False
         if (
             self._is_broken
@@ -94,10 +98,10 @@ class GaplessTimeline:
             or picture.pulse // self._gop != newest.pulse // self._gop
         ):
             return True
-        return bridge.is_lost_between(newest, picture, picture.pulse - self._until)
+        return gap_filler.is_lost_between(newest, picture, picture.pulse - self._until)
 
     def _is_restart(self, picture: EncodedPicture) -> bool:
         return picture.key and picture.pulse < self._until - _RESTART_S * self._fps
 
-    def _bridge(self) -> GapFiller | None:
-        return None if self._newest is None else self.stream_format.bridge(self._newest, self._fps)
+    def _gap_filler(self) -> GapFiller | None:
+        return None if self._newest is None else self.stream_format.gap_filler(self._newest, self._fps)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.h264.annexb import nal_units, parameter_sets
-from server.media.h264.repeat_picture import SliceHeadFormat, parse_repeatable
+from server.media.h264.repeat_picture import SliceHeaderFormat, parse_repeatable
 
 PRESETS = ("ultrafast", "superfast", "medium")
 
@@ -22,7 +22,7 @@ def encoded(size: tuple[int, int], preset: str, frames: int, gop: int = 6) -> li
     return [encoder.encode(pulse, np.asarray(picture // 4 * 2)) for pulse, picture in enumerate(noise)]
 
 
-def how(unit: AccessUnit) -> SliceHeadFormat:
+def how(unit: AccessUnit) -> SliceHeaderFormat:
     found = parameter_sets(nal_units(unit.data))
     assert found is not None
     return parse_repeatable(found)

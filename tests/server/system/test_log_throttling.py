@@ -14,7 +14,7 @@ import pytest
 
 from fakes.media.videos import write_video
 from fakes.service.fed_site import Hall
-from fakes.service.rendering import CANVAS, fragments
+from fakes.service.rendering import SETTINGS, fragments
 from fakes.service.scripted_cameras import GOP, small_config
 from logthrottle import LogThrottle
 from server.camera.audio import LiveAudioSource, RecordedAudioSource, recorded_source
@@ -154,7 +154,7 @@ def test_a_recording_that_repeats_is_read_again(tmp_path: Path, monkeypatch: pyt
     assert asked == [False, True, True]
 
 
-def test_frames_that_cannot_be_decoded_are_told_of_once_for_a_stream(
+def test_frames_that_cannot_be_decoded_are_logged_once_per_stream(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     class Damaged:
@@ -162,31 +162,31 @@ def test_frames_that_cannot_be_decoded_are_told_of_once_for_a_stream(
             raise av.error.InvalidDataError(1, "damaged")
 
     monkeypatch.setattr(stream_renderer, "_decoder", lambda _: Damaged())
-    drawing = stream_renderer.StreamRenderer(CANVAS)
+    rendering = stream_renderer.StreamRenderer(SETTINGS)
     for gop in range(3):
-        drawing.draw(RenderRequest(fragments=fragments(gop * GOP, GOP)))
+        rendering.render(RenderRequest(fragments=fragments(gop * GOP, GOP)))
     assert len(caplog.messages) == 1
     assert caplog.messages[0].startswith("frame 0 cannot be decoded: ")
 
 
-async def test_drawing_processes_that_die_again_and_again_are_counted_and_told_of_once(
+async def test_render_workers_that_die_repeatedly_are_counted_and_logged_once(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(stream_source, "_RETRY_FIRST_S", 0.0)
     monkeypatch.setattr(stream_source, "_RETRY_MAX_S", 0.0)
-    drawing = stream_source.RenderedStream(
-        "object 1", Broadcaster(), lambda _: NO_OVERLAY, CANVAS, live=True, queue_gops=4
+    rendering = stream_source.RenderedStream(
+        "object 1", Broadcaster(), lambda _: NO_OVERLAY, SETTINGS, live=True, queue_gops=4
     )
 
     async def dies() -> None:
         await asyncio.sleep(0)
-        if drawing.restarts < 10:
+        if rendering.restarts < 10:
             raise WorkerDiedError("died")
 
-    monkeypatch.setattr(drawing, "_run_process", dies)
-    await drawing.run()
-    assert drawing.restarts == 10
-    assert caplog.messages == ["drawing object 1: the process died; starting another"]
+    monkeypatch.setattr(rendering, "_run_worker", dies)
+    await rendering.run()
+    assert rendering.restarts == 10
+    assert caplog.messages == ["rendering object 1: the worker died; starting another"]
 
 
 async def test_a_mistake_in_an_answer_is_told_of_once_however_often_it_is_asked_for(

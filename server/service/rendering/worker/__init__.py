@@ -1,1 +1,1 @@
-"""Pictures out of streams: decode, draw boxes, encode again. A process of its own, started on demand."""
+"""The render worker, a process started on demand: decodes streams, draws boxes, encodes pictures."""

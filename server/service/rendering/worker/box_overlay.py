@@ -1,4 +1,4 @@
-"""Boxes and numbers on a picture."""
+"""Draws boxes and person numbers on a picture."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _DARK = (0, 0, 0)
 _LINE_AT = 360
 """Picture height in pixels at which a thin line is one pixel wide."""
 _TEXT_AT = 800.0
-"""Picture height at which letters have their own size, about 20 pixels."""
+"""Picture height at which letters have the font's size, about 20 pixels."""
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 Image = NDArray[np.uint8]
@@ -26,23 +26,23 @@ Image = NDArray[np.uint8]
 def draw_boxes(
     image: Image, boxes: Sequence[tuple[int, float, float, float, float]], chosen: int | None
 ) -> None:
-    """Draw on a picture ``(height, width, 3)`` BGR: the chosen person's box last, wider, in its colour.
+    """Draw boxes on a picture ``(height, width, 3)`` BGR: the chosen person's last, in its own color.
 
-    A box is ``object, left, top, right, bottom``; its right and bottom edges lie just outside the person.
+    A box is (object, left, top, right, bottom); right and bottom are exclusive.
     """
     line = max(1, round(image.shape[0] / _LINE_AT))
     for number, *box in sorted(boxes, key=lambda it: (it[0] == chosen, it[0])):
-        width, colour = (2 * line, CHOSEN_COLOR) if number == chosen else (line, OTHER_COLOR)
+        width, color = (2 * line, CHOSEN_COLOR) if number == chosen else (line, OTHER_COLOR)
         left, top, right, bottom = (round(edge) for edge in np.clip(box, -COORDINATE_MAX, COORDINATE_MAX))
-        cv2.rectangle(image, (left, top), (right - 1, bottom - 1), colour, width)
-        _number(image, (left, top), str(number), colour)
+        cv2.rectangle(image, (left, top), (right - 1, bottom - 1), color, width)
+        _number(image, (left, top), str(number), color)
 
 
-def _number(image: Image, at: tuple[int, int], text: str, colour: tuple[int, int, int]) -> None:
-    """Write a number on a ground of its colour, above the box or, at the picture's edge, inside it."""
+def _number(image: Image, at: tuple[int, int], text: str, color: tuple[int, int, int]) -> None:
+    """Draw a number on a filled label, above the box or, at the picture's edge, inside it."""
     scale, weight = max(0.35, image.shape[0] / _TEXT_AT), max(1, round(image.shape[0] / _TEXT_AT))
     (width, height), below = cv2.getTextSize(text, _FONT, scale, weight)
     left, top = max(0, at[0]), at[1] - height - below - 2
     top = top if top >= 0 else max(0, at[1])
-    cv2.rectangle(image, (left, top), (left + width + 3, top + height + below + 1), colour, cv2.FILLED)
+    cv2.rectangle(image, (left, top), (left + width + 3, top + height + below + 1), color, cv2.FILLED)
     cv2.putText(image, text, (left + 2, top + height + 1), _FONT, scale, _DARK, weight, cv2.LINE_AA)

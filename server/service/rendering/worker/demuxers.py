@@ -1,4 +1,4 @@
-"""Demuxers of the service's own MP4 fragments and WebM clusters: one frame each."""
+"""Demuxers of the service's own MP4 fragments and WebM clusters, of one frame each."""
 
 from __future__ import annotations
 
@@ -10,58 +10,58 @@ from server.media.h264.annexb import NAL_IDR, nal_type
 from server.media.rendering_messages import TIMESCALE
 
 _HEAD = 8
-"""Bytes of a box's size and kind."""
-_INSIDE = frozenset({b"moof", b"traf"})
-"""Boxes that hold boxes."""
+"""Bytes of a box's size and type."""
+_CONTAINERS = frozenset({b"moof", b"traf"})
+"""Boxes that contain boxes."""
 _TFDT_TIME = 4
 """Bytes of version and flags before the time."""
 _TRUN_DURATION = 12
-"""Bytes of version and flags, the number of samples and where they are, before the first one's duration."""
+"""Bytes of version, flags, sample_count and data_offset, before the first sample's duration."""
 _START_CODE = b"\x00\x00\x00\x01"
 
 
 @dataclass(frozen=True, slots=True)
 class DemuxedFrame:
-    """One access unit, Annex B, or a frame of VP8."""
+    """One access unit, Annex B, or a VP8 frame."""
 
     pulse: int
     key: bool
     data: bytes
-    lasts: int
-    """Pulses that it is shown for."""
+    duration: int
+    """The number of pulses it is shown for."""
 
 
 def demux_mp4(fragments: bytes, fps: float) -> Iterator[DemuxedFrame]:
     """Yield the frames of MP4 fragments in order."""
-    pulse, lasts = -1, 1
+    pulse, duration = -1, 1
     for kind, start, end in _boxes(fragments, 0, len(fragments)):
         if kind == b"tfdt" and end - start >= _TFDT_TIME + 8:
             (ticks,) = struct.unpack_from(">Q", fragments, start + _TFDT_TIME)
             pulse = round(ticks * fps / TIMESCALE)
         elif kind == b"trun" and end - start >= _TRUN_DURATION + 4:
             (ticks,) = struct.unpack_from(">I", fragments, start + _TRUN_DURATION)
-            lasts = max(1, round(ticks * fps / TIMESCALE))
+            duration = max(1, round(ticks * fps / TIMESCALE))
         elif kind == b"mdat":
             units = list(_units(fragments, start, end))
             key = any(nal_type(unit) == NAL_IDR for unit in units)
-            yield DemuxedFrame(pulse, key, b"".join(_START_CODE + unit for unit in units), lasts)
+            yield DemuxedFrame(pulse, key, b"".join(_START_CODE + unit for unit in units), duration)
 
 
 def _boxes(data: bytes, start: int, end: int) -> Iterator[tuple[bytes, int, int]]:
-    """Yield type, start and end of the boxes' contents, those inside others after them."""
+    """Yield the type, start and end of each box's content, depth first."""
     while start + _HEAD <= end:
         size = int.from_bytes(data[start : start + 4], "big")
         kind = data[start + 4 : start + _HEAD]
         if size < _HEAD or start + size > end:
             return
         yield kind, start + _HEAD, start + size
-        if kind in _INSIDE:
+        if kind in _CONTAINERS:
             yield from _boxes(data, start + _HEAD, start + size)
         start += size
 
 
 def _units(data: bytes, start: int, end: int) -> Iterator[bytes]:
-    """Yield the NAL units of a sample, each behind its length (ISO/IEC 14496-15, 5.3.2)."""
+    """Yield the length-prefixed NAL units of a sample (ISO/IEC 14496-15, 5.3.2)."""
     while start + 4 < end:
         size = int.from_bytes(data[start : start + 4], "big")
         unit = data[start + 4 : min(start + 4 + size, end)]
@@ -72,14 +72,14 @@ def _units(data: bytes, start: int, end: int) -> Iterator[bytes]:
 
 _TICKS = 1000
 _HEAD = 8
-"""Bytes of a cluster's name and size."""
+"""Bytes of a cluster's element ID and size."""
 _TIME = 10
-"""Bytes of the element that says its time."""
+"""Bytes of the element with its time."""
 _SIMPLE_BLOCK, _BLOCK_GROUP, _BLOCK, _DURATION = 0xA3, 0xA0, 0xA1, 0x9B
 _ELEMENT = 5
-"""Bytes of the name and the size of what is inside."""
+"""Bytes of the ID and the size of an inner element."""
 _FLAGS = 3
-"""Bytes of a block before its flags: the track, and the time in the cluster."""
+"""Bytes of a block before its flags: track number and relative time."""
 _KEY = 0x80
 
 
@@ -89,20 +89,22 @@ def demux_webm(clusters: bytes, fps: float) -> Iterator[DemuxedFrame]:
     while at + _HEAD + _TIME + _ELEMENT <= len(clusters):
         end = at + _HEAD + _size(clusters, at + 4)
         time = int.from_bytes(clusters[at + _HEAD + 2 : at + _HEAD + _TIME], "big")
-        block, lasts = b"", 1
+        block, duration = b"", 1
         for name, content in _inside(clusters[at + _HEAD + _TIME : end]):
             if name in (_SIMPLE_BLOCK, _BLOCK):
                 block = content
             elif name == _DURATION:
-                lasts = max(1, round(int.from_bytes(content, "big") * fps / _TICKS))
+                duration = max(1, round(int.from_bytes(content, "big") * fps / _TICKS))
         if len(block) <= _FLAGS:
             return
-        yield DemuxedFrame(round(time * fps / _TICKS), bool(block[_FLAGS] & _KEY), block[_FLAGS + 1 :], lasts)
+        yield DemuxedFrame(
+            round(time * fps / _TICKS), bool(block[_FLAGS] & _KEY), block[_FLAGS + 1 :], duration
+        )
         at = end
 
 
 def _inside(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield the elements in some bytes; those of a group in its place."""
+    """Yield ID and content of the elements; a block group is replaced by its elements."""
     at = 0
     while at + _ELEMENT <= len(data):
         end = at + _ELEMENT + _size(data, at + 1)

@@ -37,12 +37,12 @@ HLS = {**PATIENT, "hls_segment_s": 0.4, "hls_window_s": 0.8}
 
 async def written(hall: Hall, gops: int) -> None:
     """Let the disk alone know what was, but for the newest GOP."""
-    past = hall.service.recorder
-    while past.writer is not None and past.writer.written < gops:  # noqa: ASYNC110
+    recorder = hall.service.recorder
+    while recorder.writer is not None and recorder.writer.written < gops:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
-    past.recent._frames = GOP
-    while len(past.recent._choices) > 1:
-        past.recent._choices.popleft()
+    recorder.recent._frames = GOP
+    while len(recorder.recent._choices) > 1:
+        recorder.recent._choices.popleft()
 
 
 @pytest.fixture(params=["memory", "disk"])

@@ -166,7 +166,7 @@ async def test_one_process_draws_for_all_who_watch_one_stream(drawn: Drawn) -> N
     async with drawn.session.get(film) as one, drawn.session.get(film) as other:
         async with drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg") as third:
             assert (await anext(parts(third))).pulse >= 0
-            assert set(pictures.sources) == {PersonView(SOMEBODY)}
+            assert set(pictures.streams) == {PersonView(SOMEBODY)}
             assert pictures.viewers == 3
         drawn.go_on(2)
         first, second = await read_film(one, 2 * GOP), await read_film(other, 2 * GOP)
@@ -187,7 +187,7 @@ async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(
         data = await read_film(film, 2 * GOP)
         reading = parts(series)
         await anext(reading)
-        source = pictures.sources[PersonView(SOMEBODY)]
+        source = pictures.streams[PersonView(SOMEBODY)]
         assert source.pid is not None
         os.kill(source.pid, signal.SIGKILL)
         while source.restarts == 0:  # noqa: ASYNC110 — the service notices by itself
@@ -207,11 +207,11 @@ async def test_a_process_ends_some_time_after_its_last_viewer(drawn: Drawn) -> N
     pictures._linger_s = 0.2
     async with drawn.session.get("/cameras/c0/live.jpg") as answer:
         await answer.read()
-    source = pictures.sources[CameraView("c0")]
+    source = pictures.streams[CameraView("c0")]
     pid = source.pid
     assert pid is not None
     os.kill(pid, 0)
-    while pictures.sources or source.pid is not None:  # noqa: ASYNC110 — it ends by itself
+    while pictures.streams or source.pid is not None:  # noqa: ASYNC110 — it ends by itself
         await asyncio.sleep(0.01)
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
@@ -221,7 +221,7 @@ async def test_a_process_that_hangs_slows_nobody_down(drawn: Drawn) -> None:
     pictures: RenderPool = drawn.app[SERVICE].rendering
     async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
         await anext(parts(answer))
-        source = pictures.sources[CameraView("c0")]
+        source = pictures.streams[CameraView("c0")]
         assert source.pid is not None
         os.kill(source.pid, signal.SIGSTOP)
         async with drawn.session.get("/cameras/c0/live.mp4") as plain:
@@ -277,7 +277,7 @@ async def test_processes_end_with_the_service() -> None:
     async for drawn in drawn_room():
         async with drawn.session.get("/cameras/c0/live.jpg") as answer:
             await answer.read()
-        pids = [source.pid for source in drawn.app[SERVICE].rendering.sources.values()]
+        pids = [source.pid for source in drawn.app[SERVICE].rendering.streams.values()]
         assert pids
     for pid in pids:
         assert pid is not None

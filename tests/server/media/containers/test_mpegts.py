@@ -24,9 +24,13 @@ from server.service.streaming.frame_buffer import FrameBuffer
 CLOCK = 1 << 33
 
 
-def picture(pulse: int, size: int, *, key: bool = False, lasts: int = 1, fps: float = FPS) -> EncodedPicture:
+def picture(
+    pulse: int, size: int, *, key: bool = False, duration: int = 1, fps: float = FPS
+) -> EncodedPicture:
     data = (size + 1).to_bytes(4, "big") + bytes([0x65 if key else 0x41]) + b"\x80" * size
-    return EncodedPicture(pulse, key, fragment([FragmentSample(data, key, lasts)], pulse, fps), 1, lasts)
+    return EncodedPicture(
+        pulse, key, fragment([FragmentSample(data, key, duration)], pulse, fps), 1, duration
+    )
 
 
 sizes = st.lists(st.one_of(st.integers(1, 600), st.integers(1, 70_000)), min_size=1, max_size=12)
@@ -70,7 +74,7 @@ def test_packets_are_legal_and_hold_just_what_was_packed(
 
 @given(st.integers(0, 2**34 // 3600), st.sampled_from([4, 7.5, 25, 59.94]))
 def test_the_time_reference_comes_often_and_before_its_picture(pulse: int, fps: float) -> None:
-    pictures = [picture(pulse, 50, key=True, fps=fps), picture(pulse + 1, 30, lasts=40, fps=fps)]
+    pictures = [picture(pulse, 50, key=True, fps=fps), picture(pulse + 1, 30, duration=40, fps=fps)]
     found = taken_apart(pack(pictures, fps, ContinuityCounters()))
     times = [it.pcr // 300 for it in found if it.pcr is not None]
     assert all(0 < (later - earlier) % CLOCK <= 9000 for earlier, later in pairwise(times))

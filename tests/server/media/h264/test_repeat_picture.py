@@ -87,7 +87,7 @@ def test_numbers_are_read_as_they_were_written(numbers: list[tuple[str, int]]) -
     for kind, number in numbers:
         writer.ue(number) if kind == "u" else writer.se(number - 2**19)
     writer.align(1)
-    reader = BitReader(writer.done())
+    reader = BitReader(writer.to_bytes())
     for kind, number in numbers:
         assert (reader.ue() if kind == "u" else reader.se() + 2**19) == number
 

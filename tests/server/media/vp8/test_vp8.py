@@ -146,7 +146,7 @@ def test_a_long_hole_is_one_picture_that_lasts() -> None:
         EncodedPicture(0, key=True, fragment=stream_format.pack(first.data, 0, FPS, key=True), boot=1)
     )
     shown += time.fill(1000)
-    assert [(picture.pulse, picture.lasts) for picture in shown] == [(0, 1), (1, 999)]
+    assert [(picture.pulse, picture.duration) for picture in shown] == [(0, 1), (1, 999)]
     data = header(64, 48, FPS) + b"".join(picture.fragment for picture in shown)
     with av.open(io.BytesIO(data), format="matroska") as container:
         packets = [packet for packet in container.demux(video=0) if packet.pts is not None]
@@ -173,12 +173,12 @@ def test_frames_come_out_of_clusters_as_they_went_in_and_damage_ends_them(
     frames: list[tuple[bytes, bool, int]], first: int, data: st.DataObject
 ) -> None:
     pulse, clusters, expected = first, b"", []
-    for content, begins, lasts in frames:
-        key = begins and lasts == 1
-        clusters += cluster(content, pulse, FPS, key=key, lasts=lasts)
-        expected.append((pulse, key, content, lasts))
-        pulse += lasts
-    assert [(it.pulse, it.key, it.data, it.lasts) for it in demux_webm(clusters, FPS)] == expected
+    for content, begins, duration in frames:
+        key = begins and duration == 1
+        clusters += cluster(content, pulse, FPS, key=key, duration=duration)
+        expected.append((pulse, key, content, duration))
+        pulse += duration
+    assert [(it.pulse, it.key, it.data, it.duration) for it in demux_webm(clusters, FPS)] == expected
     assert first_pulse(clusters, FPS) == first
     list(demux_webm(clusters[: data.draw(st.integers(0, len(clusters)))], FPS))
     list(demux_webm(data.draw(st.binary(max_size=100)), FPS))

@@ -250,26 +250,26 @@ async def test_who_watches_the_past_is_a_viewer_like_others(
     recorded: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_stream, "_LEAD_S", 0.2)
-    past = recorded.service.recorder
+    recorder = recorded.service.recorder
     async with recorded.session.get("/objects/1/best.mp4?from=p0") as answer:
         await answer.content.readany()
-        assert (past.viewers, recorded.service.splicer.viewers) == (1, 0)
+        assert (recorder.viewers, recorded.service.splicer.viewers) == (1, 0)
         async with recorded.session.get("/metrics") as metrics:
             assert "myview_viewers 1.0" in (await metrics.text()).splitlines()
         answer.close()
-    while past.viewers:  # noqa: ASYNC110
+    while recorder.viewers:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
 
 
 async def test_who_watches_the_past_takes_a_viewers_place_and_gives_it_back(recorded: Hall) -> None:
-    past = recorded.service.recorder
+    recorder = recorded.service.recorder
     async with recorded.session.get("/objects/1/best.mp4?from=p0") as answer:
         await answer.content.readany()
         while not recorded.service.splicer.viewers:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
-        assert past.viewers == 0, "the channel counts from the present on"
+        assert recorder.viewers == 0, "the channel counts from the present on"
         answer.close()
-    while past.viewers or recorded.service.splicer.viewers:  # noqa: ASYNC110
+    while recorder.viewers or recorded.service.splicer.viewers:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
     assert (await recorded.get("/objects/1/best.mp4?from=p0", "HEAD"))[0] == 200
 

@@ -41,7 +41,7 @@ async def spliced(config: Config) -> tuple[bytes, bytes]:
     splicer.close()
     assert viewer is not None
     pieces = [piece async for piece in viewer.chunks()]
-    head = stream_format.head(config.site.size, config.site.fps)
+    head = stream_format.init_segment(config.site.size, config.site.fps)
     assert head is not None
     ts = b"".join(piece.mpegts for piece in pieces if isinstance(piece, MediaChunk))
     return head + b"".join(piece.data for piece in pieces), ts

@@ -32,7 +32,7 @@ class Shown:
     """A decoded picture, when it is shown, and for how many pulses."""
 
     pulse: int
-    lasts: int
+    duration: int
     picture: NDArray[np.uint8]
 
 
@@ -61,8 +61,8 @@ def shown(splicer_head: bytes, pieces: list[bytes]) -> list[Shown]:
         found = []
         for frame in container.decode(video=0):
             pulse = round(float(frame.time or 0) * FPS)
-            lasts = round((frame.duration or 0) * FPS / 90_000)
-            found.append(Shown(pulse, lasts, frame.to_ndarray(format="yuv420p")))
+            duration = round((frame.duration or 0) * FPS / 90_000)
+            found.append(Shown(pulse, duration, frame.to_ndarray(format="yuv420p")))
         return found
 
 
@@ -117,7 +117,9 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
         if not pieces:
             continue
         pictures = shown(head, pieces)
-        assert [it.pulse for it in pictures[1:]] == [it.pulse + it.lasts for it in pictures[:-1]], "no hole"
+        assert [it.pulse for it in pictures[1:]] == [it.pulse + it.duration for it in pictures[:-1]], (
+            "no hole"
+        )
         before: NDArray[np.uint8] | None = None
         for it in pictures:
             possible = [own[camera][it.pulse] for camera in cameras if it.pulse in own[camera]]
@@ -125,7 +127,7 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
             assert any(np.array_equal(it.picture, other) for other in possible), it.pulse
             before = it.picture
         if viewer is best:
-            assert pictures[-1].pulse + pictures[-1].lasts == FRAMES
+            assert pictures[-1].pulse + pictures[-1].duration == FRAMES
 
 
 def splicing() -> tuple[Splicer, dict[str, FrameBuffer], bytes]:
@@ -152,7 +154,7 @@ async def test_a_picture_that_the_camera_did_not_take_costs_only_itself() -> Non
     viewer = splicer.persons[1].subscribe()
     decide(splicer, 1, None)
     pictures = shown(head, await received(viewer))
-    assert [(it.pulse, it.lasts) for it in pictures[GOP:]] == [(5, 1), (6, 1), (7, 2), (9, 1)]
+    assert [(it.pulse, it.duration) for it in pictures[GOP:]] == [(5, 1), (6, 1), (7, 2), (9, 1)]
     own = alone(units)
     for it, pulse in zip(pictures[GOP:], [5, 6, 6, 9], strict=True):
         np.testing.assert_array_equal(it.picture, own[pulse])

@@ -21,11 +21,11 @@ from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment
 from server.media.h264.annexb import ParameterSets, join_sample, nal_units, parameter_sets
 from server.media.h264.bitstream import BitWriter, escape_payload
-from server.media.h264.grey_picture import grey_picture
+from server.media.h264.gray_picture import gray_picture
 from server.media.h264.repeat_picture import UnsupportedParametersError
 from server.media.picture import EncodedPicture
 from server.media.stream_format import PerCameraStreamFormat, StreamFormat
-from server.media.vp8.grey_frame import grey_frame
+from server.media.vp8.gray_frame import gray_frame
 from server.media.vp8.stream_format import Vp8StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 
@@ -46,7 +46,7 @@ def test_it_is_grey_and_what_is_before_and_behind_it_is_as_it_was(
     samples = [join_sample(nal_units(it.data)) for it in units]
     found, writer = parameter_sets(nal_units(units[0].data)), how(units[0])
     assert found is not None
-    grey = [grey_picture(found, 0), writer.repeat(1, reference=True), grey_picture(found, 1)]
+    grey = [gray_picture(found, 0), writer.repeat(1, reference=True), gray_picture(found, 1)]
     shown, alone = decoded([*samples, *grey, *samples]), decoded(samples)
     assert len(shown) == 9
     assert all(map(is_grey, shown[3:6]))
@@ -68,7 +68,7 @@ def test_so_it_is_in_vp8(blocks: tuple[int, int]) -> None:
             it.to_ndarray(format="yuv420p") for frame in frames for it in decoder.decode(av.Packet(frame))
         ]
 
-    shown, alone = seen([*units, grey_frame(width, height), *units]), seen(units)
+    shown, alone = seen([*units, gray_frame(width, height), *units]), seen(units)
     assert is_grey(shown[3])
     for place, picture in enumerate(shown[:3] + shown[4:]):
         np.testing.assert_array_equal(picture, alone[place % 3])
@@ -120,7 +120,7 @@ def with_order_said(parameters: ParameterSets) -> ParameterSets:
         sps.u(1, value)
     sps.u(1, 1)
     sps.align(0)
-    return ParameterSets(escape_payload(0x67, sps.done()), parameters.pps)
+    return ParameterSets(escape_payload(0x67, sps.to_bytes()), parameters.pps)
 
 
 def test_where_no_picture_can_be_repeated_one_grey_picture_lasts_for_all_of_it() -> None:
@@ -144,7 +144,7 @@ def test_in_a_format_that_cannot_be_written_there_is_none() -> None:
 @given(st.binary(min_size=4, max_size=30), st.binary(min_size=1, max_size=10), st.integers(0, 1))
 def test_parameter_sets_of_any_bytes_are_written_for_or_unfit(sps: bytes, pps: bytes, number: int) -> None:
     with contextlib.suppress(UnsupportedParametersError):
-        assert grey_picture(ParameterSets(sps, pps), number)
+        assert gray_picture(ParameterSets(sps, pps), number)
 
 
 def test_a_grey_gop_of_vp8_has_no_hole() -> None:

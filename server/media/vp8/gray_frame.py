@@ -1,7 +1,7 @@
-"""A mid-grey key frame of VP8, written by hand: for who may not see what the cameras show.
+"""Writes a mid-gray VP8 keyframe, for viewers who may not see the cameras' pictures.
 
-Every macroblock is predicted by the mean of its neighbours and has no residue (RFC 6386, 12.2): grey from the
-first one on, which has none.
+Every macroblock has DC prediction and no residual (RFC 6386, 12.2): the first one, without neighbors, is
+gray, and so are the others.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ _HEADER_BITS = (
 )
 """Number of bits and their value, up to the token probabilities (9.2 to 9.6, 9.11)."""
 _DC_LUMA = ((1, 145), (0, 156), (0, 163))
-"""DC_PRED as a key frame's luma mode, each bit with its probability (11.2)."""
+"""DC_PRED as a keyframe's luma mode, each bit with its probability (11.2)."""
 _DC_CHROMA = (0, 142)
 _KEY_HEAD = struct.Struct("<3s3sHH")
 _START = b"\x9d\x01\x2a"
 
 
 @lru_cache(maxsize=4)
-def grey_frame(width: int, height: int) -> bytes:
-    """Return a grey key frame of this size in pixels."""
+def gray_frame(width: int, height: int) -> bytes:
+    """Return a gray keyframe of this size in pixels."""
     bits = frame_header(_HEADER_BITS)
     bits.number(8, SELDOM)  # prob_skip_false
     for _ in range(-(-width // BLOCK) * -(-height // BLOCK)):
@@ -42,7 +42,7 @@ def grey_frame(width: int, height: int) -> bytes:
         for bit, probability in _DC_LUMA:
             bits.put(bit, probability)
         bits.put(*_DC_CHROMA)
-    first = bits.done()
-    # A key frame, version 0, shown; then the size of the first partition (9.1).
+    first = bits.to_bytes()
+    # A keyframe, version 0, shown; then the size of the first partition (9.1).
     tag = (1 << 4 | len(first) << 5).to_bytes(3, "little")
     return _KEY_HEAD.pack(tag, _START, width, height) + first + NO_TOKENS
