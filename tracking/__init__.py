@@ -1,4 +1,9 @@
-"""Frames or detections in, tracks out: detectors, the network model, its solvers, the online window."""
+"""Multi-object tracking in one camera, as a linear program over a moving window.
+
+Sub-packages: `detectors` (candidate boxes), `model` (the network and its costs), `solvers`, `lifecycle`
+(gating, initiation, termination), `interactive` (risk prediction and operator corrections), `baselines`
+(trackers from the literature) and `evaluation` (HOTA, MOTA, IDF1).
+"""
 
 from tracking.appearance import gray_histograms
 from tracking.interpolation import interpolate_detections

@@ -16,7 +16,7 @@ def interpolate_gaps(boxes: Floats, last: tuple[int, Floats] | None, most: int) 
     Args:
         boxes: NaN where the object is hidden.
         last: the frame, counted from the window's first (negative), and the box (4,) of the last sighting
-            before the window; None: there is none.
+            before the window; None: none.
         most: frames of the longest gap that is filled.
     """
     filled = boxes.copy()

@@ -16,11 +16,11 @@ from pathlib import Path
 _MIN_FIELDS = 6
 _MAX_FIELDS = 10
 _CONFIDENCE_FIELD = 6
-# Larger frame numbers are a file of something else (timestamps), and would make a reader wait for ever.
+# Larger frame numbers are probably timestamps.
 _MAX_FRAME = 10_000_000
-# Pixels; beyond, a box has no area that counts to a number.
+# Pixels; beyond, areas lose precision.
 _MAX_COORDINATE = 1e9
-# Beyond, not every whole number is one of its own.
+# Beyond, floats do not represent every integer.
 _MAX_ID = 2**53
 _MAX_UNPACKED_BYTES = 300_000_000  # bytes
 
@@ -56,7 +56,7 @@ def read_rows(path: Path) -> list[MotRow]:
     """Read a MOTChallenge file, in the order of the file; one whose name ends in `.gz` is unpacked.
 
     Raises:
-        ValueError: the file is no such text; the message names file and line.
+        ValueError: the file is not MOTChallenge text; the message names file and line.
         OSError: the file cannot be read.
     """
     data = path.read_bytes()

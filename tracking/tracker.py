@@ -220,7 +220,7 @@ class OnlineTracker:
     def _evict_if_full(self, frame: int, hidden: Collection[int]) -> bool:
         """Remove the longest hidden object where the list is full; return whether there is room.
 
-        `hidden` has the ids of all who are in this window; who has come back in it is not any more.
+        `hidden` has the ids of the objects hidden throughout this window.
         """
         if len(self._objects) < self._window.max_objects:
             return True

@@ -18,7 +18,7 @@ class WindowSettings:
     """The moving window, track initiation and termination.
 
     Raises:
-        ValueError: a number of frames or a share makes no sense.
+        ValueError: a setting is out of range.
     """
 
     window: int = 15  # M: frames of a window; a frame is final when this less the stride have followed it

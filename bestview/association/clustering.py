@@ -16,8 +16,8 @@ from bestview.association.appearance.likelihood import (
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_SOME = 10_000
-"""Pairs whose appearance is compared at once: all pairs of a crowd would take hundreds of megabytes."""
+_COMPARISON_CHUNK = 10_000
+"""Pairs whose appearance is compared at once: all pairs of a crowd would need hundreds of megabytes."""
 
 
 def cluster(
@@ -42,7 +42,7 @@ def cluster(
     Args:
         evidence: (N, N) symmetric log-likelihood ratios, above 0 for and below 0 against one person.
         cannot_link: (N, N) symmetric, certainly two people.
-        unseen: (N,) not seen lately.
+        unseen: (N,) not seen recently.
         linked: (N, N) symmetric, pairs with positive evidence.
         appearances: of rows, one entry a camera.
         weights: of appearance.
@@ -51,10 +51,10 @@ def cluster(
     Returns:
         (N,) the lowest row of each row's cluster.
     """
-    groups = _Clusters(evidence, cannot_link, unseen, linked, appearances, weights)
-    while (pair := groups.best_pair(threshold)) is not None:
-        groups.merge(*pair)
-    return groups.labels()
+    clusters = _Clusters(evidence, cannot_link, unseen, linked, appearances, weights)
+    while (pair := clusters.best_pair(threshold)) is not None:
+        clusters.merge(*pair)
+    return clusters.labels()
 
 
 class _ClusterAppearances:
@@ -79,27 +79,29 @@ class _ClusterAppearances:
             np.float64
         )
         self._root = np.sqrt(self._total / self._count[:, None])
-        """Square roots of the mean histograms, whose products are how alike two are."""
+        """Square roots of the mean histograms: their products are Bhattacharyya coefficients."""
         self._known = weights.confidence(self._count)
         self._slope = np.repeat([camera.scale.slope(weights) for camera in appearances], size)
         self._middle = np.repeat([camera.scale.neutral_distance for camera in appearances], size)
-        self._at = np.full((len(appearances), rows), -1)
-        """(C, N) of each camera and group: which look, -1: none."""
-        self._of: list[dict[int, int]] = [{} for _ in range(rows)]
-        """Of each group, the look by camera."""
+        self._histogram_index = np.full((len(appearances), rows), -1)
+        """(C, N) index of the histogram of each camera and cluster; -1: none."""
+        self._indices: list[dict[int, int]] = [{} for _ in range(rows)]
+        """By cluster, the index of its histogram by camera."""
         start = np.cumsum([0, *size]).tolist()
         for number, (camera, first) in enumerate(zip(appearances, start, strict=False)):
-            self._at[number, camera.rows] = np.arange(first, first + camera.rows.size)
+            self._histogram_index[number, camera.rows] = np.arange(first, first + camera.rows.size)
             for at, row in enumerate(camera.rows.tolist(), first):
-                self._of[row][number] = at
+                self._indices[row][number] = at
 
     def of_pairs(self, first: Ints, second: Ints) -> Floats:
         """Return the appearance evidence of (P,) pairs of clusters: (P,)."""
         evidence = np.zeros(first.size)
-        for camera in self._at:
+        for camera in self._histogram_index:
             a, b = camera[first], camera[second]
             both = np.flatnonzero((a >= 0) & (b >= 0))
-            for chunk in (both[start : start + _SOME] for start in range(0, both.size, _SOME)):
+            for chunk in (
+                both[start : start + _COMPARISON_CHUNK] for start in range(0, both.size, _COMPARISON_CHUNK)
+            ):
                 evidence[chunk] += self._evidence(a[chunk], b[chunk])
         return evidence
 
@@ -109,10 +111,12 @@ class _ClusterAppearances:
         evidence = self._weights.evidence(distance, self._slope[first], self._middle[first])
         return evidence * (self._known[first] * self._known[second])
 
-    def of_group(self, row: int, others: Ints) -> Floats:
+    def of_cluster(self, row: int, others: Ints) -> Floats:
         """Return the appearance evidence between one cluster and (K,) others: (K,)."""
-        own_histograms = self._of[row]
-        other_histograms = self._at[np.array(list(own_histograms), dtype=np.int64)[:, None], others]
+        own_histograms = self._indices[row]
+        other_histograms = self._histogram_index[
+            np.array(list(own_histograms), dtype=np.int64)[:, None], others
+        ]
         camera, other = np.nonzero(other_histograms >= 0)
         if not other.size:
             return np.zeros(others.size)
@@ -123,17 +127,17 @@ class _ClusterAppearances:
 
     def merge(self, keep: int, lose: int) -> None:
         """Add one cluster's histograms to another's."""
-        histograms = self._of[keep]
-        for number, lost in self._of[lose].items():
+        histograms = self._indices[keep]
+        for number, lost in self._indices[lose].items():
             kept = histograms.setdefault(number, lost)
-            self._at[number, lose] = -1
-            self._at[number, keep] = kept
+            self._histogram_index[number, lose] = -1
+            self._histogram_index[number, keep] = kept
             if kept != lost:
                 self._total[kept] += self._total[lost]
                 self._count[kept] += self._count[lost]
                 self._root[kept] = np.sqrt(self._total[kept] / self._count[kept])
                 self._known[kept] = self._weights.confidence(self._count[kept])
-        self._of[lose] = {}
+        self._indices[lose] = {}
 
 
 def _pad_bins(table: Floats, columns: int) -> Floats:
@@ -155,29 +159,29 @@ class _Clusters:
         weights: AppearanceWeights,
     ) -> None:
         count = len(evidence)
-        # Sums keep it: whoever was apart from one of a group is apart from the group.
+        # Minus infinity survives sums: a cannot-link of one row holds for its cluster.
         self._evidence = np.where(cannot_link, -np.inf, evidence)
-        self._past, self._linked = unseen.copy(), linked.copy()
+        self._unseen, self._linked = unseen.copy(), linked.copy()
         np.fill_diagonal(self._linked, val=False)
-        self._looks = _ClusterAppearances(appearances, count, weights)
-        self._kept = np.arange(count)
-        """(N,) the group that each row was made part of, its own where of none."""
+        self._appearances = _ClusterAppearances(appearances, count, weights)
+        self._merged_into = np.arange(count)
+        """(N,) the cluster that each row was merged into; itself: none."""
         one, two = np.nonzero(np.triu(self._linked, 1))
-        value = self._evidence[one, two] + self._looks.of_pairs(one, two)
-        value[self._past[one] & self._past[two]] = -np.inf
+        value = self._evidence[one, two] + self._appearances.of_pairs(one, two)
+        value[self._unseen[one] & self._unseen[two]] = -np.inf
         self._value = np.full((count, count), -np.inf)
         self._value[one, two] = self._value[two, one] = value
         self._best = self._value.max(axis=1, initial=-np.inf)
-        """(N,) the most evidence of each group with another one; -inf: none, or it was merged away."""
-        self._at = self._value.argmax(axis=1) if count else np.zeros(0, dtype=np.int64)
-        """(N,) with which, the lowest of equals."""
+        """(N,) the highest affinity of each cluster with another one; -inf: none, or it was merged away."""
+        self._partner = self._value.argmax(axis=1) if count else np.zeros(0, dtype=np.int64)
+        """(N,) the partner with that affinity, the lowest of equals."""
         self._stale = np.zeros(count, dtype=np.bool_)
-        """(N,) that one has changed or gone: no other one is worth more than `_best`, but maybe less."""
+        """(N,) the partner has changed or was merged away: `_best` is an upper bound only."""
 
     def labels(self) -> Ints:
         """Return each row's cluster: (N,)."""
-        label = self._kept.copy()
-        # A row is only ever made part of a lower one, whose group is known by then.
+        label = self._merged_into.copy()
+        # A row is merged only into a lower one, whose cluster is known by then.
         for row in np.flatnonzero(label != np.arange(label.size)).tolist():
             label[row] = label[label[row]]
         return label
@@ -189,30 +193,30 @@ class _Clusters:
             if not self._best[one] >= threshold:
                 break
             if not self._stale[one]:
-                two = int(self._at[one])
+                two = int(self._partner[one])
                 return min(one, two), max(one, two)
             row = self._value[one]
-            self._at[one] = at = row.argmax()
+            self._partner[one] = at = row.argmax()
             self._best[one], self._stale[one] = row[at], False
         return None
 
     def merge(self, keep: int, lose: int) -> None:
         """Merge cluster `lose` into cluster `keep`."""
-        self._kept[lose] = keep
+        self._merged_into[lose] = keep
         evidence, linked = self._evidence[keep], self._linked[keep]
         evidence += self._evidence[lose]
         self._evidence[:, keep] = evidence
         linked |= self._linked[lose]
         linked[keep] = linked[lose] = False
-        # Whoever has no link to either of them had no value with them, and has none now.
+        # Clusters without a link to either had no affinity with them, and have none now.
         others = linked.nonzero()[0]
         self._linked[others, keep] = True
         self._linked[others, lose] = False
-        self._past[keep] &= self._past[lose]
-        self._looks.merge(keep, lose)
-        value = evidence[others] + self._looks.of_group(keep, others)
-        if self._past[keep]:
-            value[self._past[others]] = -np.inf
+        self._unseen[keep] &= self._unseen[lose]
+        self._appearances.merge(keep, lose)
+        value = evidence[others] + self._appearances.of_cluster(keep, others)
+        if self._unseen[keep]:
+            value[self._unseen[others]] = -np.inf
         self._value[others, lose] = -np.inf
         self._value[others, keep] = value
         self._value[keep] = -np.inf
@@ -221,15 +225,15 @@ class _Clusters:
 
     def _find_best(self, keep: int, lose: int, others: Ints, value: Floats) -> None:
         """Update the cached best partners of a merged cluster and of the clusters linked to it."""
-        best, at = self._best[others], self._at[others]
+        best, at = self._best[others], self._partner[others]
         stale = self._stale[others] | (at == keep) | (at == lose)
         better = value > best
         first = better | ((value == best) & ~stale & (keep < at))
-        self._at[others[first]] = keep
+        self._partner[others[first]] = keep
         self._best[others[better]] = value[better]
         self._stale[others] = stale & ~better
         self._best[lose] = self._best[keep] = -np.inf
         self._stale[keep] = self._stale[lose] = False
         if others.size:
             place = value.argmax()
-            self._best[keep], self._at[keep] = value[place], others[place]
+            self._best[keep], self._partner[keep] = value[place], others[place]

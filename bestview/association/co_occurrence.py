@@ -13,11 +13,11 @@ from bestview.association.sightings import TrackObservations
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 MINIMUM_FRAME_SCORE = -2.0
-"""Least score of a frame: foot points 1.7 gates apart or 17 say the same."""
+"""Least score of a frame, reached 1.7 gates apart: larger distances say no more."""
 _ROUNDING_MARGIN = 1.0 + 1e-6
 """Factor on the search radius, against rounding."""
 _BANDS = 0.5
-"""Bands, in roots of the number of rectangles."""
+"""Bands per square root of the number of rectangles."""
 
 
 def simultaneous_pairs(rows: Ints, camera: Ints) -> tuple[Ints, Ints]:
@@ -30,7 +30,7 @@ def simultaneous_pairs(rows: Ints, camera: Ints) -> tuple[Ints, Ints]:
     first, second = pairs_of_equal_label(camera)
     first_row, second_row = rows[first], rows[second]
     both = (first_row >= 0) & (second_row >= 0) & (first_row != second_row)
-    # Mostly a pair is the same in every frame: the first one will do.
+    # A pair is usually the same in every frame: its first frame is enough.
     both[:, 1:] &= (
         ~both[:, :-1] | (first_row[:, 1:] != first_row[:, :-1]) | (second_row[:, 1:] != second_row[:, :-1])
     )
@@ -105,7 +105,7 @@ class GroundTrajectories:
         reach = np.sqrt((1.0 - MINIMUM_FRAME_SCORE) * (longest + gate**2 / 2.0) * _ROUNDING_MARGIN)
         lower = np.fmin.reduce(self.positions[:2] - reach, axis=-1, initial=np.nan)
         upper = np.fmax.reduce(self.positions[:2] + reach, axis=-1, initial=np.nan)
-        return overlapping(lower.T, upper.T)
+        return overlapping_rectangles(lower.T, upper.T)
 
 
 def score_ground_proximity(
@@ -146,14 +146,14 @@ def score_ground_proximity(
     score = trajectories.scores(one, two, gate)
     localized = ~np.isnan(score)
     total, frames = np.zeros(one.size), localized.sum(axis=1)
-    # In the order of the frames, so that sums do not depend on how NumPy adds.
+    # Frame by frame, so that sums do not depend on how NumPy adds.
     for column in range(score.shape[1]):
         total += np.where(localized[:, column], score[:, column], 0.0)
     scored = frames > 0
     return GroundProximity(first[scored], second[scored], total[scored], frames[scored])
 
 
-def overlapping(low: Floats, high: Floats) -> tuple[Ints, Ints]:
+def overlapping_rectangles(low: Floats, high: Floats) -> tuple[Ints, Ints]:
     """Return the pairs of rectangles that overlap, each once: (P,) and (P,), the lower index first, in order.
 
     The plane is cut into bands with as many rectangles in each, and in each band a line sweeps over them
@@ -170,7 +170,7 @@ def overlapping(low: Floats, high: Floats) -> tuple[Ints, Ints]:
     first, last = (np.searchsorted(edges, side[:, 1], side="right") for side in (low, high))
     item, which = expand_counts(last - first + 1)
     band = first[item] + which
-    # Places along the sweep instead of coordinates, so that a band and a place make one number to sort by.
+    # Ranks along the sweep instead of coordinates, so that band and rank make one sort key.
     along = np.argsort(low[:, 0], kind="stable")
     place = np.empty(count, dtype=np.int64)
     place[along] = np.arange(count)
@@ -182,7 +182,7 @@ def overlapping(low: Floats, high: Floats) -> tuple[Ints, Ints]:
     at, which = expand_counts(reach - np.arange(key.size) - 1)
     one, two = item[at], item[at + 1 + which]
     beside = (low[one, 1] <= high[two, 1]) & (low[two, 1] <= high[one, 1])
-    # Two that share several bands are taken in the first of them.
+    # A pair that shares several bands counts in the first of them.
     beside &= band[at] == np.maximum(first[one], first[two])
     one, two = np.minimum(one, two)[beside], np.maximum(one, two)[beside]
     order = np.lexsort((two, one))

@@ -12,14 +12,14 @@ from bestview.geometry.ground_plane import person_heights, to_ground
 
 Floats = NDArray[np.float64]
 
-_NEIGHBOR_BIN_SHARE, _BELOW = 0.25, 0.1
+_SIDE_MARGIN, _BOTTOM_MARGIN = 0.25, 0.1
 """How far feet must be inside the picture's sides, and above its lower edge, in heights of the person."""
-_LEAST_TALL = 0.15
+_MIN_APPARENT_HEIGHT = 0.15
 """Least apparent height at which a person is detected reliably, as a share of the picture's height."""
 
 
 class GhostCheck:
-    """Counts the calibrated cameras that miss a person who stands in full view of them.
+    """Counts the calibrated cameras that miss a person in full view.
 
     Args:
         homographies: by camera name, image pixels -> common ground plane; None: not calibrated.
@@ -31,22 +31,22 @@ class GhostCheck:
         self._homographies = np.array(list(known.values())).reshape(-1, 3, 3)
 
     def count_missing_cameras(
-        self, group: TrackletCluster, pictures: Mapping[str, tuple[int, int]], height: float
+        self, cluster: TrackletCluster, pictures: Mapping[str, tuple[int, int]], height: float
     ) -> int:
         """Count the cameras that should see a cluster at its last known position and have no track of it.
 
         Args:
-            group: its last localized endpoint counts.
+            cluster: its last localized endpoint counts.
             pictures: width and height in pixels of the cameras that have reported.
             height: of a person in ground units; NaN: not known yet, and nothing is counted.
         """
-        silent = [camera in pictures and camera not in group.cameras for camera in self._cameras]
-        located = [it.end for it in group.tracklets if not np.isnan(it.end.ground_point).any()]
-        if not any(silent) or not located or not height > 0:
+        missing = [camera in pictures and camera not in cluster.cameras for camera in self._cameras]
+        localized = [it.end for it in cluster.tracklets if not np.isnan(it.end.ground_point).any()]
+        if not any(missing) or not localized or not height > 0:
             return 0
-        ground_point = max(located, key=lambda it: it.frame).ground_point
+        ground_point = max(localized, key=lambda it: it.frame).ground_point
         sizes = np.array([pictures.get(camera, (0, 0)) for camera in self._cameras], dtype=np.float64)
-        return int((fully_in_view(self._homographies, sizes, ground_point, height) & silent).sum())
+        return int((fully_in_view(self._homographies, sizes, ground_point, height) & missing).sum())
 
 
 def fully_in_view(homographies: Floats, sizes: Floats, place: Floats, height: float) -> NDArray[np.bool_]:
@@ -70,9 +70,9 @@ def fully_in_view(homographies: Floats, sizes: Floats, place: Floats, height: fl
         one_pixel_tall = np.concatenate([feet - (0.0, 1.0), feet], axis=-1)
         tall = height / person_heights(homographies, one_pixel_tall)
         wide, high = sizes.T
-        inside = (np.minimum(feet[:, 0], wide - feet[:, 0]) > _NEIGHBOR_BIN_SHARE * tall) & (
-            tall > _LEAST_TALL * high
+        inside = (np.minimum(feet[:, 0], wide - feet[:, 0]) > _SIDE_MARGIN * tall) & (
+            tall > _MIN_APPARENT_HEIGHT * high
         )
-        inside &= (feet[:, 1] > tall) & (feet[:, 1] < high - _BELOW * tall)
-    # Who is behind a camera would be above its horizon.
+        inside &= (feet[:, 1] > tall) & (feet[:, 1] < high - _BOTTOM_MARGIN * tall)
+    # A point behind a camera is projected above its horizon.
     return np.asarray(inside & ~np.isnan(to_ground(homographies, feet)).any(axis=-1))

@@ -13,89 +13,90 @@ class IdentitySettings:
     are of one person than if they are of two. The values are round numbers, not fitted distributions.
 
     Raises:
-        ValueError: a setting outside its range.
+        ValueError: a setting is out of range.
     """
 
-    # Overlap (IoU) with somebody else in the same picture above which a track is in a crowd.
+    # Overlap (IoU) with another track of the camera above which a track is in a crowd.
     crowd_iou: float = 0.2
-    # Frames of crowd after which it is asked anew who has come out of it.
+    # Frames in a crowd after which a track that leaves it starts a new tracklet.
     crowd_frames: int = 3
-    # Frames unseen after which a track that goes on is asked likewise.
+    # Frames hidden after which a track that reappears starts a new tracklet.
     gap_frames: int = 10
-    # How far apart two cameras may see the same feet, in units of the ground plane. None: by person height.
+    # Distance, in ground units, at which two foot points are as likely of one person as of two. None:
+    # `gate_heights`.
     gate_distance: float | None = None
-    # The same in person heights, which the boxes tell in a ground plane of any unit (0.7: about 1.2 m).
+    # The same in person heights, for a ground plane of any unit (0.7: about 1.2 m).
     gate_heights: float = 0.7
-    # How well boxes find the feet, standard deviations in box heights: the gate is longer where they do
-    # not, which is along the line of sight.
+    # Standard deviations of foot points in box heights. The gate is longer along the line of sight, where
+    # foot points are less certain.
     foot_sideways: float = 0.05
     foot_upwards: float = 0.15
-    # Frames of standing on the same ground that are worth one: neighbouring frames err alike.
+    # Frames on the same ground that count as one: errors of neighboring frames are correlated.
     ground_correlation_frames: float = 5.0
-    # The most evidence that the ground gives, for or against.
+    # Largest evidence from the ground, for or against.
     maximum_ground_evidence: float = 20.0
-    # Evidence of looking as much alike as the same person usually does in a camera.
+    # Evidence at the appearance distance that is typical of one person in a camera.
     appearance_evidence: float = 8.0
-    # The most evidence that looks give in one camera, for or against.
+    # Largest evidence from appearance in one camera, for or against.
     maximum_appearance_evidence: float = 12.0
-    # Frames alone after which a look is known well enough to weigh in full.
+    # Unoccluded frames from which a mean histogram has full weight.
     appearance_frames: int = 8
     # Evidence that a camera's track is the same person before and after a crowd...
     continuation_evidence: float = 3.0
-    # ... which fades with the frames of the crowd.
+    # ... which decays with the frames of the crowd: to a third after this many.
     continuation_decay_frames: float = 40.0
-    # Evidence that who begins where somebody of the same camera was just lost is the same person.
+    # Evidence that a track starting where another of the camera just ended is the same person.
     reappearance_evidence: float = 2.0
-    # How far that may be at once, and the fastest plausible walk in a second (1.5: 2.5 m/s), in person
-    # heights. Twice as far, and it is somebody else.
+    # Distance allowed at once, and fastest plausible walk per second (1.5: 2.5 m/s), in person heights. Twice
+    # as far is another person.
     reappearance_reach_heights: float = 0.6
     maximum_speed_heights: float = 1.5
-    # Frames within which place tells who was lost and found.
+    # Largest gap in frames of a reappearance.
     reappearance_frames: int = 75
-    # Evidence that who was told to be one person is one.
+    # Evidence for rows with the same published id.
     id_persistence_evidence: float = 1.0
-    # Evidence that joins.
+    # Least affinity that merges two clusters.
     merge_threshold: float = 0.5
-    # Histograms further apart than this (mean difference of their CDFs, 0..1) are two people's: between
-    # cameras without a common ground, and for who comes back after long.
+    # Appearance distance (mean difference of CDFs, 0 to 1) above which two histograms are of two people:
+    # between cameras without common ground, and for re-identification.
     appearance_gate: float = 0.05
-    # ... and so are those further apart than this times the lower quartile between people seen side by side.
+    # The gate is at most this times the lower quartile of distances between simultaneous people.
     appearance_gate_share: float = 1.0
-    # Share of the evidence of looks between cameras that lives on from one update to the next.
+    # Share of the cross-camera appearance evidence that is kept from one update to the next.
     cross_camera_memory: float = 0.95
-    # The most such evidence, for or against.
+    # Largest such evidence, for or against.
     maximum_cross_camera_evidence: float = 8.0
-    # Frames, of all cameras together, in which someone must be seen before they are given a number.
+    # Frames, over all cameras, in which a person must be seen to get an id.
     confirmation_frames: int = 25
-    # Times as many more for each camera that should see them too and does not, and that no second one which
-    # does makes up for: shadows, and ghosts of the background, are seen by one camera.
+    # Additional multiples of these frames for each calibrated camera that should see the person and does not,
+    # unless a second one sees them: shadows and ghosts of the background are seen by one camera.
     ghost_penalty: float = 4.0
-    # Frames between two times at which everybody is grouped anew.
+    # Frames between two clusterings.
     clustering_interval: int = 10
-    # Frames after which a number was told, and weighs for staying.
+    # Frames after which an id counts as published, and as evidence.
     publish_after: int = 5
-    # Frames after which an old part of a track is settled: it stays whose it was told to be.
+    # Frames after which an old tracklet is settled: its person id does not change any more.
     settle_after: int = 120
-    # Parts of tracks up to which that is so; of more, those unseen for longest are settled sooner, then those
-    # that have been told one number for longest: a bound on what grouping costs in a large site.
+    # Active tracklets up to which that holds; of more, the longest unseen are settled first, then those with
+    # the same id for longest. Bounds the cost of clustering in a large site.
     maximum_open_tracklets: int = 400
-    # Frames for which a number must be nobody's, its tracks somebody else's, to be told as merged.
+    # Frames for which an id must be unused, its tracks having another, to be reported as merged.
     merge_after: int = 50
-    # Frames after which someone whom no camera sees is said to be gone (250: ten seconds at 25/s).
+    # Frames unseen by any camera after which a person is reported as departed (250: ten seconds at 25/s).
     departed_after: int = 250
-    # Frames within which the way from camera to camera says who has come (4500: three minutes at 25/s).
+    # Longest travel time between cameras, in frames, that is learned (4500: three minutes at 25/s).
     travel_frames: int = 4500
-    # Ways out of a camera that must be known for their times to weigh half.
+    # Transitions out of a camera at which its travel times have half their weight.
     travel_half_weight_count: float = 5.0
-    # The most evidence that they give, for or against; 0: looks alone.
+    # Largest evidence from travel times, for or against; 0: appearance alone.
     maximum_travel_evidence: float = 4.0
-    # What looks weigh beside them: the evidence of being nearer than the gate by a factor of e.
+    # Weight of appearance beside it: the evidence of a distance smaller by a factor of e.
     travel_appearance_weight: float = 3.0
-    # Frames for which who is gone is compared like everybody; later only a clear likeness brings them back.
+    # Frames for which an unseen person takes part in clustering; later only re-identification by appearance.
     comparable_frames: int = 750
-    # Frames after which someone gone is forgotten (15000: ten minutes at 25/s).
+    # Frames after which a departed person is forgotten (15000: ten minutes at 25/s).
     forget_after: int = 15000
-    # The most people remembered who are gone; the longest gone are forgotten first.
+    # Departed people remembered at most; the longest departed are forgotten first.
     maximum_departed_people: int = 1000
 
     def __post_init__(self) -> None:

@@ -170,18 +170,19 @@ def align_tracks(
 def _check(track: TrackUpdate, homographies: Mapping[str, NDArray[np.float64] | None]) -> None:
     name = f"track {track.local_id} of camera {track.camera}"
     if track.camera not in homographies:
-        raise ValueError(f"{name}: the camera is not known here")
+        raise ValueError(f"{name}: the camera is unknown")
     if track.boxes.ndim != 2 or track.boxes.shape[1] != 4:  # noqa: PLR2004 — left, top, right, bottom
         raise ValueError(f"{name}: boxes have shape {track.boxes.shape}, not (M, 4)")
-    for look in track.appearance:
-        if look.histogram.ndim != 1:
-            raise ValueError(f"{name}: a histogram has shape {look.histogram.shape}, not (B,)")
+    for sample in track.appearance:
+        if sample.histogram.ndim != 1:
+            raise ValueError(f"{name}: a histogram has shape {sample.histogram.shape}, not (B,)")
         if (
             not track.first_frame
-            <= look.first_frame
-            <= look.last_frame
+            <= sample.first_frame
+            <= sample.last_frame
             < track.first_frame + len(track.boxes)
         ):
             raise ValueError(
-                f"{name}: a look of frames {look.first_frame} to {look.last_frame} is not of its frames"
+                f"{name}: an appearance sample of frames {sample.first_frame} to {sample.last_frame} "
+                "is not within its frames"
             )

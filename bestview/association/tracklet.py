@@ -38,7 +38,7 @@ class TrackletKey(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackletEndpoint:
-    """Where a tracklet starts or ends: frame, (4,) box in pixels, (2,) ground point (NaN: unknown)."""
+    """First or last observation of a tracklet: frame, (4,) box in pixels, (2,) ground point or NaN."""
 
     frame: int
     box: Floats
@@ -56,13 +56,13 @@ class Tracklet:
         predecessor: the tracklet of the same track before this one.
         crowd_frames_before: frames of crowd between the two.
         frame_count: observations.
-        uncrowded_frames: those outside crowds.
+        uncrowded_frames: observations outside crowds.
         crowd_frames_at_end: how many of the newest observations in a row are in a crowd.
         appearance: mean histograms where nobody else was in the box.
         unpublished_frames: frames whose person id has not been published yet.
         published_frames: number of frames by published person id.
         person_id: the assigned person; 0: none yet.
-        settled_id: the person, if that was settled while the tracklet goes on; 0: it was not.
+        settled_id: the person id, if settled while the tracklet continues; 0: not settled.
         confirmed_continuation: an operator said that it is the same person as the predecessor.
     """
 
@@ -108,7 +108,7 @@ class Tracklet:
         return bool(frames and self.person_id)
 
     def assign_id(self, person_id: int) -> None:
-        """Replace everything published so far by this person id."""
+        """Assign a person id, also to the frames published so far."""
         self.published_frames = {person_id: max(1, sum(self.published_frames.values()))}
         self.person_id = person_id
         self.settled_id = person_id if self.settled_id else 0
@@ -119,7 +119,7 @@ class Tracklet:
         self.predecessor, self.crowd_frames_before, self.confirmed_continuation = predecessor, 0, True
 
     def merge_ids(self, lost: int, kept: int) -> None:
-        """Count what was published as one person id as another: the two turned out to be one person."""
+        """Count frames published with the id `lost` as `kept`: the two turned out to be one person."""
         frames = self.published_frames.pop(lost, 0)
         if frames:
             self.published_frames[kept] = self.published_frames.get(kept, 0) + frames

@@ -16,7 +16,7 @@ from bestview.association.tracklet import Tracklet
 
 @dataclass(eq=False)
 class TrackletCluster:
-    """One person, as far as is known now. Complete before it is queried.
+    """Tracklets and known people that are one person. Complete before it is queried.
 
     Attributes:
         rows: of the affinity matrix.
@@ -37,7 +37,7 @@ class TrackletCluster:
 
     @property
     def first_frame(self) -> int:
-        """First frame of the active tracklets; only if there are any."""
+        """First frame of the active tracklets, of which there must be some."""
         return min(tracklet.start.frame for tracklet in self.tracklets)
 
     @property

@@ -38,10 +38,10 @@ class TrackletSplitter:
         self.active: list[Tracklet] = []
         self._current: dict[TrackKey, Tracklet] = {}
         self._row: dict[TrackletKey, int] = {}
-        self._cut: dict[TrackKey, tuple[int, Tracklet]] = {}
-        """Tracks whose next sighting is said to begin an episode: whose it is, and what was before it."""
-        self._recalled: dict[TrackKey, int] = {}
-        """Tracks that were told to be somebody's before they were first heard of here."""
+        self._pending_splits: dict[TrackKey, tuple[int, Tracklet]] = {}
+        """Tracks whose next observation starts a new tracklet: its person id and its predecessor."""
+        self._recalled_ids: dict[TrackKey, int] = {}
+        """Person ids restored from an earlier run, for tracks that have not been seen yet."""
 
     def update(
         self, seen: TrackObservations, appearance: Mapping[TrackKey, Sequence[AppearanceSample]]
@@ -58,27 +58,27 @@ class TrackletSplitter:
         """
         rows, settled = np.full(seen.visible.shape, -1), np.zeros(seen.visible.shape, dtype=np.int64)
         crowded = seen.crowded(self._settings.crowd_iou)
-        # Where this is 0, a run of one frame is as good as a longer one.
+        # With a setting of 0 every frame may start a tracklet.
         whole = min(self._settings.crowd_frames, self._settings.gap_frames) > 0
         for run in observation_runs(seen.visible, crowded, whole=whole):
             key = seen.keys[run.track]
             tracklet, frame = self._current.get(key), seen.first_frame + run.start
-            if key in self._cut:
-                number, before = self._cut.pop(key)
+            if key in self._pending_splits:
+                number, before = self._pending_splits.pop(key)
                 tracklet = self._start_tracklet(key, _endpoint(seen, run.track, run.start), before)
                 tracklet.continue_as(number, before)
             elif tracklet is None or self._starts_new_tracklet(tracklet, frame, crowded=run.crowded):
                 tracklet = self._start_tracklet(key, _endpoint(seen, run.track, run.start), tracklet)
-                if key in self._recalled:
-                    tracklet.assign_id(self._recalled.pop(key))
+                if key in self._recalled_ids:
+                    tracklet.assign_id(self._recalled_ids.pop(key))
             tracklet.add_frames(range(frame, seen.first_frame + run.stop), crowded=run.crowded)
             tracklet.end = _endpoint(seen, run.track, run.stop - 1)
             rows[run.track, run.start : run.stop] = self._row.get(tracklet.key, -1)
             settled[run.track, run.start : run.stop] = tracklet.settled_id
-            for look in appearance.get(key, ()):
-                first, last = look.first_frame - seen.first_frame, look.last_frame - seen.first_frame
+            for sample in appearance.get(key, ()):
+                first, last = sample.first_frame - seen.first_frame, sample.last_frame - seen.first_frame
                 if run.start <= last < run.stop and not crowded[run.track, first : last + 1].any():
-                    tracklet.appearance.add(key.camera, MeanHistogram.of(look.histogram, last - first + 1))
+                    tracklet.appearance.add(key.camera, MeanHistogram.of(sample.histogram, last - first + 1))
         return rows, settled
 
     def _start_tracklet(self, key: TrackKey, at: TrackletEndpoint, before: Tracklet | None) -> Tracklet:
@@ -118,7 +118,7 @@ class TrackletSplitter:
     def predecessor(self, track: TrackKey, frame: int, number: int) -> Tracklet | None:
         """Return the newest tracklet of a track that started before a frame; None: the track is not known.
 
-        Of a settled tracklet that is over only the person is kept, which `number` gives.
+        Of a settled tracklet that is over only the person id is known, which `number` gives.
         """
         earlier = [it for it in self.active if it.key.track == track and it.start.frame < frame]
         current = self._current.get(track)
@@ -140,21 +140,23 @@ class TrackletSplitter:
 
     def split_next(self, track: TrackKey, number: int, before: Tracklet) -> None:
         """Start a new tracklet at a track's next observation: its person, and the tracklet it continues."""
-        self._cut[track] = number, before
+        self._pending_splits[track] = number, before
 
     def recall(self, track: TrackKey, number: int) -> None:
         """Assign a person id to the first tracklet of a track that has not been seen yet."""
         if track not in self._current:
-            self._recalled[track] = number
+            self._recalled_ids[track] = number
 
     def merge_ids(self, lost: int, kept: int) -> None:
         """Replace a person id that was merged into another."""
         for tracklet in chain(self.active, self._current.values()):
             tracklet.merge_ids(lost, kept)
             tracklet.settled_id = kept if tracklet.settled_id == lost else tracklet.settled_id
-        for track, (number, before) in self._cut.items():
-            self._cut[track] = kept if number == lost else number, before
-        self._recalled = {it: kept if number == lost else number for it, number in self._recalled.items()}
+        for track, (number, before) in self._pending_splits.items():
+            self._pending_splits[track] = kept if number == lost else number, before
+        self._recalled_ids = {
+            it: kept if number == lost else number for it, number in self._recalled_ids.items()
+        }
 
     def settleable_rows(self, last_frame: int) -> list[int]:
         """Return the rows of tracklets that are old enough to be settled, in order.
@@ -170,7 +172,7 @@ class TrackletSplitter:
         old[longest[ends[longest] <= earliest]] = True
         excess = len(ends) - int(old.sum()) - settings.maximum_open_tracklets
         if excess > 0:
-            # Still too many: whoever has been one person for longest stays it until the next crowd.
+            # Still too many: those with the same id for longest are settled until the next crowd.
             stable_frames = [
                 it.published_frames.get(it.person_id, 0) if it.person_id == it.main_id else 0
                 for it in self.active
@@ -184,26 +186,26 @@ class TrackletSplitter:
         return [int(row) for row in np.flatnonzero(old)]
 
     def settle(self, old: Iterable[Tracklet], last_frame: int) -> None:
-        """Remove tracklets from the active ones; those that go on keep their settled id."""
+        """Remove tracklets from the active ones; those that continue keep their settled id."""
         oldest = last_frame - self._settings.settle_after
         closed = {tracklet.key for tracklet in old}
         for tracklet in self.active:
             if tracklet.key in closed:
-                tracklet.predecessor = None  # or all there ever was would be kept
+                tracklet.predecessor = None  # otherwise all earlier tracklets would stay in memory
                 tracklet.settled_id, tracklet.unpublished_frames = tracklet.main_id, []
         self.active = [tracklet for tracklet in self.active if tracklet.key not in closed]
         self._row = {tracklet.key: row for row, tracklet in enumerate(self.active)}
-        # Tracks are not cut because they were settled; but who was nobody, or is long gone, begins anew.
+        # Settled tracks continue; those without an id, or ended long ago, start a new tracklet.
         self._current = {
             key: it
             for key, it in self._current.items()
             if it.key in self._row or (it.settled_id and it.end.frame > oldest)
         }
-        self._cut = {key: it for key, it in self._cut.items() if key in self._current}
+        self._pending_splits = {key: it for key, it in self._pending_splits.items() if key in self._current}
 
 
 def _endpoint(seen: TrackObservations, track: int, column: int) -> TrackletEndpoint:
-    # Copies: an end is remembered for long, and must not keep a whole update.
+    # Copies: an endpoint lives long, and must not keep the arrays of a whole update.
     return TrackletEndpoint(
         seen.first_frame + column, seen.boxes[track, column].copy(), seen.ground_point[track, column].copy()
     )
@@ -229,7 +231,7 @@ def observation_runs(
     kind = np.pad(kind, ((0, 0), (1, 1)))
     change = (kind[:, 1:] != kind[:, :-1]) | (not whole)
     track, start = np.nonzero(change[:, :-1] & visible)
-    # As many end as begin, in the same order.
+    # Ends are as many as starts, in the same order.
     _, stop = np.nonzero(change[:, 1:] & visible)
     for run in zip(
         track.tolist(), start.tolist(), (stop + 1).tolist(), crowded[track, start].tolist(), strict=True

@@ -16,13 +16,13 @@ from bestview.calibration.single_camera import height_errors, prior_errors, robu
 from bestview.calibration.walk_settings import WalkSettings
 from bestview.geometry.ground_plane import foot_points
 
-_HEIGHTS = 200
+_MAX_HEIGHTS = 200
 """Boxes of each camera whose height counts."""
-_MOST_MATCHES = 600
-"""Correspondences of two cameras that count; evenly chosen of more."""
+_MAX_MATCHES = 600
+"""Correspondences of two cameras that count; of more, evenly chosen ones."""
 _OFF_FLOOR_ERROR = 20.0
-_SHARPEST = 0.2
-"""Lower bound of the estimated foot error, as a share of what the settings say."""
+_MIN_FOOT_ERROR = 0.2
+"""Lower bound of the estimated foot error, relative to the settings'."""
 _OFFSET_SPREAD = 100.0
 """Frames; a weak prior that keeps offsets in place for cameras that nothing constrains."""
 _EVALUATIONS = 12
@@ -47,8 +47,8 @@ class Correspondences:
     weight: Floats
 
     def thinned(self) -> Correspondences:
-        """Return evenly chosen correspondences, at most `_MOST_MATCHES`."""
-        step = max(1, -(-len(self.here) // _MOST_MATCHES))
+        """Return evenly chosen correspondences, at most `_MAX_MATCHES`."""
+        step = max(1, -(-len(self.here) // _MAX_MATCHES))
         return replace(
             self, here=self.here[::step], there=self.there[::step], weight=self.weight[::step] * step
         )
@@ -69,9 +69,9 @@ def adjust_bundle(
     settings: WalkSettings,
     *,
     sharpness: float = 1.0,
-    in_step: bool = False,
+    fixed_offsets: bool = False,
 ) -> CameraRig:
-    """Optimize the cameras and their offsets; the first one's place, direction and offset stay.
+    """Optimize the cameras and their offsets; the pose and offset of the first camera are fixed.
 
     Args:
         rig: initial cameras; the samples are taken with its offsets.
@@ -79,18 +79,18 @@ def adjust_bundle(
         matches: correspondences.
         settings: weights and priors.
         sharpness: how much more precise foot points are than the settings say.
-        in_step: offsets are known and stay.
+        fixed_offsets: offsets are known and not optimized.
     """
     count = len(rig.cameras)
     parameters = np.concatenate([camera.parameters for camera in rig.cameras])
     free = np.ones(count * (PARAMETERS + 1), dtype=bool)
     free[POSE] = False
     free[count * PARAMETERS] = False
-    if in_step:
+    if fixed_offsets:
         free[count * PARAMETERS :] = False
     start = np.concatenate([parameters, np.zeros(count)])
     thinned = [it.thinned() for it in matches]
-    boxes = [select_moving_samples(it, _HEIGHTS) for it in samples]
+    boxes = [select_moving_samples(it, _MAX_HEIGHTS) for it in samples]
     heights = [
         (it.feet[chosen], it.tall[chosen], it.weight[chosen])
         for it, chosen in zip(samples, boxes, strict=True)
@@ -127,11 +127,11 @@ def floor_residuals(
     `later` is by how many frames each camera's offset is later than the samples were taken with, (C,).
     """
 
-    def end_frame(number: int, index: Indices) -> FloorPositions:
+    def positions(number: int, index: Indices) -> FloorPositions:
         boxes = samples[number].boxes[index] - later[number] * samples[number].speed[index]
         return project_to_floor(cameras[number], foot_points(boxes), boxes[:, 3] - boxes[:, 1], settings)
 
-    return whitened_differences(end_frame(it.one, it.here), end_frame(it.other, it.there), settings)
+    return whitened_differences(positions(it.one, it.here), positions(it.other, it.there), settings)
 
 
 def _match_errors(
@@ -161,13 +161,13 @@ def _cameras(rig: CameraRig, values: Floats) -> list[Pinhole]:
 def estimate_sharpness(residuals: Floats) -> float:
     """Return how much more precise foot points are than the settings say, from whitened distances, (M, 2)."""
     typical = float(np.median(np.hypot(*residuals.T))) / 1.18 if len(residuals) else 1.0  # Rayleigh's median
-    return 1.0 / min(max(typical, _SHARPEST), 1.0)
+    return 1.0 / min(max(typical, _MIN_FOOT_ERROR), 1.0)
 
 
 def offset_standard_errors(
     rig: CameraRig, samples: Sequence[WalkSamples], matches: Sequence[Correspondences], settings: WalkSettings
 ) -> Floats:
-    """Return the standard error of each camera's offset, (C,) frames; 0 of the first, which is the reference.
+    """Return the standard error of each camera's offset, (C,) frames; 0 for the first, the reference.
 
     The walk is cut into parts. In each the offsets are fitted to its own foot points, with the cameras fixed;
     the spread between the parts gives the error of the whole. Foot points that are tracked late, or shadows
@@ -194,7 +194,7 @@ def offset_standard_errors(
         residuals, slope = np.nan_to_num(residuals), np.nan_to_num(slope)
         np.add.at(normal, part, np.einsum("m,mki,mkj->mij", weight, slope, slope))
         np.add.at(right_hand_side, part, -np.einsum("m,mki,mk->mi", weight, slope, residuals))
-    # The first camera stays; parts weigh as much as they know.
+    # The first camera is fixed; parts are weighted by their information.
     part_offsets = [
         np.linalg.solve(it[1:, 1:] + _TINY * np.eye(count - 1), goal[1:])
         for it, goal in zip(normal, right_hand_side, strict=True)

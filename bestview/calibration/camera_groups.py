@@ -33,7 +33,7 @@ _ROUNDS = 3
 
 @dataclass(frozen=True, slots=True)
 class CameraPair:
-    """Result of aligning two cameras, by their numbers; no alignment: nobody was in both at once."""
+    """Result of aligning two cameras, by their numbers; no alignment: nobody was in both at the same time."""
 
     one: int
     other: int
@@ -43,11 +43,13 @@ class CameraPair:
         """Return why the two cannot be placed on one floor; None if they can."""
         if self.alignment is None:
             return "nobody was seen walking by both at once"
-        return next((words for holds, words in _rejection_reasons(self.alignment, settings) if holds), None)
+        return next(
+            (words for applies, words in _rejection_reasons(self.alignment, settings) if applies), None
+        )
 
 
 def _rejection_reasons(it: PairAlignment, settings: WalkSettings) -> Iterator[tuple[bool, str]]:
-    """Yield each possible objection to two cameras' being on one floor, and whether it holds."""
+    """Yield the reasons against placing two cameras on one floor, and whether each applies."""
     few = f"at only {it.places:.0f} steps of the walk people stand in one place"
     needed = f"{settings.minimum_places:.0f} are needed: walk longer where both see"
     yield it.places < settings.minimum_places, f"{few}; {needed}"
@@ -133,14 +135,14 @@ def _build_group(
     accepted: Sequence[CameraPair],
     settings: WalkSettings,
 ) -> CameraGroup:
-    """Chain the tree's alignments, then adjust all cameras at once until they agree best."""
+    """Chain the alignments of the tree, then adjust all cameras jointly."""
     rig = _chain_poses(members, tree)
     pulses = comparison_pulses([walks[number] for number in members], settings)
     numbers = [(members.index(it.one), members.index(it.other)) for it in accepted if it.one in members]
     samples, matches, sharpness = _match_people(walks, members, rig, pulses, numbers, settings)
     for _ in range(_ROUNDS):
         rig = adjust_bundle(
-            rig, samples, matches, settings, sharpness=sharpness, in_step=settings.maximum_offset == 0
+            rig, samples, matches, settings, sharpness=sharpness, fixed_offsets=settings.maximum_offset == 0
         )
         samples, matches, sharpness = _match_people(walks, members, rig, pulses, numbers, settings)
     return CameraGroup(members, rig, tuple(samples), tuple(matches))
@@ -177,7 +179,7 @@ def _match_people(
 
 
 def _chain_poses(members: tuple[int, ...], tree: Sequence[CameraPair]) -> CameraRig:
-    """Place camera after camera on the first one's floor, as tilted as its best alignment has it."""
+    """Place the cameras on the first one's floor one by one, each tilted as in its best alignment."""
     cameras: dict[int, Pinhole] = {}
     offsets: dict[int, float] = {members[0]: 0.0}
     for it in tree:  # the best first

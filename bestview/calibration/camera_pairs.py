@@ -29,16 +29,16 @@ from bestview.calibration.samples import CandidateMatches, WalkSamples, candidat
 from bestview.calibration.walk import Walk, halves_swapped, time_reversed
 from bestview.calibration.walk_settings import WalkSettings
 
-_GUESSES = 60
-"""Poses that are tried for each offset."""
-_REFINED = 3
+_MAX_HYPOTHESES = 60
+"""Poses tried for each offset."""
+_MAX_REFINED = 3
 """Best poses that are refined."""
 _NEARLY = 0.7
-"""... as far as they are this share as good as the very best."""
+"""Score relative to the best one from which a pose is refined."""
 _ROUNDS = 3
 _OFFSET_STEPS = 2
 """Offsets are tried this many times `step` apart; refinement covers what is between."""
-_MOST_MEETINGS = 20_000
+_MAX_CANDIDATES = 20_000
 """Candidate matches beyond which pulses are left out."""
 
 
@@ -52,7 +52,7 @@ class CameraHypotheses:
 
 @dataclass(frozen=True, slots=True)
 class PairAlignment:
-    """Two cameras on one floor, perhaps.
+    """Alignment of two cameras that may be on one floor.
 
     Attributes:
         rig: both of them; the first is at the origin, its offset 0.
@@ -61,7 +61,7 @@ class PairAlignment:
         breadth: how broad the walk is that both saw: standard deviation across its main direction,
             person heights.
         error: how far apart they place the same people, person heights (median).
-        chance: what places times share would be by chance.
+        chance: the merit of an alignment by chance.
     """
 
     rig: CameraRig
@@ -80,7 +80,7 @@ class PairAlignment:
 def pair_alignment(
     one: CameraHypotheses, other: CameraHypotheses, settings: WalkSettings
 ) -> PairAlignment | None:
-    """Align two cameras; None where nobody walked in both at once."""
+    """Align two cameras; None if nobody walked in both at the same time."""
     best = _best_alignment(one, other, settings)
     if best is None:
         return None
@@ -110,31 +110,31 @@ def _best_alignment(
     for offset in range(-steps * interval, steps * interval + 1, interval):
         there = sample_walk(other.walk, pulses, float(offset), settings.step, settings.stride)
         candidates = candidate_matches(here, there)
-        if len(candidates.here) > _MOST_MEETINGS:
-            fewer = pulses[:: -(-len(candidates.here) // _MOST_MEETINGS)]
-            candidates = _within(candidates, np.isin(here.times[candidates.here], fewer))
+        if len(candidates.here) > _MAX_CANDIDATES:
+            fewer = pulses[:: -(-len(candidates.here) // _MAX_CANDIDATES)]
+            candidates = _subset(candidates, np.isin(here.times[candidates.here], fewer))
         trials += [
             (places, float(offset), it)
             for places, it in _score_poses(one, here, other, there, candidates, settings)
         ]
     trials.sort(key=lambda it: (-it[0], abs(it[1])))
     alignments = [
-        _refine_alignment(one, here, other, pulses, offset, guess, settings)
-        for _, offset, guess in trials[:_REFINED]
+        _refine_alignment(one, here, other, pulses, offset, pose, settings)
+        for _, offset, pose in trials[:_MAX_REFINED]
     ]
     return max(alignments, key=lambda it: it.merit, default=None)
 
 
-def _within(meeting: CandidateMatches, chosen: np.ndarray) -> CandidateMatches:
+def _subset(candidates: CandidateMatches, chosen: np.ndarray) -> CandidateMatches:
     some = np.flatnonzero(chosen)
-    numbers, pair = np.unique(meeting.pair[some], return_inverse=True)
-    scale = len(meeting.here) / max(1, len(some))
+    numbers, pair = np.unique(candidates.pair[some], return_inverse=True)
+    scale = len(candidates.here) / max(1, len(some))
     return CandidateMatches(
-        meeting.here[some],
-        meeting.there[some],
+        candidates.here[some],
+        candidates.there[some],
         pair.reshape(-1),
-        meeting.tracks[numbers],
-        meeting.weight[some] * scale,
+        candidates.tracks[numbers],
+        candidates.weight[some] * scale,
     )
 
 
@@ -150,8 +150,8 @@ def _score_poses(
     own_positions = [project_to_floor(view, here.feet, here.tall, settings) for view in one.poses]
     other_positions = [project_to_floor(view, there.feet, there.tall, settings) for view in other.poses]
     scored = []
-    for pose in propose_relative_poses(own_positions, other_positions, candidates, _GUESSES):
-        transformed = own_positions[pose.here].transformed(pose.turn, pose.maximum_offset)
+    for pose in propose_relative_poses(own_positions, other_positions, candidates, _MAX_HYPOTHESES):
+        transformed = own_positions[pose.here].transformed(pose.rotation, pose.translation)
         distances = whitened_differences(
             select_positions(transformed, candidates.here),
             select_positions(other_positions[pose.there], candidates.there),
@@ -161,17 +161,17 @@ def _score_poses(
             (total_agreement(pair_agreement(distances, candidates, settings.gate), candidates), pose)
         )
     scored.sort(key=lambda it: -it[0])
-    return scored[:_REFINED]
+    return scored[:_MAX_REFINED]
 
 
 def _rig(one: CameraHypotheses, other: CameraHypotheses, pose: RelativePose, offset: float) -> CameraRig:
     """Place the first camera at the origin and the other by the relative pose."""
     first, second = one.poses[pose.here], other.poses[pose.there]
-    # The guess turns and shifts the first one's floor onto the second's; undo it for the second.
-    cos, sin = np.cos(-pose.turn), np.sin(-pose.turn)
+    # The pose maps the first camera's floor onto the second's: invert it for the second camera.
+    cos, sin = np.cos(-pose.rotation), np.sin(-pose.rotation)
     parameters = second.parameters.copy()
-    parameters[PAN] -= pose.turn
-    parameters[[EAST, NORTH]] = -np.array([[cos, -sin], [sin, cos]]) @ pose.maximum_offset
+    parameters[PAN] -= pose.rotation
+    parameters[[EAST, NORTH]] = -np.array([[cos, -sin], [sin, cos]]) @ pose.translation
     return CameraRig((first, replace(second, parameters=parameters)), np.array([0.0, offset]))
 
 
@@ -190,7 +190,7 @@ def _refine_alignment(
         candidates = candidate_matches(here, there)
         distances, places = compare_samples(rig.cameras, (here, there), candidates, settings, gate)
         matched = mutual_matches(distances, places, here, there, candidates, gate)
-        if gate == settings.final_gate or len(matched) < _LEAST_MATCHES:
+        if gate == settings.final_gate or len(matched) < _MIN_MATCHES:
             break
         matches = Correspondences(
             0, 1, candidates.here[matched], candidates.there[matched], candidates.weight[matched]
@@ -201,7 +201,7 @@ def _refine_alignment(
             [matches],
             settings,
             sharpness=estimate_sharpness(distances[matched]),
-            in_step=settings.maximum_offset == 0,
+            fixed_offsets=settings.maximum_offset == 0,
         )
     floor = rig.cameras[0].floor(here.feet[candidates.here[matched]])
     distance = np.hypot(*(floor - rig.cameras[1].floor(there.feet[candidates.there[matched]])).T)
@@ -218,7 +218,7 @@ def _refine_alignment(
     )
 
 
-_LEAST_MATCHES = 8
+_MIN_MATCHES = 8
 
 
 def compare_samples(

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-LEAST_POINTS = 4
+MIN_POINTS = 4
 _STEPS = 20
-_STILL = 1e-12
-_LEAST_RANK = 1e-5
-"""Below this share of the largest, the eighth singular value says that the points fix no homography."""
+_CONVERGENCE = 1e-12
+_MIN_RANK = 1e-5
+"""Eighth singular value, relative to the largest, below which the points determine no homography."""
 
 Floats = NDArray[np.float64]
 
@@ -29,13 +29,13 @@ def fit_homography(source: Floats, target: Floats) -> Floats:
     Raises:
         ValueError: the points determine none: too few, or (all but one of) them on a line.
     """
-    if len(source) < LEAST_POINTS:
-        raise ValueError(f"{len(source)} points: a homography takes {LEAST_POINTS}")
+    if len(source) < MIN_POINTS:
+        raise ValueError(f"{len(source)} points: a homography takes {MIN_POINTS}")
     to_source, from_target = _normalizer(source), _normalizer(target)
     x, y = _apply(to_source, source), _apply(from_target, target)
-    # Without the left vectors that are not used: all of them would be a square of twice the points.
+    # The left singular vectors are not needed: in full they would be a matrix of (2N)^2 entries.
     _, singular_values, rows = np.linalg.svd(_equations(x, y), full_matrices=False)
-    if not singular_values[7] > _LEAST_RANK * singular_values[0]:
+    if not singular_values[7] > _MIN_RANK * singular_values[0]:
         raise ValueError("the points, or all but one of them, are on a line")
     homography = _gauss_newton(rows[-1].reshape(3, 3), x, y)
     homography = np.linalg.inv(from_target) @ homography @ to_source
@@ -81,7 +81,7 @@ def _gauss_newton(homography: Floats, x: Floats, y: Floats) -> Floats:
     least = _error(best, x, y)
     for _ in range(_STEPS):
         w = (x @ best[2, :2] + best[2, 2])[:, None]
-        if not (np.abs(w) > _STILL).all():
+        if not (np.abs(w) > _CONVERGENCE).all():
             return best
         ones = np.column_stack([x, np.ones(len(x))]) / w
         zeros, image = np.zeros_like(ones), apply_homography(best, x)
@@ -97,7 +97,7 @@ def _gauss_newton(homography: Floats, x: Floats, y: Floats) -> Floats:
         error = _error(candidate, x, y)
         if not error < least:
             return best
-        converged = least - error <= _STILL * least
+        converged = least - error <= _CONVERGENCE * least
         best, least = candidate, error
         if converged:
             break

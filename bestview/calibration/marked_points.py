@@ -9,17 +9,17 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.calibration.homography import LEAST_POINTS, Floats, apply_homography, fit_homography
+from bestview.calibration.homography import MIN_POINTS, Floats, apply_homography, fit_homography
 
-_LEAST_TO_BLAME = 6
-"""With five pairs any four of them agree: who of them is wrong cannot be told."""
+_MIN_POINTS_TO_NAME = 6
+"""Pairs needed to name the wrong ones: of five pairs any four can be fitted exactly."""
 _MOST_TRIALS = 500
-"""Fours that are tried; up to eleven pairs have fewer."""
+"""Quadruples tried; up to eleven pairs have fewer."""
 _SEED = 1
 
 
 class CalibrationError(ValueError):
-    """No calibration is possible; the text is one line: why, and what would help."""
+    """No calibration is possible. The message is one line: why, and what would help."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class PointSettings:
     """When marked points contradict each other.
 
     Raises:
-        ValueError: a setting outside its range.
+        ValueError: a setting is out of range.
     """
 
     # How far a pair may be off in the picture, as a share of how far the camera's points are spread there.
@@ -38,7 +38,9 @@ class PointSettings:
     def __post_init__(self) -> None:
         """Check the ranges."""
         if not 0 < self.tolerance < 1 or not 0 <= self.maximum_inconsistent_share < 1:
-            raise ValueError("point settings: tolerance and wrong are shares, above 0 and below 1")
+            raise ValueError(
+                "point settings: tolerance and maximum_inconsistent_share are shares, above 0 and below 1"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,17 +67,14 @@ def image_errors(backwards: Floats, points: MarkedPoints) -> Floats:
 def describe_inconsistency(
     points: MarkedPoints, errors: Floats, allowed: float, settings: PointSettings
 ) -> str:
-    """Return an error message that names the inconsistent pairs, if they can be told."""
+    """Return an error message that names the inconsistent pairs, if they can be determined."""
     count = len(points.image)
-    fits = _consensus(points, allowed) if count >= _LEAST_TO_BLAME else np.ones(count, dtype=bool)
+    fits = _consensus(points, allowed) if count >= _MIN_POINTS_TO_NAME else np.ones(count, dtype=bool)
     wrong = np.flatnonzero(~fits)
-    if (
-        not 0 < len(wrong) <= settings.maximum_inconsistent_share * count
-        or count - len(wrong) <= LEAST_POINTS
-    ):
+    if not 0 < len(wrong) <= settings.maximum_inconsistent_share * count or count - len(wrong) <= MIN_POINTS:
         return (
             f"camera {points.camera}: the pairs contradict each other, by up to {errors.max():.0f} pixels; "
-            f"check them all, or add more ({_LEAST_TO_BLAME} at least), so that the wrong ones can be told"
+            f"check them all, or add more ({_MIN_POINTS_TO_NAME} at least), to find the wrong ones"
         )
     backwards = fit_homography(points.floor[fits], points.image[fits])
     off = image_errors(backwards, points)
@@ -110,10 +109,10 @@ def _consensus(points: MarkedPoints, allowed: float) -> NDArray[np.bool_]:
 
 def _point_quadruples(count: int) -> list[list[int]]:
     """Return all quadruples of so many points, or a random sample of them."""
-    if comb(count, LEAST_POINTS) <= _MOST_TRIALS:
-        return [list(four) for four in combinations(range(count), LEAST_POINTS)]
+    if comb(count, MIN_POINTS) <= _MOST_TRIALS:
+        return [list(four) for four in combinations(range(count), MIN_POINTS)]
     random = np.random.default_rng(_SEED)
-    return [random.choice(count, LEAST_POINTS, replace=False).tolist() for _ in range(_MOST_TRIALS)]
+    return [random.choice(count, MIN_POINTS, replace=False).tolist() for _ in range(_MOST_TRIALS)]
 
 
 def _point_text(point: Floats) -> str:

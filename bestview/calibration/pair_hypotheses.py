@@ -17,7 +17,7 @@ from bestview.calibration.samples import CandidateMatches
 
 _LEAST_MOMENTS = 5
 _LEAST_SPREAD = 0.3
-"""Variance of positions in person heights squared, below which somebody has hardly walked."""
+"""Variance of positions, person heights squared, below which a track is too short to align."""
 _NOISE = 0.1
 
 
@@ -25,14 +25,14 @@ _NOISE = 0.1
 class RelativePose:
     """Rotation (radians) and then translation, (2,), of one camera's floor onto the other's.
 
-    `here` and `there` say which of the cameras' possible poses were taken.
+    `here` and `there` are the indices of the two cameras' pose hypotheses.
     """
 
     merit: float
     here: int
     there: int
-    turn: float
-    maximum_offset: Floats
+    rotation: float
+    translation: Floats
 
 
 def propose_relative_poses(
@@ -43,10 +43,10 @@ def propose_relative_poses(
 ) -> list[RelativePose]:
     """Return the best relative poses, best first, over all combinations of the cameras' possible poses."""
     poses = [
-        guess
+        pose
         for a, one in enumerate(here)
         for b, other in enumerate(there)
-        for guess in _poses_of_views(a, one, b, other, candidates)
+        for pose in _poses_of_views(a, one, b, other, candidates)
     ]
     poses.sort(key=lambda it: -it.merit)
     return poses[:maximum]

@@ -1,7 +1,7 @@
 """Pinhole camera over the floor, in person heights: the model that is fitted to a walk.
 
-The floor is z = 0 and everybody is 1 tall. Eight parameters are as many as a homography has: nothing that a
-plane's image can show is left out, but each parameter has a meaning and can be estimated.
+The floor is z = 0 and people are 1 tall. The eight parameters are as general as a homography, but each has a
+meaning and a prior.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ VIEW = slice(0, PAN)
 POSE = slice(PAN, PARAMETERS)
 
 
-_MOST_DEPTH = 1000.0
+_MAX_DEPTH = 1000.0
 """Person heights beyond which a point is too near the horizon to have a position."""
-_LEAST_DEPTH = 1e-3
+_MIN_DEPTH = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +42,14 @@ class Pinhole:
 
     def homography(self, person: float = 1.0) -> Floats:
         """Return the homography from pixels to the floor, (3, 3); people are `person` units tall."""
-        back = np.diag([person, person, 1.0]) @ self._back()
+        back = np.diag([person, person, 1.0]) @ self._inverse()
         return np.asarray(back / np.abs(back).max())
 
     def floor(self, feet: Floats) -> Floats:
         """Map foot points to the floor: (..., 2) pixels -> (..., 2) person heights; NaN above the horizon."""
-        back = self._back()
+        back = self._inverse()
         through = feet @ back[:, :2].T + back[:, 2]
-        return np.asarray(through[..., :2] / _near(through[..., 2:]))
+        return np.asarray(through[..., :2] / _valid_depth(through[..., 2:]))
 
     def floor_and_steps(self, feet: Floats) -> tuple[Floats, Floats]:
         """Map foot points to the floor, with the derivatives by the pixel's column and row.
@@ -57,9 +57,9 @@ class Pinhole:
         (..., 2) pixels -> (..., 2) and (..., 2, 2) person heights. The last axis of the derivatives is the
         direction in the picture, the one before it east and north.
         """
-        back = self._back()
+        back = self._inverse()
         through = feet @ back[:, :2].T + back[:, 2]
-        near = _near(through[..., 2:])
+        near = _valid_depth(through[..., 2:])
         place = through[..., :2] / near
         steps = (back[:2, :2] - place[..., None] * back[2, :2]) / near[..., None]
         return place, steps
@@ -67,7 +67,7 @@ class Pinhole:
     def picture(self, place: Floats) -> Floats:
         """Map floor positions to the picture: (..., 2) person heights -> (..., 2) pixels; NaN behind it."""
         through = place @ self._projection()[:, :2].T + self._projection()[:, 3]
-        depth = np.where(through[..., 2:] > _LEAST_DEPTH, through[..., 2:], np.nan)
+        depth = np.where(through[..., 2:] > _MIN_DEPTH, through[..., 2:], np.nan)
         return np.asarray(through[..., :2] / depth)
 
     def heights(self, feet: Floats) -> Floats:
@@ -77,10 +77,10 @@ class Pinhole:
             [place, np.ones((*place.shape[:-1], 1)), np.ones((*place.shape[:-1], 1))], axis=-1
         )
         through = head @ self._projection().T
-        depth = np.where(through[..., 2] > _LEAST_DEPTH, through[..., 2], np.nan)
+        depth = np.where(through[..., 2] > _MIN_DEPTH, through[..., 2], np.nan)
         return np.asarray(feet[..., 1] - through[..., 1] / depth)
 
-    def _back(self) -> Floats:
+    def _inverse(self) -> Floats:
         """Return the (3, 3) matrix from pixels to the floor; its last row gives one over the depth."""
         return np.asarray(np.linalg.inv(self._projection()[:, [0, 1, 3]]))
 
@@ -108,6 +108,6 @@ class Pinhole:
         return np.asarray(lens @ np.column_stack([axes, shift]))
 
 
-def _near(near: Floats) -> Floats:
+def _valid_depth(near: Floats) -> Floats:
     """Set points without depth or with too much of it to NaN; `near` is one over the depth."""
-    return np.where(near > 1.0 / _MOST_DEPTH, near, np.nan)
+    return np.where(near > 1.0 / _MAX_DEPTH, near, np.nan)

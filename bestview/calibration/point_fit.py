@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bestview.calibration.homography import LEAST_POINTS, Floats, fit_homography
+from bestview.calibration.homography import MIN_POINTS, Floats, fit_homography
 from bestview.calibration.marked_points import (
     CalibrationError,
     MarkedPoints,
@@ -37,14 +37,14 @@ def fit_points(points: MarkedPoints, settings: PointSettings | None = None) -> P
     """Fit the homography of a camera to its marked points: least squares in the picture.
 
     Raises:
-        CalibrationError: too few pairs, or on a line; some contradict the others, and are named (from one);
-            or the floor would be seen from below the horizon.
+        CalibrationError: too few pairs, pairs on a line, pairs that contradict each other, or pairs above
+            the horizon.
     """
     settings = settings or PointSettings()
     _check(points)
     backwards = _fit(points.floor, points.image, points.camera)
     errors = image_errors(backwards, points)
-    allowed = settings.tolerance * _summarize(points.image)
+    allowed = settings.tolerance * _extent(points.image)
     if errors.max() > allowed:
         raise CalibrationError(describe_inconsistency(points, errors, allowed, settings))
     try:
@@ -92,9 +92,9 @@ def is_mirrored(fit: PointFit, points: MarkedPoints) -> bool:
 
 def _check(points: MarkedPoints) -> None:
     count = len(points.image)
-    if count < LEAST_POINTS:
+    if count < MIN_POINTS:
         pairs = "pair" if count == 1 else "pairs"
-        raise CalibrationError(f"camera {points.camera}: {count} {pairs}; at least {LEAST_POINTS} are needed")
+        raise CalibrationError(f"camera {points.camera}: {count} {pairs}; at least {MIN_POINTS} are needed")
     for place, words in ((points.image, "in the picture"), (points.floor, "on the floor")):
         if not np.isfinite(place).all():
             raise CalibrationError(f"camera {points.camera}: a point {words} is not a finite number")
@@ -123,6 +123,6 @@ def _on_a_line(camera: str) -> str:
     return f"camera {camera}: the points, or all but one of them, are on a line; mark some beside it"
 
 
-def _summarize(image: Floats) -> float:
-    """The diagonal of the points' bounding box."""
+def _extent(image: Floats) -> float:
+    """Return the diagonal of the points' bounding box."""
     return float(np.hypot(*np.ptp(image, axis=0)))

@@ -14,7 +14,7 @@ from bestview.geometry.ground_plane import foot_points
 Indices = NDArray[np.intp]
 
 LEAST_WEIGHT = 0.02
-"""Weight of a sample without movement: standing people say little, however long."""
+"""Weight of a sample without movement: standing people add little information."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,12 +112,12 @@ def candidate_matches(one: WalkSamples, other: WalkSamples) -> CandidateMatches:
 
 
 def select_moving_samples(samples: WalkSamples, maximum: int) -> Indices:
-    """Return evenly chosen samples of people who walk, (N,) indices; of all, if hardly anybody does."""
-    walking = np.flatnonzero(samples.weight >= _WALKING)
-    if len(walking) < _FEW:
+    """Return evenly chosen samples of walking people, (N,) indices; of all people if too few walk."""
+    walking = np.flatnonzero(samples.weight >= _WALKING_WEIGHT)
+    if len(walking) < _MIN_WALKING_SAMPLES:
         walking = np.arange(len(samples.times))
     return walking[:: max(1, -(-len(walking) // maximum))]
 
 
-_WALKING = 0.3
-_FEW = 30
+_WALKING_WEIGHT = 0.3
+_MIN_WALKING_SAMPLES = 30

@@ -11,14 +11,14 @@ from bestview.calibration.samples import WalkSamples, select_moving_samples
 from bestview.calibration.walk_settings import WalkSettings
 
 _OFF_FLOOR_ERROR = 3.0
-"""The error, as a logarithm, of the height of somebody who stands above the horizon."""
-_MOST_HEIGHTS = 60.0
-"""Heights count as this many independent ones at most: tall people are always tall."""
+"""Logarithmic height error of a person above the horizon."""
+_MAX_INDEPENDENT_HEIGHTS = 60.0
+"""Independent samples that all heights together count as at most: a person's height is constant."""
 _TILTS = (0.1, 0.35, 0.8)
 _START_HEIGHT = 1.7
-_MOMENTS = 600
-_FIXED = 0.01
-"""Standard deviation of the focal length where it is given."""
+_MAX_SAMPLES = 600
+_FOCAL_ERROR = 0.01
+"""Standard deviation of the logarithm of a given focal length."""
 
 
 def prior_errors(camera: Pinhole, settings: WalkSettings) -> Floats:
@@ -41,7 +41,7 @@ def height_errors(
     with np.errstate(invalid="ignore", divide="ignore"):
         log_ratio = np.log(camera.heights(feet) / heights)
     log_ratio = np.where(np.isfinite(log_ratio), log_ratio, _OFF_FLOOR_ERROR) / settings.person_height_spread
-    share = weight * min(1.0, _MOST_HEIGHTS / max(float(weight.sum()), 1e-9))
+    share = weight * min(1.0, _MAX_INDEPENDENT_HEIGHTS / max(float(weight.sum()), 1e-9))
     return np.asarray(robust(log_ratio) * np.sqrt(share))
 
 
@@ -58,7 +58,7 @@ def fit_tilt_and_height(
     On a flat floor the apparent height of people falls linearly to 0 at the horizon, and how fast they grow
     towards the camera gives its height.
     """
-    chosen = select_moving_samples(samples, _MOMENTS)
+    chosen = select_moving_samples(samples, _MAX_SAMPLES)
     feet, tall, weight = samples.feet[chosen], samples.tall[chosen], samples.weight[chosen]
     best, least = None, np.inf
     for tilt in _TILTS:
@@ -67,12 +67,12 @@ def fit_tilt_and_height(
 
         def errors(view: Floats, start: Floats = start) -> Floats:
             camera = Pinhole(np.concatenate([view, start[VIEW.stop :]]), size)
-            given = (view[FOCAL] - np.log(focal)) / _FIXED
+            focal_error = (view[FOCAL] - np.log(focal)) / _FOCAL_ERROR
             heights = height_errors(camera, feet, tall, weight, settings)
-            return np.concatenate([heights, prior_errors(camera, settings), [given]])
+            return np.concatenate([heights, prior_errors(camera, settings), [focal_error]])
 
-        found = scipy.optimize.least_squares(errors, start[VIEW], x_scale="jac", ftol=1e-5, max_nfev=60)
-        if found.cost < least:
-            best, least = np.concatenate([found.x, start[VIEW.stop :]]), found.cost
+        solution = scipy.optimize.least_squares(errors, start[VIEW], x_scale="jac", ftol=1e-5, max_nfev=60)
+        if solution.cost < least:
+            best, least = np.concatenate([solution.x, start[VIEW.stop :]]), solution.cost
     assert best is not None  # noqa: S101 — priors are finite
     return Pinhole(best, size)

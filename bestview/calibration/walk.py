@@ -16,7 +16,7 @@ class WalkTrack:
 
     Attributes:
         first_frame: the frame of the first box.
-        boxes: left, top, right, bottom in pixels, (F, 4); NaN where unseen or of no use.
+        boxes: left, top, right, bottom in pixels, (F, 4); NaN where unseen or unusable.
     """
 
     first_frame: int
@@ -34,7 +34,7 @@ class WalkTrack:
         low = np.clip(np.floor(place), 0, len(self.boxes) - 1).astype(np.intp)
         high = np.minimum(low + 1, len(self.boxes) - 1)
         share = np.clip(place - low, 0.0, 1.0)[:, None]
-        # Half of a box that is not there is none, unless nothing of it is asked for.
+        # A neighbor of weight 0 does not count, even if it is NaN.
         between = np.where(
             share > 0, (1 - share) * self.boxes[low] + share * self.boxes[high], self.boxes[low]
         )
@@ -57,7 +57,7 @@ class Walk:
 
     @property
     def end_frame(self) -> int:
-        """The frame after the last one in which somebody was seen."""
+        """The frame after the last one with a person."""
         return max((it.end_frame for it in self.tracks), default=0)
 
 
@@ -88,7 +88,7 @@ def build_walk(
     for number in np.unique(track_id):
         rows = np.flatnonzero((track_id == number) & inside)
         rows = rows[np.argsort(frame[rows], kind="stable")]
-        # A gap that is long parts a track in two: who was hidden long may have come back as somebody else.
+        # A long gap splits a track: the person may have been confused with another.
         parts = np.split(rows, np.flatnonzero(np.diff(frame[rows]) > step) + 1)
         tracks += [_track(frame[part], boxes[part], step) for part in parts if len(part) > 1]
     return Walk(camera, size, tuple(sorted(tracks, key=lambda it: (it.first_frame, it.end_frame))))

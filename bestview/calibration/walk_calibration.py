@@ -107,16 +107,16 @@ def calibrate_from_walks(
     for number in sorted(set(range(len(walks))) - grouped):
         best = max((it for it in pairs if number in (it.one, it.other)), key=_alignment_merit)
         left_out.append(UncalibratedCamera(walks[number].camera, _rejection_text(walks, best, settings)))
-    unsure = [offset_standard_errors(it.rig, it.samples, it.matches, settings) for it in groups]
-    found = [
+    offset_errors = [offset_standard_errors(it.rig, it.samples, it.matches, settings) for it in groups]
+    calibrated = [
         _camera(walks[number].camera, floor, group, place, errors, person)
-        for floor, (group, errors) in enumerate(zip(groups, unsure, strict=True))
+        for floor, (group, errors) in enumerate(zip(groups, offset_errors, strict=True))
         for place, number in enumerate(group.members)
     ]
     order = {walk.camera: number for number, walk in enumerate(walks)}
     off = [_correspondence_errors(group, it, it.other) for group in groups for it in group.matches]
     return WalkCalibration(
-        tuple(sorted(found, key=lambda it: order[it.camera])),
+        tuple(sorted(calibrated, key=lambda it: order[it.camera])),
         tuple(left_out),
         _summarize([it.heights for it in off]),
         _summarize([it.picture for it in off]),

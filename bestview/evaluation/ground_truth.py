@@ -45,11 +45,11 @@ def view_ground_truth(
     The largest such view has quality 1, and the others are divided by it.
 
     Args:
-        boxes: (K, N, C, 4) left, top, right, bottom in pixels of the camera's picture; NaN: there is none.
+        boxes: (K, N, C, 4) left, top, right, bottom in pixels of the camera's picture; NaN: no box.
         shown: (K, N, C) the share of each person that shows, in [0, 1]; negative where it is not known,
             which counts as all of it.
         sizes: (C, 2) width and height of each camera's picture, pixels.
-        minimum_visible_share: in [0, 1]; 0: whoever has a box is visible.
+        minimum_visible_share: in [0, 1]; 0: everybody with a box is visible.
 
     Raises:
         ValueError: shapes that do not fit, or a picture without area.
@@ -100,7 +100,7 @@ def match_objects_to_people(matches: NDArray[np.int64]) -> NDArray[np.int64]:
         (O,) the index of each object's person; -1: none.
 
     Raises:
-        ValueError: matches that are no table.
+        ValueError: `matches` is not two-dimensional.
     """
     if matches.ndim != 2:  # noqa: PLR2004 — people, objects
         raise ValueError(f"matches have shape {matches.shape}, not (people, objects)")

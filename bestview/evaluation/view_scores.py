@@ -22,13 +22,13 @@ class ViewScore:
     Attributes:
         frames: object-frames that count.
         agreement: share of them in which the choice is the optimum's.
-        regret: extra cost over the optimum's, as a share of it (0: as good; infinite: the optimum is free).
+        regret: extra cost over the optimum's, as a share of item (0: as good; infinite: the optimum is free).
         visible: share of them in which the object is visible in the chosen camera.
         chosen: share of them in which there is a choice at all.
         cuts_per_minute: cuts per minute of an object's stream.
         optimum_cuts_per_minute: the same for the optimum.
         shortest_shot: frames between the closest two cuts; 0 where there are fewer than two.
-        cost: of the choice, in frames of not seeing the object; `regret` compares it with the next.
+        cost: of the choice, in frames of not seeing the object; `regret` compares item with the next.
         optimum_cost: of the optimum.
     """
 
@@ -69,7 +69,7 @@ def score_views(
 
     Frames in which no camera could show the object are left out, of the selection and of the optimum alike;
     the frames around such a gap are taken as neighbors. A frame without a view costs 1, and no cut is counted
-    to it or from it to the camera before.
+    to item or from item to the camera before.
 
     Args:
         cost: (K, N, C) true view cost in [0, 1] per object, frame and camera.
@@ -86,7 +86,7 @@ def score_views(
             f"shapes do not fit: cost {cost.shape}, visible {visible.shape}, views {views.shape}"
         )
     if views.size and not (views.min() >= NO_CAMERA and views.max() < cost.shape[2]):
-        raise ValueError(f"the choice names a camera outside -1 .. {cost.shape[2] - 1}")
+        raise ValueError(f"views name a camera outside -1 .. {cost.shape[2] - 1}")
     truth = ViewGroundTruth(cost, visible)
     totals = [
         _object_totals(
@@ -97,24 +97,19 @@ def score_views(
         )
         if evaluated.any()
     ]
-    frames = sum(total_of_object.frames for total_of_object in totals)
+    frames = sum(item.frames for item in totals)
     per_minute = _SECONDS_PER_MINUTE * fps / max(frames, 1)
-    best = sum(total_of_object.best_cost for total_of_object in totals)
-    total = sum(total_of_object.cost for total_of_object in totals)
-    shots = [
-        int(np.diff(total_of_object.cuts).min())
-        for total_of_object in totals
-        if total_of_object.cuts.size > 1
-    ]
+    best = sum(item.best_cost for item in totals)
+    total = sum(item.cost for item in totals)
+    shots = [int(np.diff(item.cuts).min()) for item in totals if item.cuts.size > 1]
     return ViewScore(
         frames=frames,
-        agreement=sum(total_of_object.agreed for total_of_object in totals) / max(frames, 1),
+        agreement=sum(item.agreed for item in totals) / max(frames, 1),
         regret=_share(total - best, best),
-        visible=sum(total_of_object.visible_frames for total_of_object in totals) / max(frames, 1),
-        chosen=sum(total_of_object.chosen for total_of_object in totals) / max(frames, 1),
-        cuts_per_minute=sum(total_of_object.cuts.size for total_of_object in totals) * per_minute,
-        optimum_cuts_per_minute=sum(total_of_object.best_cuts.size for total_of_object in totals)
-        * per_minute,
+        visible=sum(item.visible_frames for item in totals) / max(frames, 1),
+        chosen=sum(item.chosen for item in totals) / max(frames, 1),
+        cuts_per_minute=sum(item.cuts.size for item in totals) * per_minute,
+        optimum_cuts_per_minute=sum(item.best_cuts.size for item in totals) * per_minute,
         shortest_shot=min(shots, default=0),
         cost=float(total),
         optimum_cost=float(best),

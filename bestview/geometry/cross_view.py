@@ -43,7 +43,7 @@ class CrossViewSettings:
     absence_penalty: float = (
         0.2  # share of a box's score that is lost where another camera plainly sees nobody
     )
-    gate_heights: float = 0.3  # how far apart two cameras may see the same feet, in person heights
+    gate_heights: float = 0.3  # how margin apart two cameras may see the same feet, in person heights
     foot_sideways: float = 0.05  # how well boxes find the feet: standard deviation in box heights, across
     foot_upwards: float = 0.15  # and up and down
     minimum_occluder_score: float = 0.3  # least score of a box that may hide who is behind it
@@ -96,7 +96,7 @@ def rescore_detections(
 ) -> Floats:
     """Return a camera's detection scores (K,), corrected by the detections of other cameras.
 
-    With `a` the confirmation by another camera that detects somebody at the same ground point, and `d` the
+    With `a` the confirmation by another camera that detects a person at the same ground point, and `d` the
     evidence of one that has a clear view of an empty place, each the maximum over the cameras: `s +
     confirmation_boost a (1 - s) - absence_penalty d s`. Cameras that are not given and boxes without ground
     point change nothing.
@@ -121,7 +121,7 @@ def rescore_detections(
 def views_overlap(own: CameraGeometry, other: CameraGeometry) -> bool:
     """Return whether the other camera sees ground that a camera sees, or nearly so.
 
-    Tested at points all over the camera's picture and below it as far as boxes reach.
+    Tested at points all over the camera's picture and below it as margin as boxes reach.
     """
     width, height = own.size
     x, y = np.meshgrid(
@@ -129,8 +129,8 @@ def views_overlap(own: CameraGeometry, other: CameraGeometry) -> bool:
         np.linspace(0.0, height * (1.0 + _OVERLAP_MARGIN), _OVERLAP_GRID),
     )
     projected = from_ground(other.homography, to_ground(own.homography, np.stack([x, y], axis=-1)))
-    far = np.array(other.size) * _OVERLAP_MARGIN
-    return bool(((projected >= -far) & (projected <= far + other.size)).all(axis=-1).any())
+    margin = np.array(other.size) * _OVERLAP_MARGIN
+    return bool(((projected >= -margin) & (projected <= margin + other.size)).all(axis=-1).any())
 
 
 def _confirmation(
@@ -140,7 +140,7 @@ def _confirmation(
     other_detections: CameraDetections,
     settings: CrossViewSettings,
 ) -> Floats:
-    """Compute how surely the other camera has somebody at each box's place: (K,)."""
+    """Compute how surely the other camera detects a person at each box's ground point: (K,)."""
     if not len(other_detections.scores):
         return np.zeros(detections.scores.shape)
     own_points, own_covariance = _foot_positions(own, detections.boxes, settings)
@@ -202,7 +202,7 @@ def _body_points(
     """Return points all over where the other camera would see each person: (K, P, 2), NaN: not in view."""
     ground, _ = _foot_positions(own, boxes, settings)
     foot = from_ground(other.homography, ground)
-    # How long a pixel is there tells how tall somebody of this height is.
+    # The size of a pixel on the ground gives the height of the person in the other picture.
     one_pixel = np.concatenate([foot - (0.0, 1.0), foot], axis=-1)
     height = person_heights(own.homography, boxes) / person_heights(other.homography, one_pixel)
     x = foot[:, None, None, 0] + height[:, None, None] * _PERSON_ASPECT_RATIO * _ACROSS

@@ -11,21 +11,21 @@ Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 _ROWS, _COLUMNS = 18, 32
-"""Cells of a picture, for feet: a cell is about as wide as somebody who is not near."""
-_AROUND = 3
-"""Cells that are averaged in each direction: places are known no better."""
-_GOOD = 0.5
-"""Detection rate of a camera below which its places are not compared with it."""
-_HIDDEN, _MORE = 0.04, 0.02
-"""The share of looks in which people are really hidden, and misses beyond it by which a camera is known."""
+"""Cells of a picture, for foot points: about as wide as a person at medium distance."""
+_SMOOTHING_CELLS = 3
+"""Cells averaged in each direction: the accuracy of foot points."""
+_MIN_CAMERA_RATE = 0.5
+"""Least detection rate of a camera that the rates of its cells are compared with."""
+_OCCLUSION_RATE, _OCCLUSION_MARGIN = 0.04, 0.02
+"""Miss rate explained by occlusion alone, and the excess over it at which misses count in full."""
 
 
 class DetectionProbabilityMap:
     """Estimates how likely each camera detects a person who stands at a place.
 
-    The probability at a place is ``(found + w camera) / (trials + w)`` over the cells around it, with `w` the
-    `cell_prior_weight`, and the camera's ``(found + v prior) / (trials + v)`` over all of its picture, with
-    `v` the `camera_prior_weight`.
+    The probability at a place is ``(detections + w camera) / (trials + w)`` over the cells around it, with
+    `w` the `cell_prior_weight`, and the camera's ``(detections + v prior) / (trials + v)`` over all of its
+    picture, with `v` the `camera_prior_weight`.
 
     Args:
         cameras: C.
@@ -43,49 +43,63 @@ class DetectionProbabilityMap:
         cell_prior_weight: float,
         camera_prior_weight: float,
     ) -> None:
-        self._size, self._prior, self._few, self._many = size, prior, cell_prior_weight, camera_prior_weight
+        self._size, self._prior, self._cell_weight, self._camera_weight = (
+            size,
+            prior,
+            cell_prior_weight,
+            camera_prior_weight,
+        )
         self._counts = np.zeros((2, cameras, _ROWS, _COLUMNS))
-        """Looks, and those in which somebody was found."""
-        self._own = np.full(cameras, prior)
-        self._shares = np.full((cameras, _ROWS, _COLUMNS), prior)
+        """Trials, and those with a detection."""
+        self._camera_rate = np.full(cameras, prior)
+        self._cell_rate = np.full((cameras, _ROWS, _COLUMNS), prior)
 
-    def learn(self, camera: Ints, feet: Floats, found: Mask, looks: Floats | float, kept: float) -> None:
+    def learn(
+        self, camera: Ints, feet: Floats, detected: Mask, weight: Floats | float, retention: float
+    ) -> None:
         """Count trials: people who stand in a camera's view, and whether it detected them.
 
         Args:
             camera: (V,) camera of each trial.
             feet: (V, 2) position in its picture, pixels.
-            found: (V,).
-            looks: weight of each trial, (V,) or of all of them.
-            kept: factor on all earlier counts.
+            detected: (V,).
+            weight: of each trial, (V,) or one for all.
+            retention: factor on all earlier counts.
         """
         cells = self._cells(camera, feet)
-        self._counts *= kept
+        self._counts *= retention
         flat = self._counts.reshape(2, -1)
-        weights = np.broadcast_to(np.asarray(looks, dtype=np.float64), cells.shape)
+        weights = np.broadcast_to(np.asarray(weight, dtype=np.float64), cells.shape)
         flat[0] += np.bincount(cells, weights, flat.shape[1])
-        flat[1] += np.bincount(cells[found], weights[found], flat.shape[1])
-        looked, seen = self._counts.sum(axis=(2, 3))
-        self._own = (seen + self._many * self._prior) / (looked + self._many)
-        around = (
-            scipy.ndimage.uniform_filter(self._counts, (1, 1, _AROUND, _AROUND), mode="constant") * _AROUND**2
+        flat[1] += np.bincount(cells[detected], weights[detected], flat.shape[1])
+        trials, detections = self._counts.sum(axis=(2, 3))
+        self._camera_rate = (detections + self._camera_weight * self._prior) / (trials + self._camera_weight)
+        smoothed = (
+            scipy.ndimage.uniform_filter(
+                self._counts, (1, 1, _SMOOTHING_CELLS, _SMOOTHING_CELLS), mode="constant"
+            )
+            * _SMOOTHING_CELLS**2
         )
-        self._shares = (around[1] + self._few * self._own[:, None, None]) / (around[0] + self._few)
+        self._cell_rate = (smoothed[1] + self._cell_weight * self._camera_rate[:, None, None]) / (
+            smoothed[0] + self._cell_weight
+        )
 
     def probability(self, camera: Ints, feet: Floats) -> Floats:
         """Return the probability that cameras (V,) detect people at (V, 2) pixels of their pictures."""
-        return self._shares.reshape(-1)[self._cells(camera, feet)]
+        return self._cell_rate.reshape(-1)[self._cells(camera, feet)]
 
     def trust(self, camera: Ints, feet: Floats) -> Floats:
-        """Return how surely cameras (V,) show undetected people at (V, 2) pixels: (V,) in [0, 1].
+        """Return the probability that cameras (V,) show undetected people at (V, 2) pixels: (V,) in [0, 1].
 
         ``min(p / max(own, 0.5), 1) · min(max((1 - own - 0.04) / 0.02, 0), 1)``, with `p` the probability
-        there and `own` that of the whole camera. If a camera detects nearly everybody, whom it does not
-        detect is occluded.
+        there and `own` that of the whole camera. A camera that detects nearly everybody misses only people
+        who are occluded.
         """
-        place = np.minimum(self.probability(camera, feet) / np.maximum(self._own, _GOOD)[camera], 1.0)
-        misses = np.clip((1.0 - self._own - _HIDDEN) / _MORE, 0.0, 1.0)
-        return np.asarray(place * misses[camera])
+        relative_rate = np.minimum(
+            self.probability(camera, feet) / np.maximum(self._camera_rate, _MIN_CAMERA_RATE)[camera], 1.0
+        )
+        misses = np.clip((1.0 - self._camera_rate - _OCCLUSION_RATE) / _OCCLUSION_MARGIN, 0.0, 1.0)
+        return np.asarray(relative_rate * misses[camera])
 
     def _cells(self, camera: Ints, feet: Floats) -> Ints:
         """Return the cells of positions, (V,); those outside the picture are clipped to its edge."""

@@ -12,7 +12,7 @@ _EDGE = 0.01
 _HEIGHT_OF_SPAN = 2.2
 """How much taller people are than their box from above is wide: 1.7 m over shoulders, arms and steps."""
 _MAX_CONDITION = 1e12
-"""Above this a 3x3 matrix, scaled by rows and columns, has no inverse worth the name in float64."""
+"""Condition number above which a 3x3 matrix, scaled by rows and columns, counts as singular."""
 
 
 def validate_homography(matrix: ArrayLike, name: str) -> NDArray[np.float64]:
@@ -20,7 +20,7 @@ def validate_homography(matrix: ArrayLike, name: str) -> NDArray[np.float64]:
 
     Args:
         matrix: anything that NumPy makes an array of.
-        name: whose homography it is, for the message.
+        name: of the camera, for the message.
 
     Raises:
         ValueError: in one line that names `name`: not 3x3, not finite numbers, or not invertible.
@@ -33,7 +33,7 @@ def validate_homography(matrix: ArrayLike, name: str) -> NDArray[np.float64]:
         raise ValueError(f"the homography of {name} has shape {homography.shape}, not (3, 3)")
     if not np.isfinite(homography).all():
         raise ValueError(f"the homography of {name} has entries that are not finite numbers")
-    # Image coordinates are hundreds and the last row is thousandths: judge it with both evened out.
+    # Image coordinates are hundreds and the last row is thousandths: equilibrate before the condition number.
     rows = np.abs(homography).max(axis=1, keepdims=True)
     evened = homography / np.where(rows > 0, rows, 1.0)
     columns = np.abs(evened).max(axis=0, keepdims=True)
@@ -56,7 +56,7 @@ def upright_from_overhead(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     left, top, right, bottom = np.moveaxis(boxes, -1, 0)
     foot = (top + bottom) / 2.0
-    # A box that was predicted or measured badly may be inside out: nobody stands there, no taller than zero.
+    # A badly predicted box may be inside out: its person has height 0.
     height = _HEIGHT_OF_SPAN * np.sqrt(np.maximum((right - left) * (bottom - top), 0.0))
     return np.stack([left, foot - height, right, foot], axis=-1)
 
@@ -109,7 +109,7 @@ def ground_handedness(homography: NDArray[np.float64]) -> int:
     of a homography's Jacobian is that of its determinant over the third coordinate cubed).
     """
     third = homography[2]
-    sign = next((float(np.sign(it)) for it in (third[1], third[2], third[0]) if it), 0.0)
+    sign = next((float(np.sign(entry)) for entry in (third[1], third[2], third[0]) if entry), 0.0)
     return int(np.sign(np.linalg.det(homography)) * sign)
 
 
@@ -189,10 +189,10 @@ def _depth(homography: NDArray[np.float64], mapped: NDArray[np.float64]) -> NDAr
 class PersonHeightEstimate:
     """Running estimate of a person's height in units of the ground plane."""
 
-    _REMEMBERED = 200
+    _HISTORY_LENGTH = 200
 
     def __init__(self) -> None:
-        self._medians: deque[float] = deque(maxlen=self._REMEMBERED)
+        self._medians: deque[float] = deque(maxlen=self._HISTORY_LENGTH)
 
     def learn(self, heights: NDArray[np.float64]) -> None:
         """Add estimated heights of any shape, NaN where unknown."""
@@ -202,5 +202,5 @@ class PersonHeightEstimate:
 
     @property
     def height(self) -> float:
-        """Median of the updates' medians, in ground units; NaN before anybody was seen."""
+        """Median of the updates' medians, in ground units; NaN before the first one."""
         return float(np.median(np.array(self._medians))) if self._medians else float("nan")

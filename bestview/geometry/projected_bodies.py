@@ -21,7 +21,7 @@ Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 _SIDEWAYS, _UPWARDS = 0.05, 0.15
-"""How well boxes find feet, in box heights: by it cameras are weighed that know of the same feet."""
+"""Standard deviation of foot points in box heights, by which cameras that see one person are weighted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,17 +58,17 @@ def estimate_bodies(
         bottom: (C,) lower edge of each camera's own picture, pixels.
     """
     matrix = homographies[camera]
-    place, tall = to_ground(matrix, foot_points(boxes)), person_heights(matrix, boxes)
-    spread = np.trace(foot_covariance(matrix, boxes, _SIDEWAYS, _UPWARDS), axis1=-2, axis2=-1)
+    position, height = to_ground(matrix, foot_points(boxes)), person_heights(matrix, boxes)
+    variance = np.trace(foot_covariance(matrix, boxes, _SIDEWAYS, _UPWARDS), axis1=-2, axis2=-1)
     with np.errstate(divide="ignore", invalid="ignore"):  # a box may have no height: it is left out below
-        slim = (boxes[:, 2] - boxes[:, 0]) / (boxes[:, 3] - boxes[:, 1])
-    measurements = np.column_stack([place, tall, slim])
-    valid = np.isfinite(measurements).all(axis=1) & (measurements[:, 2:] > 0.0).all(axis=1) & (spread > 0.0)
+        aspect_ratio = (boxes[:, 2] - boxes[:, 0]) / (boxes[:, 3] - boxes[:, 1])
+    measurements = np.column_stack([position, height, aspect_ratio])
+    valid = np.isfinite(measurements).all(axis=1) & (measurements[:, 2:] > 0.0).all(axis=1) & (variance > 0.0)
     rows = np.flatnonzero(valid & ~feet_cut_off(boxes, bottom[camera]))
-    owner, weight = moment[rows], 1.0 / spread[rows]
+    owner, weight = moment[rows], 1.0 / variance[rows]
 
     def summed(values: Floats) -> Floats:
-        # bincount adds row after row, so that no sum depends on how many others there are.
+        # bincount adds row by row, so no sum depends on the number of other rows.
         return np.bincount(owner, values, moments).astype(np.float64)
 
     total = summed(weight)

@@ -75,7 +75,7 @@ def compute_view_quality(tracks: TrackWindow, layout: CameraLayout, settings: Qu
         ValueError: shapes that do not fit.
     """
     _check(tracks, layout)
-    # In memory sides are apart, and in each of them frames: it is how the terms read them.
+    # Sides outermost in memory, then frames: the terms read them in this order.
     sides = np.ascontiguousarray(tracks.boxes.transpose(2, 1, 0))
     inputs = _TermInputs(tracks, layout, sides.transpose(2, 1, 0))
     weights = settings.weights
@@ -92,36 +92,38 @@ def compute_view_quality(tracks: TrackWindow, layout: CameraLayout, settings: Qu
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _TermInputs:
-    """Inputs of the terms; `boxes` are those of `seen`, reordered in memory."""
+    """Inputs of the terms; `boxes` are those of `tracks`, reordered in memory."""
 
-    seen: TrackWindow
-    looks: CameraLayout
+    tracks: TrackWindow
+    layout: CameraLayout
     boxes: Floats
 
     @property
     def picture_boxes(self) -> Floats:
         """(T, 1, 4): picture of each track's camera."""
-        return self.looks.picture_boxes[self.seen.camera][:, None]
+        return self.layout.picture_boxes[self.tracks.camera][:, None]
 
 
-def _facing(rows: _TermInputs) -> Floats:
-    camera = rows.seen.camera
+def _facing(inputs: _TermInputs) -> Floats:
+    camera = inputs.tracks.camera
     whole_window = np.full(len(camera), NEUTRAL)
-    for column, homography in enumerate(rows.looks.homographies):
+    for column, homography in enumerate(inputs.layout.homographies):
         if homography is not None:
             own_tracks = camera == column
-            whole_window[own_tracks] = facing_score(rows.seen.boxes[own_tracks], homography, rows.looks.fps)
+            whole_window[own_tracks] = facing_score(
+                inputs.tracks.boxes[own_tracks], homography, inputs.layout.fps
+            )
     return whole_window[:, None]
 
 
 TERMS: dict[str, Callable[[_TermInputs], Floats]] = {
-    "size": lambda rows: size_quality(rows.boxes, *rows.looks.size),
-    "truncation": lambda rows: visible_share(rows.boxes, rows.picture_boxes),
-    "occlusion": lambda rows: unoccluded_share(rows.boxes, rows.seen.camera),
-    "centering": lambda rows: centering_score(rows.boxes, rows.picture_boxes),
-    "sharpness": lambda rows: np.nan_to_num(rows.seen.sharpness, nan=1.0)[:, None],
+    "size": lambda inputs: size_quality(inputs.boxes, *inputs.layout.size),
+    "truncation": lambda inputs: visible_share(inputs.boxes, inputs.picture_boxes),
+    "occlusion": lambda inputs: unoccluded_share(inputs.boxes, inputs.tracks.camera),
+    "centering": lambda inputs: centering_score(inputs.boxes, inputs.picture_boxes),
+    "sharpness": lambda inputs: np.nan_to_num(inputs.tracks.sharpness, nan=1.0)[:, None],
     "facing": _facing,
-    "confidence": lambda rows: rows.seen.confidence[:, None],
+    "confidence": lambda inputs: inputs.tracks.confidence[:, None],
 }
 """The terms by name; each is (T, N), or (T, 1) where all frames are alike; any value where hidden."""
 

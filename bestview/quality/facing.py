@@ -13,7 +13,7 @@ _HALF_CONFIDENCE_SPEED = 0.15
 _PIXEL_DOWN = np.array([0.0, 1.0])
 
 NEUTRAL = 0.5
-"""For people who stand, cross the view, or whose ground point is not known."""
+"""Score of people who stand, cross the view, or have no ground point."""
 
 
 def facing_score(boxes: Floats, homography: Floats, fps: float) -> Floats:
@@ -40,7 +40,7 @@ def facing_score(boxes: Floats, homography: Floats, fps: float) -> Floats:
     time = np.arange(boxes.shape[1]) / fps
     centered_time = time - (weight * time).sum(axis=1, keepdims=True)
     spread = (weight * centered_time**2).sum(axis=1)
-    # Hidden frames have no weight; a number must stand there all the same.
+    # Hidden frames have weight 0, but NaN times 0 would be NaN.
     ground_point = np.where(known[..., None], ground, 0.0)
     velocity = ((weight * centered_time)[..., None] * ground_point).sum(axis=1) / np.where(
         enough, spread, 1.0
@@ -52,7 +52,7 @@ def facing_score(boxes: Floats, homography: Floats, fps: float) -> Floats:
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     length = np.hypot(down[:, 0], down[:, 1])
     along = (velocity * down).sum(axis=1)
-    # cos |v| / (|v| + stroll): the speed in the cosine's divisor goes out.
+    # cos(v, u) |v| / (|v| + ...): the speed cancels against the cosine's divisor.
     divisor = length * (speed + _HALF_CONFIDENCE_SPEED * person_heights(homography, middle))
     valid = enough & (divisor > 0)
     towards = np.divide(along, divisor, out=np.zeros(len(boxes)), where=valid)

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 _EDGE_MARGIN = 0.03
-"""Share of the box's height from an edge at which it counts as clear of it."""
+"""Distance from an edge, in box heights, from which a box counts as clear of it."""
 _EDGE_PENALTY = 0.05
-"""What a box at the upper or lower edge loses: how much is beyond it is unknown."""
+"""Penalty of a box at the upper or lower edge: how much lies beyond is unknown."""
 _MINIMUM_MARGIN = 1e-6
 """Pixels; avoids a division by zero for boxes without height."""
 _UPRIGHT_ASPECT_RATIO = 0.37

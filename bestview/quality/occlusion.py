@@ -10,14 +10,14 @@ from bestview.quality.framing import Floats, area_shares
 Ints = NDArray[np.int64]
 
 _FOOT_TOLERANCE = 0.05
-"""Heights by which feet must be lower to be nearer for sure; boxes locate feet no better."""
+"""Heights by which feet must be lower to be nearer for sure: the accuracy of foot points."""
 
 _FULLY_VISIBLE_SHARE = 0.5
-"""The share of a box that has to be left: people do not fill their boxes, and half of one is well seen."""
+"""Uncovered share of a box from which a person counts as fully visible: people do not fill their boxes."""
 
 
 def unoccluded_share(boxes: Floats, cameras: Ints) -> Floats:
-    """Return twice the share of each box that nobody nearer to the camera covers, at most 1.
+    """Return twice the share of each box that no nearer person covers, at most 1.
 
     Lower feet in the picture are nearer. With *a* the covered share of the box and *p*, in [0, 1], how surely
     the other person is nearer, the share left is the product of ``1 - p a`` over all others in the picture,
@@ -48,7 +48,7 @@ def unoccluded_share(boxes: Floats, cameras: Ints) -> Floats:
     depth_order = (bottom[second_box] - bottom[first_box]) / np.maximum(height[first_box], height[second_box])
     nearer = np.clip(0.5 + depth_order / (2.0 * _FOOT_TOLERANCE), 0.0, 1.0)
     visible = np.ones(area.shape)
-    # Pairs are in line by their first track, then their second: who comes before a box, then who comes after.
+    # Pairs are sorted by their first track, then their second, so each product is in the order of the tracks.
     np.multiply.at(visible, second_box, 1.0 - (1.0 - nearer) * area_shares(intersection, area[second_box]))
     np.multiply.at(visible, first_box, 1.0 - nearer * area_shares(intersection, area[first_box]))
     return np.asarray(np.minimum(visible / _FULLY_VISIBLE_SHARE, 1.0).reshape(frames, tracks).T)
@@ -71,13 +71,13 @@ def _overlap_candidates(sides: Floats, cameras: Ints) -> tuple[Ints, Ints]:
         return visible, visible
     left, top = np.fmin.reduce(sides[:2], axis=1)
     right, bottom = np.fmax.reduce(sides[2:], axis=1)
-    # One axis for all cameras, each its own stretch of it: one sort and one search do for all.
+    # All cameras on one axis, each with an interval of its own: one sort and one search serve all.
     start = left[visible].min()
-    stretch = cameras[visible] * (max(left[visible].max(), right[visible].max()) - start + 1.0) - start
-    begin = stretch + left[visible]
+    offset = cameras[visible] * (max(left[visible].max(), right[visible].max()) - start + 1.0) - start
+    begin = offset + left[visible]
     order = np.argsort(begin, kind="stable")
     first, second = _overlapping_intervals(
-        np.searchsorted(begin[order], (stretch + right[visible])[order], side="right")
+        np.searchsorted(begin[order], (offset + right[visible])[order], side="right")
     )
     in_order = visible[order]
     first, second = in_order[first], in_order[second]

@@ -30,8 +30,8 @@ class GopCosts:
 
     def for_people(self, people: NDArray[np.int64]) -> GopCosts:
         """Return the costs of some of the people, by index."""
-        blind = [None if it is None else it[:, people] for it in self.shows_nobody]
-        return GopCosts([it[:, people] for it in self.cost], self.frames, blind)
+        shows_nobody = [None if gop is None else gop[:, people] for gop in self.shows_nobody]
+        return GopCosts([gop[:, people] for gop in self.cost], self.frames, shows_nobody)
 
 
 def solve_dynamic_program(

@@ -27,19 +27,19 @@ class LastDetections:
 
     def advanced_to(self, views: VisibleViews, frames: int) -> LastDetections:
         """Return the last detections before frame `frames`, given the views until then."""
-        ago, worth = self.age + frames, self.quality.copy()
+        age, quality = self.age + frames, self.quality.copy()
         rows = np.flatnonzero(views.frame < frames)
-        at = views.camera[rows], views.person[rows]
-        # Later frames come later, and what is written last stays.
-        ago[at], worth[at] = frames - views.frame[rows], views.quality[rows]
-        return LastDetections(ago, worth)
+        cells = views.camera[rows], views.person[rows]
+        # Rows of later frames come later, and the last assignment to a cell stays.
+        age[cells], quality[cells] = frames - views.frame[rows], views.quality[rows]
+        return LastDetections(age, quality)
 
 
 def add_missed_detections(views: VisibleViews, last: LastDetections, decay_frames: float) -> VisibleViews:
     """Keep views of people who are not detected any more, with decaying quality.
 
     *n* frames after the last detection a view has ``1 - n / decay_frames`` of its quality, until the camera
-    detects the person again. Detectors miss people for moments, and two cuts for that are two too many.
+    detects the person again. Detectors miss people for moments, which should not cause cuts.
 
     Args:
         views: detected ones.
@@ -61,7 +61,7 @@ def add_missed_detections(views: VisibleViews, last: LastDetections, decay_frame
     row[views.frame, key] = np.arange(len(key), dtype=np.int32)
     cells = np.concatenate([at_start, missed_keys])
     last_seen = np.concatenate([-last.age.reshape(-1)[at_start], ends])
-    worth = np.concatenate([last.quality.reshape(-1)[at_start], views.quality[row[ends, missed_keys]]])
+    last_quality = np.concatenate([last.quality.reshape(-1)[at_start], views.quality[row[ends, missed_keys]]])
     begin = np.concatenate([np.zeros(len(at_start), dtype=np.int64), ends + 1])
     redetected = detected[:, cells] & (np.arange(frames)[:, None] >= begin)
     until = np.where(redetected.any(axis=0), redetected.argmax(axis=0), frames)
@@ -69,7 +69,7 @@ def add_missed_detections(views: VisibleViews, last: LastDetections, decay_frame
     count = np.maximum(until - begin, 0)
     owner = np.repeat(np.arange(len(cells)), count)
     frame = np.arange(len(owner)) + np.repeat(begin - (np.cumsum(count) - count), count)
-    remaining = worth[owner] * (1.0 - (frame - last_seen[owner]) / decay_frames)
+    remaining = last_quality[owner] * (1.0 - (frame - last_seen[owner]) / decay_frames)
     camera, person = np.divmod(cells[owner], people)
     counts = (remaining > 0.0) & views.available[frame, camera]
     return VisibleViews(

@@ -47,19 +47,16 @@ def select_views(
     The cost is ``sum_n c(n, b_n) + lambda * sum_n [b_n != b_(n-1)]``. A cut may only happen at a frame
     where `cut_allowed` is true (a GOP start); with all of them true this is the paper's program.
 
-    * A camera that cannot be shown somewhere in a GOP cannot be shown in any of it. In a GOP that started
-    before
-      the window, the previous camera goes on until the first frame in which it cannot be shown.
+    * A camera that cannot be shown in a frame of a GOP cannot be shown in any of it. In a GOP that started
+      before the window, the previous camera continues until the first frame in which it cannot be shown.
     * Where no camera is possible, the view is -1. Such a gap is no cut: continuing with the camera from
-    before
-      the gap is free. An object without a previous camera starts, for free, at the first frame where a cut is
-      allowed.
+      before the gap is free. An object without a previous camera starts, for free, at the first frame where
+      a cut is allowed.
     * Of equally good sequences the one that stays longest with its camera wins, and then the lowest camera
       index, so the result is the same on every machine.
     * With a minimum shot no camera is left before it was shown for that many GOPs, unless it cannot be shown
-    in
-      the GOP, or does not show the object in it (every frame costs at least ``NO_VIEW_COST``). A gap counts
-      as shown.
+      in the GOP, or does not show the object in it (every frame costs at least ``NO_VIEW_COST``). A gap
+      counts as shown.
 
     Fastest if the costs lie in memory as (N, C, K), objects innermost.
 
@@ -84,7 +81,7 @@ def select_views(
     if shot_ages is not None and shot_ages.shape != (objects,):
         raise ValueError(f"shot_ages has shape {shot_ages.shape}, not ({objects},)")
     if decided_gops is not None and decided_gops < 1:
-        raise ValueError(f"views of {decided_gops} GOPs are asked for")
+        raise ValueError(f"decided_gops is {decided_gops}, not at least 1")
     views = np.full((objects, frames), NO_CAMERA, dtype=np.int64)
     frame_weights = np.ones(frames) if weight is None else weight
     if frame_weights.shape != (frames,) or not (frame_weights > 0).all():

@@ -1,4 +1,4 @@
-"""GOP costs from a sparse list of views: most cameras do not see most people."""
+"""GOP costs from a sparse list of views, since most cameras do not see most people."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VisibleViews:
-    """R views that show somebody, of K people in N frames of C cameras. All other views have quality 0.
+    """R views that show a person, of K people in N frames of C cameras. All other views have quality 0.
 
     There is at most one view of a camera and person in a frame.
 
@@ -56,7 +56,7 @@ class VisibleViews:
         offset = self.frame[rows] - first
         cell = (gop[offset] * cameras + self.camera[rows]) * self.person_count + self.person[rows]
         cells = count * cameras * self.person_count
-        # bincount adds row after row, so that no sum depends on how many others there are.
+        # bincount adds row by row, so no sum depends on the number of other rows.
         gained = np.bincount(cell, self.quality[rows] * weight[offset], cells).reshape(
             count, cameras, self.person_count
         )

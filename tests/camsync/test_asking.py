@@ -17,7 +17,7 @@ from fakes.timeouts import PATIENCE
 FPS = 50.0
 
 
-async def test_everybody_but_who_asks_is_named_in_the_order_of_coming(by_hand: Connect) -> None:
+async def test_all_other_clients_are_listed_in_the_order_of_joining(by_hand: Connect) -> None:
     async with PulseServer(FPS, expect={"c0", "c1"}) as server:
         assert await query_clients("127.0.0.1", server.port) == ()
         for line in (b"HELLO 1 c0\n", b"", b"HELLO 1 bestview\n"):
@@ -30,14 +30,14 @@ async def test_everybody_but_who_asks_is_named_in_the_order_of_coming(by_hand: C
         assert told == (ListedClient("c0", 0), ListedClient(None, 0), ListedClient("bestview", 0))
 
 
-async def test_a_full_server_of_long_names_can_be_asked() -> None:
+async def test_the_list_of_a_full_server_with_long_names_fits_a_line() -> None:
     most = ClientList(tuple(ListedClient(f"{place:064d}", 10**6) for place in range(256)))
     line = encode(most)
     assert len(line) <= MAX_SERVER_LINE
     assert parse_server_line(line[:-1]) == most
 
 
-async def test_where_there_is_no_server_the_error_says_so() -> None:
+async def test_querying_a_closed_port_is_a_clear_error() -> None:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -55,7 +55,7 @@ async def test_where_there_is_no_server_the_error_says_so() -> None:
         (b"MYVIEW-SYNC 7 rate:25\n", "speaks version 7"),
     ],
 )
-async def test_what_is_no_pulse_server_is_given_up(said: bytes, error: str) -> None:
+async def test_querying_something_else_is_a_clear_error(said: bytes, error: str) -> None:
     over = asyncio.Event()
 
     async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -85,7 +85,7 @@ STRANGE = (
 
 
 @pytest.mark.parametrize("sent", STRANGE)
-async def test_without_a_login_nothing_is_told_and_nothing_changes(by_hand: Connect, sent: bytes) -> None:
+async def test_without_a_login_nothing_is_revealed_and_nothing_changes(by_hand: Connect, sent: bytes) -> None:
     async with PulseServer(FPS, expect={"c0"}, start_timeout=1000.0, users=USERS) as server:
         stranger = await by_hand(server.port)
         assert isinstance(await stranger.message(), LoginRequest)
@@ -242,7 +242,7 @@ async def test_over_tls_a_client_gets_every_pulse_and_may_list_the_clients(certi
 
 
 @needs_openssl
-async def test_a_client_gives_its_password_to_no_server_that_it_does_not_trust(
+async def test_a_client_sends_no_password_to_an_untrusted_server(
     certificates: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     settings = ClientSettings(backoff_first=0.01, backoff_most=0.01, free_run_after=0.2)
@@ -261,7 +261,7 @@ async def test_a_client_gives_its_password_to_no_server_that_it_does_not_trust(
 
 @needs_openssl
 @pytest.mark.parametrize("sent", [b"", b"HELLO 1 c0\n", b"LOGIN c0 " + USERS["c0"].encode() + b"\n"])
-async def test_without_tls_nothing_is_told(by_hand: Connect, certificates: Path, sent: bytes) -> None:
+async def test_without_tls_nothing_is_revealed(by_hand: Connect, certificates: Path, sent: bytes) -> None:
     limits = ServerLimits(login_within=0.2, pending_logins=4)
     async with PulseServer(FPS, users=USERS, limits=limits, tls=server_tls(certificates)) as server:
         strangers = [await by_hand(server.port) for _ in range(8)]

@@ -83,7 +83,7 @@ async def test_the_offset_of_the_servers_clock_is_measured(jumping_clock: Jumpin
         assert pulse.due == pytest.approx(client.now(), abs=20 * BUSY)
 
 
-async def test_a_slow_consumer_is_told_what_it_missed() -> None:
+async def test_a_slow_consumer_gets_the_number_of_missed_pulses() -> None:
     settings = ClientSettings(queue=1)
     async with (
         PulseServer(FPS) as server,
@@ -111,7 +111,7 @@ async def test_a_short_stall_of_the_consumer_costs_nothing() -> None:
         assert client.missed == 0
 
 
-async def test_a_process_that_was_held_up_takes_the_pulses_that_lie_unread() -> None:
+async def test_a_stalled_process_reads_the_waiting_pulses_first() -> None:
     server = await asyncio.create_subprocess_exec(
         sys.executable, "-c", _SERVER, stdout=asyncio.subprocess.PIPE, cwd=Path(camsync.__file__).parents[1]
     )
@@ -175,7 +175,7 @@ async def test_without_a_server_it_waits() -> None:
             assert not client.status().connected
 
 
-async def test_without_a_server_it_counts_alone_if_told_to_and_a_server_takes_the_count_up() -> None:
+async def test_without_a_server_it_free_runs_if_configured_and_a_server_continues_the_count() -> None:
     settings = ClientSettings(backoff_first=0.01, backoff_most=0.05, free_run_after=0.05)
     with socket.socket() as held:
         held.bind(("127.0.0.1", 0))
@@ -211,7 +211,7 @@ async def take_all(client: PulseClient) -> list[Pulse]:
     return [pulse async for pulse in client]
 
 
-async def test_a_server_that_falls_silent_is_left_and_sought_again() -> None:
+async def test_a_silent_server_is_disconnected_and_reconnected() -> None:
     clock = steady_unix_clock()
     axis = PulseAxis.through(7, clock(), FPS)
 
@@ -232,7 +232,7 @@ async def test_a_server_that_falls_silent_is_left_and_sought_again() -> None:
 
 
 @pytest.mark.parametrize("noise", [b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\x00\xff" * 10, b"x" * 50_000])
-async def test_something_else_on_that_port_is_not_a_server(noise: bytes) -> None:
+async def test_another_service_on_the_port_is_not_a_server(noise: bytes) -> None:
     async with (
         pretended_server(lambda: noise) as (port, calls),
         PulseClient("127.0.0.1", port, "c0", settings=QUICK) as client,
@@ -252,7 +252,7 @@ async def test_a_server_of_another_version_is_an_error() -> None:
             await take(client, 1)
 
 
-async def test_a_host_name_that_can_be_nobodys_is_an_error() -> None:
+async def test_a_malformed_host_name_is_an_error() -> None:
     async with PulseClient("two..dots", 1, "c0", settings=QUICK) as client:
         with pytest.raises(SyncError, match=r"two\.\.dots"):
             await take(client, 1)

@@ -18,7 +18,7 @@ from fakes.timeouts import PATIENCE
 FPS = 400.0
 
 
-async def test_who_says_nothing_gets_pulses_from_the_first_on(by_hand: Connect) -> None:
+async def test_a_client_that_sends_nothing_gets_all_pulses(by_hand: Connect) -> None:
     async with PulseServer(FPS, expect={"c0"}) as server:
         listener = await by_hand(server.port)
         greeting = await listener.message()
@@ -38,14 +38,14 @@ async def test_a_pulse_is_due_at_epoch_plus_number_over_rate(by_hand: Connect) -
             assert beat.due == pytest.approx(server.epoch + beat.number / FPS, abs=1e-6)
 
 
-async def test_nobody_expected_means_no_waiting() -> None:
+async def test_without_expected_clients_the_server_begins_at_once() -> None:
     async with PulseServer(FPS, start_timeout=1000.0) as server:
         await server.wait_begun()
     async with PulseServer(FPS, expect={"c0"}, start_timeout=0.0) as server:
         await server.wait_begun()
 
 
-async def test_it_begins_when_all_have_said_hello(by_hand: Connect) -> None:
+async def test_the_server_begins_when_all_expected_clients_sent_hello(by_hand: Connect) -> None:
     async with PulseServer(FPS, expect={"c0", "c1", "bestview"}, start_timeout=1000.0) as server:
         listener = await by_hand(server.port)
         await listener.message()
@@ -62,7 +62,7 @@ async def test_it_begins_when_all_have_said_hello(by_hand: Connect) -> None:
         assert (await listener.beat()).number == 0
 
 
-async def test_who_leaves_before_the_beginning_is_waited_for_again(by_hand: Connect) -> None:
+async def test_a_client_that_leaves_before_the_first_pulse_is_waited_for_again(by_hand: Connect) -> None:
     async with PulseServer(FPS, expect={"c0", "c1"}, start_timeout=1000.0) as server:
         listener = await by_hand(server.port)
         await listener.message()
@@ -74,7 +74,7 @@ async def test_who_leaves_before_the_beginning_is_waited_for_again(by_hand: Conn
         assert await listener.message() == WaitMessage(("c0", "c1"))
 
 
-async def test_it_begins_without_the_missing_after_the_timeout(
+async def test_the_server_begins_without_missing_clients_after_the_timeout(
     by_hand: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.WARNING, "camsync"):
@@ -105,7 +105,7 @@ async def test_a_late_joiner_gets_the_current_pulse_next(by_hand: Connect) -> No
         assert (await late.beat()).number == greeting.pulse + 1
 
 
-async def test_it_tells_its_clock(by_hand: Connect, jumping_clock: JumpingClock) -> None:
+async def test_the_server_answers_with_its_clock(by_hand: Connect, jumping_clock: JumpingClock) -> None:
     async with PulseServer(FPS, clock=jumping_clock) as server:
         client = await by_hand(server.port)
         await client.message()
@@ -134,7 +134,7 @@ async def test_a_wrong_line_is_answered_and_the_pulses_go_on(by_hand: Connect) -
 
 
 @pytest.mark.parametrize("noise", [b"x" * 100_000, b"x" * 400 + b"\n", b"\n" * 5000, b"PING 1\n" * 5000])
-async def test_who_floods_is_cut_off_and_others_get_all(by_hand: Connect, noise: bytes) -> None:
+async def test_a_flooding_client_is_closed_and_others_get_all_pulses(by_hand: Connect, noise: bytes) -> None:
     async with PulseServer(FPS, limits=ServerLimits(line_burst=10)) as server:
         quiet, loud = await by_hand(server.port), await by_hand(server.port)
         first = (await quiet.beat()).number
@@ -145,7 +145,7 @@ async def test_who_floods_is_cut_off_and_others_get_all(by_hand: Connect, noise:
         assert len(server.clients()) == 1
 
 
-async def test_who_sends_an_endless_line_is_told_why(by_hand: Connect) -> None:
+async def test_an_overlong_line_is_answered_with_an_error(by_hand: Connect) -> None:
     async with PulseServer(FPS) as server:
         client = await by_hand(server.port)
         await client.beat()
@@ -165,7 +165,7 @@ async def test_a_second_client_of_a_name_replaces_the_first(by_hand: Connect) ->
         assert [info.name for info in server.clients()] == ["c0"]
 
 
-async def test_who_does_not_read_loses_pulses_and_is_cut_off_while_others_get_all(by_hand: Connect) -> None:
+async def test_a_client_that_does_not_read_loses_pulses_and_is_closed(by_hand: Connect) -> None:
     limits = ServerLimits(backlog=16384, cut_off=0.2)
     async with PulseServer(2000.0, limits=limits) as server:
         reads, stuck = await by_hand(server.port), await by_hand(server.port, receive=1)
@@ -180,7 +180,7 @@ async def test_who_does_not_read_loses_pulses_and_is_cut_off_while_others_get_al
         assert server.clients()[0].dropped == 0
 
 
-async def test_who_vanishes_is_forgotten_and_others_get_all(by_hand: Connect) -> None:
+async def test_a_vanished_client_is_removed_and_others_get_all_pulses(by_hand: Connect) -> None:
     async with PulseServer(FPS) as server:
         stays = await by_hand(server.port)
         numbers = [(await stays.beat()).number]
@@ -221,7 +221,7 @@ async def test_after_a_short_stall_it_sends_every_pulse(
         assert server.skipped == 0
 
 
-async def test_it_falls_silent_at_the_number_it_was_given(by_hand: Connect) -> None:
+async def test_the_server_stops_at_max_pulses(by_hand: Connect) -> None:
     async with PulseServer(FPS, expect={"c0"}, max_pulses=20) as server:
         listener = await by_hand(server.port)
         listener.say(b"HELLO 1 c0\n")
@@ -230,7 +230,7 @@ async def test_it_falls_silent_at_the_number_it_was_given(by_hand: Connect) -> N
         assert (numbers[-1], server.pulse) == (19, 19)
 
 
-async def test_a_port_in_use_is_told_plainly() -> None:
+async def test_a_port_in_use_is_a_clear_error() -> None:
     async with PulseServer(FPS) as server:
         with pytest.raises(OSError, match=f"cannot listen on 127.0.0.1:{server.port}: .*in use"):
             await PulseServer(FPS, port=server.port).start()

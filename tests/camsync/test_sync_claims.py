@@ -58,7 +58,7 @@ async def counted(client: PulseClient, count: int) -> list[int]:
 
 
 @pytest.mark.parametrize("claim", ["last=500000000000", f"last={FAR} ago=0.1"])
-async def test_no_camera_says_alone_where_counting_begins(by_hand: Connect, claim: str) -> None:
+async def test_a_single_claim_does_not_set_the_first_pulse(by_hand: Connect, claim: str) -> None:
     async with PulseServer(FPS, expect=NAMES, start_timeout=1000.0, users=USERS, limits=SOON) as server:
         liar = await come(by_hand, server.port, "c0")
         await liar.says(f"HELLO 1 c0 {claim}")
@@ -72,7 +72,7 @@ async def test_no_camera_says_alone_where_counting_begins(by_hand: Connect, clai
 
 @pytest.mark.parametrize("names", [NAMES, NAMES[:2]])
 @pytest.mark.parametrize("claim", ["last=500000000000", f"last={FAR} ago=0.1"])
-async def test_no_camera_says_alone_where_counting_goes_on(
+async def test_a_single_claim_does_not_move_the_axis(
     by_hand: Connect, claim: str, names: tuple[str, ...]
 ) -> None:
     async with PulseServer(FPS, expect=names, start_timeout=0.0, users=USERS) as server:
@@ -86,7 +86,7 @@ async def test_no_camera_says_alone_where_counting_goes_on(
         assert after[-1] < before[0] + PATIENCE * FPS
 
 
-async def test_a_restarted_server_goes_on_where_all_but_one_are(by_hand: Connect) -> None:
+async def test_a_restarted_server_continues_the_count_of_all_but_one_client(by_hand: Connect) -> None:
     names = [name for name in NAMES if name != "c0"]
     async with PulseServer(FPS, expect=names, users=USERS) as server:
         port = server.port
@@ -110,7 +110,7 @@ async def test_a_restarted_server_goes_on_where_all_but_one_are(by_hand: Connect
         await client.close()
 
 
-async def test_a_camera_that_says_it_has_counted_little_holds_nobody_back(by_hand: Connect) -> None:
+async def test_a_low_claim_does_not_hold_the_others_back(by_hand: Connect) -> None:
     async with PulseServer(FPS, expect=NAMES, start_timeout=1000.0, users=USERS, limits=SOON) as server:
         liar = await come(by_hand, server.port, "c0")
         await liar.says("HELLO 1 c0 last=1")
@@ -120,7 +120,7 @@ async def test_a_camera_that_says_it_has_counted_little_holds_nobody_back(by_han
             assert (await counted(client, 1))[0] >= 50_000
 
 
-async def test_one_who_alone_remembers_a_count_begins_anew_with_the_others() -> None:
+async def test_a_client_far_ahead_of_all_others_has_to_restart() -> None:
     """Whether it lies nobody knows; it is told so, and can start anew."""
     settings = ClientSettings(backoff_first=0.01, backoff_most=0.05, ahead_most=0.1, settle=0.05)
     alone = PulseClient(HERE, 1, "c0", settings=settings, credentials=Credentials("c0", USERS["c0"]))
@@ -178,7 +178,7 @@ def test_the_lower_median_of_what_is_claimed_counts(
     st.integers(0, 10),
     st.randoms(use_true_random=False),
 )
-def test_fewer_than_half_move_nobody_whatever_they_claim(
+def test_fewer_than_half_of_the_clients_cannot_move_the_axis(
     lies: list[int], true: int, more: int, random: object
 ) -> None:
     counts = [*lies, *[true] * (len(lies) + 2 + more)]

@@ -72,7 +72,7 @@ def test_a_stalled_client_skips_to_the_present_instead_of_making_up_for_hours() 
 
 @settings(deadline=None, max_examples=60)
 @given(rates, st.integers(0, 10**6), st.integers(1, 300))
-def test_a_short_gap_is_made_good_and_a_long_one_is_not(fps: float, last: int, ahead: int) -> None:
+def test_a_short_gap_is_filled_and_a_long_one_is_not(fps: float, last: int, ahead: int) -> None:
     follower = PulseCounter(fps, catch_up=0.5)
     follower.accept(last, 1.8e9)
     number = last + ahead
@@ -83,7 +83,7 @@ def test_a_short_gap_is_made_good_and_a_long_one_is_not(fps: float, last: int, a
     assert all(due == pytest.approx(1.8e9 + (one - last) / fps, abs=1e-6) for one, due in made)
 
 
-def test_who_never_heard_a_pulse_counts_nothing() -> None:
+def test_without_any_pulse_nothing_is_counted() -> None:
     follower = PulseCounter(25.0, catch_up=0.5)
     assert list(follower.count_own(1e9)) == []
     assert follower.known(1e9) is None

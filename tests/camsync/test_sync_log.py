@@ -15,7 +15,7 @@ from fakes.camsync.pulse_clients import FPS, QUICK, Connect, JumpingClock, prete
 from fakes.timeouts import PATIENCE
 
 
-async def test_a_server_that_comes_and_goes_is_not_told_of_each_time(
+async def test_a_server_that_comes_and_goes_is_one_event_of_the_log(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level(logging.INFO, "camsync")
@@ -38,7 +38,7 @@ async def test_a_server_that_comes_and_goes_is_not_told_of_each_time(
     assert f": {FPS:g} pulses per second, after " in back
 
 
-async def test_who_says_hello_again_and_again_has_come_once(
+async def test_repeated_hellos_are_one_line_of_the_log(
     by_hand: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "camsync")
@@ -50,7 +50,7 @@ async def test_who_says_hello_again_and_again_has_come_once(
     assert caplog.messages == ["c0 connected"]
 
 
-async def test_who_claims_too_much_again_and_again_is_told_of_once(
+async def test_repeated_implausible_claims_are_one_line_of_the_log(
     by_hand: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with PulseServer(FPS) as server:
@@ -62,7 +62,7 @@ async def test_who_claims_too_much_again_and_again_is_told_of_once(
     assert caplog.messages[0].endswith(": not believed")
 
 
-async def test_a_machine_that_stalls_again_and_again_is_told_of_once(
+async def test_repeated_stalls_are_one_line_of_the_log(
     by_hand: Connect, jumping_clock: JumpingClock, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with PulseServer(FPS, clock=jumping_clock) as server:

@@ -47,7 +47,7 @@ def named(server: PulseServer) -> list[str | None]:
     return [it.name for it in server.clients()]
 
 
-async def test_one_login_that_comes_again_and_again_keeps_nobody_else_out(by_hand: Connect) -> None:
+async def test_repeated_logins_of_one_user_keep_no_other_out(by_hand: Connect) -> None:
     limits = ServerLimits(clients=16, login_places=3, catch_up=PATIENCE)
     async with PulseServer(FPS, users=USERS, limits=limits) as server:
         for _ in range(40):
@@ -57,7 +57,7 @@ async def test_one_login_that_comes_again_and_again_keeps_nobody_else_out(by_han
             await first_pulses(server.port, user, Credentials(user, password))
 
 
-async def test_one_login_with_more_connections_than_there_are_places_keeps_nobody_out(
+async def test_a_user_with_more_connections_than_places_keeps_no_other_out(
     by_hand: Connect,
 ) -> None:
     """By what a server has unless it is told otherwise."""
@@ -68,7 +68,7 @@ async def test_one_login_with_more_connections_than_there_are_places_keeps_nobod
         assert len(server.clients()) < 20
 
 
-async def test_who_follows_under_a_login_stays_when_it_comes_again_to_ask(by_hand: Connect) -> None:
+async def test_a_client_keeps_its_place_when_its_user_connects_again(by_hand: Connect) -> None:
     limits = ServerLimits(login_places=2, catch_up=PATIENCE)
     async with PulseServer(FPS, users=USERS, limits=limits) as server:
         follows = await logged_in(by_hand, server.port, "c0", hello=True)
@@ -83,7 +83,7 @@ async def test_who_follows_under_a_login_stays_when_it_comes_again_to_ask(by_han
         assert others[0].name == "c0"
 
 
-async def test_a_second_of_a_login_that_follows_takes_the_place_of_the_first(by_hand: Connect) -> None:
+async def test_a_second_client_of_a_user_replaces_the_first(by_hand: Connect) -> None:
     async with PulseServer(FPS, users=USERS) as server:
         older = await logged_in(by_hand, server.port, "c0", hello=True)
         await logged_in(by_hand, server.port, "c0", hello=True)
@@ -176,7 +176,7 @@ def test_the_oldest_of_the_busiest_origin_is_evicted() -> None:
     assert select_evicted(there[3:4]) is there[3]
 
 
-async def test_two_of_one_name_that_replace_each_other_are_few_lines_of_the_log(
+async def test_clients_that_replace_each_other_are_few_lines_of_the_log(
     by_hand: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "camsync")
@@ -190,7 +190,7 @@ async def test_two_of_one_name_that_replace_each_other_are_few_lines_of_the_log(
     assert caplog.messages[1].startswith("another c0 connected from 127.0.0.1:")
 
 
-async def test_every_expected_name_that_comes_is_a_line_of_the_log(
+async def test_every_arrival_of_an_expected_name_is_a_line_of_the_log(
     by_hand: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "camsync")
@@ -202,7 +202,7 @@ async def test_every_expected_name_that_comes_is_a_line_of_the_log(
     assert sorted(caplog.messages) == sorted(f"{name} connected" for name in names)
 
 
-async def test_names_that_nobody_expects_are_few_lines_of_the_log(
+async def test_unexpected_names_are_few_lines_of_the_log(
     by_hand: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "camsync")

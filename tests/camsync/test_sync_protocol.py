@@ -52,7 +52,7 @@ server_lines = st.one_of(
 
 @settings(deadline=None, max_examples=60)
 @given(client_lines)
-def test_what_a_client_says_is_heard_as_said(message: ClientLine) -> None:
+def test_client_messages_survive_encoding_and_parsing(message: ClientLine) -> None:
     line = encode(message)
     assert line.endswith(b"\n")
     assert len(line) <= MAX_LINE
@@ -61,7 +61,7 @@ def test_what_a_client_says_is_heard_as_said(message: ClientLine) -> None:
 
 @settings(deadline=None, max_examples=60)
 @given(server_lines)
-def test_what_the_server_says_is_heard_as_said(message: ServerLine) -> None:
+def test_server_messages_survive_encoding_and_parsing(message: ServerLine) -> None:
     line = encode(message)
     assert line.isascii()
     assert line.count(b"\n") == 1
@@ -115,12 +115,12 @@ def test_a_wrong_line_is_refused_with_a_code(line: bytes, code: str) -> None:
 
 
 @pytest.mark.parametrize("fps", [b"0", b"0.0000000000000001", b"10000.5", b"999999"])
-def test_a_rate_at_which_nobody_could_count_is_refused(fps: bytes) -> None:
+def test_an_impossible_rate_in_a_greeting_is_refused(fps: bytes) -> None:
     with pytest.raises(ProtocolError):
         parse_server_line(b"MYVIEW-SYNC 1 fps=" + fps + b" now=0 pulse=-")
 
 
-def test_words_of_a_later_version_are_passed_over() -> None:
+def test_unknown_words_of_a_later_version_are_ignored() -> None:
     assert parse_server_line(b"TEMPERATURE 21") is None
     assert parse_client_line(b"HELLO 1 c0 colour=blue") == Hello("c0")
     assert parse_server_line(b"MYVIEW-SYNC 1 fps=25 now=0 pulse=- colour=blue") == Greeting(
@@ -128,7 +128,7 @@ def test_words_of_a_later_version_are_passed_over() -> None:
     )
 
 
-def test_a_greeting_of_another_version_tells_its_version() -> None:
+def test_a_greeting_of_another_version_keeps_its_version() -> None:
     greeting = parse_server_line(b"MYVIEW-SYNC 7 rate:25")
     assert isinstance(greeting, Greeting)
     assert greeting.version == 7

@@ -35,7 +35,7 @@ def in_step(pulse: Pulse) -> bool:
 
 @pytest.mark.parametrize("claim", [b"last=500000000000", b"last=9999999999999", b"last=1 ago=999999999999"])
 @pytest.mark.parametrize("expect", [(), ("c0",)])
-async def test_who_claims_to_have_counted_for_ever_is_not_believed(
+async def test_an_implausible_claim_is_ignored(
     by_hand: Connect, expect: tuple[str, ...], claim: bytes
 ) -> None:
     async with PulseServer(FPS, expect=expect) as server:
@@ -62,7 +62,7 @@ async def test_while_the_server_is_away_the_client_counts_on_at_the_same_rate() 
 
 
 @pytest.mark.parametrize("expect", [(), ("c0",), ("c0", "c1", "absent")])
-async def test_a_restarted_server_goes_on_where_the_clients_have_got_to(expect: tuple[str, ...]) -> None:
+async def test_a_restarted_server_continues_the_clients_count(expect: tuple[str, ...]) -> None:
     async with PulseServer(FPS, expect={"c0", "c1"}) as server:
         port, epoch = server.port, server.epoch
         clients = [PulseClient("127.0.0.1", port, name, settings=QUICK) for name in ("c0", "c1")]
@@ -99,7 +99,7 @@ async def test_a_new_camera_joins_the_continued_axis(by_hand: Connect) -> None:
         assert (await new.beat()).number == pytest.approx(5000 + FPS, abs=20 * BUSY * FPS)
 
 
-async def test_what_most_have_counted_to_moves_a_server_that_has_just_begun_forward(by_hand: Connect) -> None:
+async def test_the_count_of_most_clients_moves_a_new_server_forward(by_hand: Connect) -> None:
     async with PulseServer(FPS) as server:
         listener = await by_hand(server.port)
         await listener.beat()
@@ -117,7 +117,7 @@ async def test_what_most_have_counted_to_moves_a_server_that_has_just_begun_forw
         assert server.skipped > 15_000
 
 
-async def test_who_is_not_expected_cannot_move_the_axis(by_hand: Connect) -> None:
+async def test_an_unexpected_client_cannot_move_the_axis(by_hand: Connect) -> None:
     async with PulseServer(FPS, expect={"c0"}, start_timeout=0.0) as server:
         stranger = await by_hand(server.port)
         stranger.say(b"HELLO 1 stranger last=1000000 ago=0\n")
@@ -125,7 +125,7 @@ async def test_who_is_not_expected_cannot_move_the_axis(by_hand: Connect) -> Non
         assert server.skipped == 0
 
 
-async def test_a_server_long_begun_is_not_moved_and_the_client_says_that_its_axis_is_lost() -> None:
+async def test_a_running_server_is_not_moved_and_the_client_reports_a_lost_axis() -> None:
     settings = ClientSettings(backoff_first=0.01, backoff_most=0.05, ahead_most=0.2, settle=0.05)
     async with PulseServer(FPS) as server:
         port = server.port

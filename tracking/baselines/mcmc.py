@@ -33,7 +33,7 @@ class McmcSettings:
     """The chain.
 
     Raises:
-        ValueError: a number makes no sense.
+        ValueError: a setting is out of range.
     """
 
     samples: int = 60  # kept of each picture
@@ -94,7 +94,7 @@ class McmcFilter:
                 boxes[row] = item.box
         return boxes
 
-    def update(self, known: McmcTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
+    def update(self, known: McmcTarget, box: Floats) -> Floats:  # noqa: ARG002 — the image alone decides
         """Return the target's own box: a detection does not move it."""
         return known.box
 

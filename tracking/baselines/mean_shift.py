@@ -65,7 +65,7 @@ class MeanShift:
                 item.box = boxes[row] = np.concatenate([middle - size / 2, middle + size / 2])
         return boxes
 
-    def update(self, known: MeanShiftTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
+    def update(self, known: MeanShiftTarget, box: Floats) -> Floats:  # noqa: ARG002 — the image alone decides
         """Return the target's own box: a detection does not move it."""
         return known.box
 

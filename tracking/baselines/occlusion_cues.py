@@ -73,7 +73,7 @@ class OcclusionCueSettings:
     """The filters.
 
     Raises:
-        ValueError: a number makes no sense.
+        ValueError: a setting is out of range.
     """
 
     particles: int = 100  # of each filter
@@ -171,7 +171,7 @@ class OcclusionCues:
                 boxes[row] = item.box
         return boxes
 
-    def update(self, known: OcclusionCueTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
+    def update(self, known: OcclusionCueTarget, box: Floats) -> Floats:  # noqa: ARG002 — the image alone decides
         """Return the target's own box: a detection does not move it."""
         return known.box
 

@@ -65,7 +65,7 @@ class OpticalFlow:
                 boxes[row] = item.box = moved
         return boxes
 
-    def update(self, known: FlowTarget, box: Floats) -> Floats:  # noqa: ARG002 — the flow alone says where
+    def update(self, known: FlowTarget, box: Floats) -> Floats:  # noqa: ARG002 — the image alone decides
         """Return the target's own box: a detection does not move it."""
         return known.box
 

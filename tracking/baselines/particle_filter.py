@@ -97,7 +97,7 @@ class ParticleFilters:
                 boxes[row] = item.box
         return boxes
 
-    def update(self, known: ParticleTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
+    def update(self, known: ParticleTarget, box: Floats) -> Floats:  # noqa: ARG002 — the image alone decides
         """Return the target's own box: a detection does not move it."""
         return known.box
 

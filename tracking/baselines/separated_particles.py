@@ -44,7 +44,7 @@ class SeparatedParticleSettings:
     """The filters.
 
     Raises:
-        ValueError: a number makes no sense.
+        ValueError: a setting is out of range.
     """
 
     particles: int = 100  # of each object
@@ -109,7 +109,7 @@ class SeparatedParticles:
                 boxes[row] = item.box
         return boxes
 
-    def update(self, known: SeparatedTarget, box: Floats) -> Floats:  # noqa: ARG002 — the colors alone say where
+    def update(self, known: SeparatedTarget, box: Floats) -> Floats:  # noqa: ARG002 — the image alone decides
         """Return the target's own box: a detection does not move it."""
         return known.box
 

@@ -56,7 +56,7 @@ class StepwiseSettings:
     """When tracks start, match and end.
 
     Raises:
-        ValueError: a share is none, or a number of frames makes no sense.
+        ValueError: a setting is out of range.
     """
 
     min_birth_score: float = 0.5  # least score of a detection that somebody new begins with

@@ -21,7 +21,7 @@ class TrackGraphSettings:
     """Merges and splits.
 
     Raises:
-        ValueError: a number makes no sense.
+        ValueError: a setting is out of range.
     """
 
     min_covered_share: float = 0.5  # share of a box that another must cover for its person to merge into it

@@ -1,4 +1,4 @@
-"""The `Detector` protocol, and the array types of images and masks."""
+"""The `Detector` protocol, the array types of images and masks, and checks that detectors share."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ Mask: TypeAlias = npt.NDArray[np.uint8]
 """A mask, `(H, W)`, 0 or 255: what OpenCV calls a binary image."""
 Plane: TypeAlias = npt.NDArray[np.float32]
 """One value per pixel or cell, `(H, W)`."""
+_CHANNELS = 3
 
 
 class Detector(Protocol):
@@ -36,3 +37,26 @@ class Detector(Protocol):
             ValueError: the image has another size or type than before.
         """
         ...
+
+
+def validate_image(image: Image) -> Image:
+    """Return the image, after checking it.
+
+    Raises:
+        ValueError: it is not `(H, W, 3)` uint8.
+    """
+    if image.ndim != _CHANNELS or image.shape[2] != _CHANNELS or image.dtype != np.uint8:
+        raise ValueError(f"a frame is (H, W, 3) uint8, not {image.shape} {image.dtype}")
+    return image
+
+
+def require_at_least_one(settings: object, *names: str) -> None:
+    """Check counts among a detector's settings.
+
+    Raises:
+        ValueError: one of them is below 1; the text names it.
+    """
+    for name in names:
+        value = getattr(settings, name)
+        if value < 1:
+            raise ValueError(f"{name} must be at least 1, not {value}")

@@ -8,11 +8,10 @@ import cv2
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.detectors.base import Image
+from tracking.detectors.base import Image, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor
 from tracking.detectors.ignore_mask import IgnoreFilter, Polygons
 from tracking.detectors.non_maximum_suppression import non_maximum_suppression
-from tracking.detectors.validation import validate_image
 from tracking.types import Detections
 
 # The detector's window is 64x128 pixels, the person in its middle is 96 tall, with 16 above and below.
@@ -29,7 +28,7 @@ class HogSettings:
     """The HOG people detector.
 
     Raises:
-        ValueError: a setting makes no sense.
+        ValueError: a setting is out of range.
     """
 
     min_height: float = 0.14  # smallest person, in image heights: the smaller the slower

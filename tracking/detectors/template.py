@@ -10,10 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import Floats
-from tracking.detectors.base import Image
+from tracking.detectors.base import Image, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSettings
 from tracking.detectors.subimage_appearance import SubimageSettings, subimage_histograms
-from tracking.detectors.validation import validate_image
 from tracking.types import Detections
 
 _LEAST_SIDE = 4
@@ -25,7 +24,7 @@ class TemplateSettings:
     """Settings of template matching for one object.
 
     Raises:
-        ValueError: a setting makes no sense.
+        ValueError: a setting is out of range.
     """
 
     max_peaks: int = 80  # K: peaks handed on at most, best first

@@ -20,8 +20,8 @@ class FrameSimilarity:
     """Ground truth and tracks of one frame, and their overlaps.
 
     Attributes:
-        truth: `(T,)` ids of the people who are there.
-        tracks: `(R,)` ids of the tracks that are there.
+        truth: `(T,)` ids of the people in the frame.
+        tracks: `(R,)` ids of the tracks in the frame.
         similarity: `(T, R)` overlap (IoU) of their boxes, in [0, 1].
     """
 
@@ -35,16 +35,16 @@ def align_frames(
 ) -> list[FrameSimilarity]:
     """Return the overlaps of truth and tracks frame by frame, for frames with any, in order.
 
-    Truth of confidence 0 does not count: such a person need not be found, and a track that is at them
-    (and at nobody who counts) is left out rather than wrong, as MOTChallenge has it.
+    Truth of confidence 0 does not count: such a person need not be detected, and a track matched with them is
+    left out instead of counted as wrong, as in MOTChallenge.
 
     Raises:
         ValueError: an id is twice in one frame.
     """
-    there, found = _by_frame(truth, "ground truth"), _by_frame(tracks, "tracks")
+    truth_rows, track_rows = _by_frame(truth, "ground truth"), _by_frame(tracks, "tracks")
     return [
-        _frame(there.get(number, []), found.get(number, []), least_iou)
-        for number in sorted(there.keys() | found.keys())
+        _frame(truth_rows.get(number, []), track_rows.get(number, []), least_iou)
+        for number in sorted(truth_rows.keys() | track_rows.keys())
     ]
 
 
@@ -77,8 +77,8 @@ def _boxes(rows: Sequence[MotRow]) -> Floats:
     return np.array([row.box for row in rows], dtype=np.float64).reshape(-1, BOX_SIDES)
 
 
-_STAY = 1000.0
-"""Worth more than all overlaps of a frame together."""
+_KEEP_BONUS = 1000.0
+"""Bonus for keeping a match: more than all overlaps of a frame together."""
 
 
 def match_frames(frames: Iterable[FrameSimilarity], least_iou: float) -> Iterator[NDArray[np.bool_]]:
@@ -88,9 +88,9 @@ def match_frames(frames: Iterable[FrameSimilarity], least_iou: float) -> Iterato
         pairs = np.zeros(frame.similarity.shape, dtype=bool)
         if pairs.size:
             # NaN is no track's id.
-            held = np.array([before.get(person, np.nan) for person in frame.truth.tolist()])
-            stay = _STAY * (held[:, None] == frame.tracks[None])
-            rows, columns = assign_pairs(frame.similarity, least_iou, stay)
+            previous = np.array([before.get(person, np.nan) for person in frame.truth.tolist()])
+            bonus = _KEEP_BONUS * (previous[:, None] == frame.tracks[None])
+            rows, columns = assign_pairs(frame.similarity, least_iou, bonus)
             pairs[rows, columns] = True
             before = dict(zip(frame.truth[rows].tolist(), frame.tracks[columns].tolist(), strict=True))
         yield pairs

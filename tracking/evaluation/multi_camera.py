@@ -26,9 +26,9 @@ class MultiCameraScores:
 
     Attributes:
         cameras: each camera for itself, by name.
-        joint: the frames of all cameras, put one after the other. A number is one person in all of them,
-            in the truth and in the tracks, so that whoever has another number in another camera is
-            wrong there: `joint.idf1` is the joint IDF1.
+        joint: the frames of all cameras one after the other. An id is one person in all cameras, in the
+            truth and in the tracks, so a person with different ids in two cameras is an error:
+            `joint.idf1` is the joint IDF1.
     """
 
     cameras: dict[str, Scores]

@@ -14,11 +14,12 @@ from tracking.evaluation.scores import DEFAULT_MIN_IOU
 from tracking.motchallenge import MotRow
 
 HIDDEN_BELOW = 0.25
-"""Visible share of somebody below which they are hidden."""
+"""Visible share below which a person is hidden."""
 COVERED_ABOVE = 0.5
-"""Share of a box that somebody nearer covers above which its person is hidden, where shares are not known."""
+"""Share of a box covered by a nearer person above which its person is hidden, if visible shares are
+unknown."""
 _LEAST_SEEN = 3
-"""Frames in which somebody must be seen before and after; two that are nearer than this are one occlusion."""
+"""Least visible frames before and after; two occlusions with fewer frames between them are one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +34,12 @@ class Occlusion:
 def find_occlusions(truth: Iterable[MotRow], around: int) -> list[Occlusion]:
     """Find the occlusions after which a person reappears, from the truth's visible shares.
 
-    Truth without shares between 0 and 1 only says whom its annotator called hidden, or nothing at all (-1).
-    There somebody is hidden by their box, too; of two boxes the one that ends lower is the nearer person's.
+    If no visible share lies between 0 and 1, boxes count too: a person is hidden if a nearer one covers their
+    box. Of two boxes the one that ends lower is nearer.
 
     Args:
         truth: rows of ground truth; those of confidence 0 do not count.
-        around: frames before, and after, in some of which somebody must be seen.
+        around: frames before and after in which the person must be visible for a while.
     """
     seen: dict[int, dict[int, bool]] = {}
     for row, hidden in _hidden([row for row in truth if row.confidence != 0.0]):
@@ -55,8 +56,8 @@ def identities_kept(
 ) -> list[bool]:
     """Return for each occlusion whether the person's track id is the same before and after it.
 
-    That is the number they are most often matched with in the `around` frames before, and in those after;
-    somebody who has none on either side did not keep it.
+    The id is the one matched most often in the `around` frames before and after; a person without a match on
+    either side did not keep it.
     """
     truth, tracks = list(truth), list(tracks)
     lined = align_frames(truth, tracks, least_iou)

@@ -18,9 +18,8 @@ def oracle_association(
 ) -> list[MotRow]:
     """Return the detections with the id of the person they match; drop those that match no one.
 
-    In each frame people and detections are assigned to each other, for the largest total overlap, none
-    below `least_iou`. What the scores of these tracks lack, no tracker can find in the detections (but
-    one that adds boxes where nothing was detected).
+    In each frame people and detections are assigned to each other for the largest total overlap, none below
+    `least_iou`. No tracker on these detections scores higher, unless it adds boxes.
     """
     people = _by_frame(row for row in truth if row.confidence != 0.0)
     tracks: list[MotRow] = []

@@ -11,7 +11,7 @@ from tracking.evaluation.frame_matching import FrameSimilarity, align_frames, ma
 from tracking.motchallenge import MotRow
 
 DEFAULT_MIN_IOU = 0.5
-"""The overlap from which a box is taken to be at a person, as in MOTChallenge."""
+"""Overlap (IoU) from which a box matches a person, as in MOTChallenge."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +57,8 @@ def evaluate(truth: Iterable[MotRow], tracks: Iterable[MotRow], least_iou: float
 
     Args:
         truth: rows whose confidence is 0 do not count; see `align_frames`.
-        tracks: what was found.
-        least_iou: the overlap from which a box is taken to be at a person, for all but HOTA.
+        tracks: rows to score.
+        least_iou: overlap from which a box matches a person, for all scores but HOTA.
 
     Raises:
         ValueError: an id is twice in one frame.

@@ -1,8 +1,7 @@
 """Interactive tracking: risk prediction and operator corrections (Todor 2009, chapter 8)."""
 
 from tracking.interactive.corrections import PositionCorrection
-from tracking.interactive.risk import RiskFeatures
-from tracking.interactive.risk_prediction import RiskPredictor
+from tracking.interactive.risk import RiskFeatures, RiskPredictor
 from tracking.interactive.settings import InteractiveSettings
 from tracking.interactive.swap_margins import SwapMargins, swap_margin_matrix, swap_margins
 from tracking.interactive.tracker import InteractiveTracker

@@ -25,7 +25,7 @@ class PositionCorrection:
         tolerance: how far off the correction may be, pixels: where it is usually within.
 
     Raises:
-        ValueError: the reach is not positive, or a number is none.
+        ValueError: the tolerance is not positive, or a number is not finite.
     """
 
     frame: int
@@ -42,9 +42,8 @@ class PositionCorrection:
 def normalized_offset(correction: PositionCorrection, boxes: Floats) -> Floats:
     """Return the normalized squared distance of boxes `(..., 4)` from a correction, `(...)` in [0, 1].
 
-    The squared distance of the point from the middle of the box, in units of twice the reach, 1 at most:
-    where people point with normal errors it is the logarithm of a likelihood, up to a factor; and nobody
-    is more than elsewhere, however far.
+    The squared distance of the point from the center of the box, in units of twice the tolerance, at most
+    1. For normally distributed pointing errors it is a log-likelihood, up to a factor.
     """
     middles = (boxes[..., :2] + boxes[..., 2:]) / 2.0
     squared = ((middles - [correction.x, correction.y]) ** 2).sum(axis=-1) / (2.0 * correction.tolerance) ** 2

@@ -1,7 +1,7 @@
 """Inserted hypotheses: candidates for corrected objects that the detector missed.
 
-Where a detector takes two bodies for one, or overlooks somebody, there is no place for who is pointed at to
-be in. So one is made: theirs alone, and in nobody's way.
+Where a detector merges two bodies or misses one, the corrected object has no observation. One is inserted
+that only this object can use and that conflicts with no other.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from tracking.model.network import Network
 from tracking.types import Detections
 
 _MAX_AREA_RATIO = 1.6
-"""Factor between the areas of somebody and a box that is still theirs; two bodies side by side have more."""
+"""Largest ratio of a box's area to the object's; two bodies side by side have more."""
 
 InsertedHypotheses = Mapping[int, Mapping[int, int]]
-"""Which observation was made for whom: the index by object, by frame."""
+"""By frame and object, the index of the observation inserted for it."""
 
 
 def box_around(correction: PositionCorrection, size: Floats) -> Floats:
@@ -54,9 +54,8 @@ def apply_insertions(
 ) -> Network:
     """Return the network of a window in which inserted hypotheses belong to their object only.
 
-    To others such a place is none. It conflicts with nothing, since what is found there is one box of
-    several. A way of less than a body to it or from it costs at most `change`, what a usual change does: a
-    hand trembles more than people move.
+    Other objects cannot use them, and they conflict with nothing. Moving by less than a body to or from one
+    costs at most `change`: pointing is less exact than detection.
     """
     frames = [m for m in range(network.frames) if places.get(first + m)]
     if not frames:

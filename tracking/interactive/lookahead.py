@@ -16,13 +16,13 @@ from tracking.model.settings import CostSettings
 from tracking.types import Detections
 
 _MIN_OVERLAP = 0.25
-"""Shared over average area from which two boxes are in each other's way."""
+"""Shared over average area from which two boxes overlap."""
 
 _RECENT = 5
-"""Frames within which somebody must have been seen, and how often, for their way to be known."""
+"""Frames within which an object must have been seen, and how often, to predict its path."""
 
 _SIGHTINGS = 12
-"""Sightings that a velocity is taken from, at most."""
+"""Sightings that a velocity is fitted to, at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +32,8 @@ class Crossing:
     Attributes:
         first, second: their ids.
         frame: frames after the one that follows the window.
-        length: frames for which they are in each other's way, as far as it is looked ahead.
-        margin: what it would cost to take each for the other from then on.
+        length: frames for which they overlap within the horizon.
+        margin: cost of swapping the two from then on.
     """
 
     first: int

@@ -1,4 +1,4 @@
-"""Probability of an identity failure."""
+"""Risk prediction from a solved window: upcoming and undecided identity failures, and their probability."""
 
 from __future__ import annotations
 
@@ -6,12 +6,25 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tracking.types import RiskReason
+import numpy as np
+
+from tracking.appearance import appearance_distance
+from tracking.boxes import Floats, overlap
+from tracking.interactive.lookahead import predict_crossings, predict_paths
+from tracking.interactive.settings import InteractiveSettings
+from tracking.interactive.solved_window import SolvedWindow
+from tracking.interactive.swap_margins import SwapMargins, swap_margins
+from tracking.model.settings import CostSettings
+from tracking.types import RiskEvent, RiskReason
 
 _MAX_MARGIN = 10.0
-"""A margin from which more of it tells nothing."""
+"""Margins above this count as this."""
 _LEAD_SCALE = 10.0
-"""Frames that what is ahead is counted in."""
+"""Frames per unit of lead time."""
+_MIN_OVERLAP = 0.25
+"""Shared over average area from which one object covers another."""
+_RECENT = 5
+"""Least sightings to extrapolate a score or a path."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,9 +32,9 @@ class RiskFeatures:
     """Features of the risk model.
 
     Attributes:
-        margin: what it would cost the tracker to see it the other way.
-        lead: frames from the newest one to when it is expected; negative: so long ago.
-        length: frames for which the two are in each other's way, or somebody is hidden.
+        margin: cost of the alternative solution above the chosen one.
+        lead: frames from the newest one to the expected failure; negative: in the past.
+        length: frames for which two objects overlap, or one is hidden.
     """
 
     margin: float
@@ -30,7 +43,7 @@ class RiskFeatures:
 
     @property
     def regression_terms(self) -> tuple[float, float, float, float, float]:
-        """The terms of the log odds: a constant, the margin, and what is ahead and what has begun apart."""
+        """Terms of the log odds: a constant, the margin, and those of future and of past failures."""
         ahead = float(self.lead > 0.0)
         begun = math.log1p(self.length) * (1.0 - ahead)
         return 1.0, min(self.margin, _MAX_MARGIN), ahead, ahead * self.lead / _LEAD_SCALE, begun
@@ -51,3 +64,137 @@ def failure_probability(reason: RiskReason, signs: RiskFeatures) -> float:
     """Return the probability of an identity failure, by logistic regression."""
     odds = sum(weight * term for weight, term in zip(WEIGHTS[reason], signs.regression_terms, strict=True))
     return 1.0 / (1.0 + math.exp(-odds))
+
+
+class RiskPredictor:
+    """Predicts identity failures from solved windows. Stateless."""
+
+    def __init__(self, settings: InteractiveSettings, costs: CostSettings) -> None:
+        self._settings = settings
+        self._costs = costs
+
+    def predict(self, window: SolvedWindow) -> tuple[RiskEvent, ...]:
+        """Return the risk events of a window, the riskiest first, one per pair and reason."""
+        found = swap_margins(window.network, window.states)
+        events = [
+            *self._swaps(window, found),
+            *self._similar_crossings(window),
+            *self._hidden_objects(window),
+            *self._low_confidence(window),
+            *self._unproven(window, found.margins),
+        ]
+        once: dict[tuple[str, tuple[int, ...]], RiskEvent] = {}
+        for it in sorted(events, key=lambda it: (-it.risk, it.frame, it.objects, it.reason)):
+            once.setdefault((it.reason, tuple(sorted(it.objects))), it)
+        return tuple(once.values())
+
+    def _swaps(self, window: SolvedWindow, found: SwapMargins) -> list[RiskEvent]:
+        """Return the pairs with a small swap margin in a frame that becomes final now."""
+        settled = window.first + found.frames <= window.final_to
+        first, second = np.nonzero(np.triu((found.margins < self._settings.swap_margin) & settled, 1))
+        return [
+            _risk_event(
+                "id_switch",
+                _pair(window, a, b),
+                window,
+                window.first + int(found.frames[a, b]),
+                float(found.margins[a, b]),
+                _ambiguous_frames(window, a, b),
+            )
+            for a, b in zip(first.tolist(), second.tolist(), strict=True)
+        ]
+
+    def _similar_crossings(self, window: SolvedWindow) -> list[RiskEvent]:
+        """Return the pairs that cross within the horizon and could then be swapped at low cost."""
+        found = predict_crossings(window, self._settings.horizon_frames, self._costs)
+        return [
+            _risk_event(
+                "crossing",
+                tuple(sorted((it.first, it.second))),
+                window,
+                window.last + 1 + it.frame,
+                it.margin,
+                it.length,
+            )
+            for it in found
+            if it.margin < self._settings.crossing_margin
+        ]
+
+    def _hidden_objects(self, window: SolvedWindow) -> list[RiskEvent]:
+        """Return the objects hidden for a while, with the similar object that covers them, if any.
+
+        The margin is the appearance distance of the two over a whole window, above the distance of an
+        object to itself; it is 0 for an object that is hidden without an occluder.
+        """
+        histograms, found = window.known_histograms, []
+        length = window.last - window.first + 1
+        for n, (hidden, way) in predict_paths(window, window.recent_boxes.shape[1]).items():
+            if hidden < self._settings.hidden_frames:
+                continue
+            here = window.recent_boxes[:, -hidden:].copy()
+            here[n] = np.nan
+            covers = np.nan_to_num(overlap(here, way[:hidden])).max(axis=1, initial=0.0)
+            b = int(covers.argmax())
+            frame = window.last - hidden + 1
+            differ = float(
+                appearance_distance(histograms[n, None], histograms[b, None], self._costs.measure)[0, 0]
+            )
+            margin = length * max(differ - self._costs.unknown_appearance, 0.0)
+            if covers[b] > _MIN_OVERLAP and margin < self._settings.crossing_margin:
+                pair = window.known_ids[n], window.known_ids[b]
+                found.append(_risk_event("crossing", pair, window, frame, margin, hidden))
+            else:
+                found.append(_risk_event("track_loss", (window.known_ids[n],), window, frame, 0.0, hidden))
+        return found
+
+    def _low_confidence(self, window: SolvedWindow) -> list[RiskEvent]:
+        """Return the objects whose detection scores are low, or will be within the horizon."""
+        found = []
+        scores, faint = window.scores, self._settings.min_confidence
+        for n, number in enumerate(window.ids):
+            seen = np.flatnonzero(~np.isnan(scores[n]))
+            if len(seen) < 2 * _RECENT or seen[-1] < scores.shape[1] - _RECENT:
+                continue
+            slope, level = np.polyfit(seen - seen[-1], scores[n, seen], 1)
+            left = (level - faint) / -slope if slope < 0.0 else np.inf
+            if level <= faint or left <= self._settings.horizon_frames:
+                frame = window.last + max(int(left), 0) if level > faint else window.last
+                found.append(_risk_event("track_loss", (number,), window, frame, float(level - faint), 0))
+        return found
+
+    def _unproven(self, window: SolvedWindow, margins: Floats) -> list[RiskEvent]:
+        """Return the pair with the smallest swap margin, where the solution is not proven optimal."""
+        if window.report.gap <= self._settings.max_solver_gap or not np.isfinite(margins).any():
+            return []
+        a, b = divmod(int(margins.argmin()), margins.shape[1])
+        pair = _pair(window, a, b)
+        return [
+            _risk_event(
+                "optimality_gap",
+                pair,
+                window,
+                window.last,
+                float(margins[a, b]),
+                _ambiguous_frames(window, a, b),
+            )
+        ]
+
+
+def _risk_event(
+    reason: RiskReason, objects: tuple[int, ...], window: SolvedWindow, frame: int, margin: float, length: int
+) -> RiskEvent:
+    """Return a risk event with its probability; `length` as in `RiskFeatures`."""
+    margin = max(margin, 0.0)
+    likely = failure_probability(reason, RiskFeatures(margin, frame - window.last, length))
+    return RiskEvent(reason, objects, frame, margin, length, likely)
+
+
+def _ambiguous_frames(window: SolvedWindow, a: int, b: int) -> int:
+    """Return in how many recent frames objects a and b overlapped, or one of them was hidden."""
+    one, other = (window.recent_boxes[window.known_ids.index(window.ids[n])] for n in (a, b))
+    hidden = np.isnan(one[:, 0]) | np.isnan(other[:, 0])
+    return int(np.count_nonzero(hidden | (np.nan_to_num(overlap(one, other)) > _MIN_OVERLAP)))
+
+
+def _pair(window: SolvedWindow, a: int, b: int) -> tuple[int, ...]:
+    return tuple(sorted((window.ids[a], window.ids[b])))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 _MOST_FRAMES = 10_000
-"""Frames back, or ahead: messages, and what is worked out of a window, grow with them."""
+"""Frames back or ahead: the size of messages and the time of predictions grow with them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,7 +13,7 @@ class InteractiveSettings:
     """Settings of risk prediction and operator corrections.
 
     Raises:
-        ValueError: a number makes no sense.
+        ValueError: a setting is out of range.
     """
 
     enabled: bool = False  # predict risks and accept operator corrections; false: no overhead

@@ -20,13 +20,13 @@ class SolvedWindow:
 
     Attributes:
         first: its first frame.
-        ids: the tracks that were in the program, in the order of the network's objects.
-        network: what it was solved on.
+        ids: the tracks in the program, in the order of the network's objects.
+        network: the solved network.
         states: `(n, M)`, -1 where hidden.
         detections: its M frames.
-        report: what is proven.
+        report: of the solver.
         final_to: the last frame that becomes final with it.
-        known_ids: all tracks that are remembered, those that nothing in the window can be, too.
+        known_ids: all remembered tracks, also those without an observation in the window.
         recent_boxes: `(k, T, 4)` pixels, the known tracks' boxes in the last T frames, NaN where hidden.
         known_histograms: `(k, B)`, their templates.
     """
@@ -49,7 +49,7 @@ class SolvedWindow:
 
     @property
     def scores(self) -> Floats:
-        """How sure the detector is of them, `(n, M)`, NaN where hidden."""
+        """Detection scores of the tracks, `(n, M)`, NaN where hidden."""
         found = np.full(self.states.shape, np.nan)
         for m, seen in enumerate(self.detections):
             there = self.states[:, m] != OCCLUDED

@@ -18,9 +18,9 @@ class SwapMargins:
     """The cheapest identity swap of every two objects of a window.
 
     Attributes:
-        margins: (n, n) symmetric, what it costs more than the answer; infinite where no arcs lead over, and
-            on the diagonal. Negative only where the answer was not the best one.
-        frames: (n, n) index of the first frame of the window in which the two have changed places.
+        margins: (n, n) symmetric, cost above the solution's; infinite where there are no arcs, and on the
+            diagonal. Negative only where the solution was not optimal.
+        frames: (n, n) index of the first frame of the window after the swap.
     """
 
     margins: Floats
@@ -54,11 +54,11 @@ def swap_margins(network: Network, states: NDArray[np.int64]) -> SwapMargins:
         return SwapMargins(np.empty((0, 0)), np.empty((0, 0), dtype=np.int64))
     own, crossed = _path_costs(network, nodes_from_states(network, states))
     both = crossed + crossed.transpose(1, 0, 2)
-    # Two who stay hidden to the end have exchanged nothing that could be seen.
+    # A swap of two objects that stay hidden to the end changes nothing visible.
     shown = (states != OCCLUDED)[:, ::-1].cumsum(axis=1)[:, ::-1] > 0
     both[~(shown[:, None] | shown[None])] = np.inf
     frames = both.argmin(axis=2)
-    # A rounded answer may hold an arc that is gated: who has it has no margin.
+    # A rounded solution may hold a gated arc: its object has no margin.
     least, now = both.min(axis=2), own[:, None] + own[None]
     margins = np.subtract(least, now, out=np.full((n, n), np.inf), where=np.isfinite(now))
     np.fill_diagonal(margins, np.inf)

@@ -13,7 +13,7 @@ from tracking.detectors.base import Image
 from tracking.interactive.corrections import PositionCorrection, apply_corrections, near_correction
 from tracking.interactive.hypothesis_insertion import apply_insertions
 from tracking.interactive.late_correction import backdate_correction
-from tracking.interactive.risk_prediction import RiskPredictor
+from tracking.interactive.risk import RiskPredictor
 from tracking.interactive.settings import InteractiveSettings
 from tracking.interactive.solved_window import SolvedWindow
 from tracking.interactive.window_memory import WindowMemory, WindowSnapshot

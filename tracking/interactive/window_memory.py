@@ -19,13 +19,13 @@ from tracking.solvers.warm_start import WindowWarmStart
 from tracking.types import Detections
 
 _SAME_PLACE = 0.5
-"""Overlap (IoU) from which somebody new is the one who began in that frame before."""
+"""Overlap (IoU) from which a new track is the one that started there before the windows were undone."""
 
 _SIZE_FRAMES = 50
-"""Frames before and after in which it is looked how large somebody is."""
+"""Frames before and after over which the size of an object is taken."""
 
 _SAME_TIME = 5
-"""Frames by which somebody new may begin earlier or later than before."""
+"""Frames by which a track may start earlier or later than before."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +37,7 @@ class WindowSnapshot:
         end: its last frame.
         final_to: the last frame that becomes final.
         objects: the object list before it.
-        warm_start: what the window before it has told.
+        warm_start: from the window before it.
     """
 
     first: int
@@ -67,8 +67,8 @@ class WindowMemory:
 
     Attributes:
         detections: the detections, by frame; a frame that is not there showed nothing.
-        assignments: who was in which of them in the end, by frame: the observation's index by id.
-        inserted: what was made of corrections, by frame: the observation's index by whom it was made for.
+        assignments: by frame, the index of each track's observation.
+        inserted: by frame, the index of the observation inserted for each corrected object.
         snapshots: the windows, oldest first.
     """
 
@@ -76,7 +76,7 @@ class WindowMemory:
         self._frames = frames
         self._initiated: list[InitiatedTrack] = []
         self._undone: list[InitiatedTrack] = []
-        """Those whose windows are solved again: who begins there once more has their number."""
+        """Tracks of windows that are solved again: a track that starts there again gets the same id."""
         self.detections: dict[int, Detections] = {}
         self.assignments: dict[int, Mapping[int, int]] = {}
         self.inserted: dict[int, dict[int, int]] = {}
@@ -174,7 +174,7 @@ class WindowMemory:
     def assign_id(self, frame: int, box: Floats, fresh: int) -> int:
         """Return the id of a new track: `fresh`, or its id before its window was undone.
 
-        Without anything undone nobody ever has a number that somebody else had.
+        Otherwise ids are never reused.
         """
         known = self._undone_track(frame, box)
         if known is not None:

@@ -1,1 +1,1 @@
-"""Model."""
+"""The network of a window: observations, objects, costs and conflicts (paper II.B)."""

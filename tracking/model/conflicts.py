@@ -1,4 +1,4 @@
-"""Which places exclude each other: the conflict sets O(v) of paper II.B, and their rows in the program."""
+"""Conflict sets O(v) of places that exclude each other (paper II.B), and their rows in the program."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What it costs to be elsewhere than somebody who goes on as they went: not in the paper."""
+"""Costs of the network's nodes and arcs (paper II.B), and motion costs, which are not in the paper."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def source_costs(
 def pair_costs(charges: MotionCosts | None, places: ObservationArrays, settings: CostSettings) -> Floats:
     """Return what the arcs between two frames cost besides the node, (Q, M - 1, S, S).
 
-    Q is the number of sets of observations, or n where somebody's motion is known.
+    Q is the number of sets of observations, or n where the motion of an object is known.
     """
     sets, frames, width = places.present.shape
     costs = np.zeros((sets, max(frames - 1, 0), width + 1, width + 1))

@@ -1,4 +1,4 @@
-"""Where an object should be by now: it goes on as it went, slower and slower, since it was last seen."""
+"""Motion model: an object's predicted position since its last sighting, with damped velocity."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 from tracking.boxes import Floats, normalized_distance
 
-# Frames over which somebody out of sight keeps their velocity: people turn and stop.
+# Frames after which the velocity of a hidden object has decayed to a third: people turn and stop.
 _VELOCITY_DECAY_FRAMES = 20.0
-# Sum of squared times, frames², at which the sightings count as much as the belief that nobody moves:
-# that of three sightings in a row, whose boxes tremble by more than a step.
+# Sum of squared times, frames², at which the sightings count as much as the prior of no motion: that of
+# three sightings in a row, whose boxes jitter by more than a step.
 _VELOCITY_REGULARIZATION = 3.0
 
 

@@ -1,4 +1,4 @@
-"""The network of one window: all places that each object can be in, and what moving between them costs.
+"""The network of one window: the places that each object can be in, and the costs of moving between them.
 
 Paper II.B, Fig. 4. The observations of a frame are padded to K places; the node after them, the last
 one, is the occlusion node, so that index -1 means occluded everywhere.

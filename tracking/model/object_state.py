@@ -1,4 +1,4 @@
-"""What is known of an object before the window: the source node s_n."""
+"""State of a tracked object before the window: the source node s_n."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class TrackedObject:
         self.present = False
 
     def copy(self) -> TrackedObject:
-        """Return what is remembered now, to go back to."""
+        """Return a copy, to go back to."""
         other = TrackedObject(self.id, self.histogram, self.box, self.frame)
         other._past.extend(self._past)
         other.is_confirmed, other.present = self.is_confirmed, self.present
@@ -113,7 +113,7 @@ class TrackedObject:
             self.histogram = (1.0 - rate) * self.histogram + rate * sighting.histogram
 
     def restart_at(self, box: Floats, frame: int) -> None:
-        """Begin anew at a place where it was recognised: how it went long ago says nothing there."""
+        """Restart at the place where the object was re-identified, without its old motion."""
         self.box = box
         self.frame = frame
         self._past.clear()

@@ -12,7 +12,7 @@ ConflictRows = Literal["clique", "star"]
 DisplacementUnit = Literal["pixels", "heights"]
 
 
-# Pixels: below this a gate was meant for the other unit.
+# Pixels: a smaller gate was meant in heights.
 _MIN_GATE_PIXELS = 2.0
 
 
@@ -38,25 +38,25 @@ class CostSettings:
     # c_b: above the appearance difference of one object to itself, below that of two objects.
     occlusion: float = 0.8
     # Added for an observation of score 0, falling to nothing at score 1: a hypothesis that explains
-    # nothing of its own is nearly as dear as being hidden. 0 is the paper.
+    # nothing of its own costs nearly as much as being hidden. 0 is the paper.
     confidence: float = 0.7
-    # Added where somebody seen becomes hidden, once for however long it lasts. 0 is the paper.
+    # Added to arcs into an occlusion, once for its whole length. 0 is the paper.
     disappearance: float = 1.0
-    # Weight of the distance from where somebody known should be by now if they go on as they went: the
-    # full weight from `slack + course_drift * frames elapsed` heights on. 0 is the paper.
+    # Weight of the distance from an object's predicted position: in full from
+    # `motion_slack + motion_drift * elapsed frames` heights on. 0 is the paper.
     motion: float = 0.2
     motion_drift: float = 0.04
-    # Weight of the square of that distance where somebody comes out of hiding, in units of
-    # `slack + comeback_drift * frames elapsed` heights; nobody comes back farther off. 0 is the paper:
-    # anywhere.
+    # Weight of the square of that distance for arcs out of an occlusion, in units of
+    # `motion_slack + reappearance_drift * elapsed frames` heights; farther off there is no arc. 0 is the
+    # paper: anywhere.
     reappearance: float = 1.0
     reappearance_drift: float = 0.03
-    # Largest difference of appearance to their template at which somebody comes out of hiding, 0 to 1.
+    # Largest appearance distance to its template at which an object comes out of an occlusion, 0 to 1.
     reappearance_max_distance: float = 0.5
-    # How far somebody may be from there without having moved, heights.
+    # Deviation from the predicted position that is measurement error, heights.
     motion_slack: float = 0.2
-    # g of somebody or something whose appearance is not known: about what one object differs from
-    # itself, so that the other costs weigh the same with pictures and without.
+    # g of an unknown appearance: about what one object differs from itself, so that the other costs weigh
+    # the same with and without images.
     unknown_appearance: float = 0.3
     # How histograms are compared: g(.), in [0, 1].
     measure: AppearanceMeasure = "bhattacharyya"
@@ -71,8 +71,8 @@ class CostSettings:
     # Rule "overlap": boxes conflict above this ratio of shared to average area.
     conflict_overlap: float = 0.5
     # "clique": no two objects hold conflicting boxes. "star" is II.D to the letter: at most one path
-    # goes through the conflict set of every box, even where the box itself is nobody's; from three
-    # objects on that forbids more.
+    # goes through the conflict set of every box, even of an unused one; from three objects on that forbids
+    # more.
     conflict_rows: ConflictRows = "clique"
 
     def __post_init__(self) -> None:
@@ -92,11 +92,11 @@ class CostSettings:
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
         if not min(self.motion_slack, self.motion_drift, self.reappearance_drift) > 0.0:
-            raise ValueError("slack, course_drift and comeback_drift must be positive")
+            raise ValueError("motion_slack, motion_drift and reappearance_drift must be positive")
         if self.gate is not None and not self.gate > 0.0:
             raise ValueError(f"gate must be positive, not {self.gate}")
         if self.gate is not None and self.displacement_unit == "pixels" and self.gate < _MIN_GATE_PIXELS:
-            raise ValueError(f"a gate of {self.gate:g} pixels lets nobody move: give another, or none")
+            raise ValueError(f"a gate of {self.gate:g} pixels lets no object move: set a larger one, or none")
         if not self.conflict_distance > 0.0:
             raise ValueError(f"conflict_distance must be positive, not {self.conflict_distance}")
         if not self.conflict_overlap > 0.0:

@@ -27,13 +27,13 @@ class AffinityFusion:
     Args:
         settings: of identity.
         calibrated: by camera, whether it has a homography.
-        walking_speed: the farthest that somebody walks in a frame, in person heights.
+        walking_speed: largest distance walked in a frame, person heights.
     """
 
     def __init__(
         self, settings: IdentitySettings, calibrated: Mapping[str, bool], walking_speed: float
     ) -> None:
-        self._settings, self._calibrated, self._pace = settings, calibrated, walking_speed
+        self._settings, self._calibrated, self._walking_speed = settings, calibrated, walking_speed
         self._scales = DistanceScales(settings.appearance_frames)
         self._weights = AppearanceWeights(
             settings.appearance_evidence, settings.maximum_appearance_evidence, settings.appearance_frames
@@ -52,7 +52,7 @@ class AffinityFusion:
         Args:
             tracklets: active ones.
             people: known people with settled tracklets.
-            visible: (P,) people who are seen by settled tracklets that go on.
+            visible: (P,) people seen by settled tracklets that continue.
             affinity: of all pairs of both.
             height: of a person in ground units.
 
@@ -61,9 +61,9 @@ class AffinityFusion:
         """
         count = len(tracklets) + len(people)
         evidence = PairEvidence(
-            tracklets, people, affinity, self._calibrated, self._settings, height, self._pace
+            tracklets, people, affinity, self._calibrated, self._settings, height, self._walking_speed
         )
-        appearances = self._looks(tracklets, people, affinity)
+        appearances = self._collect_appearances(tracklets, people, affinity)
         links = CandidateLinks.find(evidence, appearances, self._weights, len(tracklets), count)
         unseen = np.concatenate([np.zeros(len(tracklets), dtype=np.bool_), ~visible])
         group = np.arange(count)
@@ -80,7 +80,7 @@ class AffinityFusion:
             group[batch.rows] = batch.rows[label]
         return group
 
-    def _looks(
+    def _collect_appearances(
         self, tracklets: Sequence[Tracklet], people: Sequence[Person], affinity: AffinityMatrix
     ) -> list[CameraAppearances]:
         """Collect the mean histograms of all rows, camera by camera."""
@@ -107,7 +107,7 @@ class AffinityFusion:
     def remember_distances(
         self, old: Collection[int], tracklets: Sequence[Tracklet], affinity: AffinityMatrix
     ) -> None:
-        """Keep the appearance distances of tracklets that are about to be settled, given by their rows."""
+        """Store the appearance distances of tracklets that are about to be settled, given by their rows."""
         self._scales.remember_distances(old, tracklets, affinity)
 
 

@@ -40,19 +40,19 @@ class AffinityMatrix:
     """
 
     def __init__(self, settings: IdentitySettings) -> None:
-        self._cap, self._memory, self._cap_alike = (
+        self._ground_cap, self._memory, self._appearance_cap = (
             settings.maximum_ground_evidence,
             settings.cross_camera_memory,
             settings.maximum_cross_camera_evidence,
         )
         self._frames = settings.ground_correlation_frames
         self._row_of: dict[RowKey, int] = {}
-        # What the tables call each row, and no other one later.
+        # Number of each row in the tables, never reused.
         self._row_names: Ints = np.zeros(0, dtype=np.int64)
         self._name_count = 0
         self._presence = PresenceBitmap(settings.comparable_frames + _EXTRA_PRESENCE_FRAMES)
-        # Frames of being elsewhere after which more of them say nothing more.
-        self._enough = max(
+        # Common frames at different places after which the evidence is capped.
+        self._max_common_frames = max(
             _MINIMUM_COMMON_FRAMES,
             math.ceil(
                 settings.maximum_ground_evidence * settings.ground_correlation_frames / -MINIMUM_FRAME_SCORE
@@ -60,7 +60,7 @@ class AffinityMatrix:
         )
         self._cannot_link = SparsePairTable()
         self._appearance = SparsePairTable()
-        # Evidence of standing on the same ground, and in how many frames; no more than says anything.
+        # Ground evidence and common frames, both capped.
         self._ground = SparsePairTable(2)
 
     def __len__(self) -> int:
@@ -141,7 +141,7 @@ class AffinityMatrix:
         known = self._ground_entries(first_name, second_name, first, second)
         np.add.at(known[:, 0], index, score / self._frames)
         np.add.at(known[:, 1], index, frames)
-        known[:, 0] = np.clip(known[:, 0], -self._cap, self._cap)
+        known[:, 0] = np.clip(known[:, 0], -self._ground_cap, self._ground_cap)
         known[:, 1] = np.minimum(known[:, 1], _MINIMUM_COMMON_FRAMES)
         self._ground.set(first_name, second_name, known)
 
@@ -151,11 +151,11 @@ class AffinityMatrix:
         Rows without ground evidence were at different places in common frames.
         """
         self._presence.add_presence(row, frame)
-        # Who went their ways for good is elsewhere like anybody else.
-        capped = np.flatnonzero(self._ground.values[:, 0] <= -self._cap)
+        # A pair at the lower cap needs no entry if its default evidence is at the cap too.
+        capped = np.flatnonzero(self._ground.values[:, 0] <= -self._ground_cap)
         first, second = self._rows_of(self._ground.first[capped]), self._rows_of(self._ground.second[capped])
         keep = np.ones(len(self._ground), dtype=np.bool_)
-        keep[capped] = self._default_ground_entries(first, second)[:, 0] > -self._cap
+        keep[capped] = self._default_ground_entries(first, second)[:, 0] > -self._ground_cap
         self._ground.keep(keep)
 
     def appearance_evidence(self, first: Ints, second: Ints) -> Floats:
@@ -171,7 +171,7 @@ class AffinityMatrix:
         """Add an update's appearance scores of (P,) pairs of rows, each pair once."""
         first, second = self._names_of(first, second)
         known = self._appearance.get(first, second)[:, 0]
-        value = np.clip(self._memory * known + score, -self._cap_alike, self._cap_alike)
+        value = np.clip(self._memory * known + score, -self._appearance_cap, self._appearance_cap)
         self._appearance.set(first, second, value[:, None])
         self._appearance.keep(self._appearance.values[:, 0] != 0)
 
@@ -179,7 +179,7 @@ class AffinityMatrix:
         """Add the evidence of rows to others: both are one person.
 
         Args:
-            pairs: kept and lost row; no row is both.
+            pairs: kept row and lost row; no row is both.
         """
         pairs = [(kept, lost) for kept, lost in pairs if lost in self._row_of]
         if not pairs:
@@ -198,7 +198,7 @@ class AffinityMatrix:
 
     def _merge_ground_evidence(self, into: Ints) -> None:
         """Sum the ground evidence of merged rows; `into` (N,) is the row that each goes into."""
-        # Of each row all that go there, itself too.
+        # The rows merged into each row, itself included.
         order = np.argsort(into, kind="stable")
         begin, end = (np.searchsorted(into[order], np.arange(into.size), side=it) for it in ("left", "right"))
         size = end - begin
@@ -207,7 +207,7 @@ class AffinityMatrix:
         first, second = unique_pairs(first[touched], second[touched])
         different = first != second
         first, second = first[different], second[different]
-        # Whoever of one side has no entry with somebody of the other was elsewhere.
+        # Pairs of merged rows without an entry were at different places: their default evidence counts.
         pair, which = expand_counts(size[first] * size[second])
         first_row = order[begin[first][pair] + which // size[second][pair]]
         second_row = order[begin[second][pair] + which % size[second][pair]]
@@ -229,8 +229,8 @@ class AffinityMatrix:
 
     def _default_ground_entries(self, first: Ints, second: Ints) -> Floats:
         """Return ground evidence and common frames of (P,) pairs of rows that never came close: (P, 2)."""
-        common = self._presence.common(first, second, self._enough).astype(np.float64)
-        evidence = np.maximum(MINIMUM_FRAME_SCORE * common / self._frames, -self._cap)
+        common = self._presence.common(first, second, self._max_common_frames).astype(np.float64)
+        evidence = np.maximum(MINIMUM_FRAME_SCORE * common / self._frames, -self._ground_cap)
         return np.stack([evidence, np.minimum(common, _MINIMUM_COMMON_FRAMES)], axis=1)
 
     def _names_of(self, one: Ints, two: Ints) -> tuple[Ints, Ints]:

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _MINIMUM_BATCH_ROWS = 64
-"""Rows that are worth a batch: fewer cost as much."""
+"""Least rows of a batch: smaller batches cost as much."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,8 +55,8 @@ class CandidateLinks:
         """
         first, second = evidence.positive_pairs()
         value = np.zeros(first.size)
-        more = [first * rows + second]
-        worth = [value]
+        pair_keys = [first * rows + second]
+        values = [value]
         place = np.full(rows, -1)
         for camera in appearances:
             place[camera.rows] = np.arange(camera.rows.size)
@@ -65,13 +65,13 @@ class CandidateLinks:
             known = (a >= 0) & (b >= 0)
             value[known] = alike[a[known], b[known]]
             a, b = np.nonzero(alike > 0)
-            more.append(camera.rows[a] * rows + camera.rows[b])
-            worth.append(alike[a, b])
+            pair_keys.append(camera.rows[a] * rows + camera.rows[b])
+            values.append(alike[a, b])
             place[camera.rows] = -1
-        pairs, at = np.unique(np.concatenate(more), return_index=True)
+        pairs, at = np.unique(np.concatenate(pair_keys), return_index=True)
         first, second = pairs // max(rows, 1), pairs % max(rows, 1)
-        rest, apart = evidence.of(first, second)
-        linked = (np.concatenate(worth)[at] + rest > 0) & ~apart
+        other_evidence, cannot_link = evidence.of(first, second)
+        linked = (np.concatenate(values)[at] + other_evidence > 0) & ~cannot_link
         return cls(first[linked], second[linked], rows)
 
     def components(self) -> Ints:
@@ -79,16 +79,16 @@ class CandidateLinks:
         graph = scipy.sparse.coo_array(
             (np.ones(self.first.size), (self.first, self.second)), shape=(self.rows, self.rows)
         )
-        _, chain = scipy.sparse.csgraph.connected_components(graph, directed=False)
-        chain = chain.astype(np.int64)
+        _, component = scipy.sparse.csgraph.connected_components(graph, directed=False)
+        component = component.astype(np.int64)
         linked = np.zeros(self.rows, dtype=np.bool_)
         linked[self.first] = linked[self.second] = True
-        return np.where(linked, chain, -1)
+        return np.where(linked, component, -1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClusteringBatch:
-    """Everything known about N rows that have no link to any other row.
+    """Evidence and constraints of N rows that have no link to any other row.
 
     Attributes:
         rows: (N,) rising.
@@ -119,9 +119,9 @@ def split_into_batches(
         appearances: one entry a camera.
         minimum_rows: of a batch, as long as there are so many.
     """
-    chain = links.components()
-    parts = _pack_components(chain, minimum_rows)
-    # Of each row, which of the parts it is in and where.
+    component = links.components()
+    parts = _pack_components(component, minimum_rows)
+    # Batch of each row, and its position in the batch.
     part, place = np.full(links.rows, -1), np.zeros(links.rows, dtype=np.int64)
     for number, rows in enumerate(parts):
         part[rows], place[rows] = number, np.arange(rows.size)
@@ -132,19 +132,19 @@ def split_into_batches(
         for rows in parts
         for shape in [(rows.size, rows.size)]
     ]
-    one, two = pairs_of_equal_label(chain)
-    value, apart = evidence.of(one, two)
+    one, two = pairs_of_equal_label(component)
+    value, cannot_link = evidence.of(one, two)
     for number, own_pairs in _indices_by_label(part[one], len(parts)):
         a, b = place[one[own_pairs]], place[two[own_pairs]]
         batches[number].evidence[a, b] = batches[number].evidence[b, a] = value[own_pairs]
-        batches[number].cannot_link[a, b] = batches[number].cannot_link[b, a] = apart[own_pairs]
+        batches[number].cannot_link[a, b] = batches[number].cannot_link[b, a] = cannot_link[own_pairs]
     for number, own_pairs in _indices_by_label(part[links.first], len(parts)):
         a, b = place[links.first[own_pairs]], place[links.second[own_pairs]]
         batches[number].linked[a, b] = batches[number].linked[b, a] = True
     for camera in appearances:
-        # Looks say something only where others of the same chain were seen in this camera as well.
-        several = np.bincount(chain[camera.rows] + 1, minlength=int(chain.max(initial=-1)) + 2) > 1
-        at = np.flatnonzero(several[chain[camera.rows] + 1] & (chain[camera.rows] >= 0))
+        # Appearance only counts where several rows of a component were seen in this camera.
+        several = np.bincount(component[camera.rows] + 1, minlength=int(component.max(initial=-1)) + 2) > 1
+        at = np.flatnonzero(several[component[camera.rows] + 1] & (component[camera.rows] >= 0))
         for number, own_pairs in _indices_by_label(part[camera.rows[at]], len(parts)):
             own = at[own_pairs]
             batches[number].appearance.append(
@@ -155,12 +155,12 @@ def split_into_batches(
     return batches
 
 
-def _pack_components(chain: Ints, minimum_rows: int) -> list[Ints]:
+def _pack_components(component: Ints, minimum_rows: int) -> list[Ints]:
     """Group components into batches of at least `minimum_rows` rows: the rows of each, rising."""
-    order = np.argsort(chain, kind="stable")
-    order = order[int(np.searchsorted(chain[order], 0)) :]
+    order = np.argsort(component, kind="stable")
+    order = order[int(np.searchsorted(component[order], 0)) :]
     batches, start = [], 0
-    for end in (np.flatnonzero(np.diff(chain[order], append=-1)) + 1).tolist():
+    for end in (np.flatnonzero(np.diff(component[order], append=-1)) + 1).tolist():
         if end - start >= minimum_rows or end == order.size:
             batches.append(np.sort(order[start:end]))
             start = end

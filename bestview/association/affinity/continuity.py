@@ -15,7 +15,7 @@ from bestview.geometry.ground_plane import foot_points
 Floats = NDArray[np.float64]
 
 _GAP_DECAY_FRAMES = 25.0
-"""Gap in frames after which continuing a track is worth a third."""
+"""Gap in frames after which the evidence of a continued track falls to a third."""
 _IMPOSSIBLE_REACH = 2.0
 """Distance in reaches from which on it cannot be the same person."""
 
@@ -95,8 +95,8 @@ def reappearance_evidence(
         first: (P,) of them.
         second: (P,) others; their order in time does not matter.
         settings: `reappearance_evidence` and related ones.
-        height: of a person in ground units; NaN: not known yet.
-        walking_speed: the farthest that somebody walks in a frame, in person heights.
+        height: of a person in ground units; NaN: unknown.
+        walking_speed: largest distance walked in a frame, person heights.
 
     Returns:
         (P,) evidence of being one person, of pairs in one camera; (P,) too far apart to be one person.
@@ -110,7 +110,7 @@ def reappearance_evidence(
     reach = settings.reappearance_reach_heights + walking_speed * gap
     same_camera = endpoints.camera[earlier] == endpoints.camera[later]
     distance = np.hypot(*(endpoints.end_ground[earlier] - endpoints.start_ground[later]).T) / height
-    # A camera that has a ground but does not see the feet knows nothing: pixels would not tell better.
+    # A calibrated camera that does not see the feet has no distance: pixels would be no better.
     in_picture = same_camera & ~endpoints.calibrated[earlier]
     distance[in_picture] = _image_distance_in_heights(
         endpoints.end[earlier[in_picture]], endpoints.start[later[in_picture]]

@@ -34,7 +34,7 @@ class PairEvidence:
         calibrated: by camera, whether it has a homography.
         settings: of identity.
         height: of a person in ground units.
-        walking_speed: the farthest that somebody walks in a frame, in person heights.
+        walking_speed: largest distance walked in a frame, person heights.
     """
 
     def __init__(
@@ -47,12 +47,17 @@ class PairEvidence:
         height: float,
         walking_speed: float,
     ) -> None:
-        self._affinity, self._settings, self._height, self._pace = affinity, settings, height, walking_speed
+        self._affinity, self._settings, self._height, self._walking_speed = (
+            affinity,
+            settings,
+            height,
+            walking_speed,
+        )
         number_of = {camera: i for i, camera in enumerate(calibrated)}
         self._camera = np.array([number_of[it.key.camera] for it in tracklets], dtype=np.int64)
         ground = np.array([calibrated[it.key.camera] for it in tracklets], dtype=np.bool_)
-        self._places = EndpointArrays.of(tracklets, self._camera, ground)
-        self._number = np.array(
+        self._endpoints = EndpointArrays.of(tracklets, self._camera, ground)
+        self._published_id = np.array(
             [it.main_id for it in tracklets] + [it.person_id for it in people], dtype=np.int64
         )
         self._continuation = self._continuations(tracklets, people)
@@ -60,13 +65,13 @@ class PairEvidence:
     def _continuations(self, tracklets: Sequence[Tracklet], people: Sequence[Person]) -> SparsePairTable:
         """Compute the continuation evidence between tracklets and their predecessors."""
         row_of = {id(tracklet): row for row, tracklet in enumerate(tracklets)}
-        row_of_past = {person.person_id: len(tracklets) + i for i, person in enumerate(people)}
+        row_of_person = {person.person_id: len(tracklets) + i for i, person in enumerate(people)}
         evidence: dict[tuple[int, int], float] = {}
         for row, tracklet in enumerate(tracklets):
             predecessor = tracklet.predecessor
             if predecessor is None:
                 continue
-            other = row_of.get(id(predecessor), row_of_past.get(predecessor.main_id, -1))
+            other = row_of.get(id(predecessor), row_of_person.get(predecessor.main_id, -1))
             if other >= 0:
                 evidence[row, other] = continuation_evidence(tracklet, self._settings)
         table = SparsePairTable()
@@ -81,12 +86,12 @@ class PairEvidence:
         """
         same_camera = pairs_of_equal_label(self._camera)
         reappeared, _ = reappearance_evidence(
-            self._places, *same_camera, self._settings, self._height, self._pace
+            self._endpoints, *same_camera, self._settings, self._height, self._walking_speed
         )
         first, second = self._affinity.proximity_pairs()
         near = self._affinity.ground_evidence(first, second) > 0
         alike = self._affinity.appearance_pairs()
-        same_published_id = pairs_of_equal_label(np.where(self._number > 0, self._number, -1))
+        same_published_id = pairs_of_equal_label(np.where(self._published_id > 0, self._published_id, -1))
         sources = [
             (same_camera[0][reappeared > 0], same_camera[1][reappeared > 0]),
             (first[near], second[near]),
@@ -94,7 +99,7 @@ class PairEvidence:
             same_published_id,
             (self._continuation.first, self._continuation.second),
         ]
-        size = self._number.size
+        size = self._published_id.size
         pairs = sorted_unique(
             np.concatenate([first_rows * size + second_rows for first_rows, second_rows in sources])
         )
@@ -107,14 +112,16 @@ class PairEvidence:
         temporal, too_far = np.zeros(first.size), np.zeros(first.size, dtype=np.bool_)
         both = np.flatnonzero(second < count)
         temporal[both], too_far[both] = reappearance_evidence(
-            self._places, first[both], second[both], self._settings, self._height, self._pace
+            self._endpoints, first[both], second[both], self._settings, self._height, self._walking_speed
         )
         follows = self._continuation.find(first, second)
         continued = follows >= 0
-        # That the track goes on says it better than the place does.
+        # A continued track is stronger evidence than its distance.
         temporal[continued] = self._continuation.values[follows[continued], 0]
         too_far[continued] = False
-        same_published_id = (self._number[first] == self._number[second]) & (self._number[first] > 0)
+        same_published_id = (self._published_id[first] == self._published_id[second]) & (
+            self._published_id[first] > 0
+        )
         ground, appearance = (
             self._affinity.ground_evidence(first, second),
             self._affinity.appearance_evidence(first, second),

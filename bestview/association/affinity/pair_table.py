@@ -25,7 +25,7 @@ class SparsePairTable:
     """
 
     def __init__(self, columns: int = 1) -> None:
-        # Both names in one number, the lower one in front; rising.
+        # Both names in one number, the lower one in the upper bits; sorted.
         self._code: Ints = np.zeros(0, dtype=np.int64)
         self.values: Floats = np.zeros((0, columns))
 
@@ -48,7 +48,7 @@ class SparsePairTable:
         return self._at(_codes(first, second))
 
     def get(self, first: Ints, second: Ints) -> Floats:
-        """Return the values of (P,) pairs, (P, C); zeros where there is no entry."""
+        """Return the values of (P,) pairs, (P, C); zeros where present is no entry."""
         index = self.find(first, second)
         values = np.zeros((index.size, self.values.shape[1]))
         values[index >= 0] = self.values[index[index >= 0]]
@@ -87,9 +87,9 @@ class SparsePairTable:
         if not self._code.size:
             return np.full(code.size, -1)
         at = np.searchsorted(self._code, code)
-        there = at < self._code.size
-        there[there] = self._code[at[there]] == code[there]
-        return np.where(there, at, -1)
+        present = at < self._code.size
+        present[present] = self._code[at[present]] == code[present]
+        return np.where(present, at, -1)
 
 
 def _codes(one: Ints, two: Ints) -> Ints:

@@ -21,7 +21,7 @@ class PresenceBitmap:
     def __init__(self, frames: int) -> None:
         self._words = frames // _WORD + 2
         self._newest = -1
-        # Word `n` of the frames is column `n` modulo their number.
+        # Word n is stored in column n modulo the number of words.
         self._bits = np.zeros((0, self._words), dtype=np.uint64)
 
     def set_rows(self, old: Ints) -> None:
@@ -36,8 +36,8 @@ class PresenceBitmap:
             return
         word = frame // _WORD
         newest = max(self._newest, int(word.max()))
-        for begun in range(max(self._newest, newest - self._words) + 1, newest + 1):
-            self._bits[:, begun % self._words] = 0
+        for new_word in range(max(self._newest, newest - self._words) + 1, newest + 1):
+            self._bits[:, new_word % self._words] = 0
         self._newest = newest
         new = word > newest - self._words
         bit = np.left_shift(np.uint64(1), (frame[new] % _WORD).astype(np.uint64))
@@ -47,11 +47,11 @@ class PresenceBitmap:
         """Add the frames of (P,) rows to those of others."""
         np.bitwise_or.at(self._bits, kept, self._bits[lost])
 
-    def common(self, first: Ints, second: Ints, enough: int) -> Ints:
-        """Count the frames in which both rows of (P,) pairs were localized, at most `enough`."""
+    def common(self, first: Ints, second: Ints, maximum: int) -> Ints:
+        """Count the frames in which both rows of (P,) pairs were localized, at most `maximum`."""
         newest_first = (self._newest - np.arange(self._words)) % self._words
         bits = np.ascontiguousarray(self._bits[:, newest_first].T)
-        # Of each row, how many words there are up to the last one that has anything.
+        # Number of words of each row up to the last one with a bit set.
         words = (np.arange(1, self._words + 1)[:, None] * (bits != 0)).max(axis=0, initial=0)
         total = np.zeros(first.size, dtype=np.int64)
         until = np.minimum(words[first], words[second])
@@ -61,11 +61,11 @@ class PresenceBitmap:
             if not undecided.size:
                 break
             count += np.bitwise_count(row[first] & row[second])
-            # Nearly all are told apart, or were not there at all, within a few words.
-            goes_on = (count < enough) & (until > word)
-            if not goes_on.all():
-                done = ~goes_on
-                total[undecided[done]] = np.minimum(count[done], enough)
-                undecided, first, second = undecided[goes_on], first[goes_on], second[goes_on]
-                until, count = until[goes_on], count[goes_on]
+            # Most pairs are decided within a few words.
+            remaining = (count < maximum) & (until > word)
+            if not remaining.all():
+                done = ~remaining
+                total[undecided[done]] = np.minimum(count[done], maximum)
+                undecided, first, second = undecided[remaining], first[remaining], second[remaining]
+                until, count = until[remaining], count[remaining]
         return total

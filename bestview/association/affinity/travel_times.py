@@ -19,12 +19,12 @@ _NEIGHBOR_BIN_SHARE = 0.25
 _PRIOR_COUNT = 1.0
 """Weight of the uniform prior over cameras and times, in transitions."""
 _HISTORY_LIMIT = 64
-"""Transitions out of a camera beyond which all its counts are halved: habits change."""
+"""Transitions out of a camera beyond which its counts are halved, so that new habits count."""
 
 
 @dataclass(frozen=True, slots=True)
 class CameraSighting:
-    """Where and when somebody was seen last, or first: the camera's name and the frame."""
+    """Camera and frame of a person's first or last sighting."""
 
     camera: str
     frame: int
@@ -90,21 +90,21 @@ class TravelTimeModel:
             return 0.0
         times = counts.arrivals.get(arrival.camera)
         transitions, in_bin = (0.0, 0.0) if times is None else (float(times.sum()), float(times[bin_index]))
-        # Both against what chance has: one of all cameras, and the bin's part of all times.
-        goes_there = (
+        # Both relative to chance: one of all cameras, and the bin's share of all times.
+        camera_ratio = (
             self._cameras * (transitions + _PRIOR_COUNT / self._cameras) / (counts.transitions + _PRIOR_COUNT)
         )
         width = float(self.bin_edges[bin_index + 1] - self.bin_edges[bin_index]) / float(
             self.bin_edges[-1] - self.bin_edges[0]
         )
-        in_that_time = (in_bin / width + _PRIOR_COUNT) / (transitions + _PRIOR_COUNT)
+        time_ratio = (in_bin / width + _PRIOR_COUNT) / (transitions + _PRIOR_COUNT)
         reliability = (
             counts.transitions / (counts.transitions + self._settings.travel_half_weight_count)
             if counts.transitions
             else 0.0
         )
         cap = self._settings.maximum_travel_evidence
-        return float(reliability * np.clip(np.log(goes_there * in_that_time), -cap, cap))
+        return float(reliability * np.clip(np.log(camera_ratio * time_ratio), -cap, cap))
 
     def _bin(self, frames: int) -> int:
         """Return the index of a time's bin; -1: none."""

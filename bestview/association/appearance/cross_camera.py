@@ -24,7 +24,7 @@ from bestview.association.tracklet import Tracklet, TrackletKey
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 _MINIMUM_HISTOGRAM_FRAMES = 20
-"""Frames after which a mean histogram is more the person's than the moment's."""
+"""Frames from which a mean histogram represents the person rather than the moment."""
 _MAXIMUM_SCORE = 0.5
 """Largest score of one update."""
 _SWAP_MARGIN = 0.4
@@ -78,7 +78,7 @@ class CrossCameraAppearance:
         def distances_between(first: slice, second: slice) -> Floats:
             return cdf_distances(curves[first][:, None], curves[second][None, :])
 
-        # Who was seen side by side, back from the last camera to what is remembered of it.
+        # Pairs seen simultaneously in one camera, from the last camera back until there are enough.
         different_people: list[Floats] = []
         for camera in reversed(cameras):
             if sum(first.size for first in different_people) < MAXIMUM_DIFFERENT_PAIRS:
@@ -87,7 +87,7 @@ class CrossCameraAppearance:
                 rivals = affinity.cannot_link(row_of[camera][i], row_of[camera][j])
                 different_people.append(within[i[rivals], j[rivals]])
         self.equalizer.add_different_people(np.concatenate([np.zeros(0), *reversed(different_people)]))
-        scores = score_camera_pairs(
+        scores = score_score_matrixs(
             cameras,
             [self._calibrated[names[camera.start]] for camera in cameras],
             distances_between,
@@ -102,7 +102,7 @@ class CrossCameraAppearance:
         for camera in cameras:
             for tracklet in tracklets[camera]:
                 histogram = _stable_histogram(tracklet)
-                # Once per episode: somebody who stands about must not weigh more than who walks through.
+                # Once per tracklet: a person who stays must not weigh more than one who walks through.
                 if histogram is not None and tracklet.key not in self._learned:
                     self._learned.add(tracklet.key)
                     self.equalizer.learn(tracklet.key.camera, histogram.mean)
@@ -153,13 +153,13 @@ class PairScores:
         )
 
 
-def score_camera_pairs(
+def score_score_matrixs(
     cameras: Sequence[slice],
     calibrated: Sequence[bool],
     distances_between: Callable[[slice, slice], NDArray[np.float64]],
     gate: float,
 ) -> PairScores:
-    """Score the likeness of tracklets of two cameras without common ground.
+    """Score the appearance similarity of tracklets of every two cameras without common ground.
 
     The tracklets of two cameras are assigned to each other as a whole, with the least total distance. A pair
     of that assignment counts for one person only if no exchange of partners would be nearly as good; a pair
@@ -175,16 +175,18 @@ def score_camera_pairs(
         Scores in [-0.5, 0.5] where the distance is known.
     """
     parts = []
-    for (first, ground_one), (second, ground_two) in combinations(zip(cameras, calibrated, strict=True), 2):
-        if not (ground_one and ground_two):
-            score = _camera_pair(distances_between(first, second), gate)
+    for (first, first_calibrated), (second, second_calibrated) in combinations(
+        zip(cameras, calibrated, strict=True), 2
+    ):
+        if not (first_calibrated and second_calibrated):
+            score = _score_matrix(distances_between(first, second), gate)
             row, column = np.nonzero(~np.isnan(score))
             parts.append(PairScores(first.start + row, second.start + column, score[row, column]))
     return PairScores.concatenate(parts)
 
 
-def _camera_pair(distances: NDArray[np.float64], gate: float) -> NDArray[np.float64]:
-    """Compute the scores of (A, B) pairs; NaN where unknown."""
+def _score_matrix(distances: NDArray[np.float64], gate: float) -> NDArray[np.float64]:
+    """Compute the scores of (A, B) pairs; NaN: unknown."""
     gate_ratio = np.full(distances.shape, np.nan)
     np.divide(distances, gate, out=gate_ratio, where=~np.isnan(distances) & (gate > 0))
     if np.isnan(gate_ratio).all():
@@ -196,7 +198,7 @@ def _camera_pair(distances: NDArray[np.float64], gate: float) -> NDArray[np.floa
 def _unambiguous_pairs(gate_ratio: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return the pairs of the best assignment of (A, B) distances that no exchange comes close to."""
     rows, columns = gate_ratio.shape
-    # Staying alone costs a gate: padded, everybody has a partner or stays alone.
+    # Padded with the cost of a gate for rows and columns without a partner.
     square = np.ones((rows + columns, rows + columns))
     square[:rows, :columns] = np.where(np.isnan(gate_ratio), 1.0, np.minimum(gate_ratio, 1.0))
     square[rows:, columns:] = 0.0

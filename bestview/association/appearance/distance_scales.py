@@ -1,4 +1,4 @@
-"""What appearance distances mean in each camera, learned from pairs that are certainly one or two people."""
+"""Appearance distances of one and of two people in each camera, learned from certain pairs."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Floats = NDArray[np.float64]
 _CONTINUOUS_GAP = 3
 """Gap in frames within which a continued track teaches how much one person's appearance varies."""
 _HISTORY_LIMIT = 500
-"""Distances kept of each kind and camera."""
+"""Stored distances of each kind and camera."""
 
 
 class DistanceScales:
-    """Learns from active tracklets, and keeps the distances of settled ones.
+    """Learns from active tracklets, and stores the distances of settled ones.
 
     Args:
         frames: that a histogram needs to teach anything.
@@ -29,8 +29,8 @@ class DistanceScales:
 
     def __init__(self, frames: int) -> None:
         self._frames = frames
-        self._own: dict[str, Floats] = {}
-        self._others: dict[str, Floats] = {}
+        self._same_person: dict[str, Floats] = {}
+        self._different_people: dict[str, Floats] = {}
 
     def of(
         self, camera: str, rows: Sequence[int], tracklets: Sequence[Tracklet], affinity: AffinityMatrix
@@ -45,21 +45,24 @@ class DistanceScales:
         """
         same_person, different_people = self._distances(camera, rows, tracklets, affinity, rows)
         return DistanceScale.learned(
-            _extended(self._own, camera, same_person), _extended(self._others, camera, different_people)
+            _extended(self._same_person, camera, same_person),
+            _extended(self._different_people, camera, different_people),
         )
 
     def remember_distances(
         self, settled_rows: Collection[int], tracklets: Sequence[Tracklet], affinity: AffinityMatrix
     ) -> None:
-        """Keep the distances of tracklets that are about to be settled, given by their rows."""
+        """Store the distances of tracklets that are about to be settled, given by their rows."""
         rows_of: dict[str, list[int]] = {tracklets[row].key.camera: [] for row in settled_rows}
         for row, tracklet in enumerate(tracklets):
             if tracklet.key.camera in rows_of:
                 rows_of[tracklet.key.camera].append(row)
         for camera, rows in sorted(rows_of.items()):
             same_person, different_people = self._distances(camera, rows, tracklets, affinity, settled_rows)
-            self._own[camera] = _extended(self._own, camera, same_person)[-_HISTORY_LIMIT:]
-            self._others[camera] = _extended(self._others, camera, different_people)[-_HISTORY_LIMIT:]
+            self._same_person[camera] = _extended(self._same_person, camera, same_person)[-_HISTORY_LIMIT:]
+            self._different_people[camera] = _extended(self._different_people, camera, different_people)[
+                -_HISTORY_LIMIT:
+            ]
 
     def _distances(
         self,
@@ -71,7 +74,9 @@ class DistanceScales:
     ) -> tuple[Floats, Floats]:
         """Return the distances of tracklets `of` to their predecessors, and to all that are other people."""
         histograms = {
-            row: histogram for row in rows if (histogram := self._look(tracklets[row], camera)) is not None
+            row: histogram
+            for row in rows
+            if (histogram := self._histogram(tracklets[row], camera)) is not None
         }
         if not histograms:
             return np.zeros(0), np.zeros(0)
@@ -97,9 +102,9 @@ class DistanceScales:
         rivals = affinity.cannot_link(row_of[first], row_of[second])
         return np.array(same_person, dtype=np.float64), distance[first[rivals], second[rivals]]
 
-    def _look(self, tracklet: Tracklet, camera: str) -> MeanHistogram | None:
-        look = tracklet.appearance.by_camera.get(camera)
-        return look if look is not None and look.frame_count >= self._frames else None
+    def _histogram(self, tracklet: Tracklet, camera: str) -> MeanHistogram | None:
+        histogram = tracklet.appearance.by_camera.get(camera)
+        return histogram if histogram is not None and histogram.frame_count >= self._frames else None
 
 
 def _extended(known: dict[str, Floats], camera: str, more: Floats) -> Floats:

@@ -17,7 +17,7 @@ _PRIOR_TRACKS = 3.0
 With one person alone, a camera's mean is that person, and equalization by it would make everyone alike.
 """
 MAXIMUM_DIFFERENT_PAIRS = 2000
-"""Distances between different people that are kept."""
+"""Distances between different people that are stored."""
 _ENOUGH_PAIRS = 10
 
 
@@ -49,7 +49,7 @@ class MeanHistogram:
 
 @dataclass(slots=True)
 class PersonAppearance:
-    """Mean histograms of one person, by camera."""
+    """Mean histograms of one person, by camera, from frames in which nobody else is in the box."""
 
     by_camera: dict[str, MeanHistogram] = field(default_factory=dict)
 
@@ -94,7 +94,7 @@ class HistogramEqualizer:
         reference = np.cumsum(prior + self._sums.get((camera, bins), 0.0))
         edges = np.concatenate([[0.0], reference / reference[-1]])
         cumulative = np.cumsum(np.pad(histograms, ((0, 0), (1, 0))), axis=1)
-        # Where the steps lie between the edges is the same for all.
+        # The positions of the steps between the edges are the same for all histograms.
         steps = np.linspace(0.0, 1.0, CDF_POINTS)
         left = np.minimum(np.searchsorted(edges, steps, side="right") - 1, bins - 1)
         slope = (cumulative[:, left + 1] - cumulative[:, left]) / (edges[left + 1] - edges[left])
@@ -102,14 +102,14 @@ class HistogramEqualizer:
         return np.asarray(np.where(steps < edges[-1], inside, cumulative[:, -1:]))
 
     def add_different_people(self, cdf_distances: NDArray[np.float64]) -> None:
-        """Keep distances between people who were seen simultaneously in one camera."""
+        """Store distances between people who were seen simultaneously in one camera."""
         self._different.extend(cdf_distances[-MAXIMUM_DIFFERENT_PAIRS:].tolist())
 
     def same_person_gate(self, maximum: float, share: float) -> float:
         """Return the distance below which two histograms are likely of one person.
 
         At most `maximum`, and at most `share` of the lower quartile of the distances between different
-        people: where everyone looks alike, appearance joins nobody.
+        people: where everyone looks alike, appearance matches no one.
         """
         if len(self._different) < _ENOUGH_PAIRS:
             return maximum

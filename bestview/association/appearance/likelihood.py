@@ -13,7 +13,7 @@ Ints = NDArray[np.int64]
 _MINIMUM_DISTANCES = 3
 """Distances below which a camera's own statistics are not used."""
 _DEFAULT_DIFFERENT, _DEFAULT_SAME_SHARE, _MAXIMUM_SAME_SHARE = 0.2, 0.4, 0.6
-"""Between different people where nothing is known yet; of that, between the same person's; and at most."""
+"""Default distance between different people; default and largest ratio of a person's own distance to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class AppearanceWeights:
 
     def evidence(self, distance: Floats, slope: Floats | float, middle: Floats | float) -> Floats:
         """Return the evidence of distances between well-sampled appearances, any shape."""
-        # Not np.clip, which takes longer than all the rest for the few of a group.
+        # Not np.clip, which is slow on small arrays.
         return np.asarray(np.minimum(np.maximum(slope * (middle - distance), -self.maximum), self.maximum))
 
     def confidence(self, count: Floats) -> Floats:

@@ -30,7 +30,7 @@ class Split:
 
 
 class IdCorrections:
-    """Keeps the last published id of every tracklet to detect splits."""
+    """Detects splits by comparing each tracklet's id with the last published one."""
 
     def __init__(self) -> None:
         self._last: dict[TrackletKey, int] = {}
@@ -81,15 +81,15 @@ def swap_tracks(
     taken for one of the two are swapped as well.
 
     Args:
-        tracklets: all of them; changed in place.
-        people: the ids of those who are remembered.
+        tracklets: of all tracks; changed in place.
+        people: ids of the remembered people.
         tracks: of one camera.
         frame: the first in which each of the two shows the other's person.
-        person_ids: of the people before it, if that is settled and over.
+        person_ids: of the people before it, for tracklets that are settled and over.
 
     Returns:
-        The ids before and after of each tracklet that has another one now; of a track that is split only
-        later as if a tracklet had started in that frame. Empty if one of the two had no id.
+        The ids before and after of each changed tracklet; a track that is split only later counts as if a
+        tracklet had started in that frame. Empty if one of the two had no id.
     """
     first, second = (
         tracklets.predecessor(track, frame, number) for track, number in zip(tracks, person_ids, strict=True)
@@ -100,19 +100,19 @@ def swap_tracks(
     if not first_id or not second_id or first_id == second_id:
         return {}
     changed, already_wrong = {}, 0
-    for track, own_part, other_part, number in (
+    for track, own_before, other_before, number in (
         (tracks[0], first, second, second_id),
         (tracks[1], second, first, first_id),
     ):
         current = tracklets.started_since(track, frame)
-        previous_id = _id_of(own_part if current is None else current, people)
+        previous_id = _id_of(own_before if current is None else current, people)
         already_wrong += previous_id == first_id + second_id - number
         if previous_id and previous_id != number:
             changed[TrackletKey(*track, frame) if current is None else current.key] = previous_id, number
         if current is None:
-            tracklets.split_next(track, number, other_part)
+            tracklets.split_next(track, number, other_before)
         else:
-            current.continue_as(number, other_part)
+            current.continue_as(number, other_before)
     if already_wrong == len(tracks):
         for tracklet in tracklets.active:
             previous_id = tracklet.person_id
@@ -127,6 +127,6 @@ def swap_tracks(
 
 
 def _id_of(tracklet: Tracklet, people: Container[int]) -> int:
-    """Return the person of a tracklet, settled or not; 0: none who is remembered."""
+    """Return the person id of a tracklet, settled or not; 0: no remembered person."""
     number = tracklet.settled_id or tracklet.person_id or tracklet.main_id
     return number if number in people else 0

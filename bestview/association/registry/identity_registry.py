@@ -59,7 +59,7 @@ class IdentityRegistry:
         settings: of identity.
         homographies: by camera name, image pixels -> common ground plane; None: not calibrated.
         overhead: the cameras that look straight down.
-        fps: frames a second, which bounds how far somebody can have walked.
+        fps: frames per second; bounds the distance walked between frames.
 
     Raises:
         ValueError: an invalid homography.
@@ -78,13 +78,13 @@ class IdentityRegistry:
             camera: None if matrix is None else validate_homography(matrix, f"camera {camera}")
             for camera, matrix in sorted(homographies.items())
         }
-        self._camera = {camera: i for i, camera in enumerate(self._homographies)}
-        self._scale = PersonHeightEstimate()
+        self._camera_index = {camera: i for i, camera in enumerate(self._homographies)}
+        self._height_estimate = PersonHeightEstimate()
         calibrated = {camera: matrix is not None for camera, matrix in self._homographies.items()}
         self._cross_camera = CrossCameraAppearance(settings, calibrated)
         self._splitter = TrackletSplitter(settings)
         self._people = PersonStore(settings, len(self._homographies))
-        # Who should be seen is only known of pictures in which people stand upright.
+        # Whether a person should be detected is only known for views in which people stand upright.
         self._ghost_check = GhostCheck(
             {it: None if it in self._overhead else matrix for it, matrix in self._homographies.items()}
         )
@@ -92,7 +92,7 @@ class IdentityRegistry:
         self._affinity = AffinityMatrix(settings)
         self._fusion = AffinityFusion(settings, calibrated, settings.maximum_speed_heights / fps)
         self._corrections = IdCorrections()
-        self._here: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self._visible_settled_ids: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self._last_frame: int | None = None
 
     def update(
@@ -101,30 +101,30 @@ class IdentityRegistry:
         last_frame: int,
         pictures: Mapping[str, tuple[int, int]] | None = None,
     ) -> IdentityUpdate:
-        """Take in the new final frames of all cameras' tracks, by now up to `last_frame`.
+        """Add the new final frames of all cameras' tracks, up to `last_frame`; single cameras may be ahead.
 
-        Single cameras may be ahead of it. A track that is missing may come back. `pictures` are the width and
-        height in pixels of the cameras that have reported, even if they see nobody: only these can miss a
-        person.
+        A track that is missing may reappear. `pictures` are the width and height in pixels of the cameras
+        that have reported, even without tracks: only these can miss a person.
 
         Raises:
-            ValueError: updates that do not advance, or invalid tracks (see `align_tracks`).
+            ValueError: the frame is not after that of the last update, or tracks are invalid
+                (`align_tracks`).
         """
         if self._last_frame is not None and last_frame <= self._last_frame:
             raise ValueError(f"the update for frame {last_frame} comes after that for {self._last_frame}")
         previous_frame, self._last_frame = self._last_frame, last_frame
         self._pictures = pictures or {}
         seen = align_tracks(tracks, self._homographies, self._foot_error, self._overhead)
-        self._scale.learn(seen.person_heights)
+        self._height_estimate.learn(seen.person_heights)
         rows, settled = self._splitter.update(seen, {track.key: track.appearance for track in tracks})
-        self._here = np.unique(settled[settled > 0])
-        # Each track and number once: there are as many sightings of them as frames.
-        most = int(settled.max(initial=0)) + 1
+        self._visible_settled_ids = np.unique(settled[settled > 0])
+        # Each pair of track and person once, instead of once a frame.
+        id_count = int(settled.max(initial=0)) + 1
         track, person_id = np.divmod(
-            np.unique((np.arange(len(settled))[:, None] * most + settled)[settled > 0]), most
+            np.unique((np.arange(len(settled))[:, None] * id_count + settled)[settled > 0]), id_count
         )
-        by = [seen.keys[it].camera for it in track.tolist()]
-        self._people.add_sighting(zip(person_id.tolist(), by, strict=True), last_frame)
+        cameras = [seen.keys[it].camera for it in track.tolist()]
+        self._people.add_sighting(zip(person_id.tolist(), cameras, strict=True), last_frame)
         self._add_evidence(seen, rows, settled, last_frame)
         tracklets = self._splitter.active
         created: tuple[int, ...] = ()
@@ -147,7 +147,7 @@ class IdentityRegistry:
         return IdentityUpdate(person_ids, created, returned, departed, merged, split)
 
     def split_off(self, tracks: Collection[TrackKey], people: Collection[int]) -> int | None:
-        """Apply an operator's correction: these tracks show somebody new instead of these people.
+        """Apply an operator's correction: these tracks show a new person instead of these people.
 
         The split is permanent: they are never merged with the new person again, as long as they are
         remembered.
@@ -181,17 +181,17 @@ class IdentityRegistry:
     ) -> tuple[Split, ...]:
         """Apply an operator's correction: two tracks of a camera swapped their people in this frame.
 
-        From it on each continues what the other one was before. What other cameras have since taken for one
-        of the two is swapped as well.
+        From that frame on each track continues the person of the other. Tracklets of other cameras that were
+        since taken for one of the two are swapped as well.
 
         Args:
-            first: a track.
-            second: another one.
+            first: one track.
+            second: the other track.
             frame: the first in which each of them shows the other's person.
-            person_ids: of the people before it, if that is settled and over.
+            person_ids: of the people before it, for tracklets that are settled and over.
 
         Returns:
-            The splits to report; none if the evidence has corrected it already, or one had no id yet.
+            The splits to report; none if the evidence has corrected the swap already, or a track has no id.
         """
         splits = swap_tracks(self._splitter, self._people, (first, second), frame, person_ids)
         self._corrections.reassign_each(splits)
@@ -203,20 +203,20 @@ class IdentityRegistry:
         return self._people.next_id
 
     def reserve_below(self, person_id: int) -> None:
-        """Assign no id below this one any more: an earlier run has used them."""
+        """Assign only ids from this one on: an earlier run has used those below."""
         self._people.reserve_below(person_id)
 
     def recall(self, track: TrackKey, person_id: int, frame: int) -> None:
         """Restore the person of a track that has not been seen yet, from a run that ended with a frame.
 
-        It counts like a published id: later observations may overrule it.
+        It counts like a published id: later observations may override it.
         """
         self._people.recall(person_id, frame)
         self._splitter.recall(track, person_id)
 
     @property
     def pair_count(self) -> int:
-        """Number of pairs with evidence, which memory grows with."""
+        """Number of pairs with evidence, with which memory grows."""
         return self._affinity.entry_count
 
     def _gate(self) -> float:
@@ -225,11 +225,11 @@ class IdentityRegistry:
         return (
             settings.gate_distance
             if settings.gate_distance is not None
-            else settings.gate_heights * self._scale.height
+            else settings.gate_heights * self._height_estimate.height
         )
 
-    def _silent(self, group: TrackletCluster) -> int:
-        return self._ghost_check.count_missing_cameras(group, self._pictures, self._scale.height)
+    def _count_missing_cameras(self, cluster: TrackletCluster) -> int:
+        return self._ghost_check.count_missing_cameras(cluster, self._pictures, self._height_estimate.height)
 
     def _add_evidence(
         self, seen: TrackObservations, rows: NDArray[np.int64], settled: NDArray[np.int64], last_frame: int
@@ -240,10 +240,10 @@ class IdentityRegistry:
         count = len(self._splitter.active)
         affinity.set_rows([*(tracklet.key for tracklet in self._splitter.active), *known_ids])
         if known_ids:
-            # Who is settled though they go on has the row of their past.
+            # Settled tracklets that continue have the row of their person.
             position = np.minimum(np.searchsorted(known_ids, settled), len(known_ids) - 1)
             rows = np.where(np.array(known_ids)[position] == settled, count + position, rows)
-        camera = np.array([self._camera[key.camera] for key in seen.keys], dtype=np.int64)
+        camera = np.array([self._camera_index[key.camera] for key in seen.keys], dtype=np.int64)
         affinity.add_cannot_links(*simultaneous_pairs(rows, camera))
         if self._gate() > 0:
             trajectories = GroundTrajectories.of(seen, rows, camera)
@@ -261,11 +261,13 @@ class IdentityRegistry:
     def _cluster(self, last_frame: int) -> tuple[tuple[int, ...], tuple[Merge, ...]]:
         """Cluster all tracklets and assign ids; return the new ids and the merges."""
         tracklets, people = self._splitter.active, self._people.comparable_people(last_frame)
-        visible = np.isin([person.person_id for person in people], self._here)
-        labels = self._fusion.cluster(tracklets, people, visible, self._affinity, self._scale.height)
+        visible = np.isin([person.person_id for person in people], self._visible_settled_ids)
+        labels = self._fusion.cluster(
+            tracklets, people, visible, self._affinity, self._height_estimate.height
+        )
         clusters = collect_clusters(tracklets, people, labels)
         created, merged = self._people.assign_ids(
-            clusters, self._affinity, self._cross_camera, last_frame, self._silent
+            clusters, self._affinity, self._cross_camera, last_frame, self._count_missing_cameras
         )
         self._affinity.add_rows(merge.kept for merge in merged)
         self._affinity.merge([(merge.kept, merge.lost) for merge in merged])

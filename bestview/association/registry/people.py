@@ -25,7 +25,7 @@ class PersonStore:
         self._reidentifier = Reidentifier(settings, cameras)
         self._by_id: dict[int, Person] = {}
         self.next_id = 1
-        """The first that nobody was given yet."""
+        """The first id that was never assigned."""
 
     def __len__(self) -> int:
         """Return the number of people remembered."""
@@ -36,7 +36,7 @@ class PersonStore:
         return person_id in self._by_id
 
     def comparable_people(self, frame: int) -> list[Person]:
-        """Return the people who take part in clustering, by id: seen lately, with a settled tracklet."""
+        """Return the people who take part in clustering, by id: seen recently, with a settled tracklet."""
         earliest = frame - self._settings.comparable_frames
         return [
             it for _, it in sorted(self._by_id.items()) if it.settled_frames and it.last_frame >= earliest
@@ -44,7 +44,7 @@ class PersonStore:
 
     def assign_ids(
         self,
-        groups: Sequence[TrackletCluster],
+        clusters: Sequence[TrackletCluster],
         affinity: AffinityMatrix,
         cross_camera: CrossCameraAppearance,
         frame: int,
@@ -55,26 +55,26 @@ class PersonStore:
         `count_missing_cameras` counts the cameras that should see a cluster and do not.
         """
         published = [
-            {it: n for it, n in group.published_frames.items() if it in self._by_id} for group in groups
+            {it: n for it, n in cluster.published_frames.items() if it in self._by_id} for cluster in clusters
         ]
-        for group, person_id in zip(groups, assign_ids(published), strict=True):
-            group.person_id = person_id
-        created = self._assign_new_ids(groups, affinity, cross_camera, frame, count_missing_cameras)
-        for group in groups:
-            for tracklet in group.tracklets:
-                tracklet.person_id = group.person_id
-            if group.person_id:
-                person = self._by_id[group.person_id]
-                for tracklet in group.tracklets:
+        for cluster, person_id in zip(clusters, assign_ids(published), strict=True):
+            cluster.person_id = person_id
+        created = self._assign_new_ids(clusters, affinity, cross_camera, frame, count_missing_cameras)
+        for cluster in clusters:
+            for tracklet in cluster.tracklets:
+                tracklet.person_id = cluster.person_id
+            if cluster.person_id:
+                person = self._by_id[cluster.person_id]
+                for tracklet in cluster.tracklets:
                     person.add_sighting(tracklet.key.camera, tracklet.end.frame)
-                for before in group.people:
+                for before in cluster.people:
                     person.add_sighting(before.camera, before.last_frame)
-        self._reidentifier.learn_covisible_cameras((it for it in groups if it.person_id), frame)
-        return created, self._merge(groups, frame)
+        self._reidentifier.learn_covisible_cameras((it for it in clusters if it.person_id), frame)
+        return created, self._merge(clusters, frame)
 
     def _assign_new_ids(
         self,
-        groups: Sequence[TrackletCluster],
+        clusters: Sequence[TrackletCluster],
         affinity: AffinityMatrix,
         cross_camera: CrossCameraAppearance,
         frame: int,
@@ -83,11 +83,11 @@ class PersonStore:
         """Assign ids to clusters that were seen often enough: a new one, or that of a lost person."""
         new = [
             it
-            for it in groups
+            for it in clusters
             if it.tracklets and not it.person_id and self._is_confirmed(it, frame, count_missing_cameras)
         ]
         new.sort(key=lambda it: (it.first_frame, it.rows[0]))
-        by_id = {it.person_id: it for it in groups if it.person_id}
+        by_id = {it.person_id: it for it in clusters if it.person_id}
         lost = [
             LostPerson(person, by_id.get(person_id))
             for person_id, person in sorted(self._by_id.items())
@@ -95,20 +95,20 @@ class PersonStore:
         ]
         matches = self._reidentifier.match(new, lost, affinity, cross_camera, frame)
         created = []
-        for group, match in zip(new, matches, strict=True):
+        for cluster, match in zip(new, matches, strict=True):
             if match >= 0:
-                group.person_id = lost[match].person.person_id
+                cluster.person_id = lost[match].person.person_id
                 continue
-            group.person_id = self.next_id
-            self._by_id[group.person_id] = Person(group.person_id)
-            created.append(group.person_id)
+            cluster.person_id = self.next_id
+            self._by_id[cluster.person_id] = Person(cluster.person_id)
+            created.append(cluster.person_id)
             self.next_id += 1
         return tuple(created)
 
     def _is_confirmed(
         self, new: TrackletCluster, frame: int, count_missing_cameras: Callable[[TrackletCluster], int]
     ) -> bool:
-        """Return whether a cluster is seen lately and has been seen often enough to be a person."""
+        """Return whether a cluster was seen recently, and often enough to be a person."""
         settings = self._settings
         if (
             new.frame_count < settings.confirmation_frames
@@ -122,9 +122,9 @@ class PersonStore:
             1.0 + settings.ghost_penalty * unconfirmed_misses
         )
 
-    def _merge(self, groups: Sequence[TrackletCluster], frame: int) -> tuple[Merge, ...]:
+    def _merge(self, clusters: Sequence[TrackletCluster], frame: int) -> tuple[Merge, ...]:
         """Merge ids that no cluster has had for long into those of the clusters with their frames."""
-        successors = _successors(groups)
+        successors = _successors(clusters)
         merged = []
         for person_id, person in sorted(self._by_id.items()):
             if person_id not in successors:
@@ -144,11 +144,11 @@ class PersonStore:
         self._by_id[new.person_id] = new
         for camera in cameras:
             new.add_sighting(camera, frame)
-        self.keep_row([new.person_id, *people])
+        self.ensure_row([new.person_id, *people])
         return new.person_id
 
     def reserve_below(self, person_id: int) -> None:
-        """Assign no id below this one any more."""
+        """Assign only ids from this one on."""
         self.next_id = max(self.next_id, person_id)
 
     def recall(self, person_id: int, frame: int) -> None:
@@ -156,8 +156,8 @@ class PersonStore:
         self.reserve_below(person_id + 1)
         self._by_id.setdefault(person_id, Person(person_id, frame))
 
-    def keep_row(self, person_ids: Iterable[int]) -> None:
-        """Let people take part in clustering, so that they can have cannot-links."""
+    def ensure_row(self, person_ids: Iterable[int]) -> None:
+        """Make people take part in clustering, so that they can have cannot-links."""
         for person_id in person_ids:
             self._by_id[person_id].settled_frames = max(1, self._by_id[person_id].settled_frames)
 
@@ -170,7 +170,7 @@ class PersonStore:
                 person.settled_frames += tracklet.published_frames[person.person_id]
 
     def add_sighting(self, seen: Iterable[tuple[int, str]], frame: int) -> None:
-        """Note the people seen by settled tracklets that go on."""
+        """Record sightings of people by settled tracklets that continue."""
         for person_id, camera in seen:
             if person_id in self._by_id:
                 self._by_id[person_id].add_sighting(camera, frame)
@@ -207,14 +207,14 @@ class PersonStore:
                 del self._by_id[person_id]
 
 
-def _successors(groups: Sequence[TrackletCluster]) -> dict[int, int]:
+def _successors(clusters: Sequence[TrackletCluster]) -> dict[int, int]:
     """Return for each published id that no cluster has the id of the cluster with most of its frames."""
     best: dict[int, tuple[int, int]] = {}
-    for group in groups:
-        for number, frames in group.published_frames.items():
-            if group.person_id and frames > best.get(number, (0, 0))[0]:
-                best[number] = (frames, group.person_id)
-    assigned = {group.person_id for group in groups}
+    for cluster in clusters:
+        for number, frames in cluster.published_frames.items():
+            if cluster.person_id and frames > best.get(number, (0, 0))[0]:
+                best[number] = (frames, cluster.person_id)
+    assigned = {cluster.person_id for cluster in clusters}
     return {number: successor for number, (_, successor) in best.items() if number not in assigned}
 
 
@@ -232,11 +232,11 @@ def assign_ids(published: Sequence[Mapping[int, int]]) -> list[int]:
         return assigned
     column = {person_id: i for i, person_id in enumerate(person_ids)}
     frames_kept = np.zeros((len(published), len(person_ids)))
-    for group, frames in enumerate(published):
+    for cluster, frames in enumerate(published):
         for person_id, count in frames.items():
-            frames_kept[group, column[person_id]] = count
+            frames_kept[cluster, column[person_id]] = count
     rows, columns = scipy.optimize.linear_sum_assignment(frames_kept, maximize=True)
-    for group, at in zip(rows.tolist(), columns.tolist(), strict=True):
-        if frames_kept[group, at] > 0:
-            assigned[group] = person_ids[at]
+    for cluster, at in zip(rows.tolist(), columns.tolist(), strict=True):
+        if frames_kept[cluster, at] > 0:
+            assigned[cluster] = person_ids[at]
     return assigned

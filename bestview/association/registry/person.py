@@ -1,4 +1,4 @@
-"""A person with an id."""
+"""People with an id."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Person:
     Attributes:
         person_id: from 1, never reused.
         last_frame: frame of the last sighting.
-        camera: in which that was; of several the first by name.
+        camera: of the last sighting; of several the first by name.
         departed: reported as departed, and not back yet.
         appearance: of the settled tracklets.
         settled_frames: their frames that were published with this id.
@@ -32,11 +32,11 @@ class Person:
 
     @property
     def last_sighting(self) -> CameraSighting:
-        """Where they were seen last."""
+        """Camera and frame of the last sighting."""
         return CameraSighting(self.camera, self.last_frame)
 
     def add_sighting(self, camera: str, frame: int) -> None:
-        """Note a sighting."""
+        """Record a sighting."""
         if frame > self.last_frame or (frame == self.last_frame and camera < self.camera):
             self.last_frame, self.camera = frame, camera
 

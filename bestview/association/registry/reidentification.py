@@ -31,20 +31,20 @@ _FORBIDDEN_COST = 1e6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LostPerson:
-    """A person whom no camera sees.
+    """A person that no camera sees.
 
     Attributes:
-        person: who.
-        group: their cluster; None: they take part in no clustering.
+        person: with their settled appearance.
+        cluster: their cluster; None: they take part in no clustering.
     """
 
     person: Person
-    group: TrackletCluster | None
+    cluster: TrackletCluster | None
 
     @property
     def appearance(self) -> PersonAppearance:
         """Their appearance, including tracklets that are not settled yet."""
-        return self.person.appearance if self.group is None else self.group.appearance
+        return self.person.appearance if self.cluster is None else self.cluster.appearance
 
 
 class Reidentifier:
@@ -58,15 +58,15 @@ class Reidentifier:
     def __init__(self, settings: IdentitySettings, cameras: int) -> None:
         self._settings = settings
         self._travel = TravelTimeModel(settings, cameras)
-        self._meeting: set[tuple[str, str]] = set()
-        """Cameras that have seen one person at once."""
+        self._covisible_cameras: set[tuple[str, str]] = set()
+        """Pairs of cameras that have seen one person at the same time."""
 
-    def learn_covisible_cameras(self, groups: Iterable[TrackletCluster], frame: int) -> None:
+    def learn_covisible_cameras(self, clusters: Iterable[TrackletCluster], frame: int) -> None:
         """Learn from clusters which cameras see the same people simultaneously: their views overlap."""
         since = frame - self._settings.clustering_interval
-        for group in groups:
-            cameras = {it.key.camera for it in group.tracklets if it.end.frame >= since}
-            self._meeting.update(combinations(sorted(cameras), 2))
+        for cluster in clusters:
+            cameras = {it.key.camera for it in cluster.tracklets if it.end.frame >= since}
+            self._covisible_cameras.update(combinations(sorted(cameras), 2))
 
     def match(
         self,
@@ -77,7 +77,9 @@ class Reidentifier:
         frame: int,
     ) -> list[int]:
         """Return for each new cluster the index of the lost person it is, or -1."""
-        allowed = [self._may_be(one, other, affinity, cross_camera, frame) for one in new for other in lost]
+        allowed = [
+            self._may_match(one, other, affinity, cross_camera, frame) for one in new for other in lost
+        ]
         possible = np.array(allowed, dtype=np.bool_).reshape(len(new), len(lost))
         if not possible.any():
             return [-1] * len(new)
@@ -94,7 +96,8 @@ class Reidentifier:
         for i, match in enumerate(by_appearance):
             if match < 0:
                 continue
-            # Only what looks alone say teaches times, or these would prove themselves.
+            # Travel times are learned from matches by appearance alone: otherwise they would confirm
+            # themselves.
             self._travel.learn(departures[match], arrivals[i])
             if (
                 matches[i] < 0
@@ -104,7 +107,7 @@ class Reidentifier:
                 matches[i] = match
         return matches
 
-    def _may_be(
+    def _may_match(
         self,
         new: TrackletCluster,
         lost: LostPerson,
@@ -113,11 +116,11 @@ class Reidentifier:
         frame: int,
     ) -> bool:
         """Return whether appearance and travel time alone may match a new cluster with a lost person."""
-        known_cluster = lost.group
+        known_cluster = lost.cluster
         if known_cluster is None:
-            # Who has no group though they are compared with everybody is in somebody else's.
+            # A person who took part in clustering and has no cluster is in that of another id.
             return lost.person.last_frame < frame - self._settings.comparable_frames
-        # Where there was something to compare by, grouping has had its say.
+        # Pairs that can be compared directly were decided by the clustering.
         compared = bool(new.cameras & known_cluster.cameras) or (
             cross_camera.share_ground(new.cameras, known_cluster.cameras)
             and self._share_view(new, known_cluster)
@@ -126,7 +129,7 @@ class Reidentifier:
 
     def _share_view(self, first: TrackletCluster, second: TrackletCluster) -> bool:
         pairs = {(min(a, b), max(a, b)) for a in first.cameras for b in second.cameras}
-        return not pairs.isdisjoint(self._meeting)
+        return not pairs.isdisjoint(self._covisible_cameras)
 
 
 def _first_sighting(new: TrackletCluster) -> CameraSighting:
@@ -202,7 +205,7 @@ class _EqualizedCurves:
     curves: Floats
 
     @classmethod
-    def of(cls, appearances: HistogramEqualizer, people: Sequence[PersonAppearance]) -> _EqualizedCurves:
+    def of(cls, equalizer: HistogramEqualizer, people: Sequence[PersonAppearance]) -> _EqualizedCurves:
         entries = [
             (i, c, histogram)
             for i, appearance in enumerate(people)
@@ -213,7 +216,7 @@ class _EqualizedCurves:
             rows_by_kind.setdefault((camera, histogram.histogram_sum.size), []).append(row)
         curves = np.zeros((len(entries), CDF_POINTS))
         for (camera, _), rows in rows_by_kind.items():
-            curves[rows] = appearances.equalize(camera, np.array([entries[row][2].mean for row in rows]))
+            curves[rows] = equalizer.equalize(camera, np.array([entries[row][2].mean for row in rows]))
         return cls(
             owner=np.array([i for i, _, _ in entries], dtype=np.int64),
             camera=np.array([camera for _, camera, _ in entries], dtype=np.str_),
@@ -223,11 +226,11 @@ class _EqualizedCurves:
 
 
 def appearance_distances(
-    appearances: HistogramEqualizer, new: Sequence[PersonAppearance], old: Sequence[PersonAppearance]
+    equalizer: HistogramEqualizer, new: Sequence[PersonAppearance], old: Sequence[PersonAppearance]
 ) -> Floats:
-    """(N, L) appearance distances, in common cameras where there are such; NaN: unknown."""
-    new_curves, old_curves = _EqualizedCurves.of(appearances, new), _EqualizedCurves.of(appearances, old)
-    # Sums by pair of people, and how many looks went into them: in common cameras, and in any.
+    """Compute (N, L) appearance distances, in common cameras where there are any; NaN: unknown."""
+    new_curves, old_curves = _EqualizedCurves.of(equalizer, new), _EqualizedCurves.of(equalizer, old)
+    # Sums by pair of people and their numbers of histograms: in common cameras, and in any.
     total, count, common = (np.zeros((2, len(new), len(old))) for _ in range(3))
     for owner, camera, bins, curve in zip(
         new_curves.owner, new_curves.camera, new_curves.bins, new_curves.curves, strict=True

@@ -76,7 +76,7 @@ def name(row: int) -> RowKey:
 
 @settings(deadline=None, max_examples=150)
 @given(st.data())
-def test_tables_keep_what_is_known_of_pairs_however_rows_come_and_go(data: st.DataObject) -> None:
+def test_tables_keep_their_entries_while_rows_are_added_and_removed(data: st.DataObject) -> None:
     affinity, plain = AffinityMatrix(SETTINGS), Plain()
     for time in range(data.draw(st.integers(1, 6))):
         rows: list[RowKey] = [
@@ -131,7 +131,7 @@ def test_tables_keep_what_is_known_of_pairs_however_rows_come_and_go(data: st.Da
 
 @settings(deadline=None, max_examples=100)
 @given(st.data())
-def test_many_rows_absorbed_at_once_are_as_many_one_after_the_other(data: st.DataObject) -> None:
+def test_merging_many_rows_at_once_equals_merging_one_by_one(data: st.DataObject) -> None:
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
     into = {row: int(rng.integers(4)) for row in range(4, 10) if rng.random() < 0.7}
     simultaneous_pairs, in_turn = AffinityMatrix(SETTINGS), AffinityMatrix(SETTINGS)
@@ -160,7 +160,7 @@ def test_many_rows_absorbed_at_once_are_as_many_one_after_the_other(data: st.Dat
 
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 60)), max_size=12), st.sampled_from([10, 100]))
-def test_presence_counts_the_frames_in_common_of_late(steps: list[tuple[int, int]], frames: int) -> None:
+def test_presence_counts_recent_common_frames(steps: list[tuple[int, int]], frames: int) -> None:
     presence, stood, now = PresenceBitmap(frames), [set[int]() for _ in range(4)], 0
     presence.set_rows(np.full(4, -1))
     for row, later in steps:
@@ -198,7 +198,7 @@ def updates(draw: st.DrawFn) -> tuple[TrackObservations, np.ndarray, np.ndarray]
 
 @settings(deadline=None, max_examples=100)
 @given(updates(), st.floats(0.1, 3.0))
-def test_nearness_is_the_sum_over_frames_in_which_both_stand_somewhere(
+def test_ground_scores_are_summed_over_common_frames(
     update: tuple[TrackObservations, np.ndarray, np.ndarray], gate: float
 ) -> None:
     seen, rows, camera = update
@@ -236,7 +236,7 @@ def test_nearness_is_the_sum_over_frames_in_which_both_stand_somewhere(
 
 @settings(deadline=None, max_examples=100)
 @given(updates())
-def test_who_is_seen_at_once_in_one_camera_is_every_pair_of_a_frame(
+def test_simultaneous_pairs_are_all_pairs_of_a_frame_and_camera(
     update: tuple[TrackObservations, np.ndarray, np.ndarray],
 ) -> None:
     _, rows, camera = update

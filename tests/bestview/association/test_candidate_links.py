@@ -124,7 +124,7 @@ def plainly(site: Site, gone: np.ndarray) -> tuple[set[tuple[int, int]], list[in
 
 @settings(deadline=None, max_examples=150)
 @given(sites(), st.integers(0, 2**32))
-def test_chains_of_links_give_the_groups_of_everybody_at_once(site: Site, seed: int) -> None:
+def test_clustering_in_batches_equals_clustering_all_rows_at_once(site: Site, seed: int) -> None:
     rows, count = len(site.affinity), len(site.tracklets)
     gone = (np.arange(rows) >= count) & (np.random.default_rng(seed).random(rows) < 0.7)
     links, groups = plainly(site, gone)
@@ -149,7 +149,7 @@ def test_chains_of_links_give_the_groups_of_everybody_at_once(site: Site, seed: 
 
 @settings(deadline=None, max_examples=50)
 @given(sites())
-def test_what_is_known_of_a_pair_does_not_hang_on_the_others(site: Site) -> None:
+def test_pair_evidence_does_not_depend_on_other_pairs(site: Site) -> None:
     evidence = PairEvidence(site.tracklets, site.people, site.affinity, CAMERAS, SETTINGS, HEIGHT, PACE)
     one, two = np.triu_indices(len(site.affinity), 1)
     value, apart = evidence.of(one, two)

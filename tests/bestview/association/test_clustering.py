@@ -109,13 +109,13 @@ def plainly(case: Case) -> list[int]:
 
 @settings(deadline=None, max_examples=300)
 @given(cases(12))
-def test_groups_are_those_of_joining_the_best_pair_until_none_is_left(case: Case) -> None:
+def test_clusters_equal_those_of_merging_the_best_pair_until_none_is_left(case: Case) -> None:
     assert case.cluster() == plainly(case)
 
 
 @settings(deadline=None, max_examples=100)
 @given(cases())
-def test_nobody_is_joined_who_was_seen_apart_and_nobody_is_left_who_belongs_together(case: Case) -> None:
+def test_cannot_links_are_kept_and_no_mergeable_pair_is_left(case: Case) -> None:
     labels = np.array(case.cluster())
     same = labels[:, None] == labels
     assert not (same & case.cannot_link).any()
@@ -139,9 +139,7 @@ def partitions(rows: list[int]) -> Iterator[list[list[int]]]:
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(1, 7), st.integers(0, 2**32))
-def test_where_evidence_is_right_on_the_whole_groups_are_the_best_of_all_partitions(
-    count: int, seed: int
-) -> None:
+def test_with_mostly_right_evidence_the_clusters_are_the_best_partition(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     who = rng.integers(0, 3, count)
     same = who[:, None] == who
@@ -159,7 +157,7 @@ def test_where_evidence_is_right_on_the_whole_groups_are_the_best_of_all_partiti
 
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.dictionaries(st.integers(1, 4), st.integers(1, 9), max_size=3), max_size=4))
-def test_names_keep_as_many_frames_as_can_be_what_they_were_told(told: list[dict[int, int]]) -> None:
+def test_assigned_ids_keep_the_most_published_frames(told: list[dict[int, int]]) -> None:
     numbers = assign_ids(told)
     given_ = [number for number in numbers if number]
     assert len(given_) == len(set(given_))

@@ -8,21 +8,23 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview.association.co_occurrence import overlapping
+from bestview.association.co_occurrence import overlapping_rectangles
 from bestview.association.index_ranges import expand_counts, pairs_of_equal_label, sorted_unique
 from bestview.association.tracklet_splitter import observation_runs
 
 
 @settings(deadline=None, max_examples=100)
 @given(st.integers(0, 60), st.integers(0, 2**32), st.sampled_from([0.0, 0.5, 5.0]), st.booleans())
-def test_rectangles_that_overlap_are_all_found_once(count: int, seed: int, size: float, whole: bool) -> None:
+def test_every_overlapping_pair_of_rectangles_is_found_once(
+    count: int, seed: int, size: float, whole: bool
+) -> None:
     rng = np.random.default_rng(seed)
     low = rng.uniform(0, 10, (count, 2))
     high = low + rng.uniform(0, size, (count, 2)) * rng.choice([1.0, 100.0], (count, 1), p=[0.9, 0.1])
     if whole:
         # Corners that meet exactly, and many at one place.
         low, high = np.floor(low), np.floor(high)
-    one, two = overlapping(low, high)
+    one, two = overlapping_rectangles(low, high)
     expected = [
         (i, j)
         for i in range(count)
@@ -34,7 +36,7 @@ def test_rectangles_that_overlap_are_all_found_once(count: int, seed: int, size:
 
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.integers(-1, 3), max_size=9))
-def test_pairs_within_are_those_of_the_same_label(labels: list[int]) -> None:
+def test_pairs_of_equal_label_are_complete_and_unique(labels: list[int]) -> None:
     one, two = pairs_of_equal_label(np.array(labels, dtype=np.int64))
     expected = {
         (i, j) for j, label in enumerate(labels) for i in range(j) if label >= 0 and labels[i] == label
@@ -46,7 +48,7 @@ def test_pairs_within_are_those_of_the_same_label(labels: list[int]) -> None:
 
 @settings(deadline=None, max_examples=50)
 @given(st.lists(st.integers(0, 4), max_size=6))
-def test_counts_are_written_out_one_after_the_other(counts: list[int]) -> None:
+def test_counts_are_expanded_in_order(counts: list[int]) -> None:
     owner, which = expand_counts(np.array(counts, dtype=np.int64))
     expected = [(i, k) for i, count in enumerate(counts) for k in range(count)]
     assert list(zip(owner.tolist(), which.tolist(), strict=True)) == expected
@@ -55,7 +57,7 @@ def test_counts_are_written_out_one_after_the_other(counts: list[int]) -> None:
 
 @settings(deadline=None, max_examples=100)
 @given(st.integers(0, 4), st.integers(0, 6), st.integers(0, 2**32), st.booleans())
-def test_runs_are_all_sightings_in_order_parted_where_something_changes(
+def test_runs_cover_all_observations_and_end_where_crowding_changes(
     tracks: int, frames: int, seed: int, whole: bool
 ) -> None:
     rng = np.random.default_rng(seed)

@@ -26,7 +26,7 @@ def born(stays: list[Stay], speaking: dict[str, tuple[int, int]], *blind: str) -
     return [(place + 1) * STRIDE for place, update in enumerate(seen) for _ in update.created]
 
 
-def test_who_no_other_camera_sees_though_it_should_needs_more_frames_for_each() -> None:
+def test_each_camera_that_misses_a_person_requires_more_frames() -> None:
     alone = [Stay("south", 1, 0, 999, (0, 0))]
     two = {"south": (WIDE, HIGH), "west": (WIDE, HIGH)}
     assert born(alone, SPEAKING) == [(1 + 2 * 4) * 25]
@@ -35,16 +35,16 @@ def test_who_no_other_camera_sees_though_it_should_needs_more_frames_for_each() 
     assert born(alone, {}) == [25], "nobody else has spoken"
 
 
-def test_a_second_camera_that_sees_somebody_makes_up_for_one_that_does_not() -> None:
+def test_a_second_camera_that_sees_the_person_compensates_one_that_does_not() -> None:
     assert born(both(1, (0, 0)), SPEAKING) == [15], "of two cameras, as without the third"
 
 
-def test_nobody_is_missed_where_no_other_camera_looks() -> None:
+def test_no_camera_is_missing_where_none_looks() -> None:
     # Right below the western camera, and too far from the northern one.
     assert born([Stay("south", 1, 0, 999, (-9.5, -4))], SPEAKING) == [25]
 
 
-def test_who_has_gone_before_they_were_anybody_gets_no_number() -> None:
+def test_a_person_gone_before_confirmation_gets_no_id() -> None:
     assert born([Stay("south", 1, 0, 80, (0, 0))], SPEAKING) == []
     # The others fall silent: there is no reason to doubt any more, and nobody there.
     seen = IdentityRegistry(SETTINGS, CALIBRATED)
@@ -54,7 +54,7 @@ def test_who_has_gone_before_they_were_anybody_gets_no_number() -> None:
 
 
 @given(st.floats(-12, 12), st.floats(-12, 12))
-def test_in_full_view_is_whole_in_the_picture_and_large_enough(x: float, y: float) -> None:
+def test_full_view_means_inside_the_picture_and_large_enough(x: float, y: float) -> None:
     names = list(VIEWS)
     ground = np.array([CALIBRATED[name] for name in names], dtype=np.float64)
     told = fully_in_view(ground, np.full((3, 2), (WIDE, HIGH), dtype=np.float64), np.array([x, y]), TALL)
@@ -79,14 +79,14 @@ def margins(person: NDArray[np.float64]) -> list[float]:
     ]
 
 
-def test_a_plan_view_without_horizon_is_asked_too() -> None:
+def test_a_plan_view_without_horizon_counts_too() -> None:
     plan = np.diag([0.02, 0.02, 1.0])
     told = fully_in_view(plan[None], np.array([[640.0, 480.0]]), np.array([6.0, 6.0]), 1.75)
     assert told.tolist() == [True]
 
 
 @pytest.mark.parametrize("doubt", [0.0, 1e-9])
-def test_without_doubt_everybody_is_counted_alike(doubt: float) -> None:
+def test_without_ghost_penalty_everyone_needs_the_same_frames(doubt: float) -> None:
     registry = IdentityRegistry(replace(SETTINGS, ghost_penalty=doubt), CALIBRATED)
     seen = play(registry, [Stay("south", 1, 0, 999, (0, 0))], 60, speaking=SPEAKING)
     assert sum(len(update.created) for update in seen) == 1

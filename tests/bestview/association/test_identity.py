@@ -37,7 +37,7 @@ from fakes.bestview.identity_scenes import (
 
 
 @HOWEVER_MANY
-def test_a_person_has_one_number_in_every_camera(most: int) -> None:
+def test_a_person_has_one_id_in_every_camera(most: int) -> None:
     stays = [
         Stay("south", 4, 0, 999, (0, 0)),
         Stay("west", 9, 0, 999, (0, 0)),
@@ -50,7 +50,7 @@ def test_a_person_has_one_number_in_every_camera(most: int) -> None:
     assert sorted(last.values()) == [1, 1, 2, 2]
 
 
-def test_numbers_are_shown_only_when_confirmed_and_born_once() -> None:
+def test_ids_are_published_only_once_confirmed_and_created_once() -> None:
     seen = play(registry(confirmation_frames=25, clustering_interval=5), both(1, (0, 0)), 60)
     # Two cameras see 10 frames together in every update.
     assert [update.created for update in seen] == [(), (), (1,)] + [()] * 9
@@ -58,7 +58,7 @@ def test_numbers_are_shown_only_when_confirmed_and_born_once() -> None:
 
 
 @HOWEVER_MANY
-def test_two_people_seen_side_by_side_in_one_camera_are_two_however_close(most: int) -> None:
+def test_simultaneous_tracks_of_a_camera_are_two_people_however_close(most: int) -> None:
     stays = [*both(1, (0, 0)), *both(2, (0.3, 0.3))]
     last = known(play(registry(maximum_open_tracklets=most), stays, 100))
     assert last["south", 1] != last["south", 2]
@@ -67,7 +67,7 @@ def test_two_people_seen_side_by_side_in_one_camera_are_two_however_close(most: 
 
 
 @HOWEVER_MANY
-def test_a_restarted_camera_finds_everybody_again(most: int) -> None:
+def test_people_keep_their_ids_when_a_camera_restarts(most: int) -> None:
     people = [(-2.0, -2.0), (2.0, -1.0), (0.0, 3.0)]
     stays = [Stay("south", 1 + i, 0, 999, at) for i, at in enumerate(people)]
     stays += [Stay("west", 1 + i, 0, 99, at) for i, at in enumerate(people)]
@@ -78,7 +78,7 @@ def test_a_restarted_camera_finds_everybody_again(most: int) -> None:
     assert max(max(update.person_ids.values(), default=0) for update in seen) == 3
 
 
-def test_who_is_lost_and_found_at_the_same_place_keeps_the_number() -> None:
+def test_a_person_who_reappears_at_the_same_place_keeps_the_id() -> None:
     stays = [Stay("south", 1, 0, 100, (0, 0)), Stay("south", 2, 110, 999, (0, 0))]
     for homographies in (CALIBRATED, BLIND):
         seen = play(registry(homographies), stays, 200)
@@ -86,7 +86,7 @@ def test_who_is_lost_and_found_at_the_same_place_keeps_the_number() -> None:
         assert all(update.created in {(), (1,)} for update in seen)
 
 
-def test_who_turns_up_elsewhere_at_once_is_somebody_else() -> None:
+def test_an_impossible_distance_means_another_person() -> None:
     stays = [Stay("south", 1, 0, 100, (-4, 0)), Stay("south", 2, 104, 999, (4, 0))]
     assert numbers(play(registry(), stays, 200)[-1]) == {("south", 1): 1, ("south", 2): 2}
 
@@ -94,7 +94,7 @@ def test_who_turns_up_elsewhere_at_once_is_somebody_else() -> None:
 @pytest.mark.parametrize(
     "settings", [{}, {"comparable_frames": 250}], ids=["compared like everybody", "found again"]
 )
-def test_who_returns_in_the_same_coat_gets_the_number_back(settings: dict[str, int]) -> None:
+def test_a_returning_person_with_the_same_appearance_gets_the_id_back(settings: dict[str, int]) -> None:
     stays = [Stay("south", coat, 0, 150, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
     stays += [Stay("south", 10, 450, 999, (4, 2), coat=3), Stay("south", 11, 450, 999, (-4, 2), coat=7)]
     seen = play(registry(**settings), stays, 600)
@@ -103,7 +103,7 @@ def test_who_returns_in_the_same_coat_gets_the_number_back(settings: dict[str, i
     assert numbers(seen[-1]) == {("south", 10): 2, ("south", 11): 4}
 
 
-def test_in_a_crowd_dressed_alike_nobody_gets_anothers_number_back() -> None:
+def test_similar_people_do_not_get_each_others_ids_back() -> None:
     stays = [Stay("south", local, 0, 150, (local - 3.0, 0), coat=3) for local in (1, 2, 3)]
     stays += [Stay("south", 10, 400, 999, (4, 2), coat=3)]
     assert numbers(play(registry(), stays, 600)[-1]) == {("south", 10): 4}
@@ -111,7 +111,7 @@ def test_in_a_crowd_dressed_alike_nobody_gets_anothers_number_back() -> None:
 
 
 @pytest.mark.parametrize(("fps", "people"), [(5.0, 1), (25.0, 2)])
-def test_how_far_somebody_walks_unseen_goes_by_the_time_and_not_the_frames(fps: float, people: int) -> None:
+def test_reappearance_reach_depends_on_time_not_on_frames(fps: float, people: int) -> None:
     here = Stay("south", 1, 0, 30, (-4, 0), coat=3)
     there = Stay("south", 2, 46, 999, (1.7, 0), coat=3)
     who = IdentityRegistry(
@@ -120,7 +120,7 @@ def test_how_far_somebody_walks_unseen_goes_by_the_time_and_not_the_frames(fps: 
     assert len({*known(play(who, [here, there], 200)).values()}) == people
 
 
-def test_without_calibration_coats_that_differ_join_and_coats_that_do_not_do_not() -> None:
+def test_without_calibration_only_distinctive_appearance_links_cameras() -> None:
     def dressed(coats: Sequence[int]) -> dict[tuple[str, int], int]:
         stays = [
             Stay(camera, 1 + i, 0, 999, (2.0 * i - 3, 2.0 * i - 3), coat=worn)
@@ -135,7 +135,7 @@ def test_without_calibration_coats_that_differ_join_and_coats_that_do_not_do_not
     assert len(dict.fromkeys(alike.values())) == 8
 
 
-def test_evidence_corrects_a_number_and_says_so() -> None:
+def test_later_evidence_corrects_an_id_and_reports_it() -> None:
     # Too far apart to be one at first, they turn out to walk as one.
     apart = [Stay("south", 1, 0, 99, (0, 0)), Stay("west", 1, 0, 99, (0, 6))]
     joined = [Stay("south", 1, 100, 999, (0, 0)), Stay("west", 1, 100, 999, (0, 0))]
@@ -147,7 +147,7 @@ def test_evidence_corrects_a_number_and_says_so() -> None:
 
 @HOWEVER_MANY
 @pytest.mark.parametrize("dressed", [True, False], ids=["by looks and ground", "by ground alone"])
-def test_a_track_that_takes_one_for_the_other_in_a_crowd_is_two_episodes(most: int, *, dressed: bool) -> None:
+def test_a_track_that_switches_people_in_a_crowd_becomes_two_tracklets(most: int, *, dressed: bool) -> None:
     # Two meet before one camera and part again, and its tracker has exchanged them; another camera sees all.
     def meeting(camera: str, local: int, place: float, speed: float, start: int = 0, end: int = 999) -> Stay:
         return Stay(camera, local, start, end, (place, 0), (speed, 0), dressed * (1 + 2 * (place > 0)))
@@ -166,7 +166,7 @@ def test_a_track_that_takes_one_for_the_other_in_a_crowd_is_two_episodes(most: i
     assert not [update.merged for update in seen if update.merged]
 
 
-def test_who_shared_a_number_with_somebody_else_gets_one_of_their_own_and_it_is_said() -> None:
+def test_a_person_who_shared_an_id_gets_one_of_their_own_and_it_is_reported() -> None:
     # One camera sees two who walk as one and then part; the others see the one who stays.
     together = [Stay(camera, 1, 0, 150, (0, 0)) for camera in VIEWS]
     apart = [Stay(camera, 1, 151, 999, (4, 3) if camera == "west" else (0, 0)) for camera in VIEWS]
@@ -176,7 +176,7 @@ def test_who_shared_a_number_with_somebody_else_gets_one_of_their_own_and_it_is_
     assert numbers(updated[-1]) == {("south", 1): 1, ("west", 1): 2, ("north", 1): 1}
 
 
-def test_feet_cut_off_by_the_picture_do_not_stand_where_the_cut_is() -> None:
+def test_truncated_feet_have_no_ground_point() -> None:
     near = Stay("south", 1, 0, 999, (0, -7))  # 3 m before the camera: the feet are far below the picture
     cut = 480.0
     other = Stay("west", 1, 0, 999, (0, -5))  # stands where a foot at the edge of the south picture would
@@ -197,7 +197,7 @@ def test_feet_cut_off_by_the_picture_do_not_stand_where_the_cut_is() -> None:
 
 @settings(deadline=None, max_examples=10)
 @given(st.data())
-def test_the_same_updates_in_any_order_of_tracks_give_the_same_numbers(data: st.DataObject) -> None:
+def test_ids_do_not_depend_on_the_order_of_tracks(data: st.DataObject) -> None:
     spot = st.tuples(st.integers(-4, 4), st.integers(-4, 4))
     stays = []
     for camera in VIEWS:
@@ -216,7 +216,7 @@ def test_the_same_updates_in_any_order_of_tracks_give_the_same_numbers(data: st.
 
 @settings(deadline=None, max_examples=10)
 @given(st.data())
-def test_two_tracks_seen_at_once_in_one_camera_never_share_a_number(data: st.DataObject) -> None:
+def test_simultaneous_tracks_of_a_camera_never_share_an_id(data: st.DataObject) -> None:
     spot = st.tuples(st.integers(-3, 3), st.integers(-3, 3))
     stays = [
         Stay(camera, local, 0, 200, data.draw(spot), coat=data.draw(st.integers(0, 3)))
@@ -230,7 +230,7 @@ def test_two_tracks_seen_at_once_in_one_camera_never_share_a_number(data: st.Dat
 
 
 @HOWEVER_MANY
-def test_who_is_settled_while_they_go_on_is_seen_and_not_gone(most: int) -> None:
+def test_a_person_settled_while_visible_does_not_depart(most: int) -> None:
     seen = play(
         registry(maximum_open_tracklets=most, departed_after=60, settle_after=100),
         both(1, (0, 0), end=400),
@@ -276,7 +276,7 @@ def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
     + [{"confirmation_frames": 0, "comparable_frames": 5000, "merge_after": 500, "settle_after": 20}],
     ids=", ".join,
 )
-def test_any_setting_may_be_at_its_least_and_cameras_may_come_and_go(nothing: Mapping[str, int]) -> None:
+def test_minimal_settings_work_while_cameras_come_and_go(nothing: Mapping[str, int]) -> None:
     # Looks of other sizes, of no size and of nothing; boxes that shake; tracks that pause and begin anew.
     random = np.random.default_rng(1)
     who = registry({"south": CALIBRATED["south"], "west": None}, **nothing)
@@ -298,7 +298,7 @@ def test_any_setting_may_be_at_its_least_and_cameras_may_come_and_go(nothing: Ma
     assert known(updates)
 
 
-def test_what_makes_no_sense_is_refused_in_one_line() -> None:
+def test_invalid_arguments_are_refused_in_one_line() -> None:
     track = Stay("south", 1, 0, 99, (0, 0)).track(0, 14)
 
     def refused(match: str, *tracks: TrackUpdate, last: int = 14) -> None:
@@ -306,7 +306,7 @@ def test_what_makes_no_sense_is_refused_in_one_line() -> None:
             registry().update(tracks, last)
         assert "\n" not in str(refusal.value)
 
-    refused("camera is not known", replace(track, camera="cellar"))
+    refused("camera is unknown", replace(track, camera="cellar"))
     refused("shape", replace(track, boxes=np.zeros((15, 3))))
     refused("histogram", replace(track, appearance=(AppearanceSample(0, 3, np.zeros((2, 2))),)))
     refused("of frames 3 to 20", replace(track, appearance=(AppearanceSample(3, 20, np.zeros(2)),)))
@@ -329,7 +329,7 @@ def test_no_tracks_are_no_people() -> None:
     assert TrackKey("a", 2) < TrackKey("b", 1)
 
 
-def test_who_leaves_one_camera_and_comes_into_another_that_shares_no_floor_is_found_again_by_looks() -> None:
+def test_a_person_is_reidentified_by_appearance_in_a_camera_without_common_ground() -> None:
     # On one ground, but the two never see anybody at once.
     for homographies in (CALIBRATED, BLIND):
         stays = [Stay("south", coat, 0, 100, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
@@ -338,7 +338,7 @@ def test_who_leaves_one_camera_and_comes_into_another_that_shares_no_floor_is_fo
         assert [who["west", 9 - coat] for coat in (1, 3, 5)] == [who["south", coat] for coat in (1, 3, 5)]
 
 
-def test_the_time_of_the_way_tells_apart_who_looks_alike() -> None:
+def test_travel_times_separate_people_who_look_alike() -> None:
     def stays() -> Iterator[Stay]:
         # One after the other goes from south to west in 200 frames, each in a coat of their own...
         for i in range(8):

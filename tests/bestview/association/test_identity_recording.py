@@ -75,7 +75,7 @@ def agreement(
 
 
 @pytest.mark.parametrize("cameras", [("c0", "c1"), ("c0", "c1", "c2", "c3")])
-def test_views_agree_on_who_is_who_on_a_common_ground(shared_data: Path, cameras: tuple[str, ...]) -> None:
+def test_cameras_agree_on_identities_on_a_common_ground(shared_data: Path, cameras: tuple[str, ...]) -> None:
     rng = np.random.default_rng(1)
     folder = shared_data / "terrace"
     matrices = json.loads((folder / "ground.json").read_text())["homography"]
@@ -86,7 +86,7 @@ def test_views_agree_on_who_is_who_on_a_common_ground(shared_data: Path, cameras
     assert numbers <= 8  # of five people, in more than thirty tracks of two views
 
 
-def test_without_ground_and_looks_nobody_is_taken_for_somebody_else(shared_data: Path) -> None:
+def test_without_ground_and_appearance_people_are_not_confused(shared_data: Path) -> None:
     rng = np.random.default_rng(1)
     folder = shared_data / "terrace" / "gt"
     tracks = {camera: broken(people(folder / f"{camera}.txt"), rng) for camera in ("c0", "c1")}

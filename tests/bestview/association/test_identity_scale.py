@@ -70,7 +70,7 @@ def together() -> tuple[list[dict[tuple[int, str, int, int], int]], int]:
     return carried(range(4))
 
 
-def test_what_is_known_of_pairs_grows_with_the_halls_and_not_with_their_square(
+def test_pair_entries_grow_linearly_with_the_number_of_halls(
     together: tuple[list[dict[tuple[int, str, int, int], int]], int],
 ) -> None:
     _, alone = carried(range(1))
@@ -79,7 +79,7 @@ def test_what_is_known_of_pairs_grows_with_the_halls_and_not_with_their_square(
 
 
 @pytest.mark.parametrize("hall", [0, 3])
-def test_who_is_who_in_a_hall_is_the_same_with_other_halls_or_without(
+def test_identities_in_a_hall_do_not_depend_on_other_halls(
     hall: int, together: tuple[list[dict[tuple[int, str, int, int], int]], int]
 ) -> None:
     alone, _ = carried(range(hall, hall + 1))

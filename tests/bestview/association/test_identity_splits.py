@@ -20,7 +20,7 @@ def told(updates: Sequence[IdentityUpdate]) -> list[Split]:
 
 
 @HOWEVER_MANY
-def test_whom_a_camera_shows_is_somebody_new_and_stays_it(most: int) -> None:
+def test_a_split_off_track_gets_a_new_id_and_keeps_it(most: int) -> None:
     who, stays = registry(maximum_open_tracklets=most), both(1, (0, 0))
     assert known(play(who, stays, 100)) == {("south", 1): 1, ("west", 1): 1}
     assert who.split_off([WEST], [1]) == 2
@@ -35,7 +35,7 @@ def test_whom_a_camera_shows_is_somebody_new_and_stays_it(most: int) -> None:
 
 
 @HOWEVER_MANY
-def test_all_that_is_shown_may_be_somebody_new_together(most: int) -> None:
+def test_all_tracks_of_a_person_can_be_split_off_together(most: int) -> None:
     who, stays = registry(maximum_open_tracklets=most), both(1, (0, 0))
     play(who, stays, 100)
     assert who.split_off([WEST, TrackKey("south", 1)], [1]) == 2
@@ -44,7 +44,7 @@ def test_all_that_is_shown_may_be_somebody_new_together(most: int) -> None:
     assert told(after) == []
 
 
-def test_nobody_is_parted_from_whom_they_are_not() -> None:
+def test_a_split_from_another_person_changes_nothing() -> None:
     who, stays = registry(), both(1, (0, 0))
     assert who.split_off([WEST], [1]) is None
     play(who, stays, 100)
@@ -60,7 +60,7 @@ def test_nobody_is_parted_from_whom_they_are_not() -> None:
         max_size=5,
     )
 )
-def test_whatever_is_said_two_tracks_seen_at_once_in_one_camera_share_no_number(
+def test_after_any_corrections_simultaneous_tracks_of_a_camera_have_different_ids(
     said: list[tuple[int, set[TrackKey], int]],
 ) -> None:
     who = registry()
@@ -80,7 +80,7 @@ def test_whatever_is_said_two_tracks_seen_at_once_in_one_camera_share_no_number(
                 given_so.add(new or 0)
 
 
-def test_a_number_that_was_given_so_is_given_to_nobody_else() -> None:
+def test_a_split_off_id_is_never_reused() -> None:
     who, stays = registry(), both(1, (0, 0))
     play(who, stays, 100)
     new = who.split_off([WEST], [1])

@@ -39,7 +39,7 @@ def meeting(apart: float, coats: tuple[int, int] = (3, 3)) -> list[Stay]:
 @HOWEVER_MANY
 @pytest.mark.parametrize("apart", [0.8, 3.0], ids=["in a crowd", "side by side"])
 @pytest.mark.parametrize("told", [115, 170], ids=["soon", "later"])
-def test_numbers_follow_the_people(most: int, apart: float, told: int) -> None:
+def test_swapped_tracks_exchange_their_ids(most: int, apart: float, told: int) -> None:
     who, stays = registry(BLIND, maximum_open_tracklets=most), meeting(apart)
     before = known(play(who, stays, told))
     assert before == {ONE: 1, TWO: 2}
@@ -55,7 +55,7 @@ def test_numbers_follow_the_people(most: int, apart: float, told: int) -> None:
     assert known(after)[ONE] == 2
 
 
-def test_who_was_taken_for_them_in_another_camera_since_follows() -> None:
+def test_tracklets_of_other_cameras_since_the_swap_are_swapped_too() -> None:
     # The other camera shares no ground, loses both as they pass, and finds them by what the first one says.
     who, stays = registry({**CALIBRATED, "west": CALIBRATED["west"]}), meeting(0.8)
     stays += [
@@ -72,7 +72,7 @@ def test_who_was_taken_for_them_in_another_camera_since_follows() -> None:
     assert after["south", 2] == after["west", 7] == seen["west", 5]
 
 
-def test_what_the_evidence_has_told_already_is_no_split() -> None:
+def test_a_swap_that_the_evidence_already_corrected_reports_no_split() -> None:
     who, stays = registry(), meeting(0.8)
     stays += [
         Stay("west", 5, 0, 999, (-3.0, 0.0), (0.03, 0.0), 3),
@@ -86,7 +86,7 @@ def test_what_the_evidence_has_told_already_is_no_split() -> None:
     assert known(play(who, stays, 300, start=180)) == seen
 
 
-def test_nobody_is_exchanged_whom_nobody_knows() -> None:
+def test_tracks_without_an_id_are_not_swapped() -> None:
     who, stays = registry(BLIND), meeting(0.8)
     assert who.swap_tracks(ONE, TWO, TAKEN, (1, 2)) == ()
     play(who, stays, 115)
@@ -105,7 +105,7 @@ TRACKS = [TrackKey(camera, local) for camera in ("south", "west") for local in (
         max_size=6,
     )
 )
-def test_whatever_is_said_two_tracks_seen_at_once_in_one_camera_share_no_number(
+def test_after_any_corrections_simultaneous_tracks_of_a_camera_have_different_ids(
     said: list[tuple[int, TrackKey, TrackKey, int]],
 ) -> None:
     who = registry()
@@ -124,12 +124,12 @@ def test_whatever_is_said_two_tracks_seen_at_once_in_one_camera_share_no_number(
                 who.swap_tracks(one, two, frame, (1, 2))
 
 
-def test_of_tracks_that_are_never_seen_again_nothing_is_kept() -> None:
+def test_nothing_is_stored_for_tracks_that_never_reappear() -> None:
     who = registry(BLIND)
     stays = [replace(it, end=min(it.end, 199)) for it in meeting(3.0)]
     stays.append(Stay("south", 9, 0, 999, (0.0, 5.0)))
     play(who, stays, 200)
     assert who.swap_tracks(ONE, TWO, 190, (1, 2))
-    assert set(who._splitter._cut) == {ONE, TWO}, "their next sightings begin new parts"
+    assert set(who._splitter._pending_splits) == {ONE, TWO}, "their next sightings begin new parts"
     play(who, stays, 900, start=200)
-    assert not who._splitter._cut
+    assert not who._splitter._pending_splits

@@ -35,7 +35,7 @@ def people(draw: st.DrawFn) -> list[PersonAppearance]:
     return found
 
 
-def test_once_looks_have_other_bins_those_of_before_are_compared_with_nobodys() -> None:
+def test_histograms_with_other_bins_are_not_compared_with_earlier_ones() -> None:
     old, new = (MeanHistogram.of(np.ones(bins), 30) for bins in (BINS, 2 * BINS))
     assert comparable_histograms([(0, new), (1, new), (2, old), (3, old)], 2) == [(0, new), (1, new)]
     assert comparable_histograms([(0, old), (1, new), (2, new)], 2) == [(1, new), (2, new)]
@@ -45,7 +45,7 @@ def test_once_looks_have_other_bins_those_of_before_are_compared_with_nobodys() 
 
 @settings(deadline=None, max_examples=200)
 @given(st.data())
-def test_clearly_least_is_least_of_its_row_and_column_by_far(data: st.DataObject) -> None:
+def test_an_unambiguous_minimum_is_far_below_the_rest_of_its_row_and_column(data: st.DataObject) -> None:
     high, wide = data.draw(st.integers(1, 4)), data.draw(st.integers(1, 4))
     cost = np.array([[data.draw(COSTS) for _ in range(wide)] for _ in range(high)])
     clear = unambiguous_minima(cost, RATIO)
@@ -58,7 +58,7 @@ def test_clearly_least_is_least_of_its_row_and_column_by_far(data: st.DataObject
 
 @settings(deadline=None, max_examples=100)
 @given(people(), people(), st.floats(0.0, 0.3), st.data())
-def test_nobody_is_found_twice_nor_against_what_is_possible(
+def test_matches_are_one_to_one_and_possible(
     found: list[PersonAppearance], lost: list[PersonAppearance], gate: float, data: st.DataObject
 ) -> None:
     shape = (len(found), len(lost))
@@ -77,7 +77,7 @@ def test_nobody_is_found_twice_nor_against_what_is_possible(
 
 @settings(deadline=None, max_examples=100)
 @given(people(), people())
-def test_looks_are_compared_in_common_cameras_alone_where_there_are_such(
+def test_appearance_is_compared_in_common_cameras_where_there_are_any(
     found: list[PersonAppearance], lost: list[PersonAppearance]
 ) -> None:
     distance = appearance_distances(HistogramEqualizer(), found, lost)
@@ -99,7 +99,7 @@ def test_looks_are_compared_in_common_cameras_alone_where_there_are_such(
                 assert distance[i, j] == pytest.approx(0.0)
 
 
-def test_a_look_that_nothing_can_be_compared_with_is_none() -> None:
+def test_an_incomparable_histogram_counts_as_none() -> None:
     looks = PersonAppearance()
     for histogram in (np.zeros(0), np.zeros(BINS), np.full(BINS, np.nan), np.full(BINS, -1.0)):
         looks.add("c0", MeanHistogram.of(histogram, 5))
@@ -114,7 +114,7 @@ DISTANCES = st.lists(st.floats(0, 1), max_size=8).map(lambda it: np.array(it, dt
 
 @settings(deadline=None, max_examples=200)
 @given(DISTANCES, DISTANCES, st.floats(0, 1), st.floats(0, 1), st.integers(0, 20), st.integers(0, 20))
-def test_nearer_looks_never_say_less_and_never_more_than_the_cap(
+def test_appearance_evidence_falls_with_distance_within_its_cap(
     own: np.ndarray, others: np.ndarray, one: float, two: float, frames: int, more: int
 ) -> None:
     weights, scale = (

@@ -47,7 +47,7 @@ def spans(tracklets: TrackletSplitter, local: int) -> list[tuple[int, int]]:
     return [(it.key.first_frame, it.end.frame) for it in mine]
 
 
-def test_who_comes_out_of_a_crowd_begins_anew() -> None:
+def test_a_track_that_leaves_a_crowd_starts_a_new_tracklet() -> None:
     met = [RIGHT] * 5 + [ONTO_LEFT] * 3 + [RIGHT] * 4
     tracklets = taken([track(1, 0, [LEFT] * 12, seen_at(0)), track(2, 0, met, seen_at(0))])
     assert spans(tracklets, 1) == spans(tracklets, 2) == [(0, 7), (8, 11)]
@@ -60,19 +60,19 @@ def test_who_comes_out_of_a_crowd_begins_anew() -> None:
     ]
 
 
-def test_a_short_touch_and_a_short_moment_unseen_cut_nothing() -> None:
+def test_short_overlaps_and_short_gaps_start_no_tracklet() -> None:
     met = [RIGHT] * 5 + [ONTO_LEFT] * 2 + [RIGHT] * 3 + [None] * 9 + [RIGHT] * 3
     assert spans(taken([track(1, 0, [LEFT] * 22), track(2, 0, met, seen_at(0))]), 2) == [(0, 21)]
     away = [RIGHT] * 5 + [None] * 11 + [RIGHT] * 3
     assert spans(taken([track(2, 0, away, seen_at(0))]), 2) == [(0, 4), (16, 18)]
 
 
-def test_where_no_look_is_known_the_tracker_is_believed() -> None:
+def test_without_appearance_the_track_is_not_split() -> None:
     met = [RIGHT] * 5 + [ONTO_LEFT] * 3 + [RIGHT] * 4 + [None] * 20 + [RIGHT] * 3
     assert spans(taken([track(1, 0, [LEFT] * 12), track(2, 0, met)]), 2) == [(0, 34)]
 
 
-def test_looks_in_a_crowd_do_not_count() -> None:
+def test_appearance_samples_in_a_crowd_do_not_count() -> None:
     coat = np.array([1.0, 3.0])
     met = [RIGHT] * 4 + [ONTO_LEFT] * 2
     crowded = AppearanceSample(3, 4, coat)
@@ -83,7 +83,7 @@ def test_looks_in_a_crowd_do_not_count() -> None:
     np.testing.assert_allclose(look.mean, [0.25, 0.75])
 
 
-def test_of_too_many_those_unseen_for_longest_are_old_sooner_but_not_before_they_were_told() -> None:
+def test_of_too_many_tracklets_the_longest_unseen_settle_first_but_not_before_publication() -> None:
     few = IdentitySettings(
         maximum_open_tracklets=2, settle_after=100, publish_after=5, clustering_interval=10
     )
@@ -98,7 +98,7 @@ def test_of_too_many_those_unseen_for_longest_are_old_sooner_but_not_before_they
     assert tracklets.settleable_rows(139) == [0, 1, 2, 3]
 
 
-def test_who_was_nobody_when_they_were_settled_begins_anew() -> None:
+def test_a_tracklet_settled_without_an_id_is_followed_by_a_new_one() -> None:
     tracklets = taken([track(1, 0, [LEFT] * 5)])
     tracklets.settle(list(tracklets.active), 200)
     again = [track(1, 201, [LEFT] * 5)]
@@ -108,7 +108,7 @@ def test_who_was_nobody_when_they_were_settled_begins_anew() -> None:
     assert spans(tracklets, 1) == [(201, 205)]
 
 
-def test_a_track_that_is_settled_while_it_goes_on_is_not_cut() -> None:
+def test_a_tracklet_that_is_settled_while_it_continues_is_not_split() -> None:
     tracklets = taken([track(1, 0, [LEFT] * 5)])
     tracklets.active[0].published_frames[7] = 5
     tracklets.settle(list(tracklets.active), 5)
@@ -119,7 +119,7 @@ def test_a_track_that_is_settled_while_it_goes_on_is_not_cut() -> None:
 
 @settings(deadline=None, max_examples=60)
 @given(st.data())
-def test_episodes_do_not_depend_on_how_frames_come_in_updates(data: st.DataObject) -> None:
+def test_tracklets_do_not_depend_on_how_frames_are_grouped_into_updates(data: st.DataObject) -> None:
     frames = 40
     places = st.sampled_from([LEFT, RIGHT, ONTO_LEFT, None])
     runs = st.lists(st.tuples(places, st.integers(1, 14)), min_size=1, max_size=8)

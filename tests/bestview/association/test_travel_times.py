@@ -46,7 +46,7 @@ def plain(ways: list[tuple[str, str, int]], lost: str, found: str, frames: int) 
 
 @settings(deadline=None, max_examples=200)
 @given(st.lists(WAY, max_size=30), WAY)
-def test_evidence_is_that_of_all_ways_read_plainly(
+def test_travel_evidence_equals_the_reference(
     ways: list[tuple[str, str, int]], asked: tuple[str, str, int]
 ) -> None:
     travel = TravelTimeModel(SETTINGS, len(CAMERAS))
@@ -58,7 +58,7 @@ def test_evidence_is_that_of_all_ways_read_plainly(
     assert said[0, 0] == pytest.approx(plain(ways, lost, found, frames))
 
 
-def test_the_usual_time_speaks_for_somebody_and_another_camera_or_time_against() -> None:
+def test_usual_travel_times_raise_the_evidence_and_unusual_ones_lower_it() -> None:
     travel = TravelTimeModel(SETTINGS, len(CAMERAS))
     for i in range(20):
         travel.learn(CameraSighting("c0", 0), CameraSighting("c1", 150 + i))
@@ -76,7 +76,7 @@ def test_the_usual_time_speaks_for_somebody_and_another_camera_or_time_against()
     assert not travel.evidence(found, [CameraSighting("c2", 0)]).any(), "nobody has come from there yet"
 
 
-def test_old_ways_fade_and_memory_is_bounded() -> None:
+def test_old_transitions_fade_and_memory_is_bounded() -> None:
     travel = TravelTimeModel(SETTINGS, len(CAMERAS))
     for i in range(300):
         travel.learn(CameraSighting("c0", i), CameraSighting("c1", i + 30))
@@ -90,14 +90,14 @@ def test_old_ways_fade_and_memory_is_bounded() -> None:
 
 
 @given(st.integers(0, 10_000))
-def test_bins_cover_all_times_without_holes(longest: int) -> None:
+def test_time_bins_cover_all_times_without_gaps(longest: int) -> None:
     edges = travel_time_bins(longest)
     assert edges[0] == 1.0
     assert edges[-1] == longest + 1 or longest < 1
     assert (np.diff(edges) > 0).all() or longest < 1
 
 
-def test_any_settings_may_be_at_their_least() -> None:
+def test_minimal_settings_work() -> None:
     travel = TravelTimeModel(
         replace(SETTINGS, travel_frames=0, travel_half_weight_count=0.0, maximum_travel_evidence=0.0), 0
     )

@@ -37,7 +37,7 @@ def any_camera(random: np.random.Generator) -> Pinhole:
 
 @settings(deadline=None, max_examples=30)
 @given(seeds)
-def test_the_floor_of_a_camera_is_where_its_homography_has_it(random: np.random.Generator) -> None:
+def test_the_pinhole_floor_agrees_with_its_homography(random: np.random.Generator) -> None:
     camera, place = any_camera(random), random.uniform(-1, 1, (20, 2))
     image = camera.picture(place)
     assert np.allclose(camera.floor(image), place)
@@ -46,7 +46,7 @@ def test_the_floor_of_a_camera_is_where_its_homography_has_it(random: np.random.
 
 @settings(deadline=None, max_examples=30)
 @given(seeds)
-def test_a_person_is_one_tall(random: np.random.Generator) -> None:
+def test_a_person_has_height_one(random: np.random.Generator) -> None:
     camera, place = any_camera(random), random.uniform(-1, 1, (20, 2))
     lens = camera._projection()
     head = np.column_stack([place, np.ones((20, 2))]) @ lens.T
@@ -56,7 +56,7 @@ def test_a_person_is_one_tall(random: np.random.Generator) -> None:
 
 @settings(deadline=None, max_examples=30)
 @given(seeds)
-def test_how_badly_a_foot_is_known_is_what_identity_says(random: np.random.Generator) -> None:
+def test_foot_covariance_agrees_with_the_ground_planes(random: np.random.Generator) -> None:
     camera, place = any_camera(random), random.uniform(-1, 1, (10, 2))
     image, tall = camera.picture(place), random.uniform(20, 90, 10)
     boxes = np.column_stack([image[:, 0] - 5, image[:, 1] - tall, image[:, 0] + 5, image[:, 1]])
@@ -68,7 +68,7 @@ def test_how_badly_a_foot_is_known_is_what_identity_says(random: np.random.Gener
 
 @settings(deadline=None, max_examples=30)
 @given(seeds)
-def test_distances_are_those_of_mahalanobis(random: np.random.Generator) -> None:
+def test_whitened_distances_are_mahalanobis_distances(random: np.random.Generator) -> None:
     place, tall = random.uniform(-1, 1, (8, 2)), random.uniform(20, 90, 8)
     one, other = any_camera(random), any_camera(random)
     here = project_to_floor(one, one.picture(place), tall, SETTINGS)
@@ -93,7 +93,7 @@ def tracks(random: np.random.Generator, count: int) -> tuple[WalkTrack, ...]:
 
 @settings(deadline=None, max_examples=30)
 @given(seeds, st.floats(-20, 20))
-def test_samples_meet_who_is_sampled_at_the_same_pulse(random: np.random.Generator, offset: float) -> None:
+def test_candidate_matches_pair_samples_of_the_same_pulse(random: np.random.Generator, offset: float) -> None:
     one, other = (Walk(name, SIZE, tracks(random, 3)) for name in "ab")
     pulses = np.arange(-20.0, 120.0, 4.0)
     here = sample_walk(one, pulses, 0.0, 2, 0.15)
@@ -113,7 +113,7 @@ def test_samples_meet_who_is_sampled_at_the_same_pulse(random: np.random.Generat
 
 @settings(deadline=None, max_examples=30)
 @given(seeds)
-def test_between_frames_boxes_are_interpolated(random: np.random.Generator) -> None:
+def test_boxes_are_interpolated_between_frames(random: np.random.Generator) -> None:
     (track,) = tracks(random, 1)
     times = random.uniform(track.first_frame - 3, track.end_frame + 3, 30)
     frames = np.arange(track.first_frame, track.end_frame)
@@ -126,7 +126,7 @@ def test_between_frames_boxes_are_interpolated(random: np.random.Generator) -> N
 
 @settings(deadline=None, max_examples=20)
 @given(seeds, st.floats(-3, 3), st.floats(-5, 5))
-def test_one_persons_two_curves_say_how_the_cameras_stand(
+def test_two_curves_of_one_person_give_the_relative_pose(
     random: np.random.Generator, turn: float, east: float
 ) -> None:
     camera, path = camera_at(-4, -1), stroll(random, 300)
@@ -136,8 +136,8 @@ def test_one_persons_two_curves_say_how_the_cameras_stand(
     here = project_to_floor(camera, samples.feet, samples.tall, SETTINGS)
     there = here.transformed(turn, np.array([east, 2.0]))
     (best, *_) = propose_relative_poses([here], [there], candidate_matches(samples, samples), 5)
-    assert np.exp(1j * best.turn) == pytest.approx(np.exp(1j * turn))
-    assert best.maximum_offset == pytest.approx([east, 2.0])
+    assert np.exp(1j * best.rotation) == pytest.approx(np.exp(1j * turn))
+    assert best.translation == pytest.approx([east, 2.0])
 
 
 @settings(deadline=None, max_examples=30)
@@ -161,7 +161,7 @@ def test_matches_are_one_to_one_at_each_pulse_and_near(random: np.random.Generat
 
 @settings(deadline=None, max_examples=20)
 @given(seeds)
-def test_walks_in_a_wrong_order_hold_the_same_boxes(random: np.random.Generator) -> None:
+def test_reversed_and_swapped_walks_hold_the_same_boxes(random: np.random.Generator) -> None:
     walk = Walk("a", SIZE, tracks(random, 4))
     count = sum(len(it.boxes) for it in walk.tracks)
     assert sum(len(it.boxes) for it in time_reversed(walk).tracks) == count
@@ -171,7 +171,7 @@ def test_walks_in_a_wrong_order_hold_the_same_boxes(random: np.random.Generator)
         assert wrong.end_frame <= walk.end_frame
 
 
-def test_boxes_that_the_edge_cuts_are_left_out_and_long_gaps_part_a_track() -> None:
+def test_truncated_boxes_are_dropped_and_long_gaps_split_a_track() -> None:
     box = [100.0, 100.0, 140.0, 200.0]
     frames = [*range(20), *range(40, 60)]
     boxes = np.array([box] * 40)
@@ -206,7 +206,7 @@ def test_a_line_has_no_breadth() -> None:
     assert walk_breadth(square, np.ones(4000)) == pytest.approx(1 / np.sqrt(3), rel=0.05)
 
 
-def test_how_sure_an_offset_is_grows_with_the_noise() -> None:
+def test_the_offset_error_grows_with_the_noise() -> None:
     errors = []
     for noise in (0.005, 0.05):
         random = np.random.default_rng(3)

@@ -53,7 +53,7 @@ def test_exact_pairs_give_the_homography(random: np.random.Generator, count: int
     assert fit.image_error.max() < 1e-3
 
 
-def test_ever_so_many_pairs_take_no_more_room_than_themselves() -> None:
+def test_memory_is_linear_in_the_number_of_pairs() -> None:
     points, truth = marked(np.random.default_rng(0), 50_000)  # a matrix that many to a side has 20 gigabytes
     found = fit_homography(points.image, points.floor)
     assert np.allclose(to_ground(found, points.image[:4]), to_ground(truth, points.image[:4]), atol=1e-4)
@@ -61,7 +61,7 @@ def test_ever_so_many_pairs_take_no_more_room_than_themselves() -> None:
 
 @settings(deadline=None, max_examples=15)
 @given(seeds, st.integers(8, 20))
-def test_clicks_that_are_a_pixel_off_leave_an_error_of_about_a_pixel(
+def test_an_error_of_a_pixel_in_the_clicks_gives_a_fit_error_of_about_a_pixel(
     random: np.random.Generator, count: int
 ) -> None:
     points, _ = marked(random, count)
@@ -84,7 +84,7 @@ def test_a_pair_that_contradicts_the_others_is_named(
     assert "contradicts the others" in str(refused.value)
 
 
-def test_five_pairs_that_contradict_each_other_blame_nobody() -> None:
+def test_of_five_contradicting_pairs_none_is_named() -> None:
     floor = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [2.0, 2.0]])
     image = floor * 100 + np.array([[0, 0], [0, 0], [0, 0], [0, 0], [120, 60]])
     with pytest.raises(CalibrationError, match=r"the pairs contradict each other.*add more"):
@@ -105,7 +105,7 @@ def test_too_few_pairs_are_counted() -> None:
         fit_points(MarkedPoints("c0", np.eye(3)[:, :2], np.eye(3)[:, :2]))
 
 
-def test_one_place_in_the_picture_cannot_be_two_on_the_floor() -> None:
+def test_one_image_point_with_two_floor_points_is_refused() -> None:
     points, _ = marked(np.random.default_rng(1), 6)
     image = points.image.copy()
     image[4] = image[1]
@@ -120,7 +120,7 @@ def test_corners_in_another_order_are_refused() -> None:
         fit_points(MarkedPoints("c0", image, floor))
 
 
-def test_a_camera_whose_floor_coordinates_are_exchanged_is_named() -> None:
+def test_a_camera_with_exchanged_floor_coordinates_is_named() -> None:
     random = np.random.default_rng(5)
     cameras = [MarkedPoints(f"c{number}", *_both(marked(random, 6)[0])) for number in range(3)]
     cameras[1] = MarkedPoints("c1", cameras[1].image, cameras[1].floor[:, ::-1])
@@ -134,7 +134,7 @@ def _both(points: MarkedPoints) -> tuple[Floats, Floats]:
 
 @settings(deadline=None, max_examples=20)
 @given(seeds)
-def test_no_other_homography_is_nearer_to_noisy_points(random: np.random.Generator) -> None:
+def test_no_other_homography_fits_noisy_points_better(random: np.random.Generator) -> None:
     points, _ = marked(random, 9)
     noisy = points.image + random.normal(0, 2.0, points.image.shape)
     found = fit_homography(points.floor, noisy)

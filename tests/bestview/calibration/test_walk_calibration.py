@@ -26,7 +26,7 @@ def walks(
 
 
 @pytest.mark.parametrize(("seed", "offset"), [(2, -19)])
-def test_one_person_walking_about_places_two_cameras_in_space_and_time(seed: int, offset: int) -> None:
+def test_one_walking_person_calibrates_two_cameras_and_their_offset(seed: int, offset: int) -> None:
     random = np.random.default_rng(seed)
     given = walks(random, (WEST, SOUTH), [stroll(random, 450)], (0, offset))
     found = calibrate_from_walks(given, WalkSettings(maximum_offset=30), PERSON)
@@ -39,7 +39,7 @@ def test_one_person_walking_about_places_two_cameras_in_space_and_time(seed: int
     assert found.heights.median < 0.15
 
 
-def test_several_people_who_are_nobody_by_name_and_a_ghost_do_as_well() -> None:
+def test_several_unidentified_people_and_a_ghost_calibrate_as_well() -> None:
     random = np.random.default_rng(4)
     given = walks(random, (WEST, SOUTH), [stroll(random, 400) for _ in range(3)], (0, 0))
     box = np.array([300.0, 150.0, 330.0, 230.0])
@@ -52,7 +52,7 @@ def test_several_people_who_are_nobody_by_name_and_a_ghost_do_as_well() -> None:
     assert [it.offset for it in found.cameras] == [0.0, 0.0]
 
 
-def test_the_same_walk_gives_the_same_numbers() -> None:
+def test_calibration_is_deterministic() -> None:
     random = np.random.default_rng(9)
     given = walks(random, (WEST, SOUTH), [stroll(random, 120)], (0, 0))
     brief = WalkSettings(maximum_offset=0, minimum_places=5.0, minimum_breadth=0.02)
@@ -61,7 +61,7 @@ def test_the_same_walk_gives_the_same_numbers() -> None:
         assert one.homography.tobytes() == other.homography.tobytes()
 
 
-def test_a_camera_that_sees_other_people_elsewhere_is_left_out() -> None:
+def test_a_camera_that_sees_other_people_is_not_calibrated() -> None:
     random = np.random.default_rng(8)
     given = walks(random, (WEST, SOUTH), [stroll(random, 300)], (0, 0))
     elsewhere = seen("c2", WEST, [stroll(random, 300)], random)
@@ -92,14 +92,14 @@ def test_standing_still_is_refused() -> None:
         calibrate_from_walks(given, WalkSettings(maximum_offset=0))
 
 
-def test_being_seen_by_one_after_the_other_is_refused() -> None:
+def test_people_seen_by_one_camera_after_the_other_are_refused() -> None:
     random = np.random.default_rng(1)
     given = walks(random, (WEST, SOUTH), [stroll(random, 300)], (0, -1000))
     with pytest.raises(CalibrationError, match="nobody was seen walking by both at once"):
         calibrate_from_walks(given, WalkSettings(maximum_offset=0))
 
 
-def test_strangers_are_refused() -> None:
+def test_different_people_are_refused() -> None:
     random = np.random.default_rng(3)
     given = [
         seen(name, camera, [stroll(random, 400)], random) for name, camera in (("c0", WEST), ("c1", SOUTH))
@@ -108,7 +108,7 @@ def test_strangers_are_refused() -> None:
         calibrate_from_walks(given, WalkSettings(maximum_offset=0))
 
 
-def test_nobody_and_one_camera_are_refused() -> None:
+def test_an_empty_walk_and_a_single_camera_are_refused() -> None:
     nobody = [Walk(name, SIZE, ()) for name in ("c0", "c1")]
     with pytest.raises(CalibrationError, match="nobody was seen walking by both at once"):
         calibrate_from_walks(nobody)

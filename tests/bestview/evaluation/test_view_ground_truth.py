@@ -23,26 +23,26 @@ def truth_of(boxes: list[list[float]], shown: list[float], least: float = 0.25) 
     return view_ground_truth(laid, np.array(shown)[None, None], sizes, least)
 
 
-def test_a_view_costs_what_it_lacks_of_the_one_in_whose_picture_the_person_is_largest() -> None:
+def test_a_view_costs_its_share_below_the_largest_view() -> None:
     boxes = np.array([BOX, BOX])[None, None]
     truth = view_ground_truth(boxes, np.ones((1, 1, 2)), np.array([SQUARE, WIDE]), 0.25)
     assert truth.cost.ravel().tolist() == [0.0, 0.5]
     assert truth.visible.all()
 
 
-def test_who_is_hidden_or_not_there_costs_one_and_is_not_visible() -> None:
+def test_hidden_and_absent_people_cost_one_and_are_not_visible() -> None:
     truth = truth_of([BOX, BOX, NOWHERE, [-9.0, 0.0, -1.0, 9.0]], [0.2, 0.0, 1.0, 1.0])
     assert truth.cost.ravel().tolist() == [1.0] * 4
     assert not truth.visible.any()
     assert not truth.evaluated.any()
 
 
-def test_views_are_compared_with_the_best_of_those_that_show_somebody() -> None:
+def test_views_are_compared_with_the_best_visible_view() -> None:
     truth = truth_of([BOX, [0.0, 0.0, 25.0, 25.0]], [0.1, 1.0])
     assert truth.cost.ravel().tolist() == [1.0, 0.0]
 
 
-def test_an_unknown_share_counts_as_all_and_the_threshold_is_the_callers() -> None:
+def test_an_unknown_visible_share_counts_as_one_and_the_threshold_is_configurable() -> None:
     assert truth_of([BOX] * 3, [-1.0, 0.25, 1.0]).visible.all()
     assert truth_of([BOX] * 2, [0.0, 0.2], least=0.0).visible.all()
     assert not truth_of([BOX], [0.9], least=1.0).visible.any()
@@ -76,7 +76,7 @@ def total(cost: np.ndarray, views: tuple[int, ...] | list[int], switch_cost: flo
 
 @settings(deadline=None, max_examples=80)
 @given(st.integers(1, 4), st.integers(1, 4), st.integers(0, 10_000))
-def test_numbers_stand_for_people_the_best_way_round(people: int, objects: int, seed: int) -> None:
+def test_objects_are_matched_to_people_optimally(people: int, objects: int, seed: int) -> None:
     matches = np.random.default_rng(seed).integers(0, 5, (people, objects))
     found = match_objects_to_people(matches).tolist()
     somebody = [it for it in found if it != NO_PERSON]
@@ -87,6 +87,6 @@ def test_numbers_stand_for_people_the_best_way_round(people: int, objects: int, 
     assert reached == max(sum(int(square[a, b]) for b, a in enumerate(way)) for way in permutations(range(4)))
 
 
-def test_who_was_never_met_is_nobody() -> None:
+def test_an_object_without_matches_has_no_person() -> None:
     assert match_objects_to_people(np.array([[0, 3, 1], [0, 0, 2]])).tolist() == [NO_PERSON, 0, 1]
     assert match_objects_to_people(np.zeros((0, 2), dtype=np.int64)).tolist() == [NO_PERSON, NO_PERSON]

@@ -26,7 +26,7 @@ def test_regret_is_the_share_by_which_a_choice_costs_more() -> None:
     assert score.regret == pytest.approx((3.0 - 1.7) / 1.7)
 
 
-def test_a_frame_without_a_choice_costs_one_and_is_no_cut() -> None:
+def test_a_frame_without_a_view_costs_one_and_is_no_cut() -> None:
     score = score_views(COST, EVERYWHERE, np.array([[0, -1, 0, 1, 1, 1]]), 0.5, 1.0)
     assert score.regret == pytest.approx(0.8 / 1.7)
     assert score.visible == pytest.approx(5 / 6)
@@ -56,7 +56,7 @@ def test_a_camera_that_does_not_see_the_object_does_not_show_it() -> None:
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 10_000))
-def test_nothing_is_better_than_the_optimum_and_a_window_comes_close(seed: int) -> None:
+def test_no_selection_beats_the_optimum_and_a_window_comes_close(seed: int) -> None:
     rng = np.random.default_rng(seed)
     cost = rng.random((2, 20, 3))
     visible = np.ones(cost.shape, dtype=bool)
@@ -68,13 +68,13 @@ def test_nothing_is_better_than_the_optimum_and_a_window_comes_close(seed: int) 
     assert exact.agreement == 1.0
 
 
-def test_what_makes_no_sense_is_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     with pytest.raises(ValueError, match="shapes"):
         score_views(COST, EVERYWHERE, np.zeros((1, 5), int), 0.5, 1.0)
     with pytest.raises(ValueError, match="outside"):
         score_views(COST, EVERYWHERE, np.full((1, 6), 2), 0.5, 1.0)
 
 
-def test_nobody_is_nothing_to_score() -> None:
+def test_no_objects_score_zero() -> None:
     score = score_views(np.zeros((0, 5, 2)), np.zeros((0, 5, 2), bool), np.zeros((0, 5), int), 0.5, 25.0)
     assert (score.frames, score.regret) == (0, 0.0)

@@ -32,7 +32,7 @@ def drawn(rng: np.random.Generator, count: int) -> np.ndarray:
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 6))
-def test_they_touch_where_they_share_a_cell(seed: int, count: int) -> None:
+def test_boxes_touch_if_they_share_a_cell(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     boxes, others = drawn(rng, 12), drawn(rng, count)
     picture, theirs = rng.integers(0, 3, 12), rng.integers(0, 3, count)

@@ -69,25 +69,25 @@ def score_of(
     return float(score)
 
 
-def test_who_stands_there_for_another_camera_too_is_likelier() -> None:
+def test_a_detection_confirmed_by_another_camera_scores_higher() -> None:
     assert score_of(found(SIDE, (0, 10), score=1.0)) == pytest.approx(
         0.5 + DEFAULT.confirmation_boost * 0.5, abs=0.01
     )
     assert 0.5 < score_of(found(SIDE, (0, 10), score=0.4)) < score_of(found(SIDE, (0, 10), score=0.8))
 
 
-def test_where_another_camera_plainly_sees_the_empty_floor_somebody_is_less_likely() -> None:
+def test_a_detection_at_a_clearly_empty_place_scores_lower() -> None:
     assert score_of(found(SIDE)) == pytest.approx(0.5 * (1 - DEFAULT.absence_penalty))
     assert score_of(found(SIDE, (0, 14), score=1.0)) == pytest.approx(
         0.5 * (1 - DEFAULT.absence_penalty), abs=0.02
     )
 
 
-def test_a_camera_that_is_not_there_says_nothing() -> None:
+def test_an_absent_camera_changes_nothing() -> None:
     assert score_of(None) == 0.5
 
 
-def test_what_a_camera_cannot_see_it_does_not_deny() -> None:
+def test_a_camera_without_a_clear_view_lowers_no_score() -> None:
     # Somebody nearer to it stands in front.
     assert score_of(found(SIDE, (4, 10))) > score_of(found(SIDE)) + 0.05
     # The floor there is not in its picture.
@@ -101,14 +101,14 @@ def test_what_a_camera_cannot_see_it_does_not_deny() -> None:
     assert score_of(found(SIDE), elsewhere) < 0.5
 
 
-def test_nothing_is_said_of_who_stands_nowhere() -> None:
+def test_detections_without_ground_point_are_not_rescored() -> None:
     [left, top, right, _] = boxes_of(FRONT, (0, 10))[0]
     for bottom in (SIZE[1], 200.0):  # cut off by the picture's lower edge, and above the horizon
         own = CameraDetections(np.array([[left, min(top, bottom - 90), right, bottom]]), np.array([0.5]))
         assert rescore_detections(FRONT, own, [(SIDE, found(SIDE))], DEFAULT).tolist() == [0.5]
 
 
-def test_a_camera_goes_by_whoever_is_surest() -> None:
+def test_the_surest_other_camera_counts() -> None:
     west = looking(-10, 10, -90)
     here, nobody = found(SIDE, (0, 10), score=1.0), found(west)
     [both] = rescore_detections(FRONT, found(FRONT, (0, 10)), [(SIDE, here), (west, nobody)], DEFAULT)
@@ -117,7 +117,7 @@ def test_a_camera_goes_by_whoever_is_surest() -> None:
     assert score_of(found(SIDE)) < both < score_of(here)
 
 
-def test_cameras_overlook_each_other_where_they_see_the_same_ground() -> None:
+def test_views_overlap_where_they_see_common_ground() -> None:
     assert views_overlap(FRONT, SIDE)
     assert views_overlap(SIDE, FRONT)
     assert not views_overlap(FRONT, AWAY)
@@ -128,14 +128,14 @@ def test_cameras_overlook_each_other_where_they_see_the_same_ground() -> None:
     "name", ["confirmation_boost", "absence_penalty", "minimum_occluder_score", "clear_view_share"]
 )
 @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan")])
-def test_shares_are_from_0_to_1(name: str, value: float) -> None:
+def test_shares_outside_0_to_1_are_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"{name}: is .* but must be from 0 to 1"):
         CrossViewSettings(**{name: value})
 
 
 @pytest.mark.parametrize("name", ["gate_heights", "foot_sideways", "foot_upwards"])
 @pytest.mark.parametrize("value", [0.0, float("inf"), float("nan")])
-def test_lengths_are_above_0(name: str, value: float) -> None:
+def test_lengths_not_above_0_are_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"{name}: is .* but must be above 0"):
         CrossViewSettings(**{name: value})
 
@@ -199,7 +199,7 @@ def drawn(vantage: CameraGeometry, people: list[tuple[float, float, float, float
 
 @settings(deadline=None, max_examples=60)
 @given(PEOPLE, PEOPLE, PEOPLE)
-def test_it_is_the_rule_read_box_by_box_and_point_by_point(
+def test_rescoring_equals_the_reference(
     own: list[tuple[float, float, float, float]],
     one: list[tuple[float, float, float, float]],
     two: list[tuple[float, float, float, float]],

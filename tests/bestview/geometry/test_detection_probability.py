@@ -28,12 +28,12 @@ def share(it: DetectionProbabilityMap, place: np.ndarray, camera: int = 0) -> fl
     return float(it.probability(np.array([camera]), place[None])[0])
 
 
-def test_of_an_unknown_camera_the_prior_is_taken() -> None:
+def test_an_unknown_camera_has_the_prior_probability() -> None:
     it = findable(prior=0.7)
     assert share(it, HERE) == share(it, FAR, camera=1) == 0.7
 
 
-def test_where_nobody_is_found_nobody_is_expected_and_elsewhere_still_is() -> None:
+def test_a_place_without_detections_gets_a_low_probability_and_others_keep_theirs() -> None:
     it = findable()
     look(it, HERE, found=False, times=200)
     look(it, FAR, found=True, times=200)
@@ -43,13 +43,13 @@ def test_where_nobody_is_found_nobody_is_expected_and_elsewhere_still_is() -> No
     assert share(it, HERE, camera=1) == 0.6, "of another camera that says nothing"
 
 
-def test_a_camera_that_finds_nobody_is_not_believed_at_places_that_are_new() -> None:
+def test_a_camera_without_detections_has_a_low_probability_at_new_places() -> None:
     it = findable()
     look(it, HERE, found=False, times=450)
     assert share(it, FAR) == pytest.approx(50 * 0.6 / 500)
 
 
-def test_what_has_changed_is_learned_anew_sooner_when_old_looks_fade() -> None:
+def test_changes_are_learned_sooner_when_old_trials_fade() -> None:
     remembers, forgets = findable(), findable()
     for it, kept in ((remembers, 1.0), (forgets, 0.99)):
         for found in [False] * 500 + [True] * 100:
@@ -60,7 +60,7 @@ def test_what_has_changed_is_learned_anew_sooner_when_old_looks_fade() -> None:
 
 @settings(deadline=None, max_examples=30)
 @given(st.integers(0, 2**32 - 1))
-def test_it_is_the_share_of_the_looks_around(seed: int) -> None:
+def test_the_probability_is_the_detection_rate_of_the_cells_around(seed: int) -> None:
     rng = np.random.default_rng(seed)
     it, looks = findable(), []
     for _ in range(4):
@@ -83,7 +83,7 @@ def _adjoin(one: np.ndarray, two: np.ndarray) -> bool:
     return bool(np.abs(cells[0] - cells[1]).max() <= 1)
 
 
-def test_looks_may_each_stand_for_as_many_as_they_like() -> None:
+def test_trials_can_have_weights() -> None:
     one, other = findable(), findable()
     one.learn(np.zeros(2, int), np.array([HERE, FAR]), np.array([True, False]), np.array([3.0, 7.0]), 1.0)
     look(other, HERE, found=True, times=3)
@@ -95,7 +95,7 @@ def trust(it: DetectionProbabilityMap, place: np.ndarray, camera: int = 0) -> fl
     return float(it.trust(np.array([camera]), place[None])[0])
 
 
-def test_trust_is_what_is_found_at_a_place_of_what_the_camera_finds_elsewhere() -> None:
+def test_trust_is_the_local_detection_rate_relative_to_the_cameras() -> None:
     it = findable(prior=0.6, few=10.0, many=50.0)
     look(it, FAR, found=True, times=150)
     look(it, HERE, found=False, times=30)
@@ -106,13 +106,13 @@ def test_trust_is_what_is_found_at_a_place_of_what_the_camera_finds_elsewhere() 
     assert trust(it, HERE, camera=1) == 1.0, "as good as anywhere, as far as is known"
 
 
-def test_a_camera_that_finds_hardly_anybody_is_no_measure_of_its_places() -> None:
+def test_a_camera_with_few_detections_does_not_raise_trust() -> None:
     it = findable()
     look(it, HERE, found=False, times=450)
     assert trust(it, FAR) == pytest.approx(0.06 / 0.5)
 
 
-def test_whom_a_camera_does_not_find_that_finds_all_others_is_hidden() -> None:
+def test_a_person_missed_by_a_camera_that_detects_all_others_is_occluded() -> None:
     it = findable(prior=0.93, few=30.0, many=100.0)
     assert trust(it, HERE) == 1.0
     look(it, FAR, found=True, times=45)

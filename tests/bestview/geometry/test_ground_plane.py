@@ -33,13 +33,13 @@ def looking_along(height: float = 3.0, focal: float = 400.0) -> NDArray[np.float
 
 @settings(deadline=None, max_examples=60)
 @given(st.floats(-20, 20), st.floats(1, 50))
-def test_a_ground_point_comes_back_from_its_picture(x: float, y: float) -> None:
+def test_projection_to_the_picture_and_back_is_the_identity(x: float, y: float) -> None:
     pixel = np.array([320 + 400 * x / y, 240 + 400 * 3 / y])
     assert to_ground(looking_along(), pixel) == pytest.approx([x, y], rel=1e-6, abs=1e-6)
 
 
 @pytest.mark.parametrize("scale", [1.0, -2.5])
-def test_nobody_stands_on_or_above_the_horizon(scale: float) -> None:
+def test_points_on_or_above_the_horizon_have_no_ground_point(scale: float) -> None:
     points = np.array([[320, 239], [320, 240], [np.nan, 300], [320, 300]], float)
     ground = to_ground(scale * looking_along(), points)
     assert np.isnan(ground[:3]).all()
@@ -85,7 +85,7 @@ def test_a_camera_tilted_past_straight_down_has_the_floor_mirrored_and_shows_non
 
 
 @pytest.mark.parametrize("high", [1.9, 7.5])
-def test_the_camera_is_as_high_as_the_horizon_is_above_the_feet_of_somebody_as_tall(high: float) -> None:
+def test_camera_height_follows_from_the_horizon(high: float) -> None:
     for x in (100.0, 320.0):
         assert camera_height(looking_along(high), x) == pytest.approx(high)
     assert camera_height(np.diag([0.02, 0.02, 1.0]), 0.0) is None
@@ -95,14 +95,14 @@ def test_feet_are_in_the_middle_of_the_lower_edge() -> None:
     assert foot_points(np.array([[10, 20, 30, 80]], float)).tolist() == [[20, 80]]
 
 
-def test_a_person_is_as_tall_on_the_ground_as_in_the_picture() -> None:
+def test_person_height_on_the_ground_matches_the_picture() -> None:
     y, tall = 8.0, 1.75
     foot = 240 + 400 * 3 / y
     box = np.array([[400.0, foot - 400 * tall / y, 440.0, foot]])
     assert person_heights(looking_along(), box) == pytest.approx([tall])
 
 
-def test_how_far_off_somebody_stands_is_less_certain_than_in_which_direction() -> None:
+def test_distance_is_less_certain_than_direction() -> None:
     near, far = (np.array([310.0, 240 + 1200 / y - 700 / y, 330.0, 240 + 1200 / y]) for y in (5.0, 10.0))
     spreads = foot_covariance(looking_along(), np.array([near, far]), sideways=0.05, upwards=0.05)
     across, along = np.sqrt(spreads[:, 0, 0]), np.sqrt(spreads[:, 1, 1])
@@ -122,7 +122,7 @@ def test_how_far_off_somebody_stands_is_less_certain_than_in_which_direction() -
         ([[1, 0, 0], [0, 1], [0, 0, 1]], "of door is not a 3x3 matrix"),
     ],
 )
-def test_a_matrix_that_is_no_homography_is_refused_by_name(matrix: object, match: str) -> None:
+def test_an_invalid_homography_is_refused_with_the_cameras_name(matrix: object, match: str) -> None:
     with pytest.raises(ValueError, match=match) as refusal:
         validate_homography(matrix, "door")  # type: ignore[arg-type]
     assert "\n" not in str(refusal.value)
@@ -143,7 +143,7 @@ def test_the_recordings_homographies_are_accepted(shared_data: Path) -> None:
 
 @settings(deadline=None, max_examples=60)
 @given(st.floats(-20, 20), st.floats(0.1, 50) | st.floats(-50, -0.1), st.sampled_from([1.0, -2.5]))
-def test_a_place_is_where_its_picture_stands_and_what_lies_behind_the_camera_is_nowhere(
+def test_ground_points_project_to_the_picture_unless_behind_the_camera(
     x: float, y: float, scale: float
 ) -> None:
     homography = scale * looking_along()
@@ -155,14 +155,14 @@ def test_a_place_is_where_its_picture_stands_and_what_lies_behind_the_camera_is_
     assert np.isnan(from_ground(homography, np.array([np.nan, y]))).all()
 
 
-def test_feet_on_the_lower_edge_are_cut_off_and_boxes_that_reach_beyond_it_are_believed() -> None:
+def test_feet_on_the_lower_edge_are_cut_off_and_boxes_beyond_it_are_trusted() -> None:
     bottoms = np.array([100.0, 470.0, 476.0, 480.0, 484.0, 490.0, 560.0])
     boxes = np.stack([np.zeros(7), np.zeros(7), np.full(7, 50.0), bottoms], axis=-1)
     assert feet_cut_off(boxes, 480.0).tolist() == [False, False, True, True, True, False, False]
     assert not feet_cut_off(boxes, float("inf")).any()
 
 
-def test_who_is_seen_from_above_stands_in_the_middle_and_is_as_tall_as_others() -> None:
+def test_a_box_from_overhead_has_its_foot_point_in_the_middle() -> None:
     from_above = np.array([[100.0, 200.0, 140.0, 240.0], [np.nan] * 4])
     upright = upright_from_overhead(from_above)
     assert foot_points(upright)[0].tolist() == [120.0, 220.0]
@@ -172,6 +172,6 @@ def test_who_is_seen_from_above_stands_in_the_middle_and_is_as_tall_as_others() 
     assert not feet_cut_off(upright_from_overhead(np.array([[10.0, 440.0, 50.0, 480.0]])), 480.0).any()
 
 
-def test_a_box_from_above_that_is_inside_out_is_nobody_and_no_fault() -> None:
+def test_an_inverted_overhead_box_has_height_zero() -> None:
     inside_out = np.array([[140.0, 200.0, 100.0, 240.0]])  # warnings are errors in tests
     assert upright_from_overhead(inside_out).tolist() == [[140.0, 220.0, 100.0, 220.0]]

@@ -32,7 +32,7 @@ def in_all(body: BodyEstimates, grounds: np.ndarray) -> np.ndarray:
 
 @settings(deadline=None, max_examples=60)
 @given(st.floats(-1.2, 1.2), st.floats(-0.8, 0.8), st.integers(0, 1))
-def test_what_one_camera_sees_is_expected_there_again_and_where_they_are_in_the_other(
+def test_a_body_is_projected_into_its_own_and_the_other_camera(
     east: float, north: float, camera: int
 ) -> None:
     place = np.array([east, north])
@@ -48,7 +48,7 @@ def test_what_one_camera_sees_is_expected_there_again_and_where_they_are_in_the_
     assert boxes[1 - camera][3] - boxes[1 - camera][1] == pytest.approx(other[3] - other[1], rel=0.15)
 
 
-def test_the_camera_that_they_are_near_to_says_more() -> None:
+def test_the_nearer_camera_has_more_weight() -> None:
     near, far = camera_at(2.5, 0.0), camera_at(-9.0, 0.0)
     grounds = np.array([it.homography() for it in (near, far)])
     boxes = np.array([box_in(near, np.array([0.0, 0.0])), box_in(far, np.array([0.5, 0.0]))])
@@ -57,7 +57,7 @@ def test_the_camera_that_they_are_near_to_says_more() -> None:
     assert body.known_by.tolist() == [[True, True]]
 
 
-def test_feet_that_the_picture_cuts_off_and_boxes_that_are_none_stand_nowhere() -> None:
+def test_truncated_feet_and_empty_boxes_have_no_position() -> None:
     cut = np.array([300.0, 200.0, 340.0, 359.5])
     empty = np.array([300.0, 200.0, 300.0, 200.0])
     above = np.array([300.0, -90.0, 340.0, -10.0])
@@ -68,7 +68,7 @@ def test_feet_that_the_picture_cuts_off_and_boxes_that_are_none_stand_nowhere() 
     assert np.isnan(project_feet(body, GROUNDS)).all()
 
 
-def test_a_camera_does_not_see_what_is_behind_it() -> None:
+def test_points_behind_a_camera_are_not_projected() -> None:
     place = np.array([0.0, 0.0])
     away = camera_at(1.0, 0.0, towards=(5.0, 0.0))
     grounds = np.array([SOUTH.homography(), away.homography()])
@@ -80,7 +80,7 @@ def test_a_camera_does_not_see_what_is_behind_it() -> None:
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 2**32 - 1))
-def test_means_are_those_of_one_moment_after_the_other(seed: int) -> None:
+def test_means_equal_those_computed_one_by_one(seed: int) -> None:
     rng = np.random.default_rng(seed)
     places = rng.uniform(-0.8, 0.8, (20, 2))
     camera, moment = rng.integers(0, 2, 20), rng.integers(0, 6, 20)

@@ -30,7 +30,7 @@ def test_quality_and_cost_lie_between_0_and_1(box: list[float], width: float, he
     assert 0.0 <= view_cost(quality) <= 1.0
 
 
-def test_what_makes_no_sense_is_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     with pytest.raises(ValueError, match="no area"):
         size_quality(np.zeros((1, 4)), 0, 10)
     with pytest.raises(ValueError, match="shape"):

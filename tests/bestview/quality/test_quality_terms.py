@@ -53,17 +53,17 @@ def only(**weights: float) -> QualitySettings:
     return QualitySettings(**{**nothing, **weights})
 
 
-def test_who_is_inside_the_picture_and_clear_of_its_edges_is_whole() -> None:
+def test_a_box_clear_of_all_edges_is_not_truncated() -> None:
     boxes = np.array([box(20, 20), box(-5, 20), box(20, 40), box(20, 0), box(20, 60), box(200, 20)])
     assert visible_share(boxes, PICTURE) == pytest.approx([1.0, 0.5, 0.95, 0.95, 0.475, 0.0])
 
 
-def test_the_edge_counts_gradually() -> None:
+def test_truncation_grows_gradually_towards_an_edge() -> None:
     values = visible_share(np.array([box(20, 40 - gap) for gap in (0.0, 0.3, 0.6, 1.2, 5.0)]), PICTURE)
     assert values == pytest.approx([0.95, 0.9625, 0.975, 1.0, 1.0])
 
 
-def test_who_ends_at_a_side_is_as_much_of_a_person_as_the_box_is_wide() -> None:
+def test_a_slim_box_at_a_side_edge_is_truncated_by_its_width() -> None:
     slim, wide = 0.37 * 40.0 / 2.0, 0.37 * 40.0
     boxes = np.array([box(0, 20, slim), box(WIDTH - slim, 20, slim), box(0, 20, wide), box(0, 20, 2 * wide)])
     assert visible_share(boxes, PICTURE) == pytest.approx([0.5, 0.5, 1.0, 1.0])
@@ -75,7 +75,7 @@ def test_who_ends_at_a_side_is_as_much_of_a_person_as_the_box_is_wide() -> None:
     assert visible_share(beyond, PICTURE) == pytest.approx([0.5, 0.5]), "the part outside is told once"
 
 
-def test_who_is_in_the_middle_is_central() -> None:
+def test_centering_is_one_in_the_middle() -> None:
     boxes = np.array([box(45, 20), [-5.0, -20.0, 5.0, 20.0], [20.0, 20.0, 30.0, 60.0]])
     assert centering_score(boxes, PICTURE) == pytest.approx([1.0, 0.0, 1 - 25 / np.hypot(50, 40)])
 
@@ -86,13 +86,13 @@ def left_of(*boxes: list[float], cameras: tuple[int, ...] | None = None) -> list
     return [float(it) for it in unoccluded_share(np.array(boxes)[:, None], of)[:, 0]]
 
 
-def test_whose_feet_are_lower_hides_whom_they_cover() -> None:
+def test_the_person_with_lower_feet_occludes_the_other() -> None:
     near, far = box(20, 30), box(22, 20, 10, 40)
     assert left_of(near, far) == pytest.approx([1.0, 2 * (1 - 8 * 30 / 400)])
     assert left_of(near, far, cameras=(0, 1)) == [1.0, 1.0], "of two pictures"
 
 
-def test_half_of_somebody_is_enough_and_nothing_of_them_is_nothing() -> None:
+def test_half_a_visible_box_scores_one_and_none_scores_zero() -> None:
     half, nobody = box(25, 30), box(20, 30)
     behind = box(20, 20, 10, 40)
     assert left_of(behind, half) == [1.0, 1.0]
@@ -100,7 +100,7 @@ def test_half_of_somebody_is_enough_and_nothing_of_them_is_nothing() -> None:
     assert left_of(behind, nobody)[0] == pytest.approx(2 * 0.25)
 
 
-def test_of_two_at_one_distance_nobody_can_say_who_is_in_front() -> None:
+def test_at_equal_distance_both_people_are_half_occluded() -> None:
     assert left_of(box(20, 20), box(20, 20)) == [1.0, 1.0], "half of the box may be covered, in both"
 
 
@@ -133,7 +133,7 @@ def slowly(boxes: NDArray[np.float64], cameras: NDArray[np.int64]) -> NDArray[np
 
 @settings(deadline=None, max_examples=150)
 @given(TRACKS)
-def test_the_fast_way_finds_whom_the_slow_way_finds_hidden(
+def test_occlusion_equals_the_reference(
     tracks: list[tuple[int, list[list[float]]]],
 ) -> None:
     cameras = np.array([camera for camera, _ in tracks], dtype=np.int64)
@@ -141,7 +141,7 @@ def test_the_fast_way_finds_whom_the_slow_way_finds_hidden(
     assert unoccluded_share(boxes, cameras).tolist() == slowly(boxes, cameras).tolist(), "to the bit"
 
 
-def test_who_comes_faces_the_camera_and_who_goes_does_not() -> None:
+def test_walking_towards_the_camera_scores_one_and_away_zero() -> None:
     comes, goes, across, stands = (
         facing_score(walk(*way), FLOOR, FPS)[0] for way in ((0.0, 3.0), (0.0, -3.0), (3.0, 0.0), (0.0, 0.0))
     )
@@ -150,7 +150,7 @@ def test_who_comes_faces_the_camera_and_who_goes_does_not() -> None:
     assert (across, stands) == (pytest.approx(0.5), pytest.approx(0.5))
 
 
-def test_slow_steps_say_less_than_fast_ones_and_hidden_frames_nothing() -> None:
+def test_slow_walking_counts_less_and_hidden_frames_do_not_count() -> None:
     slow, fast = (facing_score(walk(0.0, speed), FLOOR, FPS)[0] for speed in (0.2, 2.0))
     assert 0.5 < slow < fast < 1.0
     gaps = walk(0.0, 2.0)
@@ -159,12 +159,12 @@ def test_slow_steps_say_less_than_fast_ones_and_hidden_frames_nothing() -> None:
     assert facing_score(np.full((2, 15, 4), np.nan), FLOOR, FPS).tolist() == [0.5, 0.5]
 
 
-def test_what_is_towards_the_camera_is_read_off_the_ground() -> None:
+def test_the_direction_towards_the_camera_comes_from_the_ground() -> None:
     turned = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     assert facing_score(walk(0.0, 3.0), turned, FPS)[0] == facing_score(walk(0.0, 3.0), FLOOR, FPS)[0]
 
 
-def test_size_alone_without_comparing_is_the_papers() -> None:
+def test_size_alone_without_relative_costs_is_the_papers_quality() -> None:
     boxes = np.random.default_rng(1).uniform(0, 80, (3, 4, 4))
     boxes[..., 2:] += boxes[..., :2]
     found = compute_view_quality(seen(boxes), looks(None, None), only(size=1.0))
@@ -177,7 +177,7 @@ WEIGHTS = st.fixed_dictionaries({name: st.floats(0, 1) for name in QualitySettin
 
 @settings(deadline=None, max_examples=60)
 @given(WEIGHTS, st.integers(0, 2**32 - 1))
-def test_the_quality_is_the_product_of_what_each_term_leaves(weights: dict[str, float], seed: int) -> None:
+def test_quality_is_the_product_of_the_weighted_terms(weights: dict[str, float], seed: int) -> None:
     rng = np.random.default_rng(seed)
     boxes = rng.uniform(-20, 90, (6, 5, 4))
     boxes[..., 2:] = boxes[..., :2] + rng.uniform(1, 60, (6, 5, 2))
@@ -196,7 +196,7 @@ def test_the_quality_is_the_product_of_what_each_term_leaves(weights: dict[str, 
     assert set(found.term_names) == {name for name, weight in terms.weights.items() if weight > 0}
 
 
-def test_what_nobody_has_measured_counts_as_sharp_and_a_doubtful_track_for_less() -> None:
+def test_unmeasured_sharpness_counts_as_one_and_low_confidence_lowers_quality() -> None:
     boxes = np.array(box(20, 20)).reshape(1, 1, 4)
     assert compute_view_quality(seen(boxes), looks(), only(sharpness=1.0)).quality.item() == 1.0
     assert compute_view_quality(
@@ -207,13 +207,13 @@ def test_what_nobody_has_measured_counts_as_sharp_and_a_doubtful_track_for_less(
     ).quality.item() == pytest.approx(0.4)
 
 
-def test_views_are_compared_with_the_best_of_the_moment() -> None:
+def test_relative_quality_compares_with_the_best_view_of_the_frame() -> None:
     quality = np.array([[[0.1, 0.2], [0.0, 0.0]]])
     assert relative_quality(quality, axis=2).tolist() == [[[0.5, 1.0], [0.0, 0.0]]]
     assert view_cost(relative_quality(quality, axis=2)).tolist() == [[[0.5, 0.0], [1.0, 1.0]]]
 
 
-def test_views_in_a_list_are_compared_alike() -> None:
+def test_relative_quality_of_a_list_of_views_is_the_same() -> None:
     quality = np.round(np.random.default_rng(2).uniform(-0.5, 1, (4, 6, 3)), 1).clip(0)
     moment = np.arange(24).repeat(3)
     assert (
@@ -222,7 +222,7 @@ def test_views_in_a_list_are_compared_alike() -> None:
     )
 
 
-def test_weights_and_shapes_that_make_no_sense_are_refused() -> None:
+def test_invalid_weights_and_shapes_are_refused() -> None:
     with pytest.raises(ValueError, match=r"facing is a share between 0 and 1, not 1\.5"):
         QualitySettings(facing=1.5)
     with pytest.raises(ValueError, match="all weights are 0"):

@@ -67,7 +67,7 @@ def test_gops_cost_the_same_to_the_bit(seed: int, first: int, data: st.DataObjec
 
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 3))
-def test_what_is_chosen_by_gops_costs_what_is_chosen_by_frames(seed: int, minimum_shot_gops: int) -> None:
+def test_selection_by_gop_equals_selection_by_frame(seed: int, minimum_shot_gops: int) -> None:
     views, worth = drawn(seed)
     rng = np.random.default_rng(seed)
     starts = np.arange(FRAMES) % 3 == 0
@@ -81,7 +81,7 @@ def test_what_is_chosen_by_gops_costs_what_is_chosen_by_frames(seed: int, minimu
     np.testing.assert_allclose(costs, by_frames.costs, rtol=1e-12)
 
 
-def test_some_of_the_people_cost_what_they_cost_among_all() -> None:
+def test_costs_of_a_subset_of_people_are_unchanged() -> None:
     views, _ = drawn(3)
     starts, weight = np.arange(FRAMES) % 2 == 0, np.ones(FRAMES)
     everybody, some = (

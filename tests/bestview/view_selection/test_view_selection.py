@@ -135,7 +135,7 @@ def test_no_sequence_of_cameras_is_better(
 
 @settings(deadline=None, max_examples=250)
 @given(windows(most_frames=6), st.integers(0, 4), st.integers(1, 4), st.data())
-def test_no_sequence_that_keeps_the_least_shot_is_better(
+def test_no_sequence_with_the_minimum_shot_is_better(
     window: tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]],
     minimum_shot_gops: int,
     age: int,
@@ -150,19 +150,19 @@ def test_no_sequence_that_keeps_the_least_shot_is_better(
         assert (choices.costs[k], tuple(choices.views[k])) == best
 
 
-def test_without_a_word_about_its_age_a_camera_may_be_left() -> None:
+def test_a_shot_of_unknown_age_may_end() -> None:
     cost, cuts = np.array([[[0.5, 0.0]] * 2]), np.ones(2, bool)
     assert select_views(cost, np.array([0]), 0.25, cuts, minimum_shot_gops=3).views.tolist() == [[1, 1]]
     young = select_views(cost, np.array([0]), 0.25, cuts, minimum_shot_gops=3, shot_ages=np.array([2]))
     assert young.views.tolist() == [[0, 1]], "shown for one GOP more, then left"
 
 
-def test_a_shot_may_be_short_where_its_camera_shows_nobody_any_more() -> None:
+def test_a_shot_may_be_short_if_its_camera_loses_the_object() -> None:
     cost, cuts = np.array([[[1.0, 0.25]] * 3]), np.ones(3, bool)
     assert select_views(cost, np.array([0]), 0.25, cuts, 9, np.array([1])).views.tolist() == [[1, 1, 1]]
 
 
-def test_what_is_seen_last_may_be_taken_to_go_on() -> None:
+def test_the_last_frames_can_be_weighted_to_extrapolate() -> None:
     cost, cuts = np.array([[[0.5, 0.5], [0.5, 0.25]]]), np.ones(2, bool)
     assert select_views(cost, np.array([0]), 1.0, cuts).views.tolist() == [[0, 0]]
     frame_weights = select_views(cost, np.array([0]), 1.0, cuts, weight=np.array([1.0, 8.0]))
@@ -172,7 +172,7 @@ def test_what_is_seen_last_may_be_taken_to_go_on() -> None:
 
 @settings(deadline=None, max_examples=100)
 @given(windows(), st.integers(0, 3), st.integers(1, 3))
-def test_the_first_gops_are_the_same_where_only_they_are_asked_for(
+def test_deciding_only_the_first_gops_gives_the_same_views(
     window: tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]],
     minimum_shot_gops: int,
     decided_gops: int,
@@ -226,21 +226,21 @@ def test_a_camera_missing_somewhere_in_a_gop_is_not_cut_to() -> None:
     assert choose(cost, 0, 0.0, [True, False, False, False]) == [0, 0, 0, 0]
 
 
-def test_a_camera_that_dies_inside_a_running_gop_is_shown_until_then() -> None:
+def test_a_camera_that_fails_within_a_running_gop_is_shown_until_then() -> None:
     cost = [[0.1, 0.9], [INF, 0.9], [0.1, 0.9], [0.1, 0.9]]
     assert choose(cost, 0, 0.5, [False, False, False, True]) == [0, -1, -1, 0]
 
 
-def test_a_hole_is_not_a_cut() -> None:
+def test_a_gap_is_not_a_cut() -> None:
     cost = [[0.5, 0.5], [INF, INF], [0.5, 0.25]]
     assert choose(cost, 0, 0.5, [True] * 3) == [0, -1, 0]
 
 
-def test_a_stream_cannot_begin_in_the_middle_of_a_gop() -> None:
+def test_a_stream_cannot_start_within_a_gop() -> None:
     assert choose([[0.1], [0.1], [0.1]], -1, 1.0, [False, True, False]) == [-1, 0, 0]
 
 
-def test_nothing_to_choose_from_gives_no_view() -> None:
+def test_without_cameras_there_is_no_view() -> None:
     nobody = select_views(np.zeros((0, 3, 2)), np.zeros(0, int), 1.0, np.ones(3, bool))
     blind = select_views(np.zeros((2, 3, 0)), np.full(2, -1), 1.0, np.ones(3, bool))
     assert nobody.views.shape == (0, 3)
@@ -248,7 +248,7 @@ def test_nothing_to_choose_from_gives_no_view() -> None:
     assert blind.costs.tolist() == [3.0, 3.0]
 
 
-def test_the_caller_keeps_its_arrays() -> None:
+def test_arguments_are_not_modified() -> None:
     cost, previous = np.array([[[0.5, 0.1]] * 3]), np.array([0])
     before = cost.copy()
     select_views(cost, previous, 0.1, np.ones(3, bool))
@@ -256,7 +256,7 @@ def test_the_caller_keeps_its_arrays() -> None:
     assert previous.tolist() == [0]
 
 
-def test_what_makes_no_sense_is_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     cost, cuts = np.zeros((1, 2, 2)), np.ones(2, bool)
 
     def refused(match: str, *arguments: object) -> None:
@@ -273,7 +273,7 @@ def test_what_makes_no_sense_is_refused() -> None:
     refused("weight", cost, np.array([0]), 1.0, cuts, 0, None, np.array([1.0, 0.0]))
 
 
-def test_a_thousand_objects_are_chosen_for_at_once() -> None:
+def test_a_thousand_objects_are_selected_at_once() -> None:
     rng = np.random.default_rng(7)
     cost = rng.random((1000, 25, 16))
     choices = select_views(cost, rng.integers(-1, 16, 1000), 2.0, np.arange(25) % 5 == 2)

@@ -18,7 +18,7 @@ class BlobSettings:
     """Background model and blob segmentation (section 3).
 
     Raises:
-        ValueError: a number makes no sense.
+        ValueError: a setting is out of range.
     """
 
     work_width: int = 320  # pixels; wider pictures are made smaller first
@@ -50,7 +50,7 @@ class TemporalSettings:
     """The window, its costs, and how people enter and leave.
 
     Raises:
-        ValueError: a number makes no sense.
+        ValueError: a setting is out of range.
     """
 
     window_stages: int = 5  # samples in a window: a sample is decided when so many have come; 1: at once

@@ -27,12 +27,10 @@ from tracking.detectors.background.height_model import (
 )
 from tracking.detectors.background.median import MedianBackground, MedianSettings
 from tracking.detectors.background.mog2 import Mog2Background, Mog2Settings
-from tracking.detectors.background.segmentation import Segmentation
-from tracking.detectors.background.shadow import ShadowSettings
+from tracking.detectors.background.segmentation import Segmentation, ShadowSettings
 from tracking.detectors.background.static_foreground import StaticForegroundSettings
-from tracking.detectors.base import Image, Mask
+from tracking.detectors.base import Image, Mask, require_at_least_one, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSettings
-from tracking.detectors.validation import require_at_least_one, validate_image
 from tracking.types import Detections
 
 # Pixels of the working picture per cell of the box filter, on each axis.

@@ -10,11 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.detectors.background.color_gain import apply_gains, channel_gains
-from tracking.detectors.background.segmentation import Segmentation
-from tracking.detectors.background.shadow import ShadowSettings, shadow_mask
+from tracking.detectors.background.segmentation import Segmentation, ShadowSettings, shadow_mask
 from tracking.detectors.background.static_foreground import StaticForegroundFilter, StaticForegroundSettings
-from tracking.detectors.base import Image, Mask
-from tracking.detectors.validation import require_at_least_one
+from tracking.detectors.base import Image, Mask, require_at_least_one
 
 
 @dataclass(frozen=True, slots=True)

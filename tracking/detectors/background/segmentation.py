@@ -1,10 +1,15 @@
-"""Result of a background model: foreground and shadow masks."""
+"""Foreground and shadow masks. A shadow is darker than the floor, but of the floor's color.
+
+Gray trousers look the same, so what looks like a shadow counts neither for a person nor against one.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tracking.detectors.base import Mask
+import numpy as np
+
+from tracking.detectors.base import Image, Mask
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -18,3 +23,37 @@ class Segmentation:
 
     foreground: Mask
     shadow: Mask
+
+
+@dataclass(frozen=True, slots=True)
+class ShadowSettings:
+    """What looks like a shadow, by the ratio of the frame to the background in each channel."""
+
+    enabled: bool = True
+    min_ratio: float = 0.6  # least mean ratio: darker is clothing
+    max_ratio: float = 0.97  # largest mean ratio: lighter is no shadow
+    max_chroma_spread: float = 0.03  # largest spread of the ratio over the channels, in shares of their mean
+
+
+def shadow_mask(image: Image, background: Image, foreground: Mask, settings: ShadowSettings) -> Mask:
+    """Return the part of the foreground `(H, W)` that looks like a shadow.
+
+    Args:
+        image: `(H, W, 3)`.
+        background: `(H, W, 3)` at the gain of the image.
+        foreground: `(H, W)`, 255 where the two differ.
+        settings: the thresholds.
+    """
+    found = np.zeros_like(foreground)
+    where = np.flatnonzero(foreground)
+    if not settings.enabled or not where.size:
+        return found
+    new = image.reshape(-1, 3)[where].astype(np.float32) + 1.0
+    old = background.reshape(-1, 3)[where].astype(np.float32) + 1.0
+    ratio = new / old
+    blue, green, red = ratio.T  # one by one: a sum over so short an axis takes three times as long
+    mean = (blue + green + red) / np.float32(3.0)
+    spread = np.maximum(np.maximum(blue, green), red) - np.minimum(np.minimum(blue, green), red)
+    darker = (mean >= settings.min_ratio) & (mean <= settings.max_ratio)
+    found.ravel()[where[darker & (spread <= settings.max_chroma_spread * mean)]] = 255
+    return found

@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tracking.detectors.base import Image, Mask, Plane
-from tracking.detectors.validation import require_at_least_one
+from tracking.detectors.base import Image, Mask, Plane, require_at_least_one
 
 _RING = np.ones((5, 5), dtype=np.uint8)
 _SMALL = np.ones((3, 3), dtype=np.uint8)

@@ -11,12 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import Floats
-from tracking.detectors.base import Image
+from tracking.detectors.base import Image, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor
 from tracking.detectors.ignore_mask import IgnoreFilter, Polygons
 from tracking.detectors.neural.yolo_output import Layout, decode_output
 from tracking.detectors.non_maximum_suppression import non_maximum_suppression
-from tracking.detectors.validation import validate_image
 from tracking.types import Detections
 
 _INPUTS: dict[str, type[np.floating]] = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
@@ -30,7 +29,7 @@ class OnnxSettings:
     """A YOLO-style network in an ONNX file.
 
     Raises:
-        ValueError: a setting makes no sense.
+        ValueError: a setting is out of range.
     """
 
     model: Path | None = None  # the file
