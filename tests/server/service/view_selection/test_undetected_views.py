@@ -90,11 +90,11 @@ def test_a_camera_that_never_finds_anybody_at_a_place_shows_nobody_there() -> No
 def test_nothing_is_learned_of_a_camera_that_is_not_there(speaks: bool) -> None:
     it = decider()
     decide(it, [FOUND] * 20)
-    trust = it._elsewhere._findable._shares.copy()
+    trust = it._elsewhere._findable._cell_rate.copy()
     for number in range(20, 40):
         away = word(B, number, {}, without_detection=[*range(number * STRIDE, (number + 1) * STRIDE)])
         it.step(epoch_of(number, word(A, number, FOUND[A]), *([away] if speaks else [])))
-    changed = np.abs(it._elsewhere._findable._shares - trust)
+    changed = np.abs(it._elsewhere._findable._cell_rate - trust)
     assert changed.max() < 0.05, "but for forgetting"
 
 
