@@ -63,11 +63,11 @@ def in_pictures(config: Config, camera: str) -> Frames:
     frames = Frames(pipeline.source.size, [], [])
     for pulse in count():
         try:
-            searched = pipeline.search(pulse, pipeline.take(pulse))
+            searched = pipeline.detect(pulse, pipeline.take(pulse))
         except SourceEndedError:
             break
         frames.found.append(searched.detections)
-        frames.looked.append(searched.looked)
+        frames.looked.append(searched.is_searched)
     pipeline.close()
     return frames
 
@@ -91,12 +91,16 @@ def followed(config: Config, frames: Mapping[str, Frames]) -> dict[str, list[Cam
     messages: dict[str, list[CameraTracks]] = {camera: [] for camera in frames}
     for pulse in range(max(len(it.found) for it in frames.values())):
         there = {camera: it for camera, it in cameras.items() if pulse < len(frames[camera].found)}
-        words = {camera: it.witness.word(pulse, it.told(pulse)) for camera, it in there.items() if it.witness}
+        words = {
+            camera: it.witness.build_message(pulse, it.told(pulse))
+            for camera, it in there.items()
+            if it.witness
+        }
         for camera, it in there.items():
             detections = frames[camera].found[pulse]
             if it.witness is not None:
                 others = [word for other, word in words.items() if other != camera]
-                detections = it.witness.scored(detections, others)
+                detections = it.witness.rescore(detections, others)
             result = it.tracker.push(pulse, detections)
             if result is not None:
                 messages[camera].append(it.reporter.regular(result))

@@ -1,1 +1,1 @@
-"""One camera: take, encode once, find, follow, publish."""
+"""One camera's process: sources, encoding, detection, tracking, publishing."""

@@ -1,4 +1,4 @@
-"""A recording's scene is learned before its first frame is searched: people are found from the start."""
+"""Warm-up of a recording's detector: the background is learned before the first frame."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ def warm_up_detector(
 ) -> CameraDetector:
     """Return a camera's detector, ready for the first frame where the source is a recording.
 
-    A live camera's learns as it goes.
+    The detector of a live camera learns its background while it runs.
 
     Raises:
         UserError: the detector's files or the recording cannot be read.
     """
     detector, settings = make_detector(config, camera, fit), config.detect
     if isinstance(detector, LetterboxedDetections) and isinstance(source, Recording):
-        detector.count_by(source.counted)
+        detector.number_frames_by(source.counted)
     if isinstance(detector, BackgroundDetector):
         places = range(0, settings.prescan_frames, settings.prescan_every)
         detector.prepare((fit.image(image) for image in source.ahead(places)), settings.prescan_every)

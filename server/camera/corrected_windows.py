@@ -1,4 +1,4 @@
-"""What is told of a window that somebody's pointing has mended: no more than what is new or has changed."""
+"""The frames to publish after an operator's correction: those that are new or have changed."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ import numpy as np
 from tracking import WindowResult, WindowTrack, merge_results
 
 
-def corrected_messages(result: WindowResult, anew: WindowResult) -> WindowResult:
-    """Return what to publish where a correction has had a window solved again.
+def corrected_messages(result: WindowResult, revised: WindowResult) -> WindowResult:
+    """Return the result to publish after a correction caused a window to be solved again.
 
-    It begins with the first frame that was told as final and has changed, or where nothing has with the first
-    frame that was not final; ``revised_from`` says which.
+    It begins with the first frame that was published as final and has changed, else with the first frame that
+    was not final; ``revised_from`` is set in the first case only.
 
     Args:
-        result: of the window, which nobody was told of yet.
-        anew: the same frames solved anew, and maybe more before them.
+        result: the window's result before the correction, not published yet.
+        revised: the result after it, which may begin earlier.
     """
-    changed = anew.revised_from
+    changed = revised.revised_from
     if changed is not None and changed < result.first:
-        return _from(anew, changed)
-    if anew.first <= result.first:
-        return replace(_from(anew, result.first), revised_from=None)
-    both = merge_results([result, anew])
+        return _from(revised, changed)
+    if revised.first <= result.first:
+        return replace(_from(revised, result.first), revised_from=None)
+    both = merge_results([result, revised])
     assert both is not None  # noqa: S101 — two make one
     return replace(both, revised_from=None)
 
 
 def _from(result: WindowResult, first: int) -> WindowResult:
-    """Leave out the frames before this one, and who is in none of the others."""
+    """Drop the frames before ``first``, and the tracks without a box in the others."""
     if first <= result.first:
         return result
     tracks = [_cut(it, result.first, first) for it in result.tracks]

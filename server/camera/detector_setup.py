@@ -34,16 +34,16 @@ _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
 
 class CameraDetector(Detector, Protocol):
-    """A detector that also knows the size of its appearance histograms, and when it cannot see."""
+    """A detector that also knows its histograms' length and whether it is still warming up."""
 
     @property
     def bins(self) -> int:
-        """Return that length: what a frame without a picture has to fit."""
+        """Bins of a detection's appearance histogram."""
         ...
 
     @property
     def warming_up(self) -> bool:
-        """Whether the last frame could not be searched: that nobody was found in it says nothing."""
+        """Whether detection did not run on the last frame, so that its empty result proves nothing."""
         ...
 
 
@@ -54,12 +54,12 @@ def make_detector(config: Config, camera: CameraSettings, fit: Letterbox) -> Cam
         UserError: the detection file or the network cannot be read, or the network cannot be run.
     """
     if camera.detections is not None:
-        with _told(f"camera {camera.id}: detections"):
+        with _as_user_error(f"camera {camera.id}: detections"):
             file = MotFileDetector(camera.detections, MotFileSettings(first_frame=camera.offset))
             return LetterboxedDetections(file, fit, config.detect)
     polygons = [fit.to_site(np.asarray(polygon, dtype=np.float64)) for polygon in camera.ignore]
     ignore = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in polygons)
-    with _told(f"camera {camera.id}: detect"):
+    with _as_user_error(f"camera {camera.id}: detect"):
         settings = replace(config.detect, ignore=(*config.detect.ignore, *ignore))
         if camera.kind == "overhead":
             return _of_kind(overhead_settings(settings), None)
@@ -67,13 +67,13 @@ def make_detector(config: Config, camera: CameraSettings, fit: Letterbox) -> Cam
 
 
 _PERSON_M = 1.7
-_LEAST_SLOPE, _MOST_SLOPE = 0.03, 1.5
-"""A person's height over the camera's: cameras at 1.1 to 57 metres. Beyond these the unit is another."""
+_MIN_SLOPE, _MAX_SLOPE = 0.03, 1.5
+"""A person's height over the camera's: cameras at 1.1 to 57 meters. Beyond, the unit is probably wrong."""
 
 
 def _floor(config: Config, camera: CameraSettings, fit: Letterbox) -> FloorGeometry | None:
-    """Return what the ground says about people's heights in the site's picture; None: nothing."""
-    per_metre = UNITS_PER_METER.get(camera.ground_unit or "")
+    """Return what the homography implies for people's heights in the site's picture; None: nothing."""
+    per_meter = UNITS_PER_METER.get(camera.ground_unit or "")
     if camera.ground is None:
         return None
     homography = np.array(camera.ground, dtype=np.float64)
@@ -82,16 +82,16 @@ def _floor(config: Config, camera: CameraSettings, fit: Letterbox) -> FloorGeome
     row = horizon_row(homography, middle)
     if row is None:
         return None
-    seen = float(fit.to_site(np.array([middle, row]))[1])
-    # Below the middle of the picture it says where people do not stand rather than how tall they are.
-    if seen > height / 2.0:
+    horizon = float(fit.to_site(np.array([middle, row]))[1])
+    # A horizon below the middle of the picture says little about people's heights.
+    if horizon > height / 2.0:
         return None
-    if per_metre is None:
-        # Far above the picture it is known badly, and there is no camera's height to check it by.
-        return FloorGeometry(seen, None) if seen >= -height else None
+    if per_meter is None:
+        # A horizon far above the picture is uncertain, and no camera height is known to check it.
+        return FloorGeometry(horizon, None) if horizon >= -height else None
     above = camera_height(homography, middle)
-    slope = _PERSON_M * per_metre / above if above else 0.0
-    return FloorGeometry(seen, slope) if _LEAST_SLOPE <= slope <= _MOST_SLOPE else None
+    slope = _PERSON_M * per_meter / above if above else 0.0
+    return FloorGeometry(horizon, slope) if _MIN_SLOPE <= slope <= _MAX_SLOPE else None
 
 
 def _of_kind(settings: DetectSettings, floor: FloorGeometry | None) -> CameraDetector:
@@ -109,11 +109,11 @@ def _of_kind(settings: DetectSettings, floor: FloorGeometry | None) -> CameraDet
 
 
 @contextmanager
-def _told(where: str) -> Iterator[None]:
-    """Turn what goes wrong into one line that begins with ``where``.
+def _as_user_error(where: str) -> Iterator[None]:
+    """Turn errors into a `UserError` of one line that begins with ``where``.
 
     Raises:
-        UserError: something went wrong.
+        UserError: a file or network is missing or invalid.
     """
     try:
         yield
@@ -131,19 +131,19 @@ class LetterboxedDetections:
     def __init__(self, file: MotFileDetector, fit: Letterbox, settings: DetectSettings) -> None:
         self._file, self._fit = file, fit
         self._looks = AppearanceExtractor(settings.appearance, settings.gray_bins)
-        self._counted: Callable[[int], int] = int
+        self._frame_number: Callable[[int], int] = int
 
-    def count_by(self, counted: Callable[[int], int]) -> None:
-        """Take the file's frames to be a recording's pictures one by one, whatever pulse each is shown at."""
-        self._counted = counted
+    def number_frames_by(self, frame_number: Callable[[int], int]) -> None:
+        """Map pulses to the file's frame numbers, which count a recording's pictures one by one."""
+        self._frame_number = frame_number
 
     @property
     def bins(self) -> int:
-        """The length of a row of the histograms."""
+        """Bins of a detection's appearance histogram."""
         return self._looks.bins
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:
-        """Return the detections of a frame, with the appearance that the site's picture shows."""
-        own = self._file.detect(_NO_PICTURE, None if frame is None else self._counted(frame))
+        """Return the detections of a frame, with appearance histograms from the site's picture."""
+        own = self._file.detect(_NO_PICTURE, None if frame is None else self._frame_number(frame))
         boxes = self._fit.boxes_to_site(own.boxes)
         return Detections(boxes, own.scores, self._looks.histograms(image, boxes))

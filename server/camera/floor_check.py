@@ -1,4 +1,4 @@
-"""Whether a camera can see the floor that its homography is about."""
+"""A check that a camera's homography puts some of its picture on the floor."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from server.system.errors import UserError
 
 
 def check_floor(camera: CameraSettings, size: tuple[int, int]) -> None:
-    """Refuse a homography by which nothing of the camera's own picture (width, height) is floor.
+    """Reject a homography that maps none of the camera's own picture (width, height) to the floor.
 
     Raises:
-        UserError: it is such a one: nobody would ever stand anywhere.
+        UserError: the whole picture lies above the horizon.
     """
     if camera.ground is not None and not shows_ground(np.array(camera.ground, dtype=np.float64), size):
         raise UserError(

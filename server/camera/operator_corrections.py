@@ -1,4 +1,4 @@
-"""Where an operator points in a camera's picture: what comes over the bus, until the tracker takes it."""
+"""Inbox of position corrections: from the bus until the tracker takes them."""
 
 from __future__ import annotations
 
@@ -10,45 +10,45 @@ import msgspec
 from logthrottle import LogThrottle
 from server.messaging.inbox import Message
 from server.messaging.messages import DECODE_ERRORS
-from server.messaging.operator_messages import OPERATOR_POINTS_MAX, OperatorPoints
+from server.messaging.operator_messages import CORRECTIONS_MAX, PositionCorrections
 from tracking.interactive import PositionCorrection
 
 log = logging.getLogger(__name__)
 
-_DECODER = msgspec.json.Decoder(OperatorPoints)
+_DECODER = msgspec.json.Decoder(PositionCorrections)
 
 
 class CorrectionInbox:
-    """Keeps the newest corrections of one run of a camera. Messages that cannot be parsed are counted."""
+    """Holds the newest corrections for one run of a camera, and counts messages that cannot be parsed."""
 
     def __init__(self, camera: str, boot: int) -> None:
         self._camera, self._boot = camera, boot
-        self._waiting: deque[PositionCorrection] = deque(maxlen=OPERATOR_POINTS_MAX)
+        self._waiting: deque[PositionCorrection] = deque(maxlen=CORRECTIONS_MAX)
         self.taken = 0
-        """Places that the tracker was given."""
+        """Corrections passed to the tracker."""
         self.bad_messages = 0
         self._bad = LogThrottle()
 
     def put(self, message: Message) -> None:
-        """Take a message in; what is said of another run's tracks is of nobody here."""
+        """Add a message's corrections; those for another run's tracks are ignored."""
         try:
-            said = _DECODER.decode(message.payload)
+            decoded = _DECODER.decode(message.payload)
         except DECODE_ERRORS as error:
             self.bad_messages += 1
             if (more := self._bad.record(str(error))) is not None:
-                told = "camera %s: a message on %s is none: %s%s"
-                log.warning(told, self._camera, message.key, error, more)
+                text = "camera %s: cannot parse a message on %s: %s%s"
+                log.warning(text, self._camera, message.key, error, more)
             return
         if ended := self._bad.end():
-            told = "camera %s: where somebody points is understood again; %d messages were not"
-            log.info(told, self._camera, ended.count)
-        if said.boot == self._boot:
+            text = "camera %s: position corrections can be parsed again; %d messages could not"
+            log.info(text, self._camera, ended.count)
+        if decoded.boot == self._boot:
             self._waiting.extend(
-                PositionCorrection(it.pulse, it.track, it.x, it.y, it.tolerance) for it in said.points
+                PositionCorrection(it.pulse, it.track, it.x, it.y, it.tolerance) for it in decoded.corrections
             )
 
     def take(self) -> list[PositionCorrection]:
-        """Return what has come since this was last asked, in its order."""
+        """Take out the corrections that came since the last call, in order."""
         taken = list(self._waiting)
         self._waiting.clear()
         self.taken += len(taken)

@@ -1,4 +1,4 @@
-"""What one camera does with a frame, live and offline alike: the same frames give the same tracks."""
+"""The processing of one camera's frames, live and offline: the same frames give the same tracks."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from server.camera.tracker_setup import set_up_tracker
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks, FrameDetections
-from server.messaging.operator_messages import OPERATOR_POINTS_MAX
+from server.messaging.operator_messages import CORRECTIONS_MAX
 from tracking import Detections, create_solver
 from tracking.interactive import PositionCorrection
 
-_BY_ITSELF = PeerDetections()
-_TOLD_MOST = 50_000
-"""Frames of one hole that are told of, the last ones: a machine that slept has missed millions."""
+_NO_PEERS = PeerDetections()
+_REPORTED_GAP_MAX = 50_000
+"""Missed frames of one gap to report, the last ones: after a suspend millions are missing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,39 +37,40 @@ class DetectedFrame:
 
     Attributes:
         pulse: its pulse.
-        image: the picture; None: there was none to search.
-        detections: what was found.
-        looked: whether it could be searched; otherwise it says nothing that nobody was found.
-        word: that, for the other cameras; None where nobody goes by it.
-        left_out: it was left out on purpose.
+        image: the picture; None: there was none.
+        detections: the detections.
+        is_searched: whether detection ran; otherwise the empty result proves nothing.
+        message: the detections as sent to the peer cameras; None without peers.
+        skipped: load shedding left the frame out.
     """
 
     pulse: int
     image: Image | None
     detections: Detections
-    looked: bool
-    word: FrameDetections | None
-    left_out: bool = False
+    is_searched: bool
+    message: FrameDetections | None
+    skipped: bool = False
 
     @property
-    def asks(self) -> bool:
-        """Whether what others found in this frame can change anything."""
-        return self.word is not None and len(self.detections) > 0
+    def needs_peers(self) -> bool:
+        """Whether the peers' detections of this frame can change a score."""
+        return self.message is not None and len(self.detections) > 0
 
 
-_WAITS_S = 2.0
-"""How long nothing may come of a camera that passes through before it counts as away."""
+_AWAY_AFTER_S = 2.0
+"""Seconds without pictures after which a passthrough camera counts as away."""
 
 
 class CameraPipeline:
     """Source, encoder, detector and tracker of one camera, without a clock and without a network.
 
-    ``take`` and ``encode`` may run in one thread, ``search`` and ``follow`` in another: they share nothing.
+    ``take`` and ``encode`` may run in one thread, ``detect`` and ``track_detections`` in another: they share
+    no state.
 
-    ``ready``: for the first frame, which takes seconds; else it is only looked whether all can be opened.
+    ``ready``: warm up for the first frame, which takes seconds; otherwise only check that everything opens.
 
     Raises:
-        UserError: the source or the detections cannot be opened, or the homography is of no such picture.
+        UserError: the source or the detections cannot be opened, or the homography does not fit the picture.
     """
 
     def __init__(
@@ -83,10 +84,10 @@ class CameraPipeline:
     ) -> None:
         camera, site = config.camera(camera_id), config.site
         own = open_passthrough(config, camera, listener)
-        self.passes = own.source is not None
-        """The source's own H.264 is passed on."""
+        self.is_passthrough = own.source is not None
+        """Whether the source's own H.264 is passed on."""
         self.why_encoded = own.why
-        """Why it is not, where it could have been; empty: nobody wished it."""
+        """Why not, where the configuration allows it; empty: it was not requested."""
         self.source: PictureSource = own.source or open_source(camera, site, listener, ready=ready)
         self._fit = Letterbox(self.source.size, (site.width, site.height))
         check_floor(camera, self.source.size)
@@ -109,18 +110,18 @@ class CameraPipeline:
         self._tracker = FrameSkipper(tracker, self._detector.bins, track.window.stride)
         self._reporter = TrackMessageBuilder(camera_id, boot, self.source.size, track.window.stride)
         self._sharpness = SharpnessMemory() if config.view.quality.sharpness > 0 else None
-        self.witness = (
+        self.cross_view = (
             CrossViewScorer(config, camera_id, self.source.size, boot)
             if config.witnesses(camera_id)
             else None
         )
-        self.begins = camera.offset if self.source.recorded else 0
-        """The pulse at which the pictures begin."""
+        self.first_pulse = camera.offset if self.source.recorded else 0
+        """The pulse of the first picture."""
         self._last: int | None = None
-        self._pointings: deque[PositionCorrection] = deque(maxlen=OPERATOR_POINTS_MAX)
-        self._without = 0
+        self._corrections: deque[PositionCorrection] = deque(maxlen=CORRECTIONS_MAX)
+        self._missing = 0
         """Pulses since the last picture."""
-        self._patience = round(_WAITS_S * site.fps) + config.encode.gop
+        self._patience = round(_AWAY_AFTER_S * site.fps) + config.encode.gop
 
     def take(self, pulse: int) -> Image | None:
         """Return the site-sized picture of a pulse, None where the source has none yet.
@@ -130,95 +131,97 @@ class CameraPipeline:
         """
         own = self.source.take(pulse)
         if own is None:
-            self._without += 1
+            self._missing += 1
             return None
-        self._without = 0
+        self._missing = 0
         return self._fit.image(own)
 
     @property
     def away(self) -> bool:
-        """Whether a camera gives no pictures; one that passes through may only wait for a GOP to begin."""
-        return not self.source.recorded and self._without > (self._patience if self.passes else 0)
+        """Whether a live camera gives no pictures; a passthrough camera may be waiting for a GOP to begin."""
+        return not self.source.recorded and self._missing > (self._patience if self.is_passthrough else 0)
 
     def encode(self, pulse: int, image: Image) -> AccessUnit:
-        """Encode the picture of a pulse, the last one that was taken."""
+        """Encode the picture of a pulse, which was the last one taken."""
         return self._encoder.encode(pulse, image)
 
     def track(self, pulse: int, image: Image | None) -> CameraTracks | None:
-        """Search a frame and follow everybody into it by what this camera sees itself."""
-        return self.follow(self.search(pulse, image))
+        """Detect and track in a frame without the peer cameras."""
+        return self.track_detections(self.detect(pulse, image))
 
-    def search(self, pulse: int, image: Image | None, *, left_out: bool = False) -> DetectedFrame:
-        """Look for people in a frame, which has no image where it was not taken, or has to be left out.
+    def detect(self, pulse: int, image: Image | None, *, skipped: bool = False) -> DetectedFrame:
+        """Detect people in a frame; ``image`` is None where it was not taken or is skipped.
 
-        ``left_out``: on purpose, so that the frames around it tell who was there. Pulses must grow.
+        ``skipped``: left out by load shedding; detections are interpolated from the frames around it. Pulses
+        must ascend.
         """
         if image is None:
-            detections, looked = Detections.empty(self._detector.bins), False
+            detections, is_searched = Detections.empty(self._detector.bins), False
         else:
             detections = self._detector.detect(image, pulse)
-            looked = not self._detector.warming_up
-        word = self.witness.word(pulse, detections if looked else None) if self.witness else None
-        return DetectedFrame(pulse, image, detections, looked, word, left_out=left_out)
+            is_searched = not self._detector.warming_up
+        word = (
+            self.cross_view.build_message(pulse, detections if is_searched else None)
+            if self.cross_view
+            else None
+        )
+        return DetectedFrame(pulse, image, detections, is_searched, word, skipped=skipped)
 
-    def follow(
+    def track_detections(
         self,
-        searched: DetectedFrame,
-        heard: PeerDetections = _BY_ITSELF,
-        pointings: Sequence[PositionCorrection] = (),
+        frame: DetectedFrame,
+        peers: PeerDetections = _NO_PEERS,
+        corrections: Sequence[PositionCorrection] = (),
     ) -> CameraTracks | None:
-        """Follow everybody into a frame; give the tracks when a window has ended.
+        """Update the tracks with a frame's detections; return the track message when a window has ended.
 
-        Where somebody points waits for that, and mends the past with it: there is one message of each epoch.
+        Corrections wait for the window's end, so that there is one message per epoch.
 
-        A pulse that does not come, or has no image, is a frame in which nobody was seen; the camera's report
-        says which those were, but for the time before a recording begins. It also says in which frames
-        some other camera's word was not there.
+        A missed pulse, or one without an image, counts as a frame without detections; the message lists these
+        frames, except those before a recording begins, and the frames without all peers' detections.
         """
-        pulse, detections = searched.pulse, searched.detections
+        pulse, detections = frame.pulse, frame.detections
         if self._last is not None:
-            missed = range(max(self._last + 1, pulse - _TOLD_MOST), pulse)
+            missed = range(max(self._last + 1, pulse - _REPORTED_GAP_MAX), pulse)
             self._reporter.shed(missed)
             self._reporter.unsearched(missed)
         self._last = pulse
-        if not searched.looked:
+        if not frame.is_searched:
             self._reporter.unsearched([pulse])
-        if searched.image is None and pulse >= self.begins:
+        if frame.image is None and pulse >= self.first_pulse:
             self._reporter.shed([pulse])
-        if self.witness is not None and searched.asks:
-            detections = self.witness.scored(detections, heard.words)
-            if heard.alone:
-                self._reporter.alone(pulse)
+        if self.cross_view is not None and frame.needs_peers:
+            detections = self.cross_view.rescore(detections, peers.messages)
+            if peers.is_incomplete:
+                self._reporter.without_peers(pulse)
         result = (
-            self._tracker.leave_out(pulse)
-            if searched.left_out
-            else self._tracker.push(pulse, detections, searched.image)
+            self._tracker.skip(pulse) if frame.skipped else self._tracker.push(pulse, detections, frame.image)
         )
-        self._pointings.extend(pointings)
+        self._corrections.extend(corrections)
         if result is None:
             return None
-        if self._pointings:
-            anew = self._tracker.point(list(self._pointings))
-            self._pointings.clear()
-            result = result if anew is None else corrected_messages(result, anew)
-        return self._measured(self._reporter.regular(result), searched.image)
+        if self._corrections:
+            revised = self._tracker.apply_corrections(list(self._corrections))
+            self._corrections.clear()
+            result = result if revised is None else corrected_messages(result, revised)
+        return self._with_sharpness(self._reporter.regular(result), frame.image)
 
-    def last_word(self, end: int) -> FrameDetections | None:
-        """Return what the other cameras are told when the recording has no frame ``end``."""
-        return None if self.witness is None else self.witness.word(end, None, ended=True)
+    def end_message(self, end: int) -> FrameDetections | None:
+        """Return the message that ends this camera's detections; the recording has no frame ``end``."""
+        return None if self.cross_view is None else self.cross_view.build_message(end, None, ended=True)
 
     def finish(self, end: int) -> CameraTracks:
-        """Close the recording, which has no frame ``end``: what is provisional becomes final.
+        """End tracking at the recording's end, which has no frame ``end``: provisional frames become final.
 
-        A camera that was started again after its recording was over says so, too.
+        A camera restarted after its recording had ended reports the end as well.
         """
         last = end - 1 if self._last is None else self._last
-        return self._measured(self._reporter.closing(self._tracker.flush(), last), None)
+        return self._with_sharpness(self._reporter.closing(self._tracker.flush(), last), None)
 
-    def _measured(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
-        """Return how sharp everybody is, where that counts."""
+    def _with_sharpness(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
+        """Add each track's sharpness, where view quality uses it."""
         return tracks if self._sharpness is None else self._sharpness.measured(tracks, image)
 
     def close(self) -> None:
-        """Let go of the source."""
+        """Close the source."""
         self.source.close()

@@ -1,4 +1,4 @@
-"""One camera's process: on every pulse take a frame, encode it, publish it, and follow everybody in it."""
+"""One camera's process: on every pulse it takes a frame, encodes and publishes it, and updates the tracks."""
 
 from __future__ import annotations
 
@@ -43,27 +43,27 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 _STATUS_EVERY_S = 1.0
-_MARKS_PER_PICTURE = 10
-"""Frame numbers that may wait for each picture that may; more are left out, as if missed."""
+_FRAMES_PER_IMAGE = 10
+"""Frames that may wait for tracking per image that may wait; further ones count as missed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Waiting:
-    """A frame on its way to the tracker.
+class _QueuedFrame:
+    """A frame in the queue to the tracker.
 
     Attributes:
         pulse: its pulse.
-        image: the picture; None: there is none, or it waits no more.
+        image: the picture; None: there was none, or it was shed.
         taken: when it was taken, by the loop's clock.
         due: when its pulse was due, likewise.
-        left_out: it was not taken, on purpose.
+        skipped: load shedding left it out.
     """
 
     pulse: int
     image: Image | None
     taken: float
     due: float
-    left_out: bool = False
+    skipped: bool = False
 
 
 class CameraProcess:
@@ -83,7 +83,7 @@ class CameraProcess:
         self._sound = open_audio(config, camera_id)
         listener = self._sound if isinstance(self._sound, LiveAudioSource) else None
         self._pipeline = CameraPipeline(config, camera_id, self._boot, listener)
-        if self._pipeline.passes:
+        if self._pipeline.is_passthrough:
             log.info("camera %s: its own H.264 passes through", camera_id)
         elif self._pipeline.why_encoded:
             log.warning("camera %s is re-encoded: its own H.264: %s", camera_id, self._pipeline.why_encoded)
@@ -91,16 +91,16 @@ class CameraProcess:
         self._tracking = ThreadPoolExecutor(1, "tracking")
         fps = config.site.fps
         self._backlog_pictures = max(1, round(config.track.backlog_s * fps))
-        self._backlog: asyncio.Queue[_Waiting | None] = asyncio.Queue(
-            maxsize=_MARKS_PER_PICTURE * self._backlog_pictures
+        self._backlog: asyncio.Queue[_QueuedFrame | None] = asyncio.Queue(
+            maxsize=_FRAMES_PER_IMAGE * self._backlog_pictures
         )
-        # What passes through is decoded from picture to picture, and a recording is shown whole.
-        live = not (self._pipeline.source.recorded or self._pipeline.passes)
+        # Passthrough frames depend on each other, and a recording is shown whole: neither drops frames.
+        live = not (self._pipeline.source.recorded or self._pipeline.is_passthrough)
         self._load = LoadMonitor(config, camera_id, live=live)
         self._exchange = PeerDetectionExchange(
-            config, camera_id, self._pipeline.witness, self._backlog.maxsize
+            config, camera_id, self._pipeline.cross_view, self._backlog.maxsize
         )
-        self._pointed = CorrectionInbox(camera_id, self._boot)
+        self._corrections = CorrectionInbox(camera_id, self._boot)
         self._meter = StatusMeter(fps)
         self._state: CameraState = "starting"
         self._end = 0
@@ -108,23 +108,23 @@ class CameraProcess:
         self._bus: Bus | None = None
 
     async def run(self) -> None:
-        """Serve until the recording is over (a camera's never is)."""
+        """Run until the recording ends; a live camera never does."""
         self._bus = bus = Bus.client(self._config.zenoh, self._id)
         try:
             if self._config.track.assist.enabled:
-                bus.subscribe(self._keys.camera(self._id, "operator_points"), self._pointed.put)
-            keeping = RetainedState(partial(self._publish, "retained_identities"))
-            bus.subscribe(self._keys.camera(self._id, "identities"), keeping.put)
-            bus.watch_alive(self._keys.bestview("**"), lambda _, there: keeping.service(there))
+                bus.subscribe(self._keys.camera(self._id, "position_corrections"), self._corrections.put)
+            retained = RetainedState(partial(self._publish, "retained_identities"))
+            bus.subscribe(self._keys.camera(self._id, "identities"), retained.put)
+            bus.watch_alive(self._keys.bestview("**"), lambda _, there: retained.service(there))
             await self._wait_for_bestview(bus)
             bus.declare_alive(self._keys.camera(self._id, "alive"))
             await self._exchange.join()
             video = asyncio.create_task(self._follow_pulses(), name="pulses")
             tracking = asyncio.create_task(self._track(), name="track")
-            status = asyncio.create_task(self._tell_status(), name="status")
+            status = asyncio.create_task(self._send_status_periodically(), name="status")
             tasks = (video, tracking, status)
             try:
-                await self._until_over(video, tracking, status)
+                await self._wait_until_done(video, tracking, status)
                 self._send_status()
             finally:
                 for task in tasks:
@@ -134,16 +134,16 @@ class CameraProcess:
             try:
                 await self._exchange.leave()
             finally:
-                bus.close()  # or the process would never end
+                bus.close()  # otherwise the process would not exit
             self._video.shutdown(wait=True)
             self._tracking.shutdown(wait=True)
             self._pipeline.close()
 
     @staticmethod
-    async def _until_over(
+    async def _wait_until_done(
         video: asyncio.Task[None], tracking: asyncio.Task[None], status: asyncio.Task[None]
     ) -> None:
-        """Wait for video and tracking; an error in any ends the process, which is then started anew."""
+        """Wait for video and tracking to end; an error in any task ends the process."""
         left = {video, tracking, status}
         while left - {status}:
             over, left = await asyncio.wait(left, return_when=asyncio.FIRST_COMPLETED)
@@ -151,7 +151,7 @@ class CameraProcess:
                 task.result()
 
     async def _wait_for_bestview(self, bus: Bus) -> None:
-        """Wait until frames have somewhere to go: what is sent to nobody is lost, and with it frame 0."""
+        """Wait for the best-view service: frames published before it connects are lost, frame 0 included."""
         there = asyncio.Event()
         bus.watch_alive(self._keys.bestview("alive"), lambda _, alive: there.set() if alive else None)
         try:
@@ -165,7 +165,7 @@ class CameraProcess:
 
     async def _follow_pulses(self) -> None:
         sync, fps = self._config.sync, self._config.site.fps
-        # A recording makes up for a stall; a camera goes on with its newest picture.
+        # After a stall a recording catches up; a live camera continues with its newest picture.
         settings = ClientSettings(queue=2, free_run_after=sync.start_timeout_s)
         if self._pipeline.source.recorded:
             settings = replace(settings, queue=self._backlog_pictures, catch_up=self._config.track.backlog_s)
@@ -185,17 +185,17 @@ class CameraProcess:
                 try:
                     await self._on_pulse(pulse, pulses.now() - pulse.due)
                 except SourceEndedError:
-                    log.info("camera %s: the recording is over", self._id)
+                    log.info("camera %s: the recording has ended", self._id)
                     self._state, self._end = "ended", pulse.number
                     await self._backlog.put(None)
                     return
 
     async def _on_pulse(self, pulse: Pulse, late: float) -> None:
         due = asyncio.get_running_loop().time() - late
-        await self._send_sound(pulse.number)
+        await self._send_audio(pulse.number)
         if not self._load.takes(pulse.number):
             self._meter.missed(pulse.number, 1 + pulse.missed)
-            self._queue_for_tracking(pulse.number, None, due, left_out=True)
+            self._queue_for_tracking(pulse.number, None, due, skipped=True)
             return
         image = await self._in(self._video, lambda: self._pipeline.take(pulse.number))
         if image is None:
@@ -220,8 +220,8 @@ class CameraProcess:
         self._meter.frame(pulse.number, pulse.missed)
         self._queue_for_tracking(pulse.number, image, due)
 
-    async def _send_sound(self, pulse: int) -> None:
-        """Send what sounds about this pulse, if this is the process to do so."""
+    async def _send_audio(self, pulse: int) -> None:
+        """Publish the audio of this pulse, if this process has the site's audio source."""
         sound = self._sound
         if sound is None:
             return
@@ -232,46 +232,46 @@ class CameraProcess:
                 self._bus.publish(self._keys.sound, data, msgspec.json.encode(head))
 
     def _queue_for_tracking(
-        self, pulse: int, image: Image | None, due: float, *, left_out: bool = False
+        self, pulse: int, image: Image | None, due: float, *, skipped: bool = False
     ) -> None:
-        """Hand a frame to the tracker; when it is far behind, only the frame's number."""
+        """Queue a frame for the tracker, without its image where tracking is far behind."""
         shed = image is not None and self._backlog.qsize() >= self._backlog_pictures
         if shed:
             self._meter.shed()
         if not self._backlog.full():
             now = asyncio.get_running_loop().time()
-            self._backlog.put_nowait(_Waiting(pulse, None if shed else image, now, due, left_out))
+            self._backlog.put_nowait(_QueuedFrame(pulse, None if shed else image, now, due, skipped))
 
     async def _track(self) -> None:
-        """Follow everybody, frame by frame, behind the video."""
+        """Detect and track, frame by frame, behind the video."""
         thumbs_every = max(1, round(self._config.site.fps))
-        took: list[float] = []
+        detect_times: list[float] = []
         while (item := await self._backlog.get()) is not None:
-            pulse, image, left_out = item.pulse, item.image, item.left_out
+            pulse, image, skipped = item.pulse, item.image, item.skipped
             if image is not None and not self._load.searches(pulse):
-                image, left_out = None, True
+                image, skipped = None, True
                 self._meter.shed()
             began = time.perf_counter()
-            search = partial(self._pipeline.search, pulse, image, left_out=left_out)
-            searched = await self._in(self._tracking, search)
+            detect = partial(self._pipeline.detect, pulse, image, skipped=skipped)
+            frame = await self._in(self._tracking, detect)
             if image is not None:
-                took.append(time.perf_counter() - began)
+                detect_times.append(time.perf_counter() - began)
             now = asyncio.get_running_loop().time()
-            self._load.measured(now - item.due, now)
-            heard = await self._exchange.of(pulse, searched.word, item.taken, needed=searched.asks)
+            self._load.measure_lag(now - item.due, now)
+            peers = await self._exchange.exchange(pulse, frame.message, item.taken, needed=frame.needs_peers)
             began = time.perf_counter()
-            follow = partial(self._pipeline.follow, searched, heard, self._pointed.take())
-            tracks = await self._in(self._tracking, follow)
+            track = partial(self._pipeline.track_detections, frame, peers, self._corrections.take())
+            tracks = await self._in(self._tracking, track)
             if tracks is None:
                 continue
-            search_s, solve_s = fmean(took) if took else None, time.perf_counter() - began
-            took.clear()
+            search_s, solve_s = fmean(detect_times) if detect_times else None, time.perf_counter() - began
+            detect_times.clear()
             self._send_tracks(msgspec.structs.replace(tracks, search_s=search_s, solve_s=solve_s))
             if image is not None and tracks.epoch * self._config.track.window.stride % thumbs_every < (
                 self._config.track.window.stride
             ):
                 await self._send_thumbnails(image, tracks)
-        await self._exchange.end(self._pipeline.last_word(self._end))
+        await self._exchange.publish_end(self._pipeline.end_message(self._end))
         self._send_tracks(await self._in(self._tracking, lambda: self._pipeline.finish(self._end)))
 
     def _send_tracks(self, tracks: CameraTracks) -> None:
@@ -283,7 +283,7 @@ class CameraProcess:
             head = ThumbnailHeader(track=track, boot=self._boot, pulse=tracks.last)
             self._publish(f"thumbs/{track}", jpeg, msgspec.json.encode(head))
 
-    async def _tell_status(self) -> None:
+    async def _send_status_periodically(self) -> None:
         while True:
             self._send_status()
             await asyncio.sleep(_STATUS_EVERY_S)
@@ -292,8 +292,10 @@ class CameraProcess:
         status: CameraStatus = self._meter.status(
             self._id, self._boot, self._state, self._backlog.qsize(), self._load
         )
-        bad = self._exchange.bad_messages + self._pointed.bad_messages
-        status = msgspec.structs.replace(status, operator_points=self._pointed.taken, bad_messages=bad)
+        bad = self._exchange.bad_messages + self._corrections.bad_messages
+        status = msgspec.structs.replace(
+            status, position_corrections=self._corrections.taken, bad_messages=bad
+        )
         self._publish("status", msgspec.json.encode(status))
 
     def _publish(self, what: str, payload: bytes, attachment: bytes | None = None) -> None:

@@ -1,4 +1,4 @@
-"""What a camera keeps for the best-view service, which may be started anew: who its tracks are."""
+"""Identity state that a camera retains for a best-view service that restarts."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from server.messaging.inbox import Message
 
 
 class RetainedState:
-    """Keeps the newest state of the service, unread, and sends it to every service that starts.
+    """Holds the newest state of the service, undecoded, and sends it to every service that starts.
 
-    ``send`` sends it.
+    ``send`` publishes it.
     """
 
     def __init__(self, send: Callable[[bytes], None]) -> None:
         self._send = send
-        self._kept = b""
+        self._state = b""
 
     def put(self, message: Message) -> None:
-        """Take a word in the place of the one before; one that is too long is not kept."""
+        """Replace the state; one that is too long is ignored."""
         if len(message.payload) <= SNAPSHOT_BYTES_MAX:
-            self._kept = message.payload
+            self._state = message.payload
 
-    def service(self, there: bool) -> None:
-        """Send the retained state to a service that appeared; an empty one too, so that it need not wait."""
-        if there:
-            self._send(self._kept)
+    def service(self, is_present: bool) -> None:
+        """Send the state to a service that appeared, even if empty, so that it does not wait."""
+        if is_present:
+            self._send(self._state)

@@ -1,4 +1,4 @@
-"""How sharp the picture of each person is: measured once a window, on its last frame."""
+"""Sharpness of each person's picture, measured once a window on its last frame."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from server.camera.sources import Image
 from server.messaging.messages import Box, CameraTracks
 
 _WIDTH, _HEIGHT = 32, 64
-"""Everybody is brought to this size first, so that what counts is detail of the person, not of the pixels."""
+"""People are scaled to this size first, so that detail is measured per person, not per pixel."""
 
 _NOISE = 25.0
-"""Grey levels squared: contrast below this is the camera's noise."""
+"""Gray levels squared: contrast below this is the camera's noise."""
 
 _HALF = 0.25
 """The share of detail in the contrast that counts as half sharp: people blurred by about a fiftieth of their
 height are below it, people in focus above it."""
 
-_LEAST = 4
-"""Pixels of a side below which nothing can be said."""
+_MIN_SIDE = 4
+"""Pixels of a side below which sharpness is not measured."""
 
 
 class SharpnessMemory:
@@ -30,7 +30,7 @@ class SharpnessMemory:
         self._known: dict[int, float] = {}
 
     def measured(self, message: CameraTracks, image: Image | None) -> CameraTracks:
-        """Return message with the sharpness of its tracks; ``image`` is the window's last frame, if any."""
+        """Return the message with its tracks' sharpness; ``image`` is the window's last frame, if any."""
         for track in message.tracks:
             box = track.boxes[-1] if track.boxes else None
             value = None if image is None or box is None else sharpness(image, box)
@@ -44,15 +44,15 @@ class SharpnessMemory:
 
 
 def sharpness(image: Image, box: Box) -> float | None:
-    """Return how much detail there is inside a box, 0 to 1: ``d / (d + 1/4)``; None where it is too small.
+    """Return the sharpness inside a box, 0 to 1: ``d / (d + 1/4)``; None where the box is too small.
 
-    *d* is the variance of the Laplacian of the person, 32 by 64 pixels and grey, over that of the grey
-    itself: a blur takes detail and leaves contrast.
+    *d* is the variance of the Laplacian over that of the gray levels, at 32 by 64 pixels: blur removes detail
+    and leaves contrast.
     """
     height, width = image.shape[:2]
     left, top, right, bottom = (round(side) for side in box)
     part = image[max(top, 0) : min(bottom, height), max(left, 0) : min(right, width)]
-    if min(part.shape[:2]) < _LEAST:
+    if min(part.shape[:2]) < _MIN_SIDE:
         return None
     shrinking = part.shape[0] > _HEIGHT
     small = cv2.resize(

@@ -1,4 +1,4 @@
-"""Counting what a camera does, for its status message."""
+"""Counters behind a camera's status message."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from server.camera.load.load_monitor import LoadMonitor
 from server.messaging.messages import CameraState, CameraStatus
 
 _SPAN_S = 2.0
-"""The frame rate is measured over this long."""
+"""Seconds over which the frame rate is measured."""
 
 
 class StatusMeter:
@@ -39,13 +39,13 @@ class StatusMeter:
         self._missed += count
 
     def shed(self) -> None:
-        """Count a frame that nobody is looked for in."""
+        """Count a frame without detection."""
         self._shed += 1
 
     def status(
         self, camera: str, boot: int, state: CameraState, waiting: int, load: LoadMonitor
     ) -> CameraStatus:
-        """Return the camera's status; ``waiting`` frames are to be searched, ``load`` is what is left out."""
+        """Return the camera's status; ``waiting`` is the number of frames queued for detection."""
         sync = self._client.status() if self._client is not None else None
         since = time.monotonic() - _SPAN_S
         return CameraStatus(
@@ -58,7 +58,7 @@ class StatusMeter:
             shed=self._shed,
             waiting=waiting,
             load_level=load.level,
-            load=load.words,
+            load=load.description,
             synchronized=sync is not None and sync.connected,
             clock_offset=(sync.offset if sync is not None else None) or 0.0,
             round_trip=(sync.round_trip if sync is not None else None) or 0.0,

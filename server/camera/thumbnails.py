@@ -1,4 +1,4 @@
-"""A small picture of everybody, cut from the newest frame."""
+"""Thumbnails of the tracked people, cut from the newest frame."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _QUALITY = 82
 
 
 def thumbnails(image: Image, tracks: CameraTracks) -> dict[int, bytes]:
-    """Return a JPEG of everybody who is visible in the window's last frame, which ``image`` is, by track."""
+    """Return a JPEG by track of each person visible in the window's last frame, ``image``."""
     pictures = {}
     for track in tracks.tracks:
         box = track.boxes[-1] if track.boxes else None

@@ -1,4 +1,4 @@
-"""From the tracker's windows to the messages that a camera sends."""
+"""Builds a camera's track messages from the tracker's window results."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from server.messaging.number_types import COORDINATE_MAX
 from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
 from tracking import SolveReport, WindowResult, WindowTrack, types
 
-_LOOK_DIGITS = 5
-"""Of a share of the pixels: more would only make messages longer."""
+_SHARE_DIGITS = 5
+"""Decimals of a histogram's share."""
 
 
 class TrackMessageBuilder:
@@ -25,26 +25,26 @@ class TrackMessageBuilder:
         self._camera, self._boot, self._size, self._stride = camera, boot, size, stride
         self._shed: list[int] = []
         self._unsearched: list[int] = []
-        self._alone: list[int] = []
+        self._without_peers: list[int] = []
 
     def shed(self, pulses: Iterable[int]) -> None:
-        """Note frames that nobody was looked for in; the next message says so."""
+        """Note frames that were missed or shed, for the next message."""
         self._shed.extend(pulses)
 
     def unsearched(self, pulses: Iterable[int]) -> None:
-        """Note frames in which nobody could have been found; the next message says so."""
+        """Note frames without detection, for the next message."""
         self._unsearched.extend(pulses)
 
-    def alone(self, pulse: int) -> None:
-        """Note a frame for which some other camera's word was not there; the next message says so."""
-        self._alone.append(pulse)
+    def without_peers(self, pulse: int) -> None:
+        """Note a frame without the detections of some peer, for the next message."""
+        self._without_peers.append(pulse)
 
     def regular(self, result: WindowResult) -> CameraTracks:
-        """Report a window."""
+        """Build the message of a window."""
         return self._message(result, epoch_of_window(result.last, self._stride), ended=False)
 
     def closing(self, result: WindowResult | None, last: int) -> CameraTracks:
-        """Report the end of the recording."""
+        """Build the last message of a recording."""
         epoch = closing_epoch(last, self._stride)
         if result is not None:
             return self._message(result, epoch, ended=True)
@@ -59,7 +59,7 @@ class TrackMessageBuilder:
             ended=True,
             shed=_taken(self._shed),
             without_detection=_taken(self._unsearched),
-            without_peers=_taken(self._alone),
+            without_peers=_taken(self._without_peers),
             tracks=[],
             solve=None,
         )
@@ -76,44 +76,44 @@ class TrackMessageBuilder:
             ended=ended,
             shed=_taken(self._shed),
             without_detection=_taken(self._unsearched),
-            without_peers=_taken(self._alone),
+            without_peers=_taken(self._without_peers),
             tracks=[_track(track) for track in result.tracks],
             solve=_solve(result.report),
-            risk_events=[_trouble(it) for it in result.risk_events[:RISK_EVENTS_MAX]],
+            risk_events=[_risk_event(it) for it in result.risk_events[:RISK_EVENTS_MAX]],
             revised_from=result.revised_from,
         )
 
 
 def _taken(noted: list[int]) -> list[int]:
-    """Take out what was noted since the last message."""
+    """Take out the frames noted since the last message."""
     taken = noted.copy()
     noted.clear()
     return taken
 
 
 def _track(track: WindowTrack) -> TrackMessage:
-    # With short moments of hiding filled in: they are no reason to show somebody from elsewhere.
+    # Interpolated: a short occlusion is no reason to cut to another camera.
     return TrackMessage(
         id=track.id,
         boxes=[_box(row) for row in track.interpolated],
         confidence=float(track.confidence),
-        appearance=[_glimpse(look) for look in track.appearance_samples],
+        appearance=[_appearance(sample) for sample in track.appearance_samples],
     )
 
 
-def _trouble(trouble: types.RiskEvent) -> RiskEvent:
+def _risk_event(event: types.RiskEvent) -> RiskEvent:
     return RiskEvent(
-        reason=trouble.reason,
-        tracks=list(trouble.objects),
-        pulse=max(trouble.frame, 0),
-        margin=float(trouble.margin),
-        risk=float(trouble.risk),
+        reason=event.reason,
+        tracks=list(event.objects),
+        pulse=max(event.frame, 0),
+        margin=float(event.margin),
+        risk=float(event.risk),
     )
 
 
-def _glimpse(look: tracking.AppearanceSample) -> AppearanceHistogram:
-    shares = [round(float(share), _LOOK_DIGITS) for share in look.histogram]
-    return AppearanceHistogram(first=look.first, last=look.last, histogram=shares)
+def _appearance(sample: tracking.AppearanceSample) -> AppearanceHistogram:
+    shares = [round(float(share), _SHARE_DIGITS) for share in sample.histogram]
+    return AppearanceHistogram(first=sample.first, last=sample.last, histogram=shares)
 
 
 def _box(row: NDArray[np.float64]) -> Box | None:

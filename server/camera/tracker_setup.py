@@ -1,4 +1,4 @@
-"""A camera's tracker, set up from the configuration, and ready for the first frame of a recording."""
+"""A camera's tracker, set up from the configuration and, for a recording, prepared by a prescan."""
 
 from __future__ import annotations
 
@@ -28,30 +28,29 @@ def set_up_tracker(
     *,
     ready: bool = True,
 ) -> Tracker:
-    """Return the tracker of that name; for a recording, what has to learn the room has done so.
+    """Return the tracker of a name; one that learns the room has scanned a recording's pictures.
 
-    It looks at the source's pictures as ``fit`` makes them, or at these themselves; not ``ready``: at none
-    ahead.
+    Pictures are scanned through the letterbox ``fit`` if given; without ``ready`` none are scanned.
     """
     track = config.track
-    seen = fit or (None if source is None else Letterbox(source.size, source.size))
-    settings = track.temporal if seen is None else _measured(track.temporal, camera, seen)
+    letterbox = fit or (None if source is None else Letterbox(source.size, source.size))
+    settings = track.temporal if letterbox is None else _with_room_width(track.temporal, camera, letterbox)
     tracker = create_tracker(
         name, track.window, track.costs, solver, settings, config.site.fps, assist=track.assist
     )
-    if ready and source is not None and seen is not None and isinstance(tracker, PrescanTracker):
+    if ready and source is not None and letterbox is not None and isinstance(tracker, PrescanTracker):
         places = range(0, config.detect.prescan_frames, config.detect.prescan_every)
-        tracker.prepare(seen.image(image) for image in source.ahead(places))
+        tracker.prepare(letterbox.image(image) for image in source.ahead(places))
     return tracker
 
 
-def _measured(settings: TemporalSettings, camera: CameraSettings, fit: Letterbox) -> TemporalSettings:
-    """Take how much floor a picture is wide, black columns and all, from the ground where it is in metres."""
-    per_metre = UNITS_PER_METER.get(camera.ground_unit or "")
-    if camera.ground is None or per_metre is None:
+def _with_room_width(settings: TemporalSettings, camera: CameraSettings, fit: Letterbox) -> TemporalSettings:
+    """Set the width of the room from the homography, where its unit is known; black columns count."""
+    per_meter = UNITS_PER_METER.get(camera.ground_unit or "")
+    if camera.ground is None or per_meter is None:
         return settings
     width, height = fit.size
     ends = fit.to_own(np.array([[0.0, height / 2.0], [width, height / 2.0]]))
     left, right = to_ground(np.array(camera.ground, dtype=np.float64), ends)
-    across = float(np.hypot(*(right - left))) / per_metre
-    return replace(settings, room_m=across) if np.isfinite(across) else settings
+    width_m = float(np.hypot(*(right - left))) / per_meter
+    return replace(settings, room_m=width_m) if np.isfinite(width_m) else settings

@@ -15,7 +15,7 @@ _SENDS = ["put", "delete", "liveliness_token"]
 _ASKS = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
 _PASSES = [*_SENDS, "declare_subscriber"]
 """What the router tells others: messages, who is there, and what somebody wants to hear."""
-_TOLD = ("operator_points", "identities")
+_TOLD = ("position_corrections", "identities")
 """What best-view services say to a camera, under its key."""
 _SERVICES = 64
 """Best-view services that a site may have, beside the first."""

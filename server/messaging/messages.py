@@ -12,7 +12,7 @@ key                                           payload                           
 ``myview/SITE/camera/ID/status``              :class:`CameraStatus`
 ``myview/SITE/camera/ID/thumbs/LOCAL``        JPEG of one person                   :class:`ThumbnailHeader`
 ``myview/SITE/camera/ID/detections``          :class:`FrameDetections`
-``myview/SITE/camera/ID/operator_points``     ``OperatorPoints``, to the camera
+``myview/SITE/camera/ID/position_corrections``     ``PositionCorrections``, to the camera
 ``myview/SITE/camera/ID/identities``          ``IdentitySnapshot``, to the camera
 ``myview/SITE/camera/ID/retained_identities``  the same, to a service that starts; empty: unknown
 ``myview/SITE/camera/ID/peer_listener``       liveliness token: receives the other cameras' detections
@@ -202,7 +202,7 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """How much is left out because the machine has too much to do; 0: nothing."""
     load: Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[ -~]*\Z")] = ""
     """What is left out, for people: printable, since it stands on pages and in terminals."""
-    operator_points: Number = 0
+    position_corrections: Number = 0
     """Places that an operator pointed at and the tracker was given, since the start."""
     bad_messages: Number = 0
     """Messages to the camera that it could not understand, since the start."""

@@ -1,4 +1,4 @@
-"""Messages between tracker and operator: predicted failures to the operator, marked positions back."""
+"""Operator messages: predicted tracking failures from a camera, position corrections to it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from server.messaging.number_types import Coordinate, Cost, Number, Pulse
 from tracking.types import RiskReason
 
 RISK_EVENTS_MAX = 32
-"""Troubles that a camera tells of one window at most; the riskiest ones."""
+"""Risk events that a camera reports per window at most, the riskiest ones."""
 
 
 class RiskEvent(msgspec.Struct, frozen=True, kw_only=True):
@@ -18,38 +18,38 @@ class RiskEvent(msgspec.Struct, frozen=True, kw_only=True):
 
     reason: RiskReason
     tracks: Annotated[list[Number], msgspec.Meta(max_length=2)]
-    """Whom it is about, first whom to point at; none: the window."""
+    """The tracks concerned, first the one to correct; empty: the whole window."""
     pulse: Pulse
-    """When that is expected."""
+    """The expected frame."""
     margin: Cost
-    """By how much the solution that is taken costs less than the other one: the smaller the less sure."""
+    """Cost difference to the alternative solution: the smaller, the less certain."""
     risk: Annotated[float, msgspec.Meta(ge=0, le=1)]
-    """How likely it is to go wrong unless somebody helps."""
+    """Probability of the failure without a correction."""
 
 
-OPERATOR_POINTS_MAX = 256
-"""Places that are pointed at in one message at most: ten seconds at 25 frames a second."""
+CORRECTIONS_MAX = 256
+"""Corrections in one message at most: ten seconds at 25 frames a second."""
 
 
 TOLERANCE_MIN = 1.0
-"""Pixels by which any pointing may be off: nobody points better."""
+"""Smallest tolerance in pixels: nobody clicks more precisely."""
 
 
-class OperatorPoint(msgspec.Struct, frozen=True, kw_only=True):
+class CorrectedPosition(msgspec.Struct, frozen=True, kw_only=True):
     """The position of a tracked person as an operator marked it."""
 
     pulse: Pulse
     track: Number
     x: Coordinate
-    """Pixels of the site's picture, as ``y`` and ``reach``."""
+    """Pixels of the site's picture, as are ``y`` and ``tolerance``."""
     y: Coordinate
     tolerance: Annotated[float, msgspec.Meta(ge=TOLERANCE_MIN, le=1e4)]
-    """How far off the pointing may be."""
+    """Largest expected error of the position."""
 
 
-class OperatorPoints(msgspec.Struct, frozen=True, kw_only=True):
-    """Positions that an operator marked in one camera's picture."""
+class PositionCorrections(msgspec.Struct, frozen=True, kw_only=True):
+    """Positions of tracked people that an operator marked in one camera's picture."""
 
     boot: Number
     """The run of the camera whose tracks are named."""
-    points: Annotated[list[OperatorPoint], msgspec.Meta(max_length=OPERATOR_POINTS_MAX)]
+    corrections: Annotated[list[CorrectedPosition], msgspec.Meta(max_length=CORRECTIONS_MAX)]

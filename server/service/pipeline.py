@@ -95,7 +95,7 @@ class BestViewPipeline:
         self.decision_state = DecisionState(config.site.fps)
         self.bus = BusConnection(config)
         self.assist = OperatorAssist(
-            config, self.decider.people, partial(self.bus.send_to_camera, "operator_points")
+            config, self.decider.people, partial(self.bus.send_to_camera, "position_corrections")
         )
         self.state_replication = StateReplication(
             self.decider.people,

@@ -112,7 +112,7 @@ def _behind(room: Room, door: Door, origin: Floats, rays: Floats) -> Floats:
     reach = np.where((beyond_jamb > 0) & (beyond_jamb < 0.15), np.minimum(reach, to_jamb), reach)  # noqa: PLR2004 — wall thickness
     points = origin + rays * reach[:, None]
     points[:, 2] = np.where(np.abs(points[:, 2]) < 1e-6, 0.0, points[:, 2])  # noqa: PLR2004 — rounding
-    return house_surfaces.corridor(points, points[:, axis] - edge)
+    return house_surfaces.corridor_color(points, points[:, axis] - edge)
 
 
 def _contact(room: Room, points: Floats) -> Floats:

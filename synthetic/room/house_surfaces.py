@@ -96,7 +96,7 @@ def wall(room: Room, points: Floats, axis: int, *, far: bool) -> Floats:
     return color * (hollow * bright)[:, None]
 
 
-def corridor(points: Floats, beyond: Floats) -> Floats:
+def corridor_color(points: Floats, beyond: Floats) -> Floats:
     """Return the colors of points seen through a doorway, `beyond` meters behind the wall."""
     ground = points[:, 2] < 1e-6  # noqa: PLR2004 — on the floor
     color = np.where(ground[:, None], _FLOOR * 0.62, _CORRIDOR * 1.15)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from synthetic.cameras.pinhole import Floats, PinholeCamera
 from synthetic.drawing.figure import Figure
 from synthetic.tank.fish_mesh import COLORS, FACES, NEARER, THIN
-from synthetic.tank.water import TILE, Bytes, caustic_pixels, open_water, seen_through_water
+from synthetic.tank.water import TILE, Bytes, attenuate_by_water, caustic_pixels, open_water
 
 _FINE = 3  # drawn pixels per pixel
 _SHIFT = 4  # fractional bits of cv2's coordinates
@@ -42,7 +42,7 @@ def _inks(view: PinholeCamera, corners: Floats, net: Bytes) -> Floats:
     sight = middle.mean(axis=1) - view.center
     distance = np.linalg.norm(sight, axis=1)
     water = open_water(sight / distance[:, None])
-    seen = seen_through_water(COLORS * light[..., None], distance[:, None], water[:, None])
+    seen = attenuate_by_water(COLORS * light[..., None], distance[:, None], water[:, None])
     inks = np.full((*light.shape, 4), 255.0)
     inks[..., :3] = np.clip(seen[..., ::-1] * 255, 0, 255)
     return inks

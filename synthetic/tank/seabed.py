@@ -16,10 +16,10 @@ from synthetic.tank.water import (
     TILE,
     Bytes,
     LightShafts,
+    attenuate_by_water,
     caustic_pixels,
     caustics,
     open_water,
-    seen_through_water,
     transmittance,
 )
 
@@ -62,7 +62,7 @@ class Seabed:
         rays = view.rays(columns, rows).reshape(-1, 3)
         cast = _cast(view.center, rays)
         water = open_water(rays)
-        color = seen_through_water(cast.color, cast.distance, water)
+        color = attenuate_by_water(cast.color, cast.distance, water)
         color[~cast.solid] = water[~cast.solid]
         gain = (
             cast.color

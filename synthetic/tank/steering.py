@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from synthetic.cameras.pinhole import Floats
-from synthetic.walking.collision_avoidance import separate_paths
+from synthetic.walking.collision_avoidance import push_paths_apart
 
 RATE = 10  # samples a second
 LOW = np.array([0.55, 0.55, 0.5])  # meters: where fish swim, corner to corner
@@ -55,7 +55,7 @@ def swim_between(rng: np.random.Generator, start: Waypoints, end: Waypoints, sec
     )
     last = slice(-round(2 * _LANDING * RATE), None)
     keep = np.full((path.shape[1], path.shape[1]), _CLEAR)
-    path[last] = separate_paths(path[last].transpose(1, 0, 2), keep, RATE).transpose(1, 0, 2)
+    path[last] = push_paths_apart(path[last].transpose(1, 0, 2), keep, RATE).transpose(1, 0, 2)
     return path
 
 

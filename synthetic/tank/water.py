@@ -34,7 +34,7 @@ _SHAFTS = (
 Bytes = NDArray[np.uint8]
 
 
-def seen_through_water(colors: Floats, meters: Floats, water: Floats) -> Floats:
+def attenuate_by_water(colors: Floats, meters: Floats, water: Floats) -> Floats:
     """Return colors ``(..., 3)`` seen through meters ``(...)`` of water of a color ``(..., 3)``."""
     left = np.exp(-_MURK * meters[..., None])
     seen: Floats = colors * left + water * (1 - left)

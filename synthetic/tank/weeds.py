@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from synthetic.cameras.pinhole import Floats, PinholeCamera
 from synthetic.drawing.figure import Figure
-from synthetic.tank.water import open_water, seen_through_water
+from synthetic.tank.water import attenuate_by_water, open_water
 
 _JOINTS = 11  # of a blade
 _SHARE = np.linspace(0, 1, _JOINTS)  # of the way up
@@ -90,7 +90,7 @@ class Weeds:
         water = open_water(sight / distance[:, None])
         self._inks = []
         for tone in _TONES:
-            seen = np.clip(seen_through_water(_MEADOW.colors * tone, distance, water)[:, ::-1] * 255, 0, 255)
+            seen = np.clip(attenuate_by_water(_MEADOW.colors * tone, distance, water)[:, ::-1] * 255, 0, 255)
             self._inks.append(np.column_stack([seen, np.full(len(seen), 255.0)]).tolist())
 
     def at(self, seconds: float) -> list[Clump]:

@@ -20,7 +20,7 @@ _WALL = 0.45  # meters kept from walls
 _FURNITURE = 0.25  # meters kept from furniture
 
 
-def separate_paths(paths: Floats, keep: Floats, rate: float) -> Floats:
+def push_paths_apart(paths: Floats, keep: Floats, rate: float) -> Floats:
     """Bend paths ``(P, T, 2 or 3)``, sampled `rate` times a second, until pairs keep ``(P, P)`` meters apart.
 
     Ends stay where they are. Without room for all, some pairs come nearer than that.

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from synthetic.cameras.pinhole import Floats
-from synthetic.walking.collision_avoidance import separate_paths
+from synthetic.walking.collision_avoidance import push_paths_apart
 
 ROUND = 10.0  # seconds
 BEFORE = 10_000  # added to numbers of rounds in seeds, which cannot be negative
@@ -59,7 +59,7 @@ def heading_to(start: Floats, end: Floats) -> float:
 def avoid_collisions(paths: Sequence[RoundPath], keep: Floats) -> tuple[RoundPath, ...]:
     """Bend paths until any two people keep ``(P, P)`` meters apart."""
     straight = np.array([path.at(sample_times()) for path in paths])
-    bends = separate_paths(straight, keep, _RATE) - straight
+    bends = push_paths_apart(straight, keep, _RATE) - straight
     return tuple(replace(path, offsets=offsets) for path, offsets in zip(paths, bends, strict=True))
 
 

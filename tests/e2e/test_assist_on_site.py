@@ -67,10 +67,10 @@ async def test_a_scripted_pointer_follows_a_flag_through_and_the_stream_goes_on(
     await point.click()
     await page.wait_for_function("myview.pointing.object !== null")
     await follow(page, "myview.pointing.taken >= 20")
-    sent = await metric(site, "myview_operator_points_total")
+    sent = await metric(site, "myview_position_corrections_total")
     assert sent >= 20
     async with asyncio.timeout(PATIENCE_MS / 1000):  # the camera says so once a second
-        while await metric(site, "myview_camera_operator_points_total") < 1:
+        while await metric(site, "myview_camera_position_corrections_total") < 1:
             await page.wait_for_function(f"myview.pulse > {await page.evaluate('myview.pulse')} + 5")
     async with aiohttp.ClientSession() as session, session.get(f"{site.url}api/flags") as answer:
         states = {it["state"] for it in (await answer.json())["flags"]}

@@ -15,7 +15,7 @@ from synthetic.cameras.pinhole import PinholeCamera, Viewpoint
 from synthetic.drawing.clothing import choose_casual_outfit
 from synthetic.room.layouts import OVERHEAD, OVERHEAD_AREA
 from synthetic.walking.choreographed_crowd import ChoreographedCrowd
-from synthetic.walking.collision_avoidance import separate_paths
+from synthetic.walking.collision_avoidance import push_paths_apart
 from synthetic.walking.gatherings import Gatherings, plan_gathering
 from synthetic.walking.round_paths import ROUND, sample_times
 
@@ -106,7 +106,7 @@ def test_two_who_meet_head_on_pass_each_other(offsets: float, speed: float) -> N
     one = np.column_stack([speed * clock, np.zeros(60)])
     other = np.column_stack([-speed * clock, np.full(60, offsets)])
     keep = np.full((2, 2), 0.7)
-    bent = separate_paths(np.array([one, other]), keep, 5.0)
+    bent = push_paths_apart(np.array([one, other]), keep, 5.0)
     apart = np.linalg.norm(bent[0] - bent[1], axis=1)
     assert apart.min() > 0.6
     assert np.array_equal(bent[:, [0, -1]], np.array([one, other])[:, [0, -1]])

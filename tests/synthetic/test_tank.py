@@ -19,7 +19,7 @@ from synthetic.tank import VIEWPOINTS
 from synthetic.tank.fish_drawing import draw_fish
 from synthetic.tank.fish_mesh import LENGTH, fish_vertices
 from synthetic.tank.shoal import ROUND, FishState, Shoal
-from synthetic.tank.water import caustics, open_water, seen_through_water
+from synthetic.tank.water import attenuate_by_water, caustics, open_water
 
 SIZE = (320, 180)
 RATE = 10  # samples a second
@@ -163,7 +163,7 @@ def test_what_only_hides_takes_its_share_and_has_no_row() -> None:
 
 def test_murk_takes_a_colour_to_the_water_s_and_red_first() -> None:
     water = open_water(np.array([[0.0, 1.0, 0.0]]))
-    seen = seen_through_water(np.ones((4, 3)), np.array([0.0, 4.0, 12.0, 200.0]), water)
+    seen = attenuate_by_water(np.ones((4, 3)), np.array([0.0, 4.0, 12.0, 200.0]), water)
     assert np.allclose(seen[0], 1.0)
     assert np.allclose(seen[3], water, atol=1e-4)
     left = (seen - water) / (1 - water)

@@ -62,7 +62,7 @@ def masks_of(config: Config, camera: str) -> Masks:
     shadow: list[Mask | None] = []
     for pulse in count():
         try:
-            pipeline.search(pulse, pipeline.take(pulse))
+            pipeline.detect(pulse, pipeline.take(pulse))
         except SourceEndedError:
             break
         one, other = heard.last()

@@ -30,7 +30,7 @@ SITE = "faults"
 SHARE = 0.3
 PICTURES = "video"
 FOUND = "detections"
-POINTING = "operator_points"
+POINTING = "position_corrections"
 _FROM_CAMERAS = (PICTURES, "tracks", "status", "thumbs/*", FOUND)
 _LATER = 2
 """A message that is held back comes after so many others of its key: others of its camera and kind."""

@@ -39,7 +39,7 @@ from server.media.stream_format import StreamFormat
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import FrameDetections
-from server.messaging.operator_messages import OPERATOR_POINTS_MAX, OperatorPoint, OperatorPoints
+from server.messaging.operator_messages import CORRECTIONS_MAX, CorrectedPosition, PositionCorrections
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.ingest import Ingest
 from server.service.service import BestViewService
@@ -122,17 +122,17 @@ class Words(Scripts):
 
     def feed(self, data: bytes) -> bool:
         """Hear them."""
-        earshot, bad = PeerDetectionBuffer(("c1",), 50, lambda _: True), self._exchange.bad_messages
+        buffer, bad = PeerDetectionBuffer(("c1",), 50, lambda _: True), self._exchange.bad_messages
         for pulse, (_, payload, _) in enumerate(_script.decode(data)):
             self.messages += 1
             # The key is what was asked for: the bus hands nothing else on.
             heard = self._exchange._read(Message(KEYS.camera("c1", "detections"), payload, b""))
             if heard is not None and heard.camera == "c1":
-                earshot.put(heard, 0.0)
-            earshot.ask(pulse, 1.0)
-            earshot.misses(pulse)
-            earshot.give_up(pulse)
-            earshot.heard(pulse)
+                buffer.put(heard, 0.0)
+            buffer.expect(pulse, 1.0)
+            buffer.is_missing(pulse)
+            buffer.give_up(pulse)
+            buffer.detections_at(pulse)
         return self._exchange.bad_messages == bad
 
 
@@ -145,10 +145,10 @@ class Places(Scripts):
         """Return some words of the best view."""
         script: Script = []
         for pulse in range(3):
-            place = OperatorPoint(pulse=pulse, track=1, x=9.0, y=9.0, tolerance=rng.random() + 0.1)
+            place = CorrectedPosition(pulse=pulse, track=1, x=9.0, y=9.0, tolerance=rng.random() + 0.1)
             points = [place] * rng.randrange(3)
-            payload = msgspec.json.encode(OperatorPoints(boot=1, points=points))
-            message = Message(KEYS.camera("c0", "operator_points"), payload, b"")
+            payload = msgspec.json.encode(PositionCorrections(boot=1, corrections=points))
+            message = Message(KEYS.camera("c0", "position_corrections"), payload, b"")
             it = wrong(rng, message) if rng.random() < 0.7 else message
             script.append((it.key, it.payload, b""))
         return _packed(script)
@@ -159,7 +159,7 @@ class Places(Scripts):
         for key, payload, _ in _script.decode(data):
             self.messages += 1
             heard.put(Message(key, payload, b""))
-            assert len(heard.take()) <= OPERATOR_POINTS_MAX
+            assert len(heard.take()) <= CORRECTIONS_MAX
         return not heard.bad_messages
 
 

@@ -10,7 +10,7 @@ from server.config.source_address import SourceKind, source_kind
 from server.system.address_redaction import redact_address
 from server.system.errors import UserError
 
-__all__ = ["EncodedAudioFrame", "LiveAudioSource", "RecordedAudioSource", "consecutive_runs", "open_sound"]
+__all__ = ["EncodedAudioFrame", "LiveAudioSource", "RecordedAudioSource", "consecutive_runs", "open_audio"]
 
 
 def open_audio(config: Config, camera_id: str) -> RecordedAudioSource | LiveAudioSource | None:

@@ -1,4 +1,4 @@
-"""Frames that are left out on purpose: the tracker is given what was probably there."""
+"""Skipped frames: the tracker receives detections interpolated from the frames around them."""
 
 from __future__ import annotations
 
@@ -11,51 +11,50 @@ from tracking.registry import Tracker
 
 
 class FrameSkipper:
-    """Hands the frames of a camera to its tracker in order, and skips detection in some.
+    """Passes frames to the tracker in order, with interpolated detections for skipped ones.
 
-    A frame that is left out waits for the next one that is searched, which is at the latest the last one of
-    its window: no window is late for it.
+    A skipped frame waits for the next one with detection, at the latest until the end of its window.
     """
 
     def __init__(self, tracker: Tracker, bins: int, stride: int) -> None:
-        self._tracker, self._nothing, self._stride = tracker, Detections.empty(bins), stride
-        self._held: list[int] = []
+        self._tracker, self._no_detections, self._stride = tracker, Detections.empty(bins), stride
+        self._skipped: list[int] = []
         self._before: tuple[int, Detections] | None = None
-        """The last searched frame."""
+        """The last frame with detection."""
 
-    def leave_out(self, pulse: int) -> WindowResult | None:
-        """Take in that a frame is left out. Pulses must grow."""
-        self._held.append(pulse)
-        # Its window must not wait for a frame that may never come.
+    def skip(self, pulse: int) -> WindowResult | None:
+        """Skip a frame. Pulses must ascend."""
+        self._skipped.append(pulse)
+        # The window must not wait for the next frame, which may never come.
         return self._release(None) if (pulse + 1) % self._stride == 0 else None
 
     def push(self, pulse: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
-        """Take in what was found in a frame."""
+        """Push a frame's detections."""
         results = [self._release((pulse, detections)), self._tracker.push(pulse, detections, image)]
         self._before = pulse, detections
         return merge_results([it for it in results if it is not None])
 
-    def point(self, pointings: Sequence[PositionCorrection]) -> WindowResult | None:
-        """Take in where somebody points; None: that changes nothing, or the tracker takes no pointings."""
+    def apply_corrections(self, corrections: Sequence[PositionCorrection]) -> WindowResult | None:
+        """Pass corrections on; None: they change nothing, or the tracker accepts none."""
         return (
-            self._tracker.apply_corrections(pointings)
+            self._tracker.apply_corrections(corrections)
             if isinstance(self._tracker, InteractiveTracker)
             else None
         )
 
     def flush(self) -> WindowResult | None:
-        """End the recording."""
+        """Push what waits, and flush the tracker."""
         results = [self._release(None), self._tracker.flush()]
         return merge_results([it for it in results if it is not None])
 
     def _release(self, after: tuple[int, Detections] | None) -> WindowResult | None:
-        """Return the tracker what waits; ``after`` is the next searched frame."""
-        held, self._held = self._held, []
-        results = [self._tracker.push(it, self._guessed(it, after)) for it in held]
+        """Push the skipped frames; ``after`` is the next frame with detection."""
+        skipped, self._skipped = self._skipped, []
+        results = [self._tracker.push(it, self._interpolated(it, after)) for it in skipped]
         return merge_results([it for it in results if it is not None])
 
-    def _guessed(self, pulse: int, after: tuple[int, Detections] | None) -> Detections:
+    def _interpolated(self, pulse: int, after: tuple[int, Detections] | None) -> Detections:
         before = self._before
         if before is None or after is None or after[0] - before[0] > self._stride:
-            return self._nothing
+            return self._no_detections
         return interpolate_detections(before[1], after[1], (pulse - before[0]) / (after[0] - before[0]))

@@ -1,4 +1,4 @@
-"""A camera's load: by how far its tracking is behind the pulses, and what it leaves out for that."""
+"""A camera's load: its tracking lag, and the shedding level that follows from it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from server.config.site_config import Config
 
 log = logging.getLogger(__name__)
 
-_BEHIND, _ABREAST = 0.25, 0.1
-"""Of `track.backlog_s`, besides a frame's own time, which it may take, and the patience with others."""
+_BEHIND, _KEEPS_UP = 0.25, 0.1
+"""Shares of `track.backlog_s`, beyond one frame interval and the wait for peers."""
 
 
 class LoadMonitor:
@@ -21,33 +21,35 @@ class LoadMonitor:
         self._camera, self._stride, self._gop = camera_id, track.window.stride, config.encode.gop
         waits = track.cross_view_wait_s if config.witnesses(camera_id) else 0.0
         waits += 1.0 / config.site.fps
-        bounds = LevelBounds(waits + _BEHIND * track.backlog_s, waits + _ABREAST * track.backlog_s)
-        all_rungs = shed_levels(self._stride, live=live) if track.shed_load else (ShedLevel(),)
-        self._ladder = LoadShedder(all_rungs, bounds)
+        bounds = LevelBounds(waits + _BEHIND * track.backlog_s, waits + _KEEPS_UP * track.backlog_s)
+        levels = shed_levels(self._stride, live=live) if track.shed_load else (ShedLevel(),)
+        self._shedder = LoadShedder(levels, bounds)
 
     @property
     def level(self) -> int:
-        """How far up the ladder the camera is; 0: nothing is left out."""
-        return self._ladder.level
+        """The shedding level; 0: none."""
+        return self._shedder.level
 
     @property
-    def words(self) -> str:
-        """What is left out, for people; empty: nothing."""
-        return self._ladder.rung.words
+    def description(self) -> str:
+        """What is shed, in words; empty: nothing."""
+        return self._shedder.current.description
 
     def searches(self, pulse: int) -> bool:
-        """Return whether a frame is searched."""
-        return self._ladder.rung.searches(pulse, self._stride)
+        """Return whether detection runs on a frame."""
+        return self._shedder.current.searches(pulse, self._stride)
 
     def takes(self, pulse: int) -> bool:
-        """Return whether a frame is taken at all."""
-        return self._ladder.rung.takes(pulse, self._stride, self._gop)
+        """Return whether a frame is taken."""
+        return self._shedder.current.takes(pulse, self._stride, self._gop)
 
-    def measured(self, lag: float, now: float) -> None:
-        """Take in how many seconds after its pulse was due a frame had been searched, by a steady clock."""
+    def measure_lag(self, lag: float, now: float) -> None:
+        """Update with the seconds from a frame's pulse to its detection, at ``now`` by a steady clock."""
         before = self.level
-        self._ladder.measured(lag, now)
+        self._shedder.measure_lag(lag, now)
         if self.level > before:
-            log.warning("camera %s is %.1f s behind: %s", self._camera, lag, self.words)
+            log.warning("camera %s is %.1f s behind: %s", self._camera, lag, self.description)
         elif self.level < before:
-            log.info("camera %s keeps up: %s", self._camera, self.words or "every frame is searched again")
+            log.info(
+                "camera %s keeps up: %s", self._camera, self.description or "every frame is searched again"
+            )

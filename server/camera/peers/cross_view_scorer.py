@@ -1,4 +1,4 @@
-"""What a camera tells the others that it found in a frame, and how it goes by what they tell."""
+"""Cross-view scoring: a camera's detections for its peers, and its own scores corrected by theirs."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _PIXEL_DIGITS, _SCORE_DIGITS = 1, 3
 
 @dataclass(frozen=True, slots=True)
 class PeerDetections:
-    """Detections of the other cameras in a frame; ``alone``: they were needed and did not come."""
+    """Detections of the peer cameras in a frame; ``is_incomplete``: some that were expected did not come."""
 
-    words: tuple[FrameDetections, ...] = ()
-    alone: bool = False
+    messages: tuple[FrameDetections, ...] = ()
+    is_incomplete: bool = False
 
 
 class CrossViewScorer:
@@ -35,15 +35,17 @@ class CrossViewScorer:
         self._config, self._camera, self._size, self._boot = config, camera_id, size, boot
         site = config.site
         self._fit = Letterbox(size, (site.width, site.height))
-        self._own = _vantage(config, camera_id, size)
+        self._own = _geometry(config, camera_id, size)
         self._others: dict[str, tuple[tuple[int, int], CameraGeometry | None]] = {}
-        """The others' sizes of picture, and where they look from; None: at none of this camera's ground."""
+        """By peer: the size of its pictures, and its geometry; None: it sees none of this camera's ground."""
 
-    def word(self, pulse: int, detections: Detections | None, *, ended: bool = False) -> FrameDetections:
-        """Return what was found in a frame; None: nobody was looked for."""
+    def build_message(
+        self, pulse: int, detections: Detections | None, *, ended: bool = False
+    ) -> FrameDetections:
+        """Build the message about a frame; detections are None where detection did not run."""
         boxes = None
         if detections is not None:
-            # The surest, in the detector's order.
+            # The most confident ones, in the detector's order.
             most = np.sort(np.argsort(-detections.scores, kind="stable")[:FRAME_DETECTIONS_MAX])
             places = self._fit.boxes_to_own(detections.boxes[most]).round(_PIXEL_DIGITS)
             scores = detections.scores[most].round(_SCORE_DIGITS)
@@ -53,34 +55,34 @@ class CrossViewScorer:
             camera=self._camera, boot=self._boot, size=self._size, pulse=pulse, boxes=boxes, ended=ended
         )
 
-    def looks_here(self, word: FrameDetections) -> bool:
-        """Return whether the camera whose word this is looks at ground that this one sees."""
-        return self._vantage_of(word) is not None
+    def sees_same_ground(self, message: FrameDetections) -> bool:
+        """Return whether the sender of a message sees ground that this camera sees."""
+        return self._geometry_of(message) is not None
 
-    def scored(self, detections: Detections, words: Sequence[FrameDetections]) -> Detections:
-        """Return the detections with the scores that they have by what the others found in the same frame."""
+    def rescore(self, detections: Detections, messages: Sequence[FrameDetections]) -> Detections:
+        """Return the detections with scores corrected by the peers' detections of the same frame."""
         others = [
-            (vantage, _findings(word.boxes))
-            for word in words
-            if word.boxes is not None and (vantage := self._vantage_of(word)) is not None
+            (geometry, _camera_detections(message.boxes))
+            for message in messages
+            if message.boxes is not None and (geometry := self._geometry_of(message)) is not None
         ]
         found = CameraDetections(self._fit.boxes_to_own(detections.boxes), detections.scores)
         return replace(
             detections, scores=rescore_detections(self._own, found, others, self._config.track.cross_view)
         )
 
-    def _vantage_of(self, word: FrameDetections) -> CameraGeometry | None:
-        known = self._others.get(word.camera)
-        if known is None or known[0] != word.size:
-            vantage = _vantage(self._config, word.camera, word.size)
-            known = self._others[word.camera] = (
-                word.size,
-                vantage if views_overlap(self._own, vantage) else None,
+    def _geometry_of(self, message: FrameDetections) -> CameraGeometry | None:
+        known = self._others.get(message.camera)
+        if known is None or known[0] != message.size:
+            geometry = _geometry(self._config, message.camera, message.size)
+            known = self._others[message.camera] = (
+                message.size,
+                geometry if views_overlap(self._own, geometry) else None,
             )
         return known[1]
 
 
-def _vantage(config: Config, camera_id: str, size: tuple[int, int]) -> CameraGeometry:
+def _geometry(config: Config, camera_id: str, size: tuple[int, int]) -> CameraGeometry:
     camera, site = config.camera(camera_id), config.site
     fit = Letterbox(size, (site.width, site.height))
     own = [np.array(polygon, dtype=np.float64) for polygon in camera.ignore]
@@ -88,8 +90,8 @@ def _vantage(config: Config, camera_id: str, size: tuple[int, int]) -> CameraGeo
     return CameraGeometry(np.array(camera.ground, dtype=np.float64), size, (*own, *shared))
 
 
-def _findings(rows: Sequence[tuple[float, ...]]) -> CameraDetections:
-    """Return boxes and scores as arrays, without boxes that have no size."""
+def _camera_detections(rows: Sequence[tuple[float, ...]]) -> CameraDetections:
+    """Return boxes and scores as arrays, without empty boxes."""
     table = np.array(rows, dtype=np.float64).reshape(-1, 5)
     table = table[(table[:, 0] < table[:, 2]) & (table[:, 1] < table[:, 3])]
     return CameraDetections(table[:, :4], table[:, 4])

@@ -70,7 +70,7 @@ def _run_frames(
     live = not pipeline.source.recorded
     frames = units = 0
     began = time.thread_time()
-    for pulse in range(pipeline.begins, pipeline.begins + max(1, round(_FRAMES_S * fps))):
+    for pulse in range(pipeline.first_pulse, pipeline.first_pulse + max(1, round(_FRAMES_S * fps))):
         try:
             image = pipeline.take(pulse)
         except SourceEndedError:
@@ -89,7 +89,7 @@ def _run_frames(
         problem="" if frames else "no picture arrived in time",
         sent=sent,
         size=size,
-        passes=pipeline.passes,
+        passes=pipeline.is_passthrough,
         why_encoded=pipeline.why_encoded,
         frames=frames,
         kbps=8 * units * each * fps / 1000,

@@ -122,8 +122,8 @@ def run_camera(pipeline: CameraPipeline, camera: str, others: PeerLink | None = 
     """Run a recording through a camera's pipeline, epoch by epoch, in step with the others."""
     run = CameraRun(pipeline, camera)
     while not run.ended:
-        detections = run.search()
-        batch = run.follow(
+        detections = run.detect()
+        batch = run.track(
             others.exchange(detections) if others is not None and detections is not None else ()
         )
         if batch is not None:
@@ -134,10 +134,10 @@ def run_cameras(pipelines: Mapping[str, CameraPipeline]) -> Iterator[EpochBatch]
     """Run all cameras' recordings in this process, in step."""
     runs = {camera: CameraRun(pipeline, camera) for camera, pipeline in pipelines.items()}
     while runs:
-        detections = {camera: run.search() for camera, run in runs.items()}
+        detections = {camera: run.detect() for camera, run in runs.items()}
         for camera, run in list(runs.items()):
             peer_detections = [it for other, it in detections.items() if other != camera and it is not None]
-            batch = run.follow(peer_detections)
+            batch = run.track(peer_detections)
             if batch is not None:
                 yield batch
             if run.ended:
@@ -151,30 +151,30 @@ class CameraRun:
         self._pipeline, self._camera = pipeline, camera
         self._units: list[AccessUnit] = []
         self._pulse = 0
-        self._searched: DetectedFrame | None = None
+        self._frame: DetectedFrame | None = None
         self.ended = False
 
-    def search(self) -> FrameDetections | None:
+    def detect(self) -> FrameDetections | None:
         """Take and encode the next frame and detect people; return the detections for the peers, if any."""
         try:
             image = self._pipeline.take(self._pulse)
         except SourceEndedError:
-            self._searched = None
-            return self._pipeline.last_word(self._pulse)
+            self._frame = None
+            return self._pipeline.end_message(self._pulse)
         if image is not None:
             self._units.append(self._pipeline.encode(self._pulse, image))
-        self._searched = self._pipeline.search(self._pulse, image)
-        return self._searched.word
+        self._frame = self._pipeline.detect(self._pulse, image)
+        return self._frame.message
 
-    def follow(self, peer_detections: Sequence[FrameDetections]) -> EpochBatch | None:
+    def track(self, peer_detections: Sequence[FrameDetections]) -> EpochBatch | None:
         """Track people in the frame, with the peers' detections; return a batch at the end of an epoch.
 
         Raises:
             UserError: the recording is over and had no pictures.
         """
-        if self._searched is None:
+        if self._frame is None:
             return self._finish()
-        tracks = self._pipeline.follow(self._searched, PeerDetections(tuple(peer_detections)))
+        tracks = self._pipeline.track_detections(self._frame, PeerDetections(tuple(peer_detections)))
         self._pulse += 1
         if tracks is None:
             return None
@@ -185,6 +185,6 @@ class CameraRun:
         self.ended = True
         tracks = self._pipeline.finish(self._pulse)
         self._pipeline.close()
-        if self._pulse <= max(0, self._pipeline.begins):
+        if self._pulse <= max(0, self._pipeline.first_pulse):
             raise UserError(f"camera {self._camera}: its recording has no pictures")
         return EpochBatch(self._camera, self._units, tracks, ended=True)

@@ -12,7 +12,7 @@ from server.http.app_keys import SERVICE
 from server.http.json_responses import json_response, read_json
 from server.http.operator.schema import Pointing
 from server.messaging.number_types import Pulse
-from server.service.facade.assist import OPERATOR_POINTS_MAX, PointAtPerson, Pointed, PointedPlace
+from server.service.facade.assist import CORRECTIONS_MAX, PointAtPerson, Pointed, PointedPlace
 from server.service.service import BestViewService
 
 routes = web.RouteTableDef()
@@ -33,7 +33,7 @@ class PointingBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     object: int
     camera: str
-    points: Annotated[list[PointBody], msgspec.Meta(min_length=1, max_length=OPERATOR_POINTS_MAX)]
+    points: Annotated[list[PointBody], msgspec.Meta(min_length=1, max_length=CORRECTIONS_MAX)]
 
 
 @routes.get(f"{OPERATOR_PATH}/pointing")
@@ -55,5 +55,5 @@ async def post_pointing(request: web.Request) -> web.Response:
 def _pointing(service: BestViewService, pointed: Pointed, too_old: int) -> Pointing:
     assist = service.assist
     return Pointing(
-        assist.memory, OPERATOR_POINTS_MAX, assist.blocked, pointed.accepted, too_old, pointed.flags
+        assist.memory, CORRECTIONS_MAX, assist.blocked, pointed.accepted, too_old, pointed.flags
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from server.messaging.operator_messages import OPERATOR_POINTS_MAX, TOLERANCE_MIN
+from server.messaging.operator_messages import CORRECTIONS_MAX, TOLERANCE_MIN
 from server.service.facade.errors import (
     ConflictError,
     InvalidCommandError,
@@ -17,7 +17,7 @@ from server.service.operator_assist.flags import Flag
 from server.service.pipeline import BestViewPipeline
 
 __all__ = [
-    "OPERATOR_POINTS_MAX",
+    "CORRECTIONS_MAX",
     "AssistService",
     "Flag",
     "PointAtPerson",

@@ -55,9 +55,9 @@ class CameraCollector(Collector):
             lambda _, it: it.metrics.totals.certified,
         )
         yield self._counter(
-            "operator_points",
+            "position_corrections",
             "Places that an operator pointed at and the tracker was given, since its start.",
-            _of_status(lambda it: it.operator_points),
+            _of_status(lambda it: it.position_corrections),
         )
         yield self._counter(
             "corrected_windows",

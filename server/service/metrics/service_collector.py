@@ -80,7 +80,7 @@ class ServiceCollector(Collector):
             "myview_flags_open", "Flags that can be answered now.", value=len(assist.flags.open)
         )
         yield CounterMetricFamily(
-            "myview_operator_points", "Places that the operator pointed at.", value=assist.points
+            "myview_position_corrections", "Places that the operator pointed at.", value=assist.points
         )
 
     def _recording(self) -> Iterable[Metric]:

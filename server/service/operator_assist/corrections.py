@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from server.messaging.operator_messages import OperatorPoint, OperatorPoints
+from server.messaging.operator_messages import CorrectedPosition, PositionCorrections
 from server.service.identity.people import PersonTracker
 
 
@@ -28,7 +28,7 @@ class PointedPosition:
 
 def corrections_for_tracker(
     people: PersonTracker, camera: str, number: int, places: Sequence[PointedPosition]
-) -> OperatorPoints | None:
+) -> PositionCorrections | None:
     """Return an operator's clicks on a person as corrections of the camera's track of that person.
 
     Frames that are forgotten are left out, and so are those of an earlier run of the camera.
@@ -43,8 +43,8 @@ def corrections_for_tracker(
     if not boots:
         return None
     points = [
-        OperatorPoint(pulse=it.pulse, track=track.track, x=it.x, y=it.y, tolerance=it.reach)
+        CorrectedPosition(pulse=it.pulse, track=track.track, x=it.x, y=it.y, tolerance=it.reach)
         for it, track in tracks
         if track is not None and track.boot == max(boots)
     ]
-    return OperatorPoints(boot=max(boots), points=points)
+    return PositionCorrections(boot=max(boots), corrections=points)

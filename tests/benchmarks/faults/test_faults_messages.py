@@ -50,12 +50,14 @@ def test_messages_are_lost_doubled_or_disordered_and_pictures_are_not(how: str) 
 def test_messages_go_to_whom_they_are_for() -> None:
     cameras, bestview = {name: Heard() for name in ("c0", "c1", "c2")}, Heard()
     crossing = Crossing(cameras, bestview)
-    for number, what in enumerate(("video", "tracks", "status", "thumbs/7", "detections", "operator_points")):
+    for number, what in enumerate(
+        ("video", "tracks", "status", "thumbs/7", "detections", "position_corrections")
+    ):
         crossing.publish(f"myview/faults/camera/c1/{what}", b"%d" % number)
     assert bestview.of == {"video": [0], "tracks": [1], "status": [2], "7": [3]}
     assert {name: heard.of for name, heard in cameras.items()} == {
         "c0": {"detections": [4]},
-        "c1": {"operator_points": [5]},
+        "c1": {"position_corrections": [5]},
         "c2": {"detections": [4]},
     }
 

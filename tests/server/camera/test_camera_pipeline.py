@@ -116,10 +116,10 @@ def test_people_in_a_recording_are_looked_for_from_its_first_frame_on(
     recording: Path, detect: dict[str, Any], first: int
 ) -> None:
     pipeline = CameraPipeline(config_of(recording, detect=detect), "c0")
-    searched = [pipeline.search(pulse, pipeline.take(pulse)) for pulse in range(30)]
-    words = [pipeline.follow(it) for it in searched]
+    searched = [pipeline.detect(pulse, pipeline.take(pulse)) for pulse in range(30)]
+    words = [pipeline.track_detections(it) for it in searched]
     pipeline.close()
-    assert [it.looked for it in searched] == [pulse >= first for pulse in range(30)]
+    assert [it.is_searched for it in searched] == [pulse >= first for pulse in range(30)]
     assert [pulse for word in words if word for pulse in word.without_detection] == list(range(first))
 
 
@@ -198,7 +198,7 @@ def test_detections_that_cannot_be_read_are_refused(
 
 
 def test_a_recording_that_ends_before_the_first_pulse_is_refused_offline(recording: Path) -> None:
-    with pytest.raises(UserError, match="camera c0: there is not one picture"):
+    with pytest.raises(UserError, match="camera c0: its recording has no pictures"):
         offline(config_of(recording, offset=-1000))
 
 

@@ -167,7 +167,7 @@ def _all(buses: Sequence[Bus], number: int) -> None:
     c1.publish(SITE.camera("c1", "video"), str(number).encode())
 
 
-@pytest.mark.parametrize("what", ["operator_points", "identities"])
+@pytest.mark.parametrize("what", ["position_corrections", "identities"])
 async def test_what_a_camera_is_told_is_said_by_the_best_view_and_heard_by_that_camera(
     settings: ZenohSettings, what: str
 ) -> None:

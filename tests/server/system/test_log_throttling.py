@@ -50,16 +50,16 @@ async def test_words_that_come_too_late_again_and_again_are_told_of_seldom_and_w
     exchange = PeerDetectionExchange(small_config(), "c0", None, 10)
     exchange._late["c1"] = LogThrottle(lambda: clock[0])
     for pulse in range(3):
-        exchange._tell_late("c1", pulse)
-        exchange._tell_in_time("c1")
+        exchange._log_late("c1", pulse)
+        exchange._log_in_time("c1")
     clock[0] = 60.0
-    exchange._tell_late("c1", 1500)
+    exchange._log_late("c1", 1500)
     clock[0] = 120.0
-    exchange._tell_in_time("c1")
+    exchange._log_in_time("c1")
     assert caplog.messages == [
-        "camera c0: what c1 found in frame 0 came too late",
-        "camera c0: what c1 found in frame 1500 came too late, and 2 times before",
-        "camera c0: what c1 finds comes in time again",
+        "camera c0: detections of camera c1 in frame 0 came too late",
+        "camera c0: detections of camera c1 in frame 1500 came too late, and 2 times before",
+        "camera c0: detections of camera c1 come in time again",
     ]
 
 
@@ -82,8 +82,10 @@ async def test_a_camera_that_nobody_understands_is_told_of_once_and_not_by_frame
     clock[0] += 60.0
     hear("c1", found("c1", 1750))
     none, well = caplog.messages
-    assert none.startswith("camera c0: a message on myview/hall/camera/c1/detections is none: Object missing")
-    assert well == "camera c0: what c1 says is understood again; 250 messages were not"
+    assert none.startswith(
+        "camera c0: cannot parse a message on myview/hall/camera/c1/detections: Object missing"
+    )
+    assert well == "camera c0: messages of camera c1 can be parsed again; 250 could not"
     assert exchange.bad_messages == 250
 
 
@@ -95,7 +97,7 @@ async def test_what_a_camera_does_not_understand_is_in_its_status(monkeypatch: p
     monkeypatch.setattr(camera, "_publish", lambda _, payload: said.append(payload))
     camera._exchange._read(Message(KEYS.camera("c1", "detections"), b"{", b""))
     for _ in range(2):
-        camera._pointed.put(Message(KEYS.camera("c0", "operator_points"), b"{", b""))
+        camera._corrections.put(Message(KEYS.camera("c0", "position_corrections"), b"{", b""))
     camera._send_status()
     camera._pipeline.close()
     [status] = [msgspec.json.decode(it, type=CameraStatus) for it in said]

@@ -32,20 +32,20 @@ def walker(frame: int) -> Detections:
     return Detections(boxes, np.array([0.9, 0.35]), looks)
 
 
-def followed(rung: ShedLevel) -> list[WindowResult]:
+def followed(current: ShedLevel) -> list[WindowResult]:
     steps = stepping(4)
     results = []
     for frame in range(FRAMES):
-        searched = rung.searches(frame, WINDOW.stride)
-        results.append(steps.push(frame, walker(frame)) if searched else steps.leave_out(frame))
+        searched = current.searches(frame, WINDOW.stride)
+        results.append(steps.push(frame, walker(frame)) if searched else steps.skip(frame))
     return [it for it in (*results, steps.flush()) if it is not None]
 
 
 @pytest.mark.parametrize(
-    "rung", shed_levels(WINDOW.stride, live=False), ids=lambda it: f"every {it.searched}"
+    "current", shed_levels(WINDOW.stride, live=False), ids=lambda it: f"every {it.searched}"
 )
-def test_somebody_is_one_person_however_few_frames_are_searched(rung: ShedLevel) -> None:
-    results = followed(rung)
+def test_somebody_is_one_person_however_few_frames_are_searched(current: ShedLevel) -> None:
+    results = followed(current)
     assert [it.last for it in results] == [
         it.last for it in followed(ShedLevel())
     ]  # windows end when they do, and none is late
@@ -78,7 +78,7 @@ def test_where_every_frame_is_searched_nothing_is_different() -> None:
 
 def test_windows_of_frames_that_are_all_left_out_end_as_well() -> None:
     steps = stepping(4)
-    ends = [frame for frame in range(40) if (it := steps.leave_out(frame)) is not None and it.last == frame]
+    ends = [frame for frame in range(40) if (it := steps.skip(frame)) is not None and it.last == frame]
     assert ends == list(range(4, 40, 5))
 
 
@@ -86,8 +86,8 @@ def test_a_window_end_that_never_came_is_in_the_next_result() -> None:
     steps = stepping(4)
     for frame in range(4):
         assert steps.push(frame, walker(frame)) is None
-    steps.leave_out(6)  # 4 and 5 were missed
-    steps.leave_out(7)
+    steps.skip(6)  # 4 and 5 were missed
+    steps.skip(7)
     result = steps.push(8, walker(8))
     assert result is not None
     assert (result.first, result.last) == (0, 4)

@@ -26,11 +26,11 @@ def simulated(seconds: float, carried: Callable[[float], float], *, live: bool =
     ladder = LoadShedder(shed_levels(STRIDE, live=live), BOUNDS)
     free, levels = 0.0, []
     for pulse in range(round(seconds * FPS)):
-        due, rung = pulse / FPS, ladder.rung
-        work = 0.75 * rung.searches(pulse, STRIDE) + 0.25 * rung.takes(pulse, STRIDE, GOP)
+        due, current = pulse / FPS, ladder.current
+        work = 0.75 * current.searches(pulse, STRIDE) + 0.25 * current.takes(pulse, STRIDE, GOP)
         start = max(due, free)
         free = min(start + work / FPS / carried(start), due + BACKLOG_S)
-        ladder.measured(free - due, free)
+        ladder.measure_lag(free - due, free)
         levels.append(ladder.level)
     return levels
 
@@ -46,13 +46,14 @@ def test_a_camera_that_keeps_up_leaves_nothing_out() -> None:
 @pytest.mark.parametrize("share", [0.9, 0.7, 0.6, 0.5, 0.4])
 def test_whatever_the_machine_carries_the_camera_is_soon_where_it_keeps_up(share: float) -> None:
     levels = simulated(600.0, lambda _: share)
-    rung = shed_levels(STRIDE, live=True)[max(levels)]
+    current = shed_levels(STRIDE, live=True)[max(levels)]
     work = sum(
-        0.75 * rung.searches(it, STRIDE) + 0.25 * rung.takes(it, STRIDE, GOP) for it in range(STRIDE * GOP)
+        0.75 * current.searches(it, STRIDE) + 0.25 * current.takes(it, STRIDE, GOP)
+        for it in range(STRIDE * GOP)
     )
     assert work / (STRIDE * GOP) < share  # so high as needed
     assert levels.index(max(levels)) < 10 * FPS
-    assert changes(levels[-round(240 * FPS) :]) <= 18  # a rung down is tried now and then, no more
+    assert changes(levels[-round(240 * FPS) :]) <= 18  # a current down is tried now and then, no more
 
 
 def test_it_comes_back_by_itself() -> None:
@@ -72,11 +73,11 @@ def test_a_short_stall_is_caught_up_with() -> None:
 def test_no_rung_leaves_out_the_end_of_a_window_or_the_beginning_of_a_gop(
     stride: int, gop: int, *, live: bool, pulse: int
 ) -> None:
-    for rung in shed_levels(stride, live=live):
+    for current in shed_levels(stride, live=live):
         end = (pulse + 1) * stride - 1
-        assert rung.searches(end, stride)
-        assert rung.takes(end, stride, gop)
-        assert rung.takes(pulse * gop, stride, gop)
+        assert current.searches(end, stride)
+        assert current.takes(end, stride, gop)
+        assert current.takes(pulse * gop, stride, gop)
 
 
 @given(stride=st.integers(1, 20), live=st.booleans())
@@ -98,12 +99,12 @@ def test_every_rung_leaves_out_more_and_a_recording_is_always_shown_whole(stride
 def test_a_frame_may_take_all_the_time_that_it_has_at_any_rate(fps: float) -> None:
     load = LoadMonitor(small_config(site={"fps": fps}), "c0", live=True)
     for pulse in range(200):
-        load.measured(0.95 / fps, pulse / fps)
+        load.measure_lag(0.95 / fps, pulse / fps)
         assert load.level == 0
 
 
 def test_the_rungs_are_told_in_words() -> None:
-    assert [it.words for it in shed_levels(5, live=True)] == [
+    assert [it.description for it in shed_levels(5, live=True)] == [
         "",
         "searching every 2nd frame: the machine is too busy",
         "searching every 3rd frame: the machine is too busy",

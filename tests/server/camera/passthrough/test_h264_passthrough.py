@@ -93,7 +93,7 @@ def nals(data: bytes) -> list[bytes]:
 @pytest.mark.parametrize("form", ["h264", "ts", "mp4", "mkv"])
 def test_access_units_come_out_as_they_went_in(tmp_path: Path, form: str) -> None:
     pipeline = CameraPipeline(site(written(tmp_path, form)), "c0")
-    assert pipeline.passes
+    assert pipeline.is_passthrough
     sent = passed(pipeline, range(FRAMES))
     with pytest.raises(SourceEndedError):
         pipeline.take(FRAMES)
@@ -164,7 +164,7 @@ def test_what_does_not_fit_is_encoded_or_refused_with_the_reason(
         CameraPipeline(site(path, **changes), "c0")
     assert "\n" not in str(refused.value)
     pipeline = CameraPipeline(site(path, "auto", **changes), "c0")
-    assert not pipeline.passes
+    assert not pipeline.is_passthrough
     assert re.search(reason, pipeline.why_encoded)
     assert passed(pipeline, range(GOP))[-1].data
     pipeline.close()
@@ -211,14 +211,14 @@ def test_where_all_cameras_pass_their_parameter_sets_are_their_own(tmp_path: Pat
     camera = {"source": str(path), "h264": "pass"}
     config = small_config(cameras=[{"id": "c0", **camera}, {"id": "c1", **camera}], encode={"crf": 30})
     pipeline = CameraPipeline(config, "c0")
-    assert pipeline.passes
+    assert pipeline.is_passthrough
     pipeline.close()
 
 
 def test_where_each_camera_may_have_its_own_parameter_sets_any_fit(tmp_path: Path) -> None:
     encode = {"crf": 30, "parameters": "own"}
     pipeline = CameraPipeline(site(written(tmp_path, "mp4"), encode=encode), "c0")
-    assert pipeline.passes
+    assert pipeline.is_passthrough
     pipeline.close()
 
 
@@ -365,7 +365,7 @@ def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(
     network = request.getfixturevalue(kind)
     camera = {"options": {"probesize": "20000", "analyzeduration": "200000"}}
     pipeline = CameraPipeline(site(network.url, camera=camera), "c0")
-    assert pipeline.passes
+    assert pipeline.is_passthrough
     source = pipeline.source
     assert isinstance(source, PassthroughStream)
     assert pipeline.take(1) is None

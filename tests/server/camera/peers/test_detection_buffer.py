@@ -15,110 +15,110 @@ def word(pulse: int, camera: str = "c1", boot: int = 1, *, ended: bool = False) 
     return FrameDetections(camera=camera, boot=boot, size=(640, 480), pulse=pulse, boxes=[], ended=ended)
 
 
-def earshot(*others: str, near: bool = True) -> PeerDetectionBuffer:
+def buffer(*others: str, near: bool = True) -> PeerDetectionBuffer:
     return PeerDetectionBuffer(others or ("c1",), MOST, lambda _: near)
 
 
 def pulses(it: PeerDetectionBuffer, pulse: int) -> list[tuple[str, int]]:
-    return [(said.camera, said.pulse) for said in it.heard(pulse).words]
+    return [(said.camera, said.pulse) for said in it.detections_at(pulse).messages]
 
 
 def test_words_that_came_before_are_there_in_the_order_of_the_configuration() -> None:
-    it = earshot("c1", "c2")
+    it = buffer("c1", "c2")
     it.put(word(7, "c2"), 0.0)
     it.put(word(7, "c1"), 0.0)
-    it.ask(7, 1.0)
-    assert not it.misses(7)
+    it.expect(7, 1.0)
+    assert not it.is_missing(7)
     assert pulses(it, 7) == [("c1", 7), ("c2", 7)]
-    assert not it.heard(7).alone
+    assert not it.detections_at(7).is_incomplete
 
 
 def test_a_camera_that_was_never_there_costs_one_wait() -> None:
-    it = earshot()
-    it.ask(0, 0.0)
-    assert it.misses(0)
+    it = buffer()
+    it.expect(0, 0.0)
+    assert it.is_missing(0)
     assert it.give_up(0) == ["c1"]
-    assert it.heard(0).alone
+    assert it.detections_at(0).is_incomplete
     for pulse in range(1, 50):
-        it.ask(pulse, pulse / 25)
-        assert not it.misses(pulse)
-        assert it.heard(pulse).alone, "it is said all the same"
+        it.expect(pulse, pulse / 25)
+        assert not it.is_missing(pulse)
+        assert it.detections_at(pulse).is_incomplete, "it is said all the same"
 
 
 def test_a_camera_that_was_late_is_waited_for_once_it_would_have_been_in_time() -> None:
-    it = earshot()
+    it = buffer()
     it.put(word(0), 0.0)
-    it.ask(1, PATIENCE)
+    it.expect(1, PATIENCE)
     it.give_up(1)
     it.put(word(1), PATIENCE + 0.01)
-    it.ask(2, 0.3 + PATIENCE)
-    assert not it.misses(2), "it is too slow by more than the patience"
+    it.expect(2, 0.3 + PATIENCE)
+    assert not it.is_missing(2), "it is too slow by more than the patience"
     it.put(word(2), 0.3 + PATIENCE / 2)
-    it.ask(3, 0.34 + PATIENCE)
-    assert it.misses(3)
+    it.expect(3, 0.34 + PATIENCE)
+    assert it.is_missing(3)
     it.put(word(3), 0.36)
-    assert not it.misses(3)
+    assert not it.is_missing(3)
     assert pulses(it, 3) == [("c1", 3)]
 
 
 def test_a_word_that_was_lost_is_not_waited_for_when_a_later_one_is_there() -> None:
-    it = earshot()
+    it = buffer()
     it.put(word(4), 0.0)
-    it.ask(3, 0.0)
-    assert not it.misses(3)
-    assert it.heard(3).alone
-    it.ask(4, 0.0)
+    it.expect(3, 0.0)
+    assert not it.is_missing(3)
+    assert it.detections_at(3).is_incomplete
+    it.expect(4, 0.0)
     assert pulses(it, 4) == [("c1", 4)]
 
 
 def test_a_recording_that_is_over_has_nothing_more_to_say_and_nothing_is_missing() -> None:
-    it = earshot()
+    it = buffer()
     it.put(word(4), 0.0)
     it.put(word(5, ended=True), 0.0)
-    it.ask(4, 0.0)
+    it.expect(4, 0.0)
     assert pulses(it, 4) == [("c1", 4)]
     for pulse in (5, 6):
-        it.ask(pulse, 0.0)
-        assert not it.misses(pulse)
-        assert it.heard(pulse).words == ()
-        assert not it.heard(pulse).alone
+        it.expect(pulse, 0.0)
+        assert not it.is_missing(pulse)
+        assert it.detections_at(pulse).messages == ()
+        assert not it.detections_at(pulse).is_incomplete
 
 
 def test_a_camera_that_was_started_again_is_waited_for_again() -> None:
-    it = earshot()
+    it = buffer()
     it.put(word(4), 0.0)
     it.put(word(5, ended=True), 0.0)
     it.put(word(9, boot=2), 0.0)
-    it.ask(10, 0.0)
-    assert it.misses(10)
+    it.expect(10, 0.0)
+    assert it.is_missing(10)
 
 
 def test_a_camera_that_looks_elsewhere_is_never_waited_for_and_its_words_are_not_needed() -> None:
-    it = earshot(near=False)
+    it = buffer(near=False)
     assert not it.put(word(0), 0.0)
     for pulse in range(3):
-        it.ask(pulse, 0.0)
-        assert not it.misses(pulse)
-        assert it.heard(pulse).words == ()
-        assert not it.heard(pulse).alone
+        it.expect(pulse, 0.0)
+        assert not it.is_missing(pulse)
+        assert it.detections_at(pulse).messages == ()
+        assert not it.detections_at(pulse).is_incomplete
 
 
 def test_no_more_words_are_kept_than_may_be_needed() -> None:
-    it = earshot()
+    it = buffer()
     for pulse in range(10 * MOST):
         it.put(word(pulse), 0.0)
-    it.ask(MOST - 1, 0.0)
+    it.expect(MOST - 1, 0.0)
     assert pulses(it, MOST - 1) == [("c1", MOST - 1)]
-    it.ask(MOST, 0.0)
-    assert not it.misses(MOST)
-    assert it.heard(MOST).alone
+    it.expect(MOST, 0.0)
+    assert not it.is_missing(MOST)
+    assert it.detections_at(MOST).is_incomplete
 
 
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.tuples(st.booleans(), st.integers(0, 3), st.floats(0, 0.5)), max_size=40))
 def test_two_waits_in_vain_have_a_word_in_time_between_them(steps: list[tuple[bool, int, float]]) -> None:
     """However words and questions come: ``steps`` are a word of so many pulses later, or a question."""
-    it = earshot()
+    it = buffer()
     it.put(word(0), 0.0)
     now, said, asked = 0.0, 0, -1
     trusted = True
@@ -133,8 +133,8 @@ def test_two_waits_in_vain_have_a_word_in_time_between_them(steps: list[tuple[bo
         else:
             asked += 1
             times[asked] = now
-            it.ask(asked, now + PATIENCE)
-            waits = it.misses(asked)
+            it.expect(asked, now + PATIENCE)
+            waits = it.is_missing(asked)
             assert waits == (trusted and said < asked)
             if waits:
                 now += PATIENCE

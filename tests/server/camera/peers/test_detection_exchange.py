@@ -184,7 +184,9 @@ async def both(
 ) -> list[PeerDetections]:
     """Let both say what they found in a frame, and hear the other."""
     pair = (("c0", one), ("c1", two))
-    return await asyncio.gather(*(it.of(pulse, word(name, pulse), now(), needed=needed) for name, it in pair))
+    return await asyncio.gather(
+        *(it.exchange(pulse, word(name, pulse), now(), needed=needed) for name, it in pair)
+    )
 
 
 async def test_words_go_both_ways_from_the_first_one_on(
@@ -193,8 +195,8 @@ async def test_words_go_both_ways_from_the_first_one_on(
     _, one, two = pair
     for pulse in range(5):
         first, second = await both(one, two, pulse)
-        assert first.words == (word("c1", pulse),)
-        assert second.words == (word("c0", pulse),)
+        assert first.messages == (word("c1", pulse),)
+        assert second.messages == (word("c0", pulse),)
 
 
 async def test_a_camera_that_cannot_join_for_a_reason_nobody_foresaw_does_not_go_on_by_itself(
@@ -208,7 +210,7 @@ async def test_a_camera_that_cannot_join_for_a_reason_nobody_foresaw_does_not_go
     alone = PeerDetectionExchange(config, "c0", CrossViewScorer(config, "c0", (192, 108), 1), 100)
     await alone.join()
     with pytest.raises(MemoryError, match="no memory"):
-        await alone.of(0, word("c0", 0), now(), needed=True)
+        await alone.exchange(0, word("c0", 0), now(), needed=True)
     await alone.leave()
 
 
@@ -220,7 +222,7 @@ async def test_a_camera_that_is_gone_is_waited_for_once(
     await two.leave()
     began = asyncio.get_running_loop().time()
     for pulse in range(1, 100):
-        assert (await one.of(pulse, word("c0", pulse), now(), needed=True)).alone
+        assert (await one.exchange(pulse, word("c0", pulse), now(), needed=True)).is_incomplete
     assert asyncio.get_running_loop().time() - began < 50 * WAIT
 
 
@@ -234,8 +236,8 @@ async def test_what_is_no_word_is_counted_and_left(
     far = msgspec.json.encode(word("c0", 1))
     for nonsense in (b"", b"{", b"[1]", b'{"camera": "c1"}', far, b"\xff\xfe"):
         two._bus.publish(key, nonsense)
-    await two.of(1, word("c1", 1), now(), needed=False)
-    assert (await one.of(1, word("c0", 1), now(), needed=True)).words == (word("c1", 1),)
+    await two.exchange(1, word("c1", 1), now(), needed=False)
+    assert (await one.exchange(1, word("c0", 1), now(), needed=True)).messages == (word("c1", 1),)
     assert one.bad_messages == 6
 
 
@@ -252,7 +254,7 @@ ROWS = st.lists(st.lists(NUMBER, min_size=4, max_size=6), max_size=4) | NUMBER
 )
 def test_whatever_is_read_as_a_word_can_be_gone_by(message: dict[str, Any], boxes: list[Any]) -> None:
     config = _room()
-    witness = CrossViewScorer(config, "c0", (640, 360), 1)
+    cross_view = CrossViewScorer(config, "c0", (640, 360), 1)
     seen = Detections(np.array([[300.0, 100.0, 340.0, 220.0]]), np.array([0.5]), np.ones((1, 1)))
     good = {"camera": "c1", "boot": 1, "size": [640, 360], "pulse": 3, "boxes": boxes}
     for it in (message, {**good, "boxes": message["boxes"]}, {**good, "size": message["size"]}, good):
@@ -261,9 +263,9 @@ def test_whatever_is_read_as_a_word_can_be_gone_by(message: dict[str, Any], boxe
         except (msgspec.ValidationError, msgspec.DecodeError, OverflowError):
             assert it is not good
             continue
-        if not witness.looks_here(read):
+        if not cross_view.sees_same_ground(read):
             continue
-        [score] = witness.scored(seen, [read]).scores
+        [score] = cross_view.rescore(seen, [read]).scores
         assert 0.0 <= score <= 1.0
 
 
@@ -280,7 +282,9 @@ def test_only_the_surest_boxes_are_told_and_in_their_order() -> None:
     config = _room()
     boxes = np.arange(4 * 150, dtype=np.float64).reshape(150, 4)
     scores = np.arange(150) % 101 / 100
-    said = CrossViewScorer(config, "c0", (640, 360), 1).word(5, Detections(boxes, scores, np.empty((150, 0))))
+    said = CrossViewScorer(config, "c0", (640, 360), 1).build_message(
+        5, Detections(boxes, scores, np.empty((150, 0)))
+    )
     assert said.boxes is not None
     assert len(said.boxes) == FRAME_DETECTIONS_MAX
     assert [row[0] for row in said.boxes] == sorted(row[0] for row in said.boxes)
@@ -293,10 +297,10 @@ def test_what_cannot_be_searched_is_no_word_that_nobody_is_there(recording: Path
     pipeline = CameraPipeline(config, "c0")
     said = []
     for pulse in range(40):
-        searched = pipeline.search(pulse, None if pulse == 35 else pipeline.take(pulse))
-        assert searched.word is not None
-        said.append(searched.word.boxes is not None)
-        pipeline.follow(searched, PeerDetections())
+        searched = pipeline.detect(pulse, None if pulse == 35 else pipeline.take(pulse))
+        assert searched.message is not None
+        said.append(searched.message.boxes is not None)
+        pipeline.track_detections(searched, PeerDetections())
     pipeline.close()
     first = said.index(True)
     assert 0 < first < 35, "the background is not known at once"
@@ -308,10 +312,10 @@ def test_a_frame_without_a_needed_word_is_told(recording: Path) -> None:
     pipeline = CameraPipeline(config, "c0")
     asked, told = [], []
     for pulse in range(FRAMES):
-        searched = pipeline.search(pulse, pipeline.take(pulse))
-        if searched.asks:
+        searched = pipeline.detect(pulse, pipeline.take(pulse))
+        if searched.needs_peers:
             asked.append(pulse)
-        tracks = pipeline.follow(searched, PeerDetections(alone=True))
+        tracks = pipeline.track_detections(searched, PeerDetections(is_incomplete=True))
         told += tracks.without_peers if tracks else []
     told += pipeline.finish(FRAMES).without_peers
     pipeline.close()
@@ -326,8 +330,8 @@ def test_a_site_with_one_homography_or_none_has_nobody_to_ask(recording: Path) -
         lone = config.model_copy(update={"cameras": cameras})
         assert not any(lone.witnesses(camera) for camera in lone.camera_ids)
         pipeline = CameraPipeline(lone, "c0")
-        assert pipeline.search(0, pipeline.take(0)).word is None
-        assert pipeline.last_word(1) is None
+        assert pipeline.detect(0, pipeline.take(0)).message is None
+        assert pipeline.end_message(1) is None
         pipeline.close()
     assert config.witnesses("c1") == ("c0", "c2")
     assert not config_of(recording, use=False).witnesses("c1")

@@ -14,7 +14,7 @@ from fakes.service.scripted_cameras import FPS, HEIGHT, LARGE, SMALL, STRIDE, WI
 from server.camera.operator_corrections import CorrectionInbox
 from server.http.access.csrf import CSRF_HEADER
 from server.messaging.inbox import Message
-from server.messaging.operator_messages import OperatorPoints, RiskEvent
+from server.messaging.operator_messages import PositionCorrections, RiskEvent
 
 POINTING = "/api/operator/pointing"
 
@@ -28,12 +28,12 @@ async def helped() -> AsyncIterator[Hall]:
         yield hall
 
 
-def sent(hall: Hall) -> list[tuple[str, OperatorPoints]]:
+def sent(hall: Hall) -> list[tuple[str, PositionCorrections]]:
     """Collect what cameras are told from now on."""
-    told: list[tuple[str, OperatorPoints]] = []
+    told: list[tuple[str, PositionCorrections]] = []
 
     def send(camera: str, payload: bytes) -> None:
-        told.append((camera, msgspec.json.decode(payload, type=OperatorPoints)))
+        told.append((camera, msgspec.json.decode(payload, type=PositionCorrections)))
 
     hall.service.assist._send = send
     return told
@@ -55,13 +55,13 @@ async def test_the_camera_is_told_by_its_own_track(helped: Hall) -> None:
     assert (status, answer["accepted"], answer["too_old"], answer["flags"]) == (200, 2, 0, [])
     [(camera, said)] = told
     assert (camera, said.boot) == (A, 1)
-    assert [(it.pulse, it.track, it.x, it.y) for it in said.points] == [(2, 2, 12, 20), (7, 2, 12, 20)]
-    assert [it.tolerance for it in said.points] == [pytest.approx(0.02 * WIDTH), 3.0]
+    assert [(it.pulse, it.track, it.x, it.y) for it in said.corrections] == [(2, 2, 12, 20), (7, 2, 12, 20)]
+    assert [it.tolerance for it in said.corrections] == [pytest.approx(0.02 * WIDTH), 3.0]
     status, answer = await say(helped, at(7), camera=B)
     assert (status, answer["accepted"]) == (200, 1)
     assert told[1][0] == B
     assert (await say(helped, at(7, tolerance=1e-200)))[0] == 200
-    assert told[2][1].points[0].tolerance == 1.0, (
+    assert told[2][1].corrections[0].tolerance == 1.0, (
         "nobody points better than a pixel, and squares of this are 0"
     )
 
@@ -72,7 +72,7 @@ async def test_what_is_too_long_ago_is_left_out_and_said(helped: Hall) -> None:
     told = sent(helped)
     status, answer = await say(helped, at(2), at(30))
     assert (status, answer["accepted"], answer["too_old"]) == (200, 1, 1)
-    assert [it.pulse for it in told[0][1].points] == [30]
+    assert [it.pulse for it in told[0][1].corrections] == [30]
     assert (await say(helped, at(2)))[0] == 409
     assert len(told) == 1
 
@@ -146,7 +146,7 @@ async def test_a_flag_is_raised_followed_answered_and_counted(helped: Hall) -> N
         'myview_flags_total{state="answered"} 1.0',
         'myview_flags_total{state="expired"} 0.0',
         "myview_flags_open 0.0",
-        "myview_operator_points_total 2.0",
+        "myview_position_corrections_total 2.0",
     ):
         assert line in lines
 
