@@ -54,6 +54,4 @@ async def post_pointing(request: web.Request) -> web.Response:
 
 def _pointing(service: BestViewService, pointed: Pointed, too_old: int) -> Pointing:
     assist = service.assist
-    return Pointing(
-        assist.memory, CORRECTIONS_MAX, assist.blocked, pointed.accepted, too_old, pointed.flags
-    )
+    return Pointing(assist.memory, CORRECTIONS_MAX, assist.blocked, pointed.accepted, too_old, pointed.flags)

@@ -43,7 +43,9 @@ class OperatorAssist:
             return 0, []
         self._send(camera, msgspec.json.encode(said))
         self.points += len(said.corrections)
-        return len(said.corrections), self.flags.pointed(number, camera, [it.pulse for it in said.corrections])
+        return len(said.corrections), self.flags.pointed(
+            number, camera, [it.pulse for it in said.corrections]
+        )
 
     def _foreseen(self, epoch: Epoch) -> Iterator[RiskEvent]:
         """Yield the risk events of an epoch whose persons all have a number."""

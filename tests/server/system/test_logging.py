@@ -57,7 +57,7 @@ def test_a_line_says_when_how_bad_who_and_what() -> None:
         ("drawing object %d on camera %s", (3, "c1"), {"object": 3, "camera": "c1"}),
         ("100 %% of camera %s after %.1f s", ("c2", 0.5), {"camera": "c2"}),
         ("%d frames of %-5s camera %s", (4, "the", "c2"), {"camera": "c2"}),
-        ("every camera's recording has ended", (), {}),
+        ("every camera's recording is over", (), {}),
         ("camera %s went to camera %s", ("a", "b"), {"camera": "a"}),
     ],
 )

@@ -82,7 +82,9 @@ def played(
                 people, "c0", left, [PointedPosition(it, places(it)[0] + 20, 160, 10) for it in of]
             )
             assert asked is not None
-            said = [PositionCorrection(it.pulse, it.track, it.x, it.y, it.tolerance) for it in asked.corrections]
+            said = [
+                PositionCorrection(it.pulse, it.track, it.x, it.y, it.tolerance) for it in asked.corrections
+            ]
         message = camera.take(frame, said)
         if message is None:
             continue
