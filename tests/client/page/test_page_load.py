@@ -16,7 +16,7 @@ pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 async def test_what_a_camera_leaves_out_stands_beside_its_name(browser: Browser) -> None:
     ladder = shed_levels(5, live=True)
-    site = FakeSite(busy={CAMERAS[1]: ladder[1].words, CAMERAS[2]: ladder[-1].words})
+    site = FakeSite(busy={CAMERAS[1]: ladder[1].description, CAMERAS[2]: ladder[-1].description})
     async with visiting(browser, site) as visit:
         await visit.playing(1)
         items = visit.page.locator("#cameras li")
@@ -24,5 +24,7 @@ async def test_what_a_camera_leaves_out_stands_beside_its_name(browser: Browser)
         await expect(items.nth(1)).to_contain_text("searching every 2nd frame")
         await expect(items.nth(2)).to_contain_text("showing every 2nd and searching every 5th frame")
         for busy in (1, 2):
-            await expect(items.nth(busy)).to_have_attribute("title", ladder[-1 if busy == 2 else 1].words)
+            await expect(items.nth(busy)).to_have_attribute(
+                "title", ladder[-1 if busy == 2 else 1].description
+            )
             await expect(items.nth(busy)).not_to_have_class("away")

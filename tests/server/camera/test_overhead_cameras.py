@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bestview import IdentityRegistry, IdentitySettings, TrackUpdate
 from server.camera.detector_setup import make_detector
-from server.camera.tracker_setup import _measured
+from server.camera.tracker_setup import _with_room_width
 from server.cli.track.command import track_one
 from server.config.loader import build_config
 from server.config.site_config import Config
@@ -119,7 +119,7 @@ def test_floor_is_measured_across_all_of_the_picture_that_is_looked_at() -> None
     # Six metres across a picture of 4 by 3, which has black columns at its sides in a site of 16 by 9.
     config = _config("overhead", ground=np.diag([0.0125, 0.0125, 1.0]).tolist(), ground_unit="m")
     across = [
-        _measured(TemporalSettings(), config.cameras[0], Letterbox((480, 360), site)).room_m
+        _with_room_width(TemporalSettings(), config.cameras[0], Letterbox((480, 360), site)).room_m
         for site in ((480, 360), (640, 360), (960, 720))
     ]
     assert across == pytest.approx([6.0, 8.0, 6.0])

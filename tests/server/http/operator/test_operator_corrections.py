@@ -151,24 +151,24 @@ async def test_a_flag_is_raised_followed_answered_and_counted(helped: Hall) -> N
         assert line in lines
 
 
-def test_a_camera_takes_what_is_said_of_its_own_tracks_and_no_more_than_it_can_hold(
+def test_the_inbox_accepts_corrections_for_its_own_run_and_keeps_only_the_newest(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    pointed = CorrectionInbox("c0", boot=2)
+    inbox = CorrectionInbox("c0", boot=2)
     point = {"track": 1, "x": 1.0, "y": 2.0, "tolerance": 3.0}
 
     def hear(content: Any) -> None:
         payload = content if isinstance(content, bytes) else msgspec.json.encode(content)
-        pointed.put(Message("myview/hall/camera/c0/pointing", payload, b""))
+        inbox.put(Message("myview/hall/camera/c0/position_corrections", payload, b""))
 
-    hear({"boot": 1, "points": [{"pulse": 1, **point}]})
+    hear({"boot": 1, "corrections": [{"pulse": 1, **point}]})
     for first in (0, 200):
-        hear({"boot": 2, "points": [{"pulse": first + it, **point} for it in range(200)]})
-    sharp = {"boot": 2, "points": [{"pulse": 1, **point, "tolerance": 1e-200}]}
-    for bad in (b"", b"[" * 100_000, b"{}", {"boot": 2, "points": [{"pulse": -1, **point}]}, sharp):
+        hear({"boot": 2, "corrections": [{"pulse": first + it, **point} for it in range(200)]})
+    sharp = {"boot": 2, "corrections": [{"pulse": 1, **point, "tolerance": 1e-200}]}
+    for bad in (b"", b"[" * 100_000, b"{}", {"boot": 2, "corrections": [{"pulse": -1, **point}]}, sharp):
         hear(bad)
-    assert pointed.bad_messages == 5
+    assert inbox.bad_messages == 5
     hear(b"{}")
     assert len(caplog.messages) == 5, "one for each reason"
-    assert [it.frame for it in pointed.take()] == list(range(400 - 256, 400))
-    assert pointed.take() == []
+    assert [it.frame for it in inbox.take()] == list(range(400 - 256, 400))
+    assert inbox.take() == []

@@ -68,7 +68,7 @@ class Site:
             for part in (it.ingest, it.state_replication):
                 part.alive(KEYS.camera(camera, "alive"), is_present=True)
             if camera != deaf:
-                self.cameras[camera].service(there=True)
+                self.cameras[camera].service(is_present=True)
         return it
 
     def tell(self, epochs: Iterable[int], seen: Seen = ALL, boot: int = 1) -> None:
@@ -222,7 +222,7 @@ def test_a_camera_that_says_late_what_it_remembers_keeps_numbers_from_being_used
     site.cameras[A] = RetainedState(lambda said: site._hear(A, said))
     site.start(deaf=B)
     site.tell(range(7, 8), {A: {}, B: {}})
-    site.cameras[B].service(there=True)
+    site.cameras[B].service(is_present=True)
     site.tell(range(8, 10))
     assert min(site.service.decider.people.known) > used
 
@@ -233,7 +233,7 @@ def test_a_camera_that_says_late_what_it_remembers_is_heard_all_the_same() -> No
     site.start(deaf=B)
     site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
     assert site.service.state_replication.may_recover(b), "camera B may still come"
-    site.cameras[B].service(there=True)
+    site.cameras[B].service(is_present=True)
     site.tell(range(8, 12), {A: {2: LARGE, 9: SMALL}, B: {3: LARGE}})
     assert [site.person_of(A, 2, 11), site.person_of(B, 3, 11)] == [ann, b]
 
@@ -245,7 +245,7 @@ def test_of_what_is_said_late_nothing_counts_that_may_be_anothers_by_now() -> No
     site.start(deaf=B)
     site.tell(range(7, 8), {A: {1: SMALL, 2: LARGE}, B: {}})
     assert site.person_of(A, 1, 7) in before, "nobody had said that it was taken"
-    site.cameras[B].service(there=True)
+    site.cameras[B].service(is_present=True)
     site.tell(range(8, 12))
     assert site.person_of(B, 3, 11) > max(before)
     assert site.service.decider.people.registry.names == {}
@@ -362,8 +362,8 @@ def test_a_camera_keeps_no_more_than_it_can() -> None:
     it = RetainedState(said.append)
     it.put(Message("", b"one", b""))
     it.put(Message("", b"2" * (SNAPSHOT_BYTES_MAX + 1), b""))
-    it.service(there=False)
-    it.service(there=True)
+    it.service(is_present=False)
+    it.service(is_present=True)
     assert said == [b"one"]
 
 
@@ -418,7 +418,7 @@ def test_whatever_cameras_remember_the_service_goes_on(
 
 def lying(site: Site, camera: str, **changes: object) -> None:
     """Let a camera remember something else than what it was told."""
-    said = msgspec.json.decode(site.cameras[camera]._kept, type=IdentitySnapshot)
+    said = msgspec.json.decode(site.cameras[camera]._state, type=IdentitySnapshot)
     site.cameras[camera].put(Message("", msgspec.json.encode(msgspec.structs.replace(said, **changes)), b""))
 
 
@@ -440,7 +440,7 @@ def test_no_camera_alone_moves_everybodys_numbers_far_ahead(lie: dict[str, objec
     site.tell(range(7, 9))
     lying(site, B, **lie)
     for _ in range(3):
-        site.cameras[B].service(there=True)
+        site.cameras[B].service(is_present=True)
     site.tell(range(9, 12), {A: {1: SMALL, 2: LARGE, 9: SMALL}, B: {3: LARGE}})
     people = site.service.decider.people
     assert people.next_number <= SINGLE_CAMERA_NUMBER_MAX + 10
