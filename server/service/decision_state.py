@@ -1,4 +1,4 @@
-"""What is known now, for the API and the page: who is there, which camera shows whom, and why."""
+"""The state of decisions, for the API and the page: each person's view now, and why it was selected."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from server.service.view_selection.recent_reasons import RecentReasons, Selected
 
 
 class DecisionState:
-    """Remembers every object's newest decision, and the reasons of the last minute."""
+    """Keeps every object's newest view, and the reasons of the last minute."""
 
     def __init__(self, fps: float) -> None:
         self.selected_views: dict[int, SelectedView] = {}
         self.merged: dict[int, int] = {}
         self.cuts = 0
         self.end = 0
-        """The first pulse that nothing is decided about."""
+        """The first pulse that is not decided yet."""
         self._reasons = RecentReasons(fps)
 
     def put(self, decision: GopDecision) -> GopChoices:
-        """Take a decision over; give it as the message that is published and sent to the page."""
+        """Add a decision; return it as the message that is published."""
         cuts = []
         seen_by: dict[int, list[str]] = {}
         for camera, frames in decision.boxes.items():
@@ -31,7 +31,7 @@ class DecisionState:
             cut = _cut(choice, decision.first)
             if cut is not None:
                 cuts.append(cut)
-            self._stand(decision, choice, tuple(seen_by.get(choice.number, ())))
+            self._select(decision, choice, tuple(seen_by.get(choice.number, ())))
         numbers = {choice.number for choice in decision.choices}
         self.selected_views = {number: it for number, it in self.selected_views.items() if number in numbers}
         self.merged = decision.merged
@@ -57,31 +57,32 @@ class DecisionState:
         )
 
     def resolve(self, number: int) -> int:
-        """Return the number that a merged person goes by now."""
+        """Return a merged person's current number."""
         return self.merged.get(number, number)
 
     def explain(self, number: int, pulse: int | None = None) -> SelectionReason | None:
         """Explain an object's newest view, or that at a pulse of the last minute.
 
-        What was before the first question about an object is not kept.
+        Reasons are kept from the first query about an object on.
 
         Returns:
-            None: there is no such object, or nothing is kept of that time.
+            None: there is no such object, or no reasons of that time.
         """
-        standing = self.selected_views.get(self.resolve(number))
-        if standing is None:
+        view = self.selected_views.get(self.resolve(number))
+        if view is None:
             return None
-        newest = self._reasons.newest(standing)
-        return newest if pulse is None else self._reasons.at(standing.choice.number, pulse)
+        newest = self._reasons.newest(view)
+        return newest if pulse is None else self._reasons.at(view.choice.number, pulse)
 
-    def _stand(self, decision: GopDecision, choice: ObjectChoice, cameras: tuple[str, ...]) -> None:
-        known = self.selected_views.get(choice.number)
-        stays = known is not None and known.choice.camera == choice.camera
+    def _select(self, decision: GopDecision, choice: ObjectChoice, cameras: tuple[str, ...]) -> None:
+        previous = self.selected_views.get(choice.number)
         self.selected_views[choice.number] = SelectedView(
             choice=choice,
             first=decision.first,
             frames=decision.frames,
-            since=known.since if known is not None and stays else decision.first,
+            since=decision.first
+            if previous is None or previous.choice.camera != choice.camera
+            else previous.since,
             cameras=cameras,
         )
 
@@ -98,17 +99,17 @@ def reason(choice: ObjectChoice, why: Explanation) -> str:
     if camera is None:
         return "No camera's picture can be shown at the moment."
     if choice.away or not any(view.seen or view.undetected for view in why.views.values()):
-        return f"Nobody sees this person at the moment; {camera} saw them last."
+        return f"No camera sees this person at the moment; {camera} saw them last."
     return _compared(camera, why)
 
 
 def _compared(camera: str, why: Explanation) -> str:
-    """Return why this camera was selected among those that see, or should see, the person."""
-    shown = why.views.get(camera)
-    if shown is not None and not shown.seen and shown.undetected:
-        return f"{camera} does not find this person, but others know that they stand before it."
+    """Return why this camera was selected among those that see the person, or should."""
+    view = why.views.get(camera)
+    if view is not None and not view.seen and view.undetected:
+        return f"{camera} does not detect this person, but other cameras locate them in its view."
     possible = {name: view.cost for name, view in why.views.items() if view.cost is not None}
-    if camera not in possible:  # it has a hole ahead
+    if camera not in possible:  # frames are missing in the look-ahead
         return f"{camera} is shown for as long as it can be: some of its next frames are missing."
     if len(possible) == 1:
         return f"{camera} is the only camera whose picture can be shown."

@@ -1,4 +1,4 @@
-"""The best-view service: all that HTTP may ask of it, and have it do."""
+"""The facade of the best-view service: all queries and commands that HTTP uses."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class BestViewService:
     """Queries and commands over a running pipeline, grouped by subject.
 
     Attributes:
-        people: who is known, which camera shows them, and what the operator corrects.
-        cameras: how well the cameras work.
+        people: people, their views, and manual corrections.
+        cameras: state and diagnostics of the cameras.
         streams: live streams.
-        recordings: what is kept of them.
-        rendering: streams that are drawn: JPEG, and boxes burnt in.
+        recordings: recorded streams.
+        rendering: JPEG pictures, and video with boxes burnt in.
         assist: flags for the operator, and corrections by pointing.
         calibration: the calibration walk.
         operations: readiness, pulse clients, view settings.
@@ -65,5 +65,5 @@ class BestViewService:
         return self._pipeline.decision_state.end
 
     def register_metrics(self, registry: CollectorRegistry, queues: Mapping[str, Callable[[], int]]) -> None:
-        """Register the metrics of cameras and service; ``queues`` are further lengths to report, by name."""
+        """Register the metrics of cameras and service; ``queues`` are further queue lengths, by name."""
         register_collectors(registry, self._pipeline, self.rendering, queues)

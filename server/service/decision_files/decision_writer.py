@@ -1,4 +1,4 @@
-"""What was decided, as files: tracks per camera, the camera choices, and what came too late."""
+"""Writes decisions to files: tracks per camera, camera choices, corrections, and late frames."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ LATE_HEAD = "frame,camera,what\n"
 class DecisionWriter:
     """Writes decisions: ``tracks/<camera>.txt``, ``choices.csv``, ``corrections.csv``, ``late.csv``.
 
-    ``fits`` may grow: a camera is in it from its first word on. A choice is a line also while nobody sees
-    the person: it says what their stream shows.
+    ``letterboxes`` grows: a camera is in it from its first window on. A choice is written even while no
+    camera sees the person: it is what their stream shows.
 
     Frames count from 1 in all of them, as in MOTChallenge files: frame 1 is pulse 0. Boxes are in pixels of
     the camera's own picture. An empty ``late.csv`` says that the files are exactly what `myview render`
@@ -62,16 +62,16 @@ class DecisionWriter:
         """Write a decision, and rows of ``late.csv``.
 
         Raises:
-            OSError: that cannot be written; the files are as they were.
+            OSError: the files cannot be written; they are unchanged.
         """
         texts: dict[Path, list[str]] = defaultdict(list)
         for camera, frames in decision.boxes.items():
-            for place, boxes in enumerate(frames):
+            for index, boxes in enumerate(frames):
                 if boxes:
-                    texts[self._tracks[camera]] += self._rows(camera, decision.first + place + 1, boxes)
-        for place in range(decision.frames):
+                    texts[self._tracks[camera]] += self._rows(camera, decision.first + index + 1, boxes)
+        for index in range(decision.frames):
             texts[self._choices] += (
-                f"{decision.first + place + 1},{choice.number},{choice.camera}\n"
+                f"{decision.first + index + 1},{choice.number},{choice.camera}\n"
                 for choice in decision.choices
                 if choice.camera is not None
             )
@@ -104,10 +104,10 @@ def _line(correction: Merge | Split) -> str:
 
 
 class AtomicFiles:
-    """Files to which texts are appended: what is appended at once stands in all of them, or in none."""
+    """Files that are appended to together: each append reaches all of them, or none."""
 
     def __init__(self, heads: Mapping[Path, str], *, private: bool = False) -> None:
-        """Begin new files with their heads, ASCII; ``private``: for this user alone.
+        """Create files with their heads, ASCII; ``private``: readable by this user alone.
 
         Raises:
             OSError: one cannot be written.
@@ -119,10 +119,10 @@ class AtomicFiles:
             self._opened = opened.pop_all()
 
     def append(self, texts: Mapping[Path, str]) -> None:
-        """Append to some of them, ASCII. It is the system's when this returns.
+        """Append ASCII text to some of them; it is handed to the system when this returns.
 
         Raises:
-            OSError: that cannot be written; all files are as they were.
+            OSError: a file cannot be written; all are unchanged.
         """
         before = {it: self._files[it].tell() for it in texts}
         try:
@@ -130,7 +130,7 @@ class AtomicFiles:
                 _write(self._files[path], text.encode("ascii"))
         except OSError:
             for path, length in before.items():
-                with contextlib.suppress(OSError):  # the first one says it
+                with contextlib.suppress(OSError):  # the first error is raised
                     self._files[path].truncate(length)
                     self._files[path].seek(length)
             raise
@@ -141,6 +141,6 @@ class AtomicFiles:
 
 
 def _write(file: FileIO, rest: bytes) -> None:
-    """Write all of it: a disk that is nearly full takes a part, and says so only when asked again."""
+    """Write all bytes: a nearly full disk takes a part, and reports an error only at the next write."""
     while rest:
         rest = rest[file.write(rest) :]

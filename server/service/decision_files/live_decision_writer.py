@@ -1,4 +1,4 @@
-"""What a running site decides, as files: where they cannot be written the site goes on without them."""
+"""Decision files of a running site: streams continue when the files cannot be written."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class _LateFrame:
-    """A frame that did not count as it should have; what is said of it."""
+    """A row of ``late.csv``: a frame, and what it lacked."""
 
     pulse: int
     camera: str
@@ -35,46 +35,46 @@ class LiveDecisionWriter:
     """
 
     def __init__(self, folder: Path, cameras: Sequence[str], letterboxes: Mapping[str, Letterbox]) -> None:
-        """Begin new files, for this user alone, in a folder, which may exist.
+        """Create the files, readable by this user alone, in a folder, which may exist.
 
         Raises:
             OSError: one cannot be written.
         """
         self._folder = folder
-        self._recorder = DecisionWriter(folder, cameras, letterboxes, private=True)
+        self._writer = DecisionWriter(folder, cameras, letterboxes, private=True)
         self._late: list[_LateFrame] = []
         self._missing = range(0)
-        """Pulses of which nothing could be written, and ``late.csv`` does not say so yet."""
+        """Pulses that could not be written and are not listed in ``late.csv`` yet."""
 
     def late(self, camera: str, pulses: Sequence[int], what: str) -> None:
-        """Note frames that came too late to count; they are written with the next decision."""
+        """Record frames that lacked something; they are written with the next decision."""
         self._late += (_LateFrame(it, camera, what) for it in pulses)
 
     def write(self, decision: GopDecision) -> None:
-        """Write a decision, or leave it out."""
+        """Write a decision; skip it if the disk does not take it."""
         try:
-            self._recorder.write(decision, self._rows())
+            self._writer.write(decision, self._rows())
         except OSError as error:
-            self._leave_out(decision, error)
+            self._skip(decision, error)
             return
         if self._missing:
-            log.info("%s: written again; %d frames are missing", self._folder, len(self._missing))
+            log.info("%s: writing again; %d frames are missing", self._folder, len(self._missing))
         self._missing = range(0)
         self._late.clear()
 
     def close(self) -> None:
-        """Write what is known of late frames, and close the files."""
+        """Write the remaining late frames, and close the files."""
         try:
-            self._recorder.write_late(self._rows())
+            self._writer.write_late(self._rows())
         except OSError as error:
             log.warning("%s: the end of late.csv could not be written: %s", self._folder, error.strerror)
         self._late.clear()
-        self._recorder.close()
+        self._writer.close()
 
-    def _leave_out(self, decision: GopDecision, error: OSError) -> None:
+    def _skip(self, decision: GopDecision, error: OSError) -> None:
         if not self._missing:
             log.error(
-                "%s: cannot write: %s; decisions are left out until there is room again; the streams go on",
+                "%s: cannot write: %s; decisions are skipped until writing succeeds; the streams continue",
                 self._folder,
                 error.strerror or error,
             )

@@ -1,4 +1,4 @@
-"""Operator assistance: flags for what the trackers expect to go wrong, and corrections by pointing."""
+"""Operator assistance: flags for predicted tracking failures, and corrections by pointing."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ __all__ = [
     "PointedPlace",
 ]
 
-_REACH = 0.02
-"""How far off a place may be where nothing else is said, as a share of the picture's width."""
-_REACH_MOST = 0.5
+_DEFAULT_TOLERANCE = 0.02
+"""The default tolerance of a position, as a share of the picture's width."""
+_MAX_TOLERANCE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class PointedPlace:
-    """A place in a frame, in pixels of the site's picture."""
+    """A position in a frame, in pixels of the site's picture."""
 
     pulse: int
     x: float
     y: float
     reach: float | None
-    """How far off it may be, in pixels; None: a fiftieth of the picture's width."""
+    """Tolerance in pixels; None: a fiftieth of the picture's width."""
 
 
 @dataclass(frozen=True, slots=True)
 class PointAtPerson:
-    """Command: a person is at these places of a camera's picture."""
+    """Command: a person is at these positions in a camera's picture."""
 
     number: int
     camera: str
@@ -52,12 +52,12 @@ class PointAtPerson:
 
 @dataclass(frozen=True, slots=True)
 class Pointed:
-    """What became of a :class:`PointAtPerson`."""
+    """The result of a :class:`PointAtPerson`."""
 
     accepted: int
-    """How many of the places were sent to the camera's tracker."""
+    """The number of positions that were sent to the camera's tracker."""
     flags: list[int]
-    """The flags that are being followed by this."""
+    """The flags that this responds to."""
 
 
 class AssistService:
@@ -87,22 +87,22 @@ class AssistService:
 
     @property
     def blocked(self) -> str:
-        """Why nobody can be pointed at here; empty: they can."""
+        """Why people cannot be pointed at here; empty: they can."""
         config = self._pipeline.config
         if config.view.share.of > 1:
-            return "several services share this site (view.share): they must agree who is who, by themselves"
+            return "several services share this site (view.share), and their person numbers must stay equal"
         if not config.track.assist.enabled:
-            return "no camera takes a pointing: track.assist.enabled is off"
+            return "cameras take no corrections: track.assist.enabled is off"
         return ""
 
     def point_at_person(self, command: PointAtPerson) -> Pointed:
-        """Send a camera's tracker where a person is; it corrects its tracks, also in the past.
+        """Send a person's positions to a camera's tracker, which corrects its tracks, also past ones.
 
         Raises:
-            ConflictError: nobody can be pointed at here, or the camera has not shown the person then.
+            ConflictError: people cannot be pointed at here, or the camera did not show the person then.
             UnknownCameraError: there is no such camera.
-            UnknownObjectError: nobody has this number.
-            InvalidCommandError: a place is outside the picture, or has not come yet.
+            UnknownObjectError: no person has this number.
+            InvalidCommandError: a position is outside the picture, or its frame has not come yet.
         """
         pipeline, camera = self._pipeline, command.camera
         if self.blocked:
@@ -115,20 +115,22 @@ class AssistService:
             raise UnknownObjectError(command.number, is_recovering=is_recovering)
         for place in command.places:
             self._check(place)
-        accepted, flags = pipeline.assist.point(number, camera, [self._place(it) for it in command.places])
+        accepted, flags = pipeline.assist.point(number, camera, [self._position(it) for it in command.places])
         if not accepted:
-            raise ConflictError(f"camera {camera} has not shown object {number} then, or it is too long ago")
+            raise ConflictError(f"camera {camera} did not show object {number} then, or it is too long ago")
         return Pointed(accepted, flags)
 
     def _check(self, place: PointedPlace) -> None:
         site = self._pipeline.config.site
         if not (0 <= place.x <= site.width and 0 <= place.y <= site.height):
-            where = f"{place.x:g}, {place.y:g}"
-            raise InvalidCommandError(f"points: {where} is not in a picture of {site.width}x{site.height}")
+            position = f"{place.x:g}, {place.y:g}"
+            raise InvalidCommandError(f"points: {position} is not in a picture of {site.width}x{site.height}")
         if place.pulse > self._pipeline.pulse:
             raise InvalidCommandError(f"points: pulse {place.pulse} has not come yet")
 
-    def _place(self, place: PointedPlace) -> PointedPosition:
+    def _position(self, place: PointedPlace) -> PointedPosition:
         width = self._pipeline.config.site.width
-        reach = _REACH * width if place.reach is None else min(place.reach, _REACH_MOST * width)
-        return PointedPosition(place.pulse, place.x, place.y, max(reach, TOLERANCE_MIN))
+        tolerance = (
+            _DEFAULT_TOLERANCE * width if place.reach is None else min(place.reach, _MAX_TOLERANCE * width)
+        )
+        return PointedPosition(place.pulse, place.x, place.y, max(tolerance, TOLERANCE_MIN))

@@ -1,4 +1,4 @@
-"""Cameras: which there are, how well they work, and what they cover of the floor."""
+"""Cameras: their state, diagnostics, and coverage of the floor."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class CameraInfo(msgspec.Struct, frozen=True):
     missed: int
     shed: int
     load_level: int
-    """How much is left out because the machine has too much to do; 0: nothing."""
+    """Load-shedding level; 0: none."""
     synchronized: bool
-    """Pulses come from the server; otherwise the camera goes on at its own rate."""
+    """Pulses come from the server; otherwise the camera counts by itself."""
     message: str
 
 
 class OwnPicture(msgspec.Struct, frozen=True):
-    """A camera's own picture, and how it lies in the site's: site = own · scale + (left, top), in pixels."""
+    """A camera's own picture, and its place in the site's: site = own · scale + (left, top), in pixels."""
 
     width: int
     height: int
@@ -44,40 +44,40 @@ class OwnPicture(msgspec.Struct, frozen=True):
 
 
 class OperatorCamera(CameraInfo, frozen=True):
-    """How one camera is, in all that is measured of it: what /api/cameras says, and more."""
+    """One camera's diagnostics: the fields of /api/cameras, and more."""
 
     bad_messages: int
     clock_offset: float | None
-    """Seconds, pulse server's clock minus the camera's; null: not known."""
+    """Seconds, pulse server's clock minus the camera's; null: unknown."""
     sync_error: RecentSeconds | None
-    """Seconds from the moment a frame was due to the moment it was taken, of the last ten seconds or so."""
+    """Seconds from a pulse to the moment its frame was taken, over the last ten seconds or so."""
     tracking_delay: RecentSeconds | None
-    """Seconds from the moment a window's last frame was due to the moment the window was solved."""
+    """Seconds from the pulse of a window's last frame to the window's solution."""
     certified: float | None
-    """Share of the windows whose answer is proven to be the optimum."""
+    """Share of the windows whose solution is proven optimal."""
     windows: int
-    """How many windows that is about."""
+    """The number of windows behind ``certified``."""
     last_error: CameraProblem | None
-    """What last went wrong, and when; it stays when the camera is well again."""
+    """The last problem; it stays when the camera has recovered."""
     picture: OwnPicture | None
-    """Null: it has not said."""
+    """Null: unknown."""
 
 
 class FloorCamera(msgspec.Struct, frozen=True):
-    """What one camera covers of the floor that all share."""
+    """One camera's coverage of the common floor."""
 
     camera: str
     homography: list[list[float]]
-    """3x3, from pixels of the site's picture to the floor; below 0 in the third: above the horizon."""
+    """3x3, from pixels of the site's picture to the floor; a third coordinate below 0: above the horizon."""
     outline: list[list[float]]
-    """Corners, x and y on the floor; empty: it sees none of it."""
+    """Corners, x and y on the floor; empty: it sees no floor."""
 
 
 class Floor(msgspec.Struct, frozen=True):
     """The floor plan."""
 
     cameras: list[FloorCamera]
-    """Those that are calibrated and have said how large their own picture is."""
+    """Calibrated cameras whose own picture size is known."""
     uncalibrated: list[str]
 
 
@@ -102,15 +102,15 @@ class CameraService:
             raise UnknownCameraError(camera, self._pipeline.frame_buffers)
 
     def list_cameras(self) -> list[CameraInfo]:
-        """Return how each camera works, as far as any viewer may know."""
+        """Return each camera's state, as far as any viewer may know it."""
         return [self._info(*it) for it in self._pipeline.ingest.states.items()]
 
     def diagnose_cameras(self) -> list[OperatorCamera]:
-        """Return all that is measured of each camera, for the operator."""
-        return [self._diagnosed(*it) for it in self._pipeline.ingest.states.items()]
+        """Return each camera's diagnostics, for the operator."""
+        return [self._diagnostics(*it) for it in self._pipeline.ingest.states.items()]
 
     def map_floor(self) -> Floor:
-        """Return what each calibrated camera covers of the floor."""
+        """Return each calibrated camera's coverage of the floor."""
         config = self._pipeline.config
         cameras = []
         for camera in config.cameras:
@@ -136,22 +136,22 @@ class CameraService:
             message=state.message,
         )
 
-    def _diagnosed(self, camera: str, state: CameraState) -> OperatorCamera:
-        status, gauge = state.status, state.metrics
+    def _diagnostics(self, camera: str, state: CameraState) -> OperatorCamera:
+        status, metrics = state.status, state.metrics
         return OperatorCamera(
             **msgspec.structs.asdict(self._info(camera, state)),
             bad_messages=state.bad_messages,
             clock_offset=status.clock_offset if status else None,
-            sync_error=gauge.sync_error,
-            tracking_delay=gauge.tracking_delay,
-            certified=gauge.certified,
-            windows=gauge.windows,
-            last_error=gauge.last_error,
-            picture=None if gauge.size is None else self._picture(gauge.size),
+            sync_error=metrics.sync_error,
+            tracking_delay=metrics.tracking_delay,
+            certified=metrics.certified,
+            windows=metrics.windows,
+            last_error=metrics.last_error,
+            picture=None if metrics.size is None else self._picture(metrics.size),
         )
 
     def _picture(self, own: tuple[int, int]) -> OwnPicture:
         site = self._pipeline.config.site
-        fit = Letterbox(own, (site.width, site.height))
-        left, top = fit.to_site(np.zeros(2)).tolist()
-        return OwnPicture(width=own[0], height=own[1], scale=fit.scale, left=left, top=top)
+        letterbox = Letterbox(own, (site.width, site.height))
+        left, top = letterbox.to_site(np.zeros(2)).tolist()
+        return OwnPicture(width=own[0], height=own[1], scale=letterbox.scale, left=left, top=top)

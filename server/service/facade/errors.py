@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 
 class RefusedError(Exception):
-    """A query or command is refused; the text is one line for whoever sent it."""
+    """A query or command is refused; the text is one line for the sender."""
 
 
 class UnknownObjectError(RefusedError):
@@ -28,8 +28,8 @@ class UnknownCameraError(RefusedError):
 
 
 class InvalidCommandError(RefusedError):
-    """A command's content makes no sense."""
+    """A command's content is invalid."""
 
 
 class ConflictError(RefusedError):
-    """A command makes sense, but not in the state that the service is in."""
+    """A command is valid, but not in the service's present state."""

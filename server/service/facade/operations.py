@@ -1,4 +1,4 @@
-"""Operations: readiness, the pulse server's clients, and the view settings that can be tried out live."""
+"""Operations: readiness, the pulse server's clients, and view settings that can change at run time."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class PulseListener(msgspec.Struct, frozen=True):
     """A client of the pulse server."""
 
     name: str | None
-    """Null: it only listens."""
+    """Null: an unnamed client, which only receives pulses."""
     expected: bool
-    """The configuration names it."""
+    """Whether the configuration names it."""
     behind: int
-    """Pulses that it has just lost because it did not read."""
+    """Pulses that it recently lost because it read too slowly."""
 
 
 class Pulses(msgspec.Struct, frozen=True):
@@ -40,10 +40,10 @@ class Pulses(msgspec.Struct, frozen=True):
     server: str
     """Its host and port."""
     error: str
-    """Why nothing is known; empty: it has answered."""
+    """Why the server did not answer; empty: it did."""
     clients: list[PulseListener]
     missing: list[str]
-    """Who is named in the configuration and not there."""
+    """Clients that the configuration names but that are not connected."""
 
 
 class OperationsService:
@@ -59,10 +59,10 @@ class OperationsService:
         return Readiness(why_not_ready(self._pipeline), live, len(states))
 
     async def list_pulse_clients(self) -> Pulses:
-        """Ask the pulse server who its clients are."""
+        """Query the pulse server's clients."""
         config = self._pipeline.config
         sync, expected = config.sync, pulse_clients(config)
-        where = f"{sync.host}:{sync.port}"
+        address = f"{sync.host}:{sync.port}"
         try:
             clients = await query_clients(
                 sync.host,
@@ -71,14 +71,14 @@ class OperationsService:
                 tls=self._pipeline.pulse_tls,
             )
         except SyncError as error:
-            return Pulses(where, str(error), [], [])
+            return Pulses(address, str(error), [], [])
         listeners = [PulseListener(it.name, it.name in expected, it.behind) for it in clients]
         connected = {it.name for it in clients}
-        return Pulses(where, "", listeners, [it for it in expected if it not in connected])
+        return Pulses(address, "", listeners, [it for it in expected if it not in connected])
 
     @property
     def view_settings(self) -> ViewSettings:
-        """The settings that views are selected by now."""
+        """The view settings in force."""
         return self._pipeline.decider.view
 
     @property
@@ -87,13 +87,13 @@ class OperationsService:
         return self._pipeline.max_lookahead
 
     def change_view_settings(self, view: ViewSettings) -> None:
-        """Select views by other settings until they are changed again or the service ends.
+        """Apply view settings until they are changed again or the service ends.
 
         Raises:
-            UserError: the look-ahead is too short, or longer than what is kept.
+            UserError: the look-ahead is too short, or longer than the frame buffers allow.
         """
         self._pipeline.apply_view_settings(view)
 
     def reset_view_settings(self) -> None:
-        """Select views by the configuration's settings again."""
+        """Apply the configuration's view settings again."""
         self._pipeline.apply_view_settings(self._pipeline.config.view)

@@ -1,4 +1,4 @@
-"""People: who is known, which camera shows them and why, and what the operator corrects by hand."""
+"""People: their views and the reasons for them, and the operator's manual corrections."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class PersonSummary:
     number: int
     name: str | None
     former_numbers: list[int]
-    """Numbers that were merged into this one; they still resolve."""
+    """Numbers that were merged into this one; they still work in addresses."""
     first_seen: int
     last_seen: int
     camera: str | None
@@ -52,12 +52,12 @@ class PersonSummary:
     cameras: list[str]
     """The cameras that see the person now."""
     thumbnail_pulse: int | None
-    """The frame that the newest thumbnail is of; None: there is no thumbnail."""
+    """The frame of the newest thumbnail; None: there is none."""
 
 
 @dataclass(frozen=True, slots=True)
 class RemotePerson:
-    """A person whom another best-view service of the site decides for."""
+    """A person of another best-view service of the site."""
 
     number: int
     server: str | None
@@ -66,17 +66,17 @@ class RemotePerson:
 
 @dataclass(frozen=True, slots=True)
 class Shard:
-    """The best-view service of the site that decides for a person."""
+    """The best-view service of the site that a person belongs to."""
 
     index: int
     is_own: bool
-    """Whether it is this one."""
+    """Whether it is this service."""
     server: str | None
     """Its base URL; None where the configuration does not name it."""
 
 
 class ViewSelection(msgspec.Struct, frozen=True):
-    """Why this view."""
+    """A person's selected view, and the costs behind it."""
 
     object: int
     first: int
@@ -90,26 +90,25 @@ class ViewSelection(msgspec.Struct, frozen=True):
     seen: dict[str, float]
     """Share of the look-ahead in which each camera sees the person."""
     quality: dict[str, float | None]
-    """How well each camera shows the person where it sees them, 0 to 1; null: it does not."""
+    """Mean view quality of each camera where it sees the person, 0 to 1; null: it does not."""
     terms: dict[str, dict[str, float]]
-    """By camera: the terms of that quality, likewise; empty where it does not see the person."""
+    """By camera, the mean terms of that quality; empty where it does not see the person."""
     undetected: dict[str, float]
-    """Share of the look-ahead in which each camera does not find the person, who stands before it as the
-    others know."""
+    """Share of the look-ahead in which each camera does not detect the person, whom others locate in its view."""
     undetected_quality: dict[str, float | None]
-    """What such a view is taken to be worth: quality, times how surely they show; null: there is none."""
+    """Mean quality of these inferred views, times the trust that the person is visible; null: there are none."""
     weights: dict[str, float]
-    """By term: the share of a view's worth that is lost where the term is 0."""
+    """By term: the share of a view's quality that is lost where the term is 0."""
     before: str | None
     """The camera of the GOP before; null: there was none."""
     lookahead: int
-    """Frames from `first` on that were looked at."""
+    """Frames of the look-ahead, from `first` on."""
     switch_cost: float
-    """What a cut costs, in frames of not seeing the person."""
+    """The cost of a cut, in frames of not seeing the person."""
     stay: float | None
-    """What the look-ahead costs with `before`, likewise; null: there is none, or it cannot be shown."""
+    """The cost of the look-ahead with `before`, likewise; null: there is none, or it cannot be shown."""
     cut: float | None
-    """What it costs with the best other camera, the cut included; null: there is none."""
+    """The cost with the best other camera, the cut included; null: there is none."""
     cut_to: str | None
     """That camera."""
     reason: str
@@ -117,16 +116,16 @@ class ViewSelection(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class PersonOverrides:
-    """What the operator has corrected by hand."""
+    """The operator's manual corrections."""
 
     names: dict[int, str]
     merged: dict[int, int]
-    """By number that was merged by hand: the number it was merged into."""
+    """By manually merged number: the number that was kept."""
 
 
 @dataclass(frozen=True, slots=True)
 class RenamePerson:
-    """Command: give a person a name; an empty one takes it away."""
+    """Command: set a person's name; an empty one removes it."""
 
     number: int
     name: str
@@ -134,7 +133,7 @@ class RenamePerson:
 
 @dataclass(frozen=True, slots=True)
 class MergePeople:
-    """Command: two numbers are one person's; ``kept`` stays."""
+    """Command: merge two people; the number ``kept`` remains."""
 
     kept: int
     lost: int
@@ -142,7 +141,7 @@ class MergePeople:
 
 @dataclass(frozen=True, slots=True)
 class SplitPerson:
-    """Command: whom these cameras show as this person is a new person; no cameras: all of them."""
+    """Command: split these cameras' tracks off a person as a new person; no cameras: all of them."""
 
     number: int
     cameras: list[str]
@@ -155,42 +154,42 @@ class PeopleService:
         self._pipeline = pipeline
 
     def list_people(self) -> list[PersonSummary]:
-        """Return everybody who has a stream, by number."""
+        """Return all people who have a stream, by number."""
         people, thumbnails = self._pipeline.decider.people, self._thumbnails()
         summaries = []
-        for number, standing in sorted(self._pipeline.decision_state.selected_views.items()):
+        for number, view in sorted(self._pipeline.decision_state.selected_views.items()):
             thumbnail = self._newest(number, thumbnails.get(number, []))
             summaries.append(
                 PersonSummary(
                     number=number,
                     name=people.registry.names.get(number),
                     former_numbers=people.registry.aliases(number),
-                    first_seen=people.registry.first_seen.get(number, standing.first),
-                    last_seen=people.registry.last_seen.get(number, standing.first),
-                    camera=standing.choice.camera,
-                    cameras=list(standing.cameras),
+                    first_seen=people.registry.first_seen.get(number, view.first),
+                    last_seen=people.registry.last_seen.get(number, view.first),
+                    camera=view.choice.camera,
+                    cameras=list(view.cameras),
                     thumbnail_pulse=None if thumbnail is None else thumbnail.pulse,
                 )
             )
         return summaries
 
     def list_remote_people(self) -> list[RemotePerson]:
-        """Return the people whom other services of the site decide for, by number."""
+        """Return the people of the site's other services, by number."""
         share = self._pipeline.config.view.share
         return [RemotePerson(it, shard_address(it, share)) for it in self._pipeline.decider.people.remote]
 
     def shard_of(self, number: int) -> Shard:
-        """Return the service that decides for a number, which need not be anybody's."""
+        """Return the service that a number belongs to, whether or not it is in use."""
         share = self._pipeline.config.view.share
         index = shard_of(number, share)
         return Shard(index, index == share.index, shard_address(number, share))
 
     def current_number(self, number: int) -> int:
-        """Return the number that a merged one goes by now, as far as decisions have been published."""
+        """Return the current number of a merged one, as far as decisions have been published."""
         return self._pipeline.decision_state.resolve(number)
 
     def unknown(self, number: int) -> UnknownObjectError:
-        """Return the error to raise where nobody has this number."""
+        """Return the error to raise for a number that no person has."""
         return UnknownObjectError(number, is_recovering=self._pipeline.state_replication.may_recover(number))
 
     @property
@@ -202,32 +201,32 @@ class PeopleService:
         """Return why a person's newest view was selected, or that at a pulse of the last minute.
 
         Returns:
-            None: there is no such person, or nothing is kept of that time.
+            None: there is no such person, or no reasons of that time.
         """
-        explained = self._pipeline.decision_state.explain(number, pulse)
-        if explained is None:
+        selection = self._pipeline.decision_state.explain(number, pulse)
+        if selection is None:
             return None
-        standing, why = explained.standing, explained.why
+        view, why = selection.view, selection.why
         return ViewSelection(
-            object=standing.choice.number,
-            first=standing.first,
-            frames=standing.frames,
-            camera=standing.choice.camera,
-            since=standing.since,
-            costs={camera: view.cost for camera, view in why.views.items()},
-            seen={camera: view.seen for camera, view in why.views.items()},
-            quality={camera: view.quality for camera, view in why.views.items()},
-            terms={camera: view.terms for camera, view in why.views.items()},
-            undetected={camera: view.undetected for camera, view in why.views.items()},
-            undetected_quality={camera: view.undetected_quality for camera, view in why.views.items()},
+            object=view.choice.number,
+            first=view.first,
+            frames=view.frames,
+            camera=view.choice.camera,
+            since=view.since,
+            costs={camera: it.cost for camera, it in why.views.items()},
+            seen={camera: it.seen for camera, it in why.views.items()},
+            quality={camera: it.quality for camera, it in why.views.items()},
+            terms={camera: it.terms for camera, it in why.views.items()},
+            undetected={camera: it.undetected for camera, it in why.views.items()},
+            undetected_quality={camera: it.undetected_quality for camera, it in why.views.items()},
             weights=why.weights,
-            before=standing.choice.before,
+            before=view.choice.before,
             lookahead=why.frames,
             switch_cost=why.switch_cost,
             stay=why.stay,
             cut=why.cut,
             cut_to=why.cut_to,
-            reason=reason(standing.choice, why),
+            reason=reason(view.choice, why),
         )
 
     def thumbnail_of(self, number: int) -> Thumbnail | None:
@@ -236,18 +235,18 @@ class PeopleService:
         return self._newest(number, self._thumbnails().get(number, []))
 
     def subscribe_decisions(self, callback: Callable[[GopChoices], None]) -> None:
-        """Call back with the choices about every GOP, as it is decided."""
+        """Call back with the choices of every GOP, as it is decided."""
         self._pipeline.on_decision.append(callback)
 
     @property
     def editing_blocked(self) -> str:
         """Why people cannot be renamed, merged or split here; empty: they can."""
         if self._pipeline.config.view.share.of > 1:
-            return "several services share this site (view.share): they must agree who is who, by themselves"
+            return "several services share this site (view.share), and their person numbers must stay equal"
         return ""
 
     def manual_overrides(self) -> PersonOverrides:
-        """Return the names and merges that the operator has given."""
+        """Return the operator's names and merges."""
         people = self._pipeline.decider.people
         return PersonOverrides(dict(sorted(people.registry.names.items())), people.merged_by_hand)
 
@@ -256,30 +255,30 @@ class PeopleService:
 
         Raises:
             ConflictError: people cannot be edited here.
-            UnknownObjectError: nobody has this number.
+            UnknownObjectError: no person has this number.
         """
         self._editable(number)
 
     def rename_person(self, command: RenamePerson) -> None:
-        """Name a person.
+        """Set a person's name.
 
         Raises:
             ConflictError: people cannot be edited here.
-            UnknownObjectError: nobody has this number.
+            UnknownObjectError: no person has this number.
             InvalidCommandError: the name is too long or cannot be printed.
         """
         number, name = self._editable(command.number), " ".join(command.name.split())
         if len(name) > NAME_LENGTH_MAX or not name.isprintable():
-            raise InvalidCommandError(f"name: at most {NAME_LENGTH_MAX} letters that can be read")
+            raise InvalidCommandError(f"name: at most {NAME_LENGTH_MAX} printable characters")
         self._pipeline.decider.people.registry.set_name(number, name)
 
     def merge_people(self, command: MergePeople) -> None:
-        """Merge one person's number into another's, whatever the evidence says from now on.
+        """Merge two people, permanently.
 
         Raises:
             ConflictError: people cannot be edited here.
-            UnknownObjectError: nobody has one of the numbers.
-            InvalidCommandError: they are one person's already.
+            UnknownObjectError: no person has one of the numbers.
+            InvalidCommandError: they are merged already.
         """
         kept, lost = self._editable(command.kept), self._editable(command.lost)
         if lost == kept:
@@ -287,12 +286,12 @@ class PeopleService:
         self._pipeline.decider.people.merge(kept, lost)
 
     def split_person(self, command: SplitPerson) -> int:
-        """Split off whom these cameras show as a person; return the new person's number.
+        """Split cameras' tracks off a person; return the new person's number.
 
         Raises:
             ConflictError: people cannot be edited here, or none of the cameras shows the person now.
-            UnknownObjectError: nobody has this number.
-            UnknownCameraError: a camera of this name does not exist.
+            UnknownObjectError: no person has this number.
+            UnknownCameraError: there is no such camera.
         """
         number, cameras = self._editable(command.number), list(self._pipeline.frame_buffers)
         for camera in command.cameras:
@@ -325,8 +324,8 @@ class PeopleService:
     def _newest(self, number: int, thumbnails: list[tuple[str, Thumbnail]]) -> Thumbnail | None:
         if not thumbnails:
             return None
-        standing = self._pipeline.decision_state.selected_views.get(number)
-        chosen = standing.choice.camera if standing else None
+        view = self._pipeline.decision_state.selected_views.get(number)
+        chosen = view.choice.camera if view else None
         newest = max(thumbnail.pulse for _, thumbnail in thumbnails)
         recent = newest - round(_THUMBNAIL_RECENT_S * self._pipeline.config.site.fps)
         return max(thumbnails, key=lambda it: (it[0] == chosen and it[1].pulse >= recent, it[1].pulse))[1]

@@ -14,7 +14,7 @@ from server.service.metrics.camera_metrics import RecentSeconds
 from server.service.pipeline import BestViewPipeline
 
 Value = Callable[[str, CameraState], float | None]
-"""A camera's number by its id and state; None: it is not known."""
+"""Returns a value by a camera's id and state; None: unknown."""
 
 
 class CameraCollector(Collector):
@@ -30,38 +30,38 @@ class CameraCollector(Collector):
         yield self._gauge("fps", "Frames taken a second.", _of_status(lambda it: it.fps))
         yield self._gauge(
             "synchronized",
-            "Pulses come from the server: the camera does not count by itself.",
+            "Pulses come from the server; otherwise the camera counts by itself.",
             _of_status(lambda it: float(it.synchronized)),
         )
         yield self._gauge(
-            "waiting_frames", "Frames that wait to be searched.", _of_status(lambda it: it.waiting)
+            "waiting_frames", "Frames that wait for detection.", _of_status(lambda it: it.waiting)
         )
         yield self._gauge(
             "load_level",
-            "How much is left out because the machine has too much to do; 0: nothing.",
+            "Load-shedding level of the camera; 0: none.",
             _of_status(lambda it: it.load_level),
         )
-        for what, words, spread in _SPREADS:
-            yield self._spread(what, words, spread)
+        for what, description, spread in _SPREADS:
+            yield self._spread(what, description, spread)
         late, lost = self._pipeline.aligner.late_messages, self._pipeline.loss_recorder.lost_pictures
         yield self._counter("late_windows", "Windows that came too late to count.", lambda it, _: late[it])
         yield self._counter(
-            "lost_pictures", "Pictures not there when their GOP was decided.", lambda it, _: lost[it]
+            "lost_pictures", "Pictures missing when their GOP was decided.", lambda it, _: lost[it]
         )
         yield self._counter("windows", "Windows solved.", lambda _, it: it.metrics.totals.windows)
         yield self._counter(
             "certified_windows",
-            "Windows whose answer is proven to be the best there is.",
+            "Windows whose solution is proven optimal.",
             lambda _, it: it.metrics.totals.certified,
         )
         yield self._counter(
             "position_corrections",
-            "Places that an operator pointed at and the tracker was given, since its start.",
+            "Position corrections that the tracker received since its start.",
             _of_status(lambda it: it.position_corrections),
         )
         yield self._counter(
             "corrected_windows",
-            "Windows that have changed what was final, by where an operator pointed.",
+            "Windows that revised final frames after an operator's correction.",
             lambda _, it: it.metrics.totals.corrected,
         )
         yield self._counter(
@@ -72,15 +72,15 @@ class CameraCollector(Collector):
         live = GaugeMetricFamily("myview_camera_live", "The camera delivers frames.", labels=["camera"])
         frames = CounterMetricFamily("myview_camera_frames", "Frames received.", labels=["camera"])
         missed = CounterMetricFamily("myview_camera_missed", "Pulses without a frame.", labels=["camera"])
-        shed = CounterMetricFamily("myview_camera_shed", "Frames not searched for people.", labels=["camera"])
-        unheard = CounterMetricFamily(
+        shed = CounterMetricFamily("myview_camera_shed", "Frames without detection.", labels=["camera"])
+        without_peers = CounterMetricFamily(
             "myview_camera_without_peers",
-            "Frames in which people were followed without what some other camera found.",
+            "Frames tracked without another camera's detections.",
             labels=["camera"],
         )
         bad = CounterMetricFamily(
             "myview_camera_bad_messages",
-            "Messages not understood: those that the camera has sent, and those that it has received.",
+            "Invalid messages that the camera has sent or received.",
             labels=["camera", "direction"],
         )
         offset = GaugeMetricFamily(
@@ -92,29 +92,33 @@ class CameraCollector(Collector):
             labels = [camera]
             live.add_metric(labels, float(state.label == "live"))
             frames.add_metric(labels, state.frames)
-            unheard.add_metric(labels, state.frames_without_peers)
+            without_peers.add_metric(labels, state.frames_without_peers)
             bad.add_metric([camera, "sent"], state.bad_messages)
             if state.status is not None:
                 missed.add_metric(labels, state.status.missed)
                 shed.add_metric(labels, state.status.shed)
                 bad.add_metric([camera, "received"], state.status.bad_messages)
                 offset.add_metric(labels, state.status.clock_offset)
-        return [live, frames, missed, shed, unheard, bad, offset]
+        return [live, frames, missed, shed, without_peers, bad, offset]
 
     def _stages(self) -> Metric:
         family = HistogramMetricFamily(
             "myview_stage_seconds", "How long a camera's stage took.", labels=["camera", "stage"]
         )
         for camera, state in self._pipeline.ingest.states.items():
-            for stage, took in state.metrics.totals.stages.items():
-                samples = [sample for metric in took.collect() for sample in metric.samples]
+            for stage, histogram in state.metrics.totals.stages.items():
+                samples = [sample for metric in histogram.collect() for sample in metric.samples]
                 buckets = [(it.labels["le"], it.value) for it in samples if it.name.endswith("_bucket")]
                 seconds = next(it.value for it in samples if it.name.endswith("_sum"))
                 family.add_metric([camera, stage], buckets, seconds)
         return family
 
-    def _spread(self, what: str, words: str, of: Callable[[CameraState], RecentSeconds | None]) -> Metric:
-        family = GaugeMetricFamily(f"myview_camera_{what}_seconds", words, labels=["camera", "statistic"])
+    def _spread(
+        self, what: str, description: str, of: Callable[[CameraState], RecentSeconds | None]
+    ) -> Metric:
+        family = GaugeMetricFamily(
+            f"myview_camera_{what}_seconds", description, labels=["camera", "statistic"]
+        )
         for camera, state in self._pipeline.ingest.states.items():
             spread = of(state)
             if spread is not None:
@@ -122,11 +126,13 @@ class CameraCollector(Collector):
                 family.add_metric([camera, "worst"], spread.worst)
         return family
 
-    def _gauge(self, what: str, words: str, value: Value) -> Metric:
-        return self._filled(GaugeMetricFamily(f"myview_camera_{what}", words, labels=["camera"]), value)
+    def _gauge(self, what: str, description: str, value: Value) -> Metric:
+        return self._filled(GaugeMetricFamily(f"myview_camera_{what}", description, labels=["camera"]), value)
 
-    def _counter(self, what: str, words: str, value: Value) -> Metric:
-        return self._filled(CounterMetricFamily(f"myview_camera_{what}", words, labels=["camera"]), value)
+    def _counter(self, what: str, description: str, value: Value) -> Metric:
+        return self._filled(
+            CounterMetricFamily(f"myview_camera_{what}", description, labels=["camera"]), value
+        )
 
     def _filled(self, family: GaugeMetricFamily | CounterMetricFamily, value: Value) -> Metric:
         for camera, state in self._pipeline.ingest.states.items():
@@ -141,10 +147,10 @@ def _of_status(value: Callable[[CameraStatus], float]) -> Value:
 
 
 _SPREADS: tuple[tuple[str, str, Callable[[CameraState], RecentSeconds | None]], ...] = (
-    ("sync_error", "How long after its pulse a frame was taken.", lambda it: it.metrics.sync_error),
+    ("sync_error", "From a pulse to the moment its frame was taken.", lambda it: it.metrics.sync_error),
     (
         "tracking_delay",
-        "How long after the pulse of a window's last frame it was solved.",
+        "From the pulse of a window's last frame to its solution.",
         lambda it: it.metrics.tracking_delay,
     ),
 )

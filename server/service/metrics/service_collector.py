@@ -33,12 +33,12 @@ class ServiceCollector(Collector):
         yield CounterMetricFamily("myview_cuts", "Changes of view.", value=pipeline.decision_state.cuts)
         yield CounterMetricFamily(
             "myview_late_epochs",
-            "Windows decided without a camera that was there.",
+            "Windows of connected cameras that came too late for their epoch.",
             value=pipeline.loss_recorder.late_epochs,
         )
         yield CounterMetricFamily(
             "myview_left_out_epochs",
-            "Windows not decided at all: their pictures would have been gone by then.",
+            "Epochs skipped because decisions had fallen too far behind.",
             value=pipeline.skipped_epochs,
         )
         yield GaugeMetricFamily(
@@ -46,7 +46,7 @@ class ServiceCollector(Collector):
         )
         yield GaugeMetricFamily(
             "myview_decided_pulse",
-            "First pulse that nothing is decided about.",
+            "First pulse that is not decided yet.",
             value=pipeline.decision_state.end,
         )
         for histogram in (stages.decide, stages.send, stages.delay):
@@ -57,7 +57,7 @@ class ServiceCollector(Collector):
 
     def _queues(self) -> Iterable[Metric]:
         pipeline, writer = self._pipeline, self._pipeline.recorder.writer
-        waiting = GaugeMetricFamily("myview_waiting", "What waits, by queue.", labels=["queue"])
+        waiting = GaugeMetricFamily("myview_waiting", "Items waiting, by queue.", labels=["queue"])
         waiting.add_metric(["messages"], sum(inbox.waiting for inbox in pipeline.bus.inboxes))
         waiting.add_metric(["windows"], pipeline.aligner.waiting)
         waiting.add_metric(["recording"], writer.queued if writer else 0)
@@ -66,7 +66,7 @@ class ServiceCollector(Collector):
         yield waiting
         yield CounterMetricFamily(
             "myview_lost_messages",
-            "Messages of the bus that came faster than they could be read.",
+            "Bus messages lost because they came faster than they could be handled.",
             value=sum(inbox.lost for inbox in pipeline.bus.inboxes),
         )
 
@@ -80,27 +80,27 @@ class ServiceCollector(Collector):
             "myview_flags_open", "Flags that can be answered now.", value=len(assist.flags.open)
         )
         yield CounterMetricFamily(
-            "myview_position_corrections", "Places that the operator pointed at.", value=assist.points
+            "myview_position_corrections", "Positions that the operator pointed at.", value=assist.points
         )
 
     def _recording(self) -> Iterable[Metric]:
         recorder = self._pipeline.recorder
         size, writer = recorder.folder.bytes if recorder.folder else 0, recorder.writer
-        well = writer is not None and not writer.problem
-        yield GaugeMetricFamily("myview_recording", "What is streamed is being recorded.", value=float(well))
-        yield GaugeMetricFamily("myview_recorded_bytes", "Recorded, on the disk.", value=size)
+        is_recording = writer is not None and not writer.problem
+        yield GaugeMetricFamily("myview_recording", "Streams are being recorded.", value=float(is_recording))
+        yield GaugeMetricFamily("myview_recorded_bytes", "Bytes of the recording on the disk.", value=size)
         yield CounterMetricFamily(
             "myview_recorded_gops", "GOPs recorded.", value=writer.written if writer else 0
         )
         yield CounterMetricFamily(
             "myview_unrecorded_gops",
-            "GOPs not recorded though they should be.",
+            "GOPs that could not be recorded.",
             value=writer.lost if writer else 0,
         )
 
 
 class RenderingCollector(Collector):
-    """Collects the numbers of the streams that are decoded and drawn."""
+    """Collects the metrics of rendered streams."""
 
     def __init__(self, rendering: RenderPool) -> None:
         self._rendering = rendering
@@ -109,16 +109,16 @@ class RenderingCollector(Collector):
         """Return all metrics as they are now."""
         rendering = self._rendering
         yield GaugeMetricFamily(
-            "myview_pictures", "People and cameras that are decoded now.", value=len(rendering.streams)
+            "myview_pictures", "People and cameras rendered now.", value=len(rendering.streams)
         )
         yield GaugeMetricFamily(
-            "myview_pictures_viewers", "Streams of pictures being watched.", value=rendering.viewers
+            "myview_pictures_viewers", "Viewers of rendered streams.", value=rendering.viewers
         )
         yield CounterMetricFamily(
-            "myview_pictures_restarts", "Drawing processes that died.", value=rendering.restarts
+            "myview_pictures_restarts", "Render workers that died.", value=rendering.restarts
         )
         yield CounterMetricFamily(
-            "myview_pictures_lost_gops", "GOPs that came too fast to be drawn.", value=rendering.lost
+            "myview_pictures_lost_gops", "GOPs that came too fast to be rendered.", value=rendering.lost
         )
 
 
@@ -128,7 +128,7 @@ def register_collectors(
     rendering: RenderPool,
     queues: Mapping[str, Callable[[], int]],
 ) -> None:
-    """Register all collectors of a service and its process; ``queues`` are further ones, by name."""
+    """Register all collectors of a service and its process; ``queues`` are further queue lengths, by name."""
     disable_created_metrics()  # type: ignore[no-untyped-call]
     registry.register(ServiceCollector(pipeline, queues))
     registry.register(CameraCollector(pipeline))

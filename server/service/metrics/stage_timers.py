@@ -1,4 +1,4 @@
-"""How long the service itself takes, and how late what it says is."""
+"""Durations of the service's own stages, and the delay of its decisions."""
 
 from __future__ import annotations
 
@@ -9,35 +9,35 @@ from contextlib import contextmanager
 from prometheus_client import Histogram
 
 SECONDS_BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
-"""Upper bounds, from the encoding of one picture to a camera that is far behind."""
+"""Upper bounds of the histogram buckets."""
 
 
 class StageTimers:
     """Measures the service's own stages.
 
     Attributes:
-        decide: all that is done about one epoch: who is who, and whose view is best.
-        send: telling viewers, cameras and files of one GOP, and giving its frames to everybody.
-        delay: from a GOP's first pulse to its being sent.
+        decide: one epoch, from identities to view selection.
+        send: publishing one GOP to viewers, bus and files.
+        delay: from a GOP's first pulse until it is sent.
     """
 
     def __init__(self) -> None:
         self.decide = _histogram("myview_decide_seconds", "Deciding one epoch.")
-        self.send = _histogram("myview_send_seconds", "Telling and sending one GOP.")
-        self.delay = _histogram("myview_delay_seconds", "From a GOP's first pulse to its being sent.")
+        self.send = _histogram("myview_send_seconds", "Publishing one GOP.")
+        self.delay = _histogram("myview_delay_seconds", "From a GOP's first pulse until it is sent.")
 
     @contextmanager
     def deciding(self) -> Iterator[None]:
-        """Measure what is done about an epoch."""
+        """Measure the decision about an epoch."""
         with _measured(self.decide):
             yield
 
     @contextmanager
-    def sending(self, late: Callable[[], float | None]) -> Iterator[None]:
-        """Measure what is done with a GOP; ``late`` says how long ago its first pulse was due, if known."""
+    def sending(self, delay: Callable[[], float | None]) -> Iterator[None]:
+        """Measure the sending of a GOP; ``delay`` returns the seconds since its first pulse, if known."""
         with _measured(self.send):
             yield
-        seconds = late()
+        seconds = delay()
         if seconds is not None:
             self.delay.observe(seconds)
 

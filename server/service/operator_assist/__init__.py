@@ -1,1 +1,1 @@
-"""The operator who helps: flags, and where somebody points."""
+"""Operator assistance: flags of predicted tracking failures, and corrections by pointing."""

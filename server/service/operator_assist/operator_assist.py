@@ -1,4 +1,4 @@
-"""The operator who helps: what cameras foresee becomes flags, and where somebody points goes to a camera."""
+"""Operator assistance: turns risk events into flags, and sends the operator's positions to the cameras."""
 
 from __future__ import annotations
 
@@ -14,48 +14,46 @@ from server.service.operator_assist.flags import FlagQueue, RiskEvent
 
 
 class OperatorAssist:
-    """Stands between the cameras' trackers, which know tracks, and the operator, who knows people.
+    """Translates between the cameras' trackers, which know tracks, and the operator, who knows people.
 
-    ``send`` sends a camera what is pointed at in its picture.
+    ``send`` sends a camera a message.
     """
 
     def __init__(self, config: Config, people: PersonTracker, send: Callable[[str, bytes], None]) -> None:
         self.flags = FlagQueue(config.view.flags, config.site.fps)
         self.points = 0
-        """Places that were pointed at and went to a camera."""
+        """The number of positions sent to cameras."""
         self._people, self._send = people, send
 
     def step(self, epoch: Epoch, config: Config) -> None:
-        """Take in what the cameras said of an epoch."""
+        """Process an epoch's risk events."""
         people, assist = self._people, config.track.assist
         people.published.frames = assist.memory_frames if assist.enabled else 0
-        self.flags.step(epoch.last, self._foreseen(epoch), people.registry.current)
+        self.flags.step(epoch.last, self._risk_events(epoch), people.registry.current)
 
-    def point(self, number: int, camera: str, places: Sequence[PointedPosition]) -> tuple[int, list[int]]:
+    def point(self, number: int, camera: str, positions: Sequence[PointedPosition]) -> tuple[int, list[int]]:
         """Send an operator's clicks on a person to a camera; its tracker corrects present and past tracks.
 
         Returns:
-            How many of the places the camera is told, and the flags that are followed by that; none: they are
-            forgotten, or the camera has not shown this person since.
+            The number of positions sent, and the flags that this responds to; 0: the frames are no longer
+            remembered, or the camera has not shown this person since.
         """
-        said = corrections_for_tracker(self._people, camera, number, places)
-        if said is None:
+        corrections = corrections_for_tracker(self._people, camera, number, positions)
+        if corrections is None:
             return 0, []
-        self._send(camera, msgspec.json.encode(said))
-        self.points += len(said.corrections)
-        return len(said.corrections), self.flags.pointed(
-            number, camera, [it.pulse for it in said.corrections]
+        self._send(camera, msgspec.json.encode(corrections))
+        self.points += len(corrections.corrections)
+        return len(corrections.corrections), self.flags.pointed(
+            number, camera, [it.pulse for it in corrections.corrections]
         )
 
-    def _foreseen(self, epoch: Epoch) -> Iterator[RiskEvent]:
+    def _risk_events(self, epoch: Epoch) -> Iterator[RiskEvent]:
         """Yield the risk events of an epoch whose persons all have a number."""
         for camera, message in epoch.tracks.items():
-            for trouble in message.risk_events:
-                whose = [
-                    self._people.person_of(camera, message.boot, it, message.last) for it in trouble.tracks
+            for event in message.risk_events:
+                numbers = [
+                    self._people.person_of(camera, message.boot, it, message.last) for it in event.tracks
                 ]
-                known = tuple(dict.fromkeys(number for number in whose if number is not None))
-                if known and len(known) == len(whose):
-                    yield RiskEvent(
-                        camera, known, trouble.reason, trouble.pulse, trouble.margin, trouble.risk
-                    )
+                known = tuple(dict.fromkeys(number for number in numbers if number is not None))
+                if known and len(known) == len(numbers):
+                    yield RiskEvent(camera, known, event.reason, event.pulse, event.margin, event.risk)

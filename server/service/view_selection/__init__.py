@@ -1,1 +1,1 @@
-"""Which camera shows whom, and why."""
+"""View selection: which camera shows each person, and why."""

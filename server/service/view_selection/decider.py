@@ -1,4 +1,4 @@
-"""Which camera shows whom: one decision per GOP for all objects at once (paper, section III)."""
+"""Selects views: one decision per GOP for all people at once (paper, section III)."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 Floats = NDArray[np.float64]
 
-_LAST = 5
-"""How the look-ahead ends is read from its last fifth: a single frame would be too uncertain."""
+_TAIL_DIVISOR = 5
+"""The end of the look-ahead is judged by its last fifth: a single frame would be too uncertain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,24 +37,24 @@ class ObjectChoice:
     before: str | None
     """The camera of the GOP before."""
     away: bool
-    """No camera has seen the object for a while; its stream stays where it was."""
+    """Whether no camera has seen the person for a while; the stream stays with the last camera."""
 
 
 @dataclass(frozen=True, slots=True)
 class GopDecision:
-    """All objects' views for the frames ``first … first + frames - 1``."""
+    """All people's views for the frames ``first … first + frames - 1``."""
 
     first: int
     frames: int
     choices: tuple[ObjectChoice, ...]
     boxes: dict[str, list[list[NumberedBox]]]
-    """Per camera and frame: everybody's final box, by rising number."""
+    """Per camera and frame: all people's final boxes, by rising number."""
     merged: dict[int, int]
-    """Numbers that turned out to be another's, up to now."""
+    """All merged numbers so far, with the numbers that were kept."""
     corrections: tuple[Merge | Split, ...]
-    """What has turned out about numbers since the last decision."""
+    """Merges and splits since the last decision."""
     why: SelectionReasons = field(compare=False, repr=False)
-    """What the choices were made by."""
+    """The costs behind the choices."""
 
 
 def camera_homographies(config: Config) -> dict[str, Floats | None]:
@@ -66,10 +66,10 @@ def camera_homographies(config: Config) -> dict[str, Floats | None]:
 
 
 class ViewDecider:
-    """Selects views GOP by GOP as epochs come. No clock, no network: the same epochs give the same cuts.
+    """Selects views GOP by GOP as epochs arrive. No clock, no network: the same epochs lead to the same cuts.
 
-    Every decision looks at the whole look-ahead anew: a camera that has died meanwhile is no longer in it.
-    ``has(camera, pulse)`` tells whether a camera's frame can be shown.
+    Every decision evaluates the whole look-ahead anew, without cameras that have died meanwhile.
+    ``has(camera, pulse)`` returns whether a camera's frame can be shown.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class ViewDecider:
         has: Callable[[str, int], bool],
     ) -> None:
         self._config = config
-        self._take(config.view)
+        self._apply(config.view)
         self._cameras: Sequence[str] = config.camera_ids
         self._has = has
         size = (config.site.width, config.site.height)
@@ -95,114 +95,113 @@ class ViewDecider:
             fps,
         )
         stride, gop = config.track.window.stride, config.encode.gop
-        self._at_once = -(-stride // gop) + 1
-        """GOPs that an epoch decides at most: one more than it completes while the look-ahead stays."""
-        self._sight = ViewQualityBuffer(config, camera_homographies, self.people.letterboxes)
-        self._elsewhere = CrossViewInference(config, self._sight)
+        self._max_gops_per_epoch = -(-stride // gop) + 1
+        """One more than an epoch completes, so that a backlog after a shorter look-ahead shrinks."""
+        self._quality_buffer = ViewQualityBuffer(config, camera_homographies, self.people.letterboxes)
+        self._cross_view_inference = CrossViewInference(config, self._quality_buffer)
         self._shots = CurrentShots()
-        self._lately = RecentViews()
+        self._recent_views = RecentViews()
         self._next_gop: int | None = None
 
     @property
     def view(self) -> ViewSettings:
-        """What the choices are made by now."""
+        """The settings in force."""
         return self._config.view
 
     def apply_view_settings(self, view: ViewSettings) -> None:
-        """Apply other settings from the next GOP on, as far as `LIVE_VIEW_SETTINGS` names them.
+        """Apply other settings from the next GOP on; only those in `LIVE_VIEW_SETTINGS`.
 
-        A longer look-ahead is waited for first; with a shorter one there is more to decide, which is done
-        little by little: who watches is not to be overrun. Either way every GOP is decided once, in order.
+        With a longer look-ahead, decisions wait for it; with a shorter one, the GOPs that are then complete
+        are decided gradually, so that viewers are not flooded. Every GOP is decided once, in order.
 
-        What is decided then cannot be had again from the recordings and the configuration alone.
+        Afterwards decisions cannot be reproduced from the recordings and the configuration alone.
         """
-        kept = self._config.view.model_copy(update={name: getattr(view, name) for name in LIVE_VIEW_SETTINGS})
-        anew = kept.quality != self._config.view.quality
-        self._config = self._config.model_copy(update={"view": kept})
-        self._take(kept)
-        if anew:
-            self._sight.weigh_anew(kept.quality)
+        live = {name: getattr(view, name) for name in LIVE_VIEW_SETTINGS}
+        settings = self._config.view.model_copy(update=live)
+        quality_changed = settings.quality != self._config.view.quality
+        self._config = self._config.model_copy(update={"view": settings})
+        self._apply(settings)
+        if quality_changed:
+            self._quality_buffer.change_settings(settings.quality)
 
-    def _take(self, view: ViewSettings) -> None:
+    def _apply(self, view: ViewSettings) -> None:
         fps = self._config.site.fps
         self.switch_cost = view.switch_cost_s * fps
-        self.least_shot = -(-round(view.min_shot_s * fps) // self._config.encode.gop)
-        """GOPs that a shot lasts at least."""
+        self.min_shot_gops = -(-round(view.min_shot_s * fps) // self._config.encode.gop)
+        """The minimum length of a shot, in GOPs."""
         self._extrapolated_frames = view.extrapolate_s * fps
 
     def step(self, epoch: Epoch) -> list[GopDecision]:
-        """Take an epoch in; give the GOPs whose look-ahead it completes.
+        """Process an epoch; return decisions for the GOPs whose look-ahead it completes.
 
-        Where epochs before it are left out, so are the GOPs that were not decided by then.
+        After skipped epochs, the GOPs that were not decided before them are skipped, too.
         """
         gop, lookahead = self._config.encode.gop, self._config.view.lookahead
-        if self._next_gop is None or epoch.skipped:  # nobody can say any more what was before
+        if self._next_gop is None or epoch.skipped:  # earlier frames are unknown
             start = epoch.last - self._config.track.window.stride + 1
             self._next_gop = -(-start // gop) * gop
-        self._sight.put(self.people.update(epoch))
+        self._quality_buffer.put(self.people.update(epoch))
         last = epoch.last - lookahead + 1
         if self._next_gop > last:
             return []
-        outlook = self._outlook(self._next_gop, epoch.last)
+        window = self._window(self._next_gop, epoch.last)
         weight = self._weight(lookahead)
-        firsts = range(self._next_gop, last + 1, gop)[: self._at_once]
-        decided = [self._decide(outlook, first, gop, weight) for first in firsts]
-        self._lately = outlook.lately(self._next_gop)
-        self._elsewhere.learn(outlook.looked, self._next_gop - outlook.first)
+        gop_starts = range(self._next_gop, last + 1, gop)[: self._max_gops_per_epoch]
+        decided = [self._decide(window, first, gop, weight) for first in gop_starts]
+        self._recent_views = window.recent_views(self._next_gop)
+        self._cross_view_inference.learn(window.inferred_views, self._next_gop - window.first)
         return decided
 
     def finish(self, last: int) -> list[GopDecision]:
-        """Decide what is left when every recording is over; ``last`` is the last frame of the longest."""
+        """Decide the remaining GOPs when all recordings are over; ``last`` is the last frame of all."""
         if self._next_gop is None or self._next_gop > last:
             return []
         gop, lookahead = self._config.encode.gop, self._config.view.lookahead
-        outlook = self._outlook(self._next_gop, last)
+        window = self._window(self._next_gop, last)
         return [
-            self._decide(
-                outlook, first, min(gop, last + 1 - first), np.ones(min(lookahead, last + 1 - first))
-            )
+            self._decide(window, first, min(gop, last + 1 - first), np.ones(min(lookahead, last + 1 - first)))
             for first in range(self._next_gop, last + 1, gop)
         ]
 
-    def _outlook(self, first: int, last: int) -> LookaheadWindow:
-        """Look at the frames from `first` to `last` with what is known of people by now."""
+    def _window(self, first: int, last: int) -> LookaheadWindow:
+        """Return the look-ahead window of the frames from `first` to `last`, as known by now."""
         return LookaheadWindow(
             self._cameras,
-            self._sight,
+            self._quality_buffer,
             self.people,
             self._has,
             first,
             last,
             relative=self._config.view.quality.relative,
-            lately=self._lately,
-            lasts=self._config.view.presence_decay_s * self._config.site.fps,
-            elsewhere=self._elsewhere if self._config.view.undetected_weight else None,
+            recent_views=self._recent_views,
+            decay_frames=self._config.view.presence_decay_s * self._config.site.fps,
+            cross_view_inference=self._cross_view_inference if self._config.view.undetected_weight else None,
             undetected_weight=self._config.view.undetected_weight,
         )
 
     def _weight(self, lookahead: int) -> Floats:
-        """Return how many frames each frame of the look-ahead stands for: the last one counts for longer."""
-        weight, last = np.ones(lookahead), max(1, lookahead // _LAST)
+        """Return the weight of each frame of the look-ahead: the last ones also stand for what follows."""
+        weight, last = np.ones(lookahead), max(1, lookahead // _TAIL_DIVISOR)
         weight[-last:] += self._extrapolated_frames / last
         return weight
 
-    def _decide(self, outlook: LookaheadWindow, first: int, frames: int, weight: Floats) -> GopDecision:
+    def _decide(self, window: LookaheadWindow, first: int, frames: int, weight: Floats) -> GopDecision:
         people, lookahead = self.people, len(weight)
-        everybody, seen = outlook.numbers, people.registry.first_seen
-        known = np.fromiter((seen[it] for it in everybody.tolist()), np.int64, len(everybody))
-        part = outlook.part(first, lookahead, known < first + frames)
+        numbers, first_seen = window.numbers, people.registry.first_seen
+        since = np.fromiter((first_seen[it] for it in numbers.tolist()), np.int64, len(numbers))
+        part = window.part(first, lookahead, since < first + frames)
         before = self._shots.of(part.numbers)
         starts = np.arange(lookahead) % self._config.encode.gop == 0
-        gops = part.gops(starts, weight, blind=self.least_shot > 1)
+        gops = part.gops(starts, weight, mark_empty=self.min_shot_gops > 1)
         (views,), _ = select_views_by_gop(
-            gops, before.cameras, self.switch_cost, self.least_shot, before.held, decided_gops=1
+            gops, before.cameras, self.switch_cost, self.min_shot_gops, before.gops, decided_gops=1
         )
         self._shots = before.then(views)
         self._next_gop = first + self._config.encode.gop
         boxes = {camera: people.boxes(camera, first, frames) for camera in self._cameras}
-        self._sight.forget_before(self._next_gop)
+        self._quality_buffer.forget_before(self._next_gop)
         people.forget_boxes_before(self._next_gop)
-        names = [*self._cameras, None]  # NO_CAMERA is the last of them
+        names = [*self._cameras, None]  # NO_CAMERA, -1, indexes the last one
         assert NO_CAMERA == -1  # noqa: S101 — as the line above says
         choices = tuple(
             ObjectChoice(number, names[view], names[last], number in people.registry.away)

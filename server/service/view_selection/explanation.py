@@ -1,4 +1,4 @@
-"""Why each view was chosen, in numbers: worked out when somebody asks."""
+"""The costs behind each selected view, computed on request."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class ViewExplanation:
-    """What one camera's view of one person is worth over the look-ahead."""
+    """One camera's view of one person over the look-ahead."""
 
     cost: float | None
     """Mean cost of a frame; None: it cannot be shown."""
     seen: float
-    """Share of the frames in which the camera sees the person."""
+    """Share of the frames in which the camera detects the person."""
     quality: float | None
-    """Mean over these; None: there are none."""
+    """Mean quality over these frames; None: there are none."""
     terms: dict[str, float]
-    """What the quality is made of: mean of each term that weighs something; empty where there are none."""
+    """Mean of each quality term with a weight; empty: there are none."""
     undetected: float
-    """Share of the frames in which it does not find the person, who stands before it as others know."""
+    """Share of the frames in which it does not detect the person, whom other cameras locate in its view."""
     undetected_quality: float | None
-    """What those views are taken to be worth, likewise; None: there are none."""
+    """Mean inferred quality of those views; None: there are none."""
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """Why one person is shown by that camera. Costs are in frames of not seeing the person at all."""
+    """The costs of one person's views, in frames of not seeing the person at all."""
 
     frames: int
     """Frames of the look-ahead."""
     views: dict[str, ViewExplanation]
     """By camera."""
     weights: dict[str, float]
-    """Of the terms: the share of a view's worth that is lost where a term is at its worst."""
+    """By term: the share of a view's quality that is lost where the term is at its worst."""
     stay: float | None
-    """What the look-ahead costs with the camera of the GOP before; None: none, or it cannot be shown."""
+    """The cost with the camera of the GOP before; None: none, or it cannot be shown."""
     cut: float | None
-    """What it costs with the best other camera, `switch_cost` included; None: there is none."""
+    """The cost with the best other camera, `switch_cost` included; None: there is none."""
     cut_to: str | None
     """That camera."""
     switch_cost: float
@@ -59,9 +59,9 @@ class SelectionReasons:
     Attributes:
         part: the look-ahead.
         before: (K,) the camera of the GOP before, by index; -1: none.
-        weight: (N,) for how many frames each frame of the look-ahead stands.
+        weight: (N,) of each frame of the look-ahead.
         switch_cost: what a cut costs, in frames of not seeing the person.
-        settings: how the terms weigh.
+        settings: the weights of the terms.
     """
 
     part: LookaheadPart
@@ -76,12 +76,12 @@ class SelectionReasons:
         Raises:
             KeyError: the GOP was not decided for this person.
         """
-        views, cameras = self.part.views(number), self.part.outlook.cameras
-        columns = self.part.outlook.views.camera[views]
+        views, cameras = self.part.views(number), self.part.window.cameras
+        columns = self.part.window.views.camera[views]
         undetected = self.part.undetected(number)
-        others = self.part.outlook.undetected.camera[undetected]
-        each = self.part.cost(number)
-        cost, mean = (each * self.weight[:, None]).sum(axis=0), each.mean(axis=0)
+        others = self.part.window.undetected.camera[undetected]
+        costs = self.part.cost(number)
+        cost, mean = (costs * self.weight[:, None]).sum(axis=0), costs.mean(axis=0)
         before = int(self.before[self.part.numbers == number][0])
         stay = np.inf if before == NO_CAMERA else cost[before]
         other = np.where(np.arange(len(cost)) == before, np.inf, cost)
@@ -101,18 +101,18 @@ class SelectionReasons:
         )
 
     def _view(self, views: Ints, undetected: Ints, mean: float) -> ViewExplanation:
-        """Return what one camera had to say of a person: where it finds them, and where it does not."""
-        outlook = self.part.outlook
-        terms = [outlook.terms(int(view)) for view in views]
+        """Explain one camera's view, by the indices of its detected and of its inferred views."""
+        window = self.part.window
+        terms = [window.terms(int(view)) for view in views]
         return ViewExplanation(
             cost=_finite(mean),
             seen=len(views) / self.part.frames,
-            quality=float(np.mean(outlook.quality[views])) if terms else None,
+            quality=float(np.mean(window.quality[views])) if terms else None,
             terms=dict(zip(self.settings.terms, np.mean(terms, axis=0).tolist(), strict=True))
             if terms
             else {},
             undetected=len(undetected) / self.part.frames,
-            undetected_quality=float(np.mean(outlook.undetected.quality[undetected]))
+            undetected_quality=float(np.mean(window.undetected.quality[undetected]))
             if undetected.size
             else None,
         )

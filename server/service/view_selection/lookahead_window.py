@@ -1,4 +1,4 @@
-"""What is ahead: every view that shows somebody, frame by frame, and what it is worth."""
+"""The look-ahead window: every view of a person, frame by frame, with its quality."""
 
 from __future__ import annotations
 
@@ -27,75 +27,83 @@ NOTHING = RecentViews()
 class LookaheadWindow:
     """The views of all people in the frames from `first` to `last`, as known at one epoch.
 
-    One outlook serves all GOPs that the epoch decides. ``has(camera, pulse)`` tells whether a camera's frame
-    can be shown. ``lately`` is how everybody was seen before, and `lasts` for how many frames who is missed
-    is taken to be still there.
+    One window serves all GOPs that the epoch decides. ``has(camera, pulse)`` returns whether a camera's frame
+    can be shown. ``recent_views`` are the last views before `first`; for about `decay_frames` frames after a
+    missed detection the person is assumed to be still there.
     """
 
     def __init__(
         self,
         cameras: Sequence[str],
-        sight: ViewQualityBuffer,
+        quality_buffer: ViewQualityBuffer,
         people: PersonTracker,
         has: Callable[[str, int], bool],
         first: int,
         last: int,
         *,
         relative: bool,
-        lately: RecentViews = NOTHING,
-        lasts: float = 0.0,
-        elsewhere: CrossViewInference | None = None,
+        recent_views: RecentViews = NOTHING,
+        decay_frames: float = 0.0,
+        cross_view_inference: CrossViewInference | None = None,
         undetected_weight: float = 0.0,
     ) -> None:
         self.cameras, self.first = cameras, first
         self.numbers: Ints = np.array(people.known, dtype=np.int64)
-        """(K,) everybody's, rising."""
-        pulses, everybody = range(first, last + 1), len(self.numbers)
+        """(K,) the people's numbers, rising."""
+        pulses, count = range(first, last + 1), len(self.numbers)
         undetected = np.array([people.undetected.over(camera, first, len(pulses)) for camera in cameras])
-        line = WindowTracks([sight.over(camera, first, last) for camera in cameras], first, undetected)
+        tracks = WindowTracks(
+            [quality_buffer.over(camera, first, last) for camera in cameras], first, undetected
+        )
         shown = np.array([[has(camera, it) for camera in cameras] for it in pulses], dtype=np.bool_)
         numbers: Ints = np.array(people.registry.everybody, dtype=np.int64)
-        anybody, mine = line.persons(people, numbers, len(pulses)), find_indices(numbers, self.numbers)
-        self.looked = (
-            UndetectedViews.nobody() if elsewhere is None else elsewhere.look(line, anybody, len(pulses))
+        anyone, own = tracks.persons(people, numbers, len(pulses)), find_indices(numbers, self.numbers)
+        self.inferred_views = (
+            UndetectedViews.empty()
+            if cross_view_inference is None
+            else cross_view_inference.infer(tracks, anyone, len(pulses))
         )
-        """For all people, also those whom another service decides for."""
-        person = np.append(mine, -1)[anybody]
-        there = np.flatnonzero((line.quality >= 0.0) & (person >= 0))
-        row, person = line.row[there], person[there]
-        cell = (line.frame * len(cameras) + line.camera)[row]
-        counts = _first_of_each(cell * everybody + person, shown.size * everybody)
-        counts &= shown.reshape(-1)[cell] & (line.quality[there] > 0.0)
-        self._line, self._places = line, there[counts]
-        self.quality: Floats = line.quality[self._places]
-        """(R,) of each view by itself."""
+        """For the people of all shards."""
+        person = np.append(own, -1)[anyone]
+        visible = np.flatnonzero((tracks.quality >= 0.0) & (person >= 0))
+        row, person = tracks.row[visible], person[visible]
+        cell = (tracks.frame * len(cameras) + tracks.camera)[row]
+        counts = _first_of_each(cell * count + person, shown.size * count)
+        counts &= shown.reshape(-1)[cell] & (tracks.quality[visible] > 0.0)
+        self._tracks, self._indices = tracks, visible[counts]
+        self.quality: Floats = tracks.quality[self._indices]
+        """(R,) the quality of each view by itself."""
         row, person = row[counts], person[counts]
-        frame, worth = line.frame[row], np.minimum(self.quality, 1.0)
-        found = (frame * len(cameras) + line.camera[row]) * everybody + person
-        self.undetected = other = self.looked.of(mine, everybody, shown, found, undetected_weight)
-        """This outlook's people's views that are worth something though the camera does not find them."""
-        extra = np.minimum(other.quality, 1.0)
+        frame, quality = tracks.frame[row], np.minimum(self.quality, 1.0)
+        detected = (frame * len(cameras) + tracks.camera[row]) * count + person
+        self.undetected = other = self.inferred_views.of(own, count, shown, detected, undetected_weight)
+        """Inferred views of this shard's people whom the camera does not detect."""
+        inferred_quality = np.minimum(other.quality, 1.0)
         if relative:
-            moment = np.concatenate([frame * everybody + person, other.frame * everybody + other.person])
-            both = relative_view_quality(np.concatenate([worth, extra]), moment, len(pulses) * everybody)
-            worth, extra = both[: len(worth)], both[len(worth) :]
-        self.views = VisibleViews(frame, line.camera[row], person, worth, shown, everybody)
-        self.before = lately.of(self.numbers, len(cameras), first)
-        """How everybody was seen before the first frame."""
-        missed = add_missed_detections(self.views, self.before, lasts)
-        self.taken = add_inferred_views(missed, other.frame, other.camera, other.person, extra)
-        """The views, and those that are taken to be there though somebody was missed, or is not found."""
+            moment = np.concatenate([frame * count + person, other.frame * count + other.person])
+            both = relative_view_quality(
+                np.concatenate([quality, inferred_quality]), moment, len(pulses) * count
+            )
+            quality, inferred_quality = both[: len(quality)], both[len(quality) :]
+        self.views = VisibleViews(frame, tracks.camera[row], person, quality, shown, count)
+        self.before = recent_views.of(self.numbers, len(cameras), first)
+        """Everybody's last views before the first frame."""
+        missed = add_missed_detections(self.views, self.before, decay_frames)
+        self.effective_views = add_inferred_views(
+            missed, other.frame, other.camera, other.person, inferred_quality
+        )
+        """Detected views, those assumed after missed detections, and those inferred from other cameras."""
 
-    def lately(self, pulse: int) -> RecentViews:
-        """Return how everybody was seen before a pulse, for the next outlook."""
+    def recent_views(self, pulse: int) -> RecentViews:
+        """Return the last views before a pulse, for the next window."""
         return RecentViews.after(self.numbers, self.before, self.views, self.first, pulse)
 
     def terms(self, view: int) -> Floats:
-        """Return what the quality of a view is made of, (terms,)."""
-        return self._line.terms(int(self._places[view]))
+        """Return the quality terms of a view, (terms,)."""
+        return self._tracks.terms(int(self._indices[view]))
 
     def part(self, first: int, frames: int, of: Mask) -> LookaheadPart:
-        """Return the outlook on some of its frames, for the people of the mask (K,)."""
+        """Return a part of the window: some of its frames, and the people of the mask (K,)."""
         return LookaheadPart(self, first - self.first, frames, np.flatnonzero(of))
 
 
@@ -104,13 +112,13 @@ class LookaheadPart:
     """Some frames of a look-ahead window, for some of the people.
 
     Attributes:
-        outlook: of which it is a part.
-        first: frame of the outlook at which it begins.
-        frames: N of them.
-        people: (K,) indices into the outlook's people, rising.
+        window: the whole window.
+        first: its first frame, counted from the window's.
+        frames: N, the number of frames.
+        people: (K,) indices into the window's people, rising.
     """
 
-    outlook: LookaheadWindow
+    window: LookaheadWindow
     first: int
     frames: int
     people: Ints
@@ -118,36 +126,36 @@ class LookaheadPart:
     @property
     def numbers(self) -> Ints:
         """(K,) the people's numbers, rising."""
-        return self.outlook.numbers[self.people]
+        return self.window.numbers[self.people]
 
-    def gops(self, starts: Mask, weight: Floats, *, blind: bool) -> GopCosts:
-        """Return what the GOPs cost that begin where the mask (N,) says, each frame by its weight (N,)."""
-        gops = self.outlook.taken.gops(self.first, starts, weight, mark_empty=blind)
-        return gops if len(self.people) == len(self.outlook.numbers) else gops.for_people(self.people)
+    def gops(self, starts: Mask, weight: Floats, *, mark_empty: bool) -> GopCosts:
+        """Return the costs of the GOPs that begin at the mask's frames (N,), frames weighted by (N,)."""
+        gops = self.window.effective_views.gops(self.first, starts, weight, mark_empty=mark_empty)
+        return gops if len(self.people) == len(self.window.numbers) else gops.for_people(self.people)
 
     def views(self, number: int) -> Ints:
-        """Return one person's views, (R,) indices into the outlook's.
+        """Return one person's views, (R,) indices into the window's.
 
         Raises:
-            KeyError: this part is not about that person.
+            KeyError: the person is not in this part.
         """
-        return self._rows(self.outlook.views, number)
+        return self._rows(self.window.views, number)
 
     def undetected(self, number: int) -> Ints:
-        """Return one person's views in which they are not found, (V,) indices into the outlook's.
+        """Return one person's inferred views, (V,) indices into the window's.
 
         Raises:
-            KeyError: this part is not about that person.
+            KeyError: the person is not in this part.
         """
-        return self._rows(self.outlook.undetected, number)
+        return self._rows(self.window.undetected, number)
 
     def cost(self, number: int) -> Floats:
         """Return one person's c(n, b), (N, C); infinite where a camera cannot be shown.
 
         Raises:
-            KeyError: this part is not about that person.
+            KeyError: the person is not in this part.
         """
-        views, rows = self.outlook.taken, self._rows(self.outlook.taken, number)
+        views, rows = self.window.effective_views, self._rows(self.window.effective_views, number)
         cost = np.where(views.available[self.first : self.first + self.frames], NO_VIEW_COST, np.inf)
         cost[views.frame[rows] - self.first, views.camera[rows]] -= views.quality[rows]
         return cost
@@ -161,8 +169,8 @@ class LookaheadPart:
 
 
 def _first_of_each(values: Ints, count: int) -> Mask:
-    """Return which values, all below `count`, are there for the first time: of two tracks one counts."""
+    """Return which values, all below `count`, occur for the first time: of two tracks the first counts."""
     places = np.arange(len(values))
-    owner = np.empty(count, dtype=np.intp)
-    owner[values[::-1]] = places[::-1]  # written last, the first one stays
-    return np.asarray(owner[values] == places)
+    first_place = np.empty(count, dtype=np.intp)
+    first_place[values[::-1]] = places[::-1]  # the first one is written last
+    return np.asarray(first_place[values] == places)

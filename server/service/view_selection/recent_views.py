@@ -1,4 +1,4 @@
-"""How each camera saw everybody last, from one decision to the next."""
+"""The last views of each person in each camera, kept from one decision to the next."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class RecentViews:
     """The last views before a pulse.
 
     Attributes:
-        pulse: before which.
-        numbers: (K,) of whom, rising.
+        pulse: the pulse.
+        numbers: (K,) the people's numbers, rising.
         last: by camera and person.
     """
 
@@ -31,17 +31,17 @@ class RecentViews:
     last: LastDetections = field(default_factory=_nothing)
 
     def of(self, numbers: Ints, cameras: int, pulse: int) -> LastDetections:
-        """Return what was seen of these people, (K,) rising, before a pulse; who is new has not been seen."""
-        ago, worth = np.full((cameras, len(numbers)), np.inf), np.zeros((cameras, len(numbers)))
+        """Return the last views of these people, (K,) rising, before a pulse; new people have none."""
+        age, quality = np.full((cameras, len(numbers)), np.inf), np.zeros((cameras, len(numbers)))
         _, old, new = np.intersect1d(self.numbers, numbers, assume_unique=True, return_indices=True)
         if old.size:
-            ago[:, new] = self.last.age[:, old] + (pulse - self.pulse)
-            worth[:, new] = self.last.quality[:, old]
-        return LastDetections(ago, worth)
+            age[:, new] = self.last.age[:, old] + (pulse - self.pulse)
+            quality[:, new] = self.last.quality[:, old]
+        return LastDetections(age, quality)
 
     @staticmethod
     def after(
         numbers: Ints, last: LastDetections, views: VisibleViews, first: int, pulse: int
     ) -> RecentViews:
-        """Return the same before a later pulse, by the views from `first` on."""
+        """Return the last views before a later pulse, updated by the views from `first` on."""
         return RecentViews(pulse, numbers, last.advanced_to(views, pulse - first))

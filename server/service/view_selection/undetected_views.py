@@ -1,4 +1,4 @@
-"""Views of people whom a camera does not find, though others know where they stand."""
+"""Views of people whom a camera does not detect though other cameras locate them."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TestedViews:
-    """T tests of cameras at places where a person stands, as other cameras know.
+    """T tests whether a camera detects a person whom other cameras locate in its view.
 
     Attributes:
-        frame: (T,) of the outlook.
+        frame: (T,) counted from the window's first.
         camera: (T,) by index.
         feet: (T, 2) pixels.
-        found: (T,) whether the camera found them.
+        found: (T,) whether the camera detects the person.
     """
 
     frame: Ints
@@ -31,14 +31,14 @@ class TestedViews:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UndetectedViews:
-    """V views of people whom a camera does not detect, though other cameras know where they stand.
+    """V inferred views of people whom a camera does not detect though other cameras locate them.
 
     Attributes:
-        frame: (V,) of the outlook.
+        frame: (V,) counted from the window's first.
         camera: (V,) by index.
         person: (V,) by index.
-        quality: (V,) as of those who are found, times how surely they show.
-        tested: what is to be learned from it.
+        quality: (V,) as of detected people, times the trust that they are visible.
+        tested: the tests to learn from.
     """
 
     frame: Ints
@@ -48,7 +48,7 @@ class UndetectedViews:
     tested: TestedViews
 
     @classmethod
-    def nobody(cls) -> UndetectedViews:
+    def empty(cls) -> UndetectedViews:
         """Return no views."""
         none = np.zeros(0, dtype=np.int64)
         tested = TestedViews(none, none, np.zeros((0, 2)), np.zeros(0, dtype=np.bool_))
@@ -58,12 +58,11 @@ class UndetectedViews:
         """Return the views of some of the people, in frames that can be shown.
 
         Args:
-            people: by index of everybody here, their index among those asked for; -1: they are not.
-            count: K, how many are asked for.
-            shown: (N, C) what can be shown.
-            found: cells, frame by frame, camera by camera and person by person, of views that are found after
-                all: between two looks somebody may be.
-            factor: that the quality is taken times.
+            people: maps each person's index here to the index in the result; -1: left out.
+            count: K, the number of people in the result.
+            shown: (N, C) whether a camera's frame can be shown.
+            found: flat indices (frame, camera, person) of detected views, which replace inferred ones.
+            factor: multiplies the quality.
         """
         if not len(self.frame):
             return self

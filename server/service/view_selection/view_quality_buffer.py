@@ -1,4 +1,4 @@
-"""What the cameras see and how well: every window's view quality, by camera and pulse."""
+"""View quality of every window, by camera and pulse."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from server.service.ingest.window_history import HistorySpan, WindowHistory
 
 Floats = NDArray[np.float64]
 
-_FOR_EVER = 2**62
+_END = 2**62
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +26,7 @@ class WindowQuality:
     Attributes:
         window: the tracks.
         quality: (F, T), NaN where hidden.
-        terms: (terms, F, T) what it is made of, NaN where hidden.
+        terms: (terms, F, T) the quality terms, NaN where hidden.
     """
 
     window: CameraWindow
@@ -37,8 +37,8 @@ class WindowQuality:
 class ViewQualityBuffer:
     """Computes the view quality of every window, and keeps the newest of each frame.
 
-    A window's quality does not depend on who its tracks are, nor on other cameras: it is worked out once.
-    ``homographies`` lead from each camera's own picture to the ground.
+    A window's quality depends neither on person numbers nor on other cameras, so it is computed once.
+    ``homographies`` map each camera's own picture to the ground.
     """
 
     def __init__(
@@ -52,70 +52,70 @@ class ViewQualityBuffer:
         self._histories = {camera: WindowHistory[WindowQuality]() for camera in config.camera_ids}
 
     def put(self, windows: Sequence[CameraWindow]) -> None:
-        """Take over what cameras said of an epoch."""
-        for seen in self._seen(windows):
-            first, frames = seen.window.first, len(seen.quality)
-            self._histories[seen.window.message.camera].put(seen, first, first + frames - 1)
+        """Add the windows of an epoch."""
+        for quality in self._qualities(windows):
+            first, frames = quality.window.first, len(quality.quality)
+            self._histories[quality.window.message.camera].put(quality, first, first + frames - 1)
 
-    def weigh_anew(self, settings: QualitySettings) -> None:
-        """Go by other settings from now on, also of what was said already."""
+    def change_settings(self, settings: QualitySettings) -> None:
+        """Apply other settings, also to the windows in the buffer."""
         self.settings = settings
         for history in self._histories.values():
-            for said in history.over(0, _FOR_EVER):
-                (seen,) = self._seen([said.window.window])
-                history.put(seen, said.first, said.last)
+            for span in history.over(0, _END):
+                (quality,) = self._qualities([span.window.window])
+                history.put(quality, span.first, span.last)
 
     def over(self, camera: str, first: int, last: int) -> list[HistorySpan[WindowQuality]]:
-        """Return what was last said of a camera's frames from `first` to `last`."""
+        """Return the newest quality of a camera's frames from `first` to `last`."""
         return self._histories[camera].over(first, last)
 
     def forget_before(self, pulse: int) -> None:
-        """Let go of the frames before a pulse."""
+        """Drop the frames before a pulse."""
         for history in self._histories.values():
             history.forget_before(pulse)
 
-    def _seen(self, windows: Sequence[CameraWindow]) -> list[WindowQuality]:
-        """Weigh the views of some windows, all at once."""
+    def _qualities(self, windows: Sequence[CameraWindow]) -> list[WindowQuality]:
+        """Compute the quality of some windows, all at once."""
         if not windows:
             return []
         start = min(window.first for window in windows)
-        weighed = self._weigh(windows, start)
-        quality, terms = weighed.quality.T, weighed.terms.transpose(0, 2, 1)
+        computed = self._compute(windows, start)
+        quality, terms = computed.quality.T, computed.terms.transpose(0, 2, 1)
         ends = np.cumsum([len(window.keys) for window in windows]).tolist()
-        seen = []
+        qualities = []
         for window, end in zip(windows, ends, strict=True):
             count, frames = window.boxes.shape[:2]
             rows, tracks = slice(window.first - start, window.first - start + frames), slice(end - count, end)
-            seen.append(WindowQuality(window, quality[rows, tracks], terms[:, rows, tracks]))
-        return seen
+            qualities.append(WindowQuality(window, quality[rows, tracks], terms[:, rows, tracks]))
+        return qualities
 
-    def _weigh(self, windows: Sequence[CameraWindow], start: int) -> ViewQuality:
-        """Weigh the views of all windows at once, track after track; frames that one lacks are hidden."""
+    def _compute(self, windows: Sequence[CameraWindow], start: int) -> ViewQuality:
+        """Compute the quality of all windows' tracks; frames outside a window count as hidden."""
         tracks = [track for window in windows for track in window.message.tracks]
         return compute_view_quality(
             TrackWindow(
-                _side_by_side(windows, start),
+                _stacked_boxes(windows, start),
                 np.repeat(np.arange(len(windows)), [len(window.keys) for window in windows]),
                 np.clip(np.array([it.confidence for it in tracks], dtype=np.float64), 0.0, 1.0),
-                # None becomes NaN: nobody has measured it.
+                # None, not measured, becomes NaN.
                 np.array([it.sharpness for it in tracks], dtype=np.float64),
             ),
-            self.looks([window.message.camera for window in windows]),
+            self.layout([window.message.camera for window in windows]),
             self.settings,
         )
 
-    def looks(self, cameras: Sequence[str]) -> CameraLayout:
-        """Return what view quality asks of cameras that have spoken."""
+    def layout(self, cameras: Sequence[str]) -> CameraLayout:
+        """Return the layout of cameras whose picture size is known."""
         pictures = np.array([self._picture(camera) for camera in cameras]).reshape(-1, 4)
         return CameraLayout(self._size, pictures, [self._ground(camera) for camera in cameras], self._fps)
 
     def _picture(self, camera: str) -> tuple[float, float, float, float]:
-        """Return where a camera's own picture lies in the site's: in its middle."""
+        """Return the rectangle of a camera's own picture, centered in the site's."""
         left, top = (float(side) for side in self.letterboxes[camera].to_site(np.zeros(2)))
         return left, top, self._size[0] - left, self._size[1] - top
 
     def _ground(self, camera: str) -> Floats | None:
-        """Return the homography from the site's picture; none of a camera that nobody can walk towards."""
+        """Return the homography from the site's picture; None for overhead cameras: none can face them."""
         own = self._homographies[camera]
         if own is None or camera in self._overhead:
             return None
@@ -124,7 +124,7 @@ class ViewQualityBuffer:
         return np.asarray(own @ to_own)
 
 
-def _side_by_side(windows: Sequence[CameraWindow], start: int) -> Floats:
+def _stacked_boxes(windows: Sequence[CameraWindow], start: int) -> Floats:
     """Return the boxes of all tracks over the frames of all windows from `start` on: (T, N, 4)."""
     frames = max(window.first + window.boxes.shape[1] for window in windows) - start
     if all(window.boxes.shape[1] == frames for window in windows):

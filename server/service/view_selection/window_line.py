@@ -1,4 +1,4 @@
-"""What was said last of some frames, in one line: camera by camera, frame by frame, track by track."""
+"""The tracks of a look-ahead window as flat arrays: camera by camera, frame by frame, track by track."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ Ints = NDArray[np.int64]
 class WindowTracks:
     """All tracks of all cameras in the frames from `first` on, hidden ones included.
 
-    ``said`` has each camera's stretches, ``unsearched`` (C, F) the frames in which it could not have found
-    anybody. One frame of one camera is a row.
+    ``spans`` are each camera's newest windows, ``undetected`` (C, F) the frames without detection. A frame of
+    a camera is a row; L is the number of tracks in all rows.
 
     Attributes:
-        quality: (L,) of each place in line, NaN where hidden.
-        row: (L,) which row it is in.
-        frame: of each row, from 0 on.
+        quality: (L,) NaN where hidden.
+        row: (L,) index of the row.
+        frame: of each row, counted from `first`.
         camera: of each row, by index.
-        searched: of each row, whether anybody could have been found.
+        searched: of each row, whether detection ran.
     """
 
     def __init__(
-        self, said: Sequence[Sequence[HistorySpan[WindowQuality]]], first: int, undetected: NDArray[np.bool_]
+        self, spans: Sequence[Sequence[HistorySpan[WindowQuality]]], first: int, undetected: NDArray[np.bool_]
     ) -> None:
-        self._spans = list(chain.from_iterable(said))
+        self._spans = list(chain.from_iterable(spans))
         self._first = first
-        camera = np.repeat(np.arange(len(said)), [len(own) for own in said])
+        camera = np.repeat(np.arange(len(spans)), [len(own) for own in spans])
         lengths = np.array([it.last - it.first + 1 for it in self._spans], dtype=np.int64)
         self._tracks = np.array([len(it.window.window.keys) for it in self._spans], dtype=np.int64)
         self._camera = camera
@@ -46,20 +46,20 @@ class WindowTracks:
         self.quality: Floats = np.concatenate([np.zeros(0), *(_quality(it) for it in self._spans)])
         self._begins = np.cumsum(np.concatenate([[0], lengths * self._tracks]))
 
-    def persons(self, people: PersonTracker, everybody: Ints, frames: int) -> Ints:
-        """Return the person at each place, (L,): indices into the sorted numbers (K,); -1: none of them.
+    def persons(self, people: PersonTracker, numbers: Ints, frames: int) -> Ints:
+        """Return the person of each track and frame, (L,): indices into the sorted numbers (K,); -1: none.
 
-        A track is in several windows; its numbers in all the frames are asked for once.
+        A track may be in several windows; its numbers are looked up once.
         """
-        if not len(self.quality) or not len(everybody):
+        if not len(self.quality) or not len(numbers):
             return np.full(len(self.quality), -1)
         windows = [it.window.window for it in self._spans]
         locals_ = np.concatenate([it.locals for it in windows])
         tracks = np.repeat(self._camera, self._tracks) * (locals_.max() + 1) + locals_
         _, once, back = np.unique(tracks, return_index=True, return_inverse=True)
         keys = list(chain.from_iterable(it.keys for it in windows))
-        numbers = people.numbers([keys[at] for at in once.tolist()], self._first, frames)
-        persons = np.ascontiguousarray(_over_frames(numbers, everybody).T)
+        track_numbers = people.numbers([keys[at] for at in once.tolist()], self._first, frames)
+        persons = np.ascontiguousarray(_indices_over_frames(track_numbers, numbers).T)
         each = np.split(back, np.cumsum(self._tracks)[:-1])
         return _joined(
             [
@@ -69,7 +69,7 @@ class WindowTracks:
         )
 
     def boxes(self, places: Ints) -> Floats:
-        """Return the boxes at places in line, (P,) rising: (P, 4) pixels of the site's picture."""
+        """Return the boxes at flat indices (P,), rising: (P, 4) pixels of the site's picture."""
         boxes = np.empty((len(places), 4))
         ends = np.searchsorted(places, self._begins)
         for span, begin, start, end in zip(
@@ -81,12 +81,12 @@ class WindowTracks:
         return boxes
 
     def terms(self, place: int) -> Floats:
-        """Return what the quality at a place in line is made of, (terms,)."""
+        """Return the quality terms at a flat index, (terms,)."""
         number = int(np.searchsorted(self._begins, place, side="right")) - 1
         span = self._spans[number]
-        seen = span.window
-        frame, track = divmod(place - int(self._begins[number]), seen.quality.shape[1])
-        return np.asarray(seen.terms[:, frame + span.first - seen.window.first, track])
+        quality = span.window
+        frame, track = divmod(place - int(self._begins[number]), quality.quality.shape[1])
+        return np.asarray(quality.terms[:, frame + span.first - quality.window.first, track])
 
 
 def _joined(parts: Sequence[Ints]) -> Ints:
@@ -94,24 +94,23 @@ def _joined(parts: Sequence[Ints]) -> Ints:
 
 
 def _quality(span: HistorySpan[WindowQuality]) -> Floats:
-    """Return the quality of a stretch's views in line."""
-    seen, first = span.window, span.window.window.first
-    return seen.quality[span.first - first : span.last - first + 1].reshape(-1)
+    """Return the quality of a span's tracks, flattened."""
+    quality, first = span.window.quality, span.window.window.first
+    return quality[span.first - first : span.last - first + 1].reshape(-1)
 
 
-def find_indices(numbers: Ints, everybody: Ints) -> Ints:
-    """Find numbers (T,) among everybody's (K,), rising: their indices, -1 where they are not among them."""
-    if not len(everybody):
+def find_indices(numbers: Ints, known: Ints) -> Ints:
+    """Return the indices of numbers (T,) in the sorted numbers (K,); -1: not among them."""
+    if not len(known):
         return np.full(numbers.shape, -1)
-    at = np.minimum(np.searchsorted(everybody, numbers), len(everybody) - 1)
-    return np.where(everybody[at] == numbers, at, -1)
+    at = np.minimum(np.searchsorted(known, numbers), len(known) - 1)
+    return np.where(known[at] == numbers, at, -1)
 
 
-def _over_frames(numbers: Ints, everybody: Ints) -> Ints:
-    """Do so for numbers (T, N)."""
-    # Hardly any track becomes another person on the way.
+def _indices_over_frames(numbers: Ints, known: Ints) -> Ints:
+    """Return the indices of numbers (T, N) likewise; most tracks keep one number in all frames."""
     changing = (numbers != numbers[:, :1]).any(axis=1)
-    indices = np.repeat(find_indices(numbers[:, 0], everybody)[:, None], numbers.shape[1], axis=1)
+    indices = np.repeat(find_indices(numbers[:, 0], known)[:, None], numbers.shape[1], axis=1)
     if changing.any():
-        indices[changing] = find_indices(numbers[changing], everybody)
+        indices[changing] = find_indices(numbers[changing], known)
     return indices

@@ -57,7 +57,7 @@ def test_from_the_first_question_on_a_minute_is_explained_and_each_gop_once() ->
     for first in range(10, 4000, 10):
         newest = board.explain(7 if first % 20 else 1)
         assert newest is not None
-        assert newest.standing.first == first - 10
+        assert newest.view.first == first - 10
         whys.append(decided(board, first))
     assert all(why.asked == [1] for why in whys)
     assert board.explain(1, 3990 - 60 * 25) is not None
@@ -65,7 +65,7 @@ def test_from_the_first_question_on_a_minute_is_explained_and_each_gop_once() ->
     for pulse in (3990, 3985, 3000):
         then = board.explain(1, pulse)
         assert then is not None
-        assert then.standing.first == pulse - pulse % 10
+        assert then.view.first == pulse - pulse % 10
     assert board.explain(1, 4000) is None, "not decided yet"
 
 

@@ -17,7 +17,7 @@ from server.http.metrics.event_loop_lag import LoopLag
 from server.http.viewers.traffic import Traffic
 from server.messaging.inbox import Message
 from server.messaging.messages import FrameHeader, SolverReport, ZenohKeys
-from server.service.readiness import most_behind
+from server.service.readiness import max_backlog
 from server.service.streaming.subscriber_queue import BytesChunk, Subscriber
 
 
@@ -176,7 +176,7 @@ async def test_a_site_is_ready_when_pulses_and_frames_come_and_decisions_keep_up
 
 
 async def test_a_site_whose_decisions_fall_behind_is_not_ready(busy: Hall) -> None:
-    allowed = most_behind(busy.service)
+    allowed = max_backlog(busy.service)
     busy.service.pulse = busy.service.decision_state.end - 1 + allowed
     assert (await ready(busy))[0] == 200
     busy.service.pulse += 1

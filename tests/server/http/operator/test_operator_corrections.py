@@ -82,7 +82,7 @@ async def test_what_is_too_long_ago_is_left_out_and_said(helped: Hall) -> None:
     [
         ({"object": 9}, 404, "there is no object 9"),
         ({"camera": "c9"}, 404, "there is no camera 'c9'"),
-        ({"object": 2, "camera": B}, 409, "camera c1 has not shown object 2"),
+        ({"object": 2, "camera": B}, 409, "camera c1 did not show object 2"),
         ({"points": []}, 400, "length >= 1"),
         ({"points": [at(1)] * 257}, 400, "length <= 256"),
         ({"points": [at(1, x=WIDTH + 1)]}, 400, f"is not in a picture of {WIDTH}x{HEIGHT}"),
@@ -113,7 +113,7 @@ async def test_another_sites_page_cannot_point(helped: Hall) -> None:
 
 async def test_where_no_camera_takes_it_that_is_said(busy: Hall) -> None:
     status, answer = await say(busy, at(7))
-    assert (status, answer["error"]) == (409, "no camera takes a pointing: track.assist.enabled is off")
+    assert (status, answer["error"]) == (409, "cameras take no corrections: track.assist.enabled is off")
     assert (await busy.get_json(POINTING))["unavailable"] == answer["error"]
 
 

@@ -107,8 +107,8 @@ async def test_whom_a_camera_shows_is_somebody_new_to_everybody(real: Hall) -> N
         ({"object": 1, "split": ["c9"]}, 404, "there is no camera 'c9'; there are c0, c1"),
         ({"object": 1}, 400, "set exactly one of name, merge and split"),
         ({"object": 1, "name": "Ann", "merge": 2}, 400, "set exactly one of name, merge and split"),
-        ({"object": 1, "name": 41 * "x"}, 400, "name: at most 40 letters that can be read"),
-        ({"object": 1, "name": "a\u202eb"}, 400, "name: at most 40 letters that can be read"),
+        ({"object": 1, "name": 41 * "x"}, 400, "name: at most 40 printable characters"),
+        ({"object": 1, "name": "a\u202eb"}, 400, "name: at most 40 printable characters"),
         ({"object": "1"}, 400, "the request's JSON: "),
     ],
 )

@@ -48,7 +48,7 @@ def test_what_could_not_be_written_is_said_once_there_is_room(
     ]
     said = [it.getMessage() for it in caplog.records]
     assert len(said) == 2
-    assert "decisions are left out until there is room again" in said[0]
+    assert "decisions are skipped until writing succeeds" in said[0]
     assert f"{3 * GOP} frames are missing" in said[1]
 
 

@@ -19,9 +19,9 @@ def raised(per_minute: int, told: list[tuple[int, int, float]]) -> list[int]:
     budget, found = FlagBudget(FlagSettings(per_minute=per_minute, risk=0.0), FPS), []
     for now, who, risk in told:
         people = frozenset({2 * who, 2 * who + 1})
-        budget.hear(now, people, risk)
-        if budget.worth(now, people, risk):
-            budget.spend(now, people)
+        budget.record_risk(now, people, risk)
+        if budget.is_worth_flag(now, people, risk):
+            budget.record_flag(now, people)
             found.append(now)
     return found
 
@@ -78,24 +78,24 @@ def test_what_is_told_again_and_again_counts_once() -> None:
     """Else one long trouble would make everything else look rare."""
     budget = FlagBudget(FlagSettings(per_minute=1, risk=0.0), FPS)
     for now in range(0, 40, 5):
-        budget.hear(now, SAME, 0.9)
-    budget.hear(45, OTHER, 0.5)
-    assert not budget.worth(45, OTHER, 0.5)
-    assert budget.worth(45, SAME, 0.9)
-    budget.hear(3 * MINUTE, LATE, 0.5)
-    assert budget.worth(3 * MINUTE, LATE, 0.5), "one in the first minute leaves two for the others"
+        budget.record_risk(now, SAME, 0.9)
+    budget.record_risk(45, OTHER, 0.5)
+    assert not budget.is_worth_flag(45, OTHER, 0.5)
+    assert budget.is_worth_flag(45, SAME, 0.9)
+    budget.record_risk(3 * MINUTE, LATE, 0.5)
+    assert budget.is_worth_flag(3 * MINUTE, LATE, 0.5), "one in the first minute leaves two for the others"
 
 
 def test_what_is_not_likely_enough_is_worth_none_however_little_else_there_is() -> None:
     budget = FlagBudget(FlagSettings(per_minute=5, risk=0.25), FPS)
-    budget.hear(10, SAME, 0.24)
-    assert not budget.worth(10, SAME, 0.24)
-    assert budget.worth(10, SAME, 0.25)
+    budget.record_risk(10, SAME, 0.24)
+    assert not budget.is_worth_flag(10, SAME, 0.24)
+    assert budget.is_worth_flag(10, SAME, 0.25)
 
 
 def test_for_some_seconds_nobody_has_two_flags() -> None:
     budget = FlagBudget(FlagSettings(per_minute=5, risk=0.0), FPS)
-    budget.spend(10, frozenset({1, 2}))
-    assert not budget.worth(12, frozenset({2, 3}), 0.9)
-    assert budget.worth(12, frozenset({3, 4}), 0.9)
-    assert budget.worth(10 + 5 * round(FPS), frozenset({2, 3}), 0.9)
+    budget.record_flag(10, frozenset({1, 2}))
+    assert not budget.is_worth_flag(12, frozenset({2, 3}), 0.9)
+    assert budget.is_worth_flag(12, frozenset({3, 4}), 0.9)
+    assert budget.is_worth_flag(10 + 5 * round(FPS), frozenset({2, 3}), 0.9)

@@ -192,7 +192,7 @@ def test_the_reason_is_one_plain_sentence_for_every_case() -> None:
     best = decide(decider(), story)[0]
     assert said(best) == "c0 sees this person best over the next frames."
     away = decide(decider(), [*story, *[{A: {}, B: {}}] * 3])[-1]
-    assert said(away) == "Nobody sees this person at the moment; c0 saw them last."
+    assert said(away) == "No camera sees this person at the moment; c0 saw them last."
 
 
 def test_a_camera_that_dies_in_the_middle_of_a_window_is_left_at_the_gop_it_dies_in() -> None:
@@ -243,7 +243,7 @@ def test_a_shot_is_as_long_as_asked_for(min_shot_s: float, cuts: int) -> None:
     views = shown(decide(it, story, end=11 * STRIDE - 1))
     changes = [n for n in range(1, len(views)) if views[n] != views[n - 1]]
     assert len(changes) == cuts
-    assert all(b - a >= it.least_shot for a, b in itertools.pairwise(changes))
+    assert all(b - a >= it.min_shot_gops for a, b in itertools.pairwise(changes))
 
 
 def test_a_shot_that_shows_nobody_may_be_short() -> None:

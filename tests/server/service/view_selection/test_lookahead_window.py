@@ -60,7 +60,7 @@ def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]
 
 
 def slowly(
-    story: Sequence[Epoch], sight: ViewQualityBuffer, people: Drifting
+    story: Sequence[Epoch], quality_buffer: ViewQualityBuffer, people: Drifting
 ) -> dict[tuple[int, str, int], float]:
     """Return the quality of every view by pulse, camera and number, one box after the other."""
     found: dict[tuple[int, str, int], float] = {}
@@ -69,7 +69,7 @@ def slowly(
         for camera, message in epoch.tracks.items():
             newest |= {(pulse, camera): message for pulse in range(message.first, message.last + 1)}
     for (pulse, camera), message in newest.items():
-        [stretch] = sight.over(camera, pulse, pulse)
+        [stretch] = quality_buffer.over(camera, pulse, pulse)
         seen = stretch.window
         for track, key in enumerate(seen.window.keys):
             box = message.tracks[track].boxes[pulse - message.first]
@@ -87,17 +87,17 @@ def test_it_holds_every_view_once_and_compares_it_with_the_best(
     config = small_config()
     people = Drifting(config.view.identity, CAMERAS, dict.fromkeys(CAMERAS), (64, 48), lag=0)
     people._registry = TrackNumbers()  # type: ignore[assignment]
-    sight = ViewQualityBuffer(config, dict.fromkeys(CAMERAS), people.letterboxes)
+    quality_buffer = ViewQualityBuffer(config, dict.fromkeys(CAMERAS), people.letterboxes)
     epochs = [
         epoch_of(number, *(long_word(camera, number, boxes) for camera, boxes in said.items()))
         for number, said in enumerate(story)
     ]
     for epoch in epochs:
-        sight.put(people.update(epoch))
+        quality_buffer.put(people.update(epoch))
     last = epochs[-1].last
     outlook = LookaheadWindow(
         CAMERAS,
-        sight,
+        quality_buffer,
         people,
         lambda camera, pulse: (camera, pulse) not in missing,
         2,
@@ -118,7 +118,7 @@ def test_it_holds_every_view_once_and_compares_it_with_the_best(
     }
     expected = {
         (pulse, camera, number): quality
-        for (pulse, camera, number), quality in slowly(epochs, sight, people).items()
+        for (pulse, camera, number), quality in slowly(epochs, quality_buffer, people).items()
         if pulse >= 2 and (camera, pulse) not in missing and quality > 0
     }
     assert len(found) == len(views.frame)

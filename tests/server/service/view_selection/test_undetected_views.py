@@ -90,11 +90,11 @@ def test_a_camera_that_never_finds_anybody_at_a_place_shows_nobody_there() -> No
 def test_nothing_is_learned_of_a_camera_that_is_not_there(speaks: bool) -> None:
     it = decider()
     decide(it, [FOUND] * 20)
-    trust = it._elsewhere._findable._cell_rate.copy()
+    trust = it._cross_view_inference._detection_probability._cell_rate.copy()
     for number in range(20, 40):
         away = word(B, number, {}, without_detection=[*range(number * STRIDE, (number + 1) * STRIDE)])
         it.step(epoch_of(number, word(A, number, FOUND[A]), *([away] if speaks else [])))
-    changed = np.abs(it._elsewhere._findable._cell_rate - trust)
+    changed = np.abs(it._cross_view_inference._detection_probability._cell_rate - trust)
     assert changed.max() < 0.05, "but for forgetting"
 
 
@@ -117,7 +117,7 @@ def test_why_says_who_does_not_find_them_and_what_that_view_is_worth() -> None:
     assert worth is not None
     assert worth == pytest.approx(2.0 * alone), "twice as large, and people are always found there"
     assert why.views[B].cost == pytest.approx(0.0)
-    assert reason(decisions[-1].choices[0], why).startswith("c1 does not find this person, but")
+    assert reason(decisions[-1].choices[0], why).startswith("c1 does not detect this person, but")
 
 
 @pytest.mark.parametrize("frames", [1, 4, 10, 13, 25])
@@ -128,8 +128,8 @@ def test_a_look_stands_for_the_frames_to_the_next_one_and_for_none_that_are_deci
     looks = np.array([0, 10, 20])
     cameras, feet = np.zeros(3, int), np.full((3, 2), 20.0)
     tested = Looked(looks, cameras, feet, np.ones(3, dtype=np.bool_))
-    it.learn(replace(UndetectedViews.nobody(), tested=tested), frames)
-    assert it._findable._counts[0].sum() == frames, "the next outlook begins with a look"
+    it.learn(replace(UndetectedViews.empty(), tested=tested), frames)
+    assert it._detection_probability._counts[0].sum() == frames, "the next outlook begins with a look"
 
 
 def test_the_factor_is_what_such_views_are_worth() -> None:
