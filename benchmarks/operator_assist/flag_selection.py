@@ -31,11 +31,11 @@ class Desk:
         now = self._last = self._began + newest
         whose = [frozenset(self._began * _MOST + it for it in trouble.objects) for trouble in troubles]
         for who, it in zip(whose, troubles, strict=True):
-            self._budget.hear(now, who, it.risk)
+            self._budget.record_risk(now, who, it.risk)
         found = []
         for who, it in sorted(zip(whose, troubles, strict=True), key=lambda it: -it[1].risk):
-            if now - self._raised.get(who, -(10**9)) > self._same and self._budget.worth(now, who, it.risk):
-                self._budget.spend(now, who)
+            if now - self._raised.get(who, -(10**9)) > self._same and self._budget.is_worth_flag(now, who, it.risk):
+                self._budget.record_flag(now, who)
                 self._raised[who] = now
                 found.append(it)
         return found
