@@ -17,13 +17,13 @@ from server.system.address_redaction import redact_endpoint
 from server.system.errors import UserError
 
 _DROP_AFTER_US = 20_000
-"""zenoh drops a message after 1 ms in a full queue by default: too soon for an I picture's burst."""
+"""How long a message may wait in a full queue; zenoh's default of 1 ms is too short for a keyframe's burst."""
 
 _OPEN_WITHIN_MS = 5_000
 _MESSAGE_MAX = 1 << 25
-"""Bytes of one message; a picture of 4K that is decoded by no other has some millions."""
-_PUBLISHERS = 64
-"""Keys for which something is prepared: of more, those not sent to for longest are prepared anew."""
+"""Bytes of one message; a 4K keyframe has some millions."""
+_MAX_PUBLISHERS = 64
+"""Declared publishers kept; beyond, the least recently used is undeclared."""
 
 
 class Bus:
@@ -32,14 +32,14 @@ class Bus:
     def __init__(self, session: zenoh.Session) -> None:
         self._session = session
         self._publishers: dict[str, zenoh.Publisher] = {}
-        """Whoever was sent to last is the last."""
+        """By key, the most recently used last."""
         self._undeclare: list[Callable[[], None]] = []
 
     @classmethod
     def router(cls, settings: ZenohSettings, access: Mapping[str, Any] | None = None) -> Self:
-        """Open the session that all others connect to (the best-view service's).
+        """Open the session that all others connect to: the best-view service's.
 
-        ``access`` is zenoh's access control: what each user of ``settings.users`` may.
+        ``access`` is zenoh's access control for the users in ``settings.users``.
 
         Raises:
             UserError: the address cannot be listened on.
@@ -63,35 +63,35 @@ class Bus:
 
     @classmethod
     def client(cls, settings: ZenohSettings, user: str | None = None) -> Self:
-        """Open a session of the site's router; it need not be there yet, and may go and come back.
+        """Open a session to the site's router, which may connect later, and disconnect and reconnect.
 
-        It hears the router's process, which is the best-view service, and is heard by it; not other clients.
-        ``user`` is who it comes as, where the router asks.
+        It exchanges messages with the router's process, the best-view service, not with other clients.
+        ``user`` is its user name, where the router requires one.
 
         Raises:
-            UserError: the address is not one that zenoh understands, or there is no such user.
+            UserError: zenoh does not support the address, or there is no such user.
         """
-        # A peer, not a client: a client's session cannot be opened while the router is away.
+        # A peer, not a client: a client session cannot be opened while the router is down.
         return cls._connected(settings, "peer", user)
 
     @classmethod
     def second(cls, settings: ZenohSettings, user: str | None = None) -> Self:
-        """Open the like for a further best-view service, which hears all of the router's clients.
+        """Open a session for a further best-view service, which receives the messages of all clients.
 
         Raises:
-            UserError: the address is not one that zenoh understands.
+            UserError: zenoh does not support the address.
         """
-        # A router tells routers what it hears from peers, but no peer what it hears from another.
+        # A router forwards peers' messages to routers, but not to other peers.
         return cls._connected(settings, "router", user)
 
     @classmethod
     def hearing(cls, settings: ZenohSettings, user: str | None = None) -> Self:
-        """Open a session that hears the router's other clients, too.
+        """Open a session that receives the messages of the router's other clients, too.
 
-        The router must be there; later it may go and come back. Blocks for some seconds at most.
+        The router must be running; later it may disconnect and reconnect. Blocks for some seconds at most.
 
         Raises:
-            UserError: the router is not there.
+            UserError: the router cannot be reached.
         """
         config = _config(settings, "client", user)
         try:
@@ -99,9 +99,9 @@ class Bus:
             config.insert_json5("connect/endpoints", json.dumps([settings.connect]))
             return cls(zenoh.open(config))
         except zenoh.ZError as error:
-            refused = "" if settings.users is None else ", or who is there refuses this user"
+            refused = "" if settings.users is None else ", or it refuses this user"
             raise UserError(
-                f"zenoh.connect: nobody is at {redact_endpoint(settings.connect)}{refused}"
+                f"zenoh.connect: no router answers at {redact_endpoint(settings.connect)}{refused}"
             ) from error
 
     @classmethod
@@ -118,15 +118,15 @@ class Bus:
             return cls(zenoh.open(config))
         except zenoh.ZError:
             raise UserError(
-                f"zenoh.connect: cannot use {redact_endpoint(settings.connect)}: has zenoh this protocol, "
-                "and is all right that stands behind the port?"
+                f"zenoh.connect: cannot use {redact_endpoint(settings.connect)}: does zenoh support this protocol, "
+                "and are the options after the port valid?"
             ) from None
 
     def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
-        """Send a message; it is dropped where a receiver is too slow or nobody is there."""
+        """Send a message; it is dropped for receivers that are too slow."""
         publisher = self._publishers.pop(key, None)
         if publisher is None:
-            if len(self._publishers) >= _PUBLISHERS:
+            if len(self._publishers) >= _MAX_PUBLISHERS:
                 self._publishers.pop(next(iter(self._publishers))).undeclare()  # type: ignore[no-untyped-call]
             publisher = self._session.declare_publisher(
                 key,
@@ -138,7 +138,7 @@ class Bus:
 
     def subscribe(self, key: str, handler: Callable[[Message], None]) -> Inbox[Message]:
         """Call ``handler`` on the event loop for every message under ``key`` (a key expression)."""
-        inbox = Inbox(handler, whose=_sender, size=_size)
+        inbox = Inbox(handler, sender_of=_sender, size=_size)
 
         def receive(sample: zenoh.Sample) -> None:
             attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
@@ -148,7 +148,7 @@ class Bus:
         return inbox
 
     def listen(self, key: str, handler: Callable[[Message], None]) -> Callable[[], None]:
-        """Subscribe until what is returned is called."""
+        """Subscribe; the returned function ends the subscription."""
         self.subscribe(key, handler)
         undeclare = self._undeclare[-1]
 
@@ -164,16 +164,16 @@ class Bus:
         self._undeclare.append(self._session.liveliness().declare_token(key).undeclare)
 
     def watch_alive(self, key: str, handler: Callable[[str, bool], None]) -> None:
-        """Call ``handler(key, is_there)`` on the event loop for all that are there now, come and go."""
+        """Call ``handler(key, is_present)`` on the event loop for every token present now, or coming or going."""
 
         def unpack(message: Message) -> None:
             handler(message.key, message.payload == b"1")
 
-        inbox = Inbox(unpack, whose=_sender, size=_size)
+        inbox = Inbox(unpack, sender_of=_sender, size=_size)
 
         def receive(sample: zenoh.Sample) -> None:
-            there = sample.kind == zenoh.SampleKind.PUT
-            inbox.put(Message(str(sample.key_expr), b"1" if there else b"0", b""))
+            is_present = sample.kind == zenoh.SampleKind.PUT
+            inbox.put(Message(str(sample.key_expr), b"1" if is_present else b"0", b""))
 
         subscriber = self._session.liveliness().declare_subscriber(key, receive, history=True)
         self._undeclare.append(subscriber.undeclare)
@@ -188,7 +188,7 @@ class Bus:
 
 
 def _sender(message: Message) -> str:
-    """Return whose a message is: one camera's are no other's."""
+    """Return the camera that sent a message."""
     return camera_of_key(message.key)
 
 
@@ -200,8 +200,8 @@ def _config(settings: ZenohSettings, mode: str, user: str | None) -> zenoh.Confi
     config = zenoh.Config()
     for key, value in {
         "mode": mode,
-        "scouting/multicast/enabled": False,  # a site is what its configuration says, not who is nearby
-        "scouting/gossip/enabled": False,  # all traffic goes by the router: cameras need not reach each other
+        "scouting/multicast/enabled": False,  # only configured processes belong to a site
+        "scouting/gossip/enabled": False,  # all traffic goes through the router: cameras need not reach each other
         "transport/link/tx/lease": int(settings.lease_s * 1000),
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": _DROP_AFTER_US,
         "transport/link/tx/queue/size/data": 16,

@@ -11,21 +11,21 @@ from server.config.site_config import Config
 from server.messaging.messages import ZenohKeys
 
 SETTING = "zenoh.users"
-_SENDS = ["put", "delete", "liveliness_token"]
-_ASKS = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
-_PASSES = [*_SENDS, "declare_subscriber"]
-"""What the router tells others: messages, who is there, and what somebody wants to hear."""
-_TOLD = ("position_corrections", "identities")
-"""What best-view services say to a camera, under its key."""
-_SERVICES = 64
-"""Best-view services that a site may have, beside the first."""
+_SEND = ["put", "delete", "liveliness_token"]
+_SUBSCRIBE = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
+_FORWARD = [*_SEND, "declare_subscriber"]
+"""What the router forwards: messages, liveliness tokens, and subscriptions."""
+_COMMANDS = ("position_corrections", "identities")
+"""Messages of best-view services to a camera, under its key."""
+_MAX_SERVICES = 64
+"""Best-view services of a site, at most."""
 
 
 def access_control_of(config: Config) -> dict[str, Any] | None:
-    """Return what each user of a site's bus may; None: whoever reaches it may everything.
+    """Return the access rules of a site's bus; None: without users, every client may do everything.
 
     Raises:
-        UserError: the users cannot be read.
+        UserError: the password file cannot be read.
     """
     if config.zenoh.users is None:
         return None
@@ -36,46 +36,60 @@ def access_control_of(config: Config) -> dict[str, Any] | None:
 def build_access_control(
     site: str, cameras: Sequence[str], sounding: str | None, users: Sequence[str]
 ) -> dict[str, Any]:
-    """Return what each user may, as zenoh's ``access_control``: what is not said is denied.
+    """Build zenoh's ``access_control``; everything not allowed is denied.
 
-    A camera sends under its own key, and the site's sound if it is the one. It hears what the others found,
-    and what the best-view services alone say to it: where the operator points, and what to remember.
-    Further best-view services may everything. Any other user may hear everything, and send nothing.
+    A camera publishes under its own key, and the site's audio if it is the audio camera. It receives the
+    other cameras' detections, and the best-view services' messages to it (operator points and identities).
+    Further best-view services may do everything. Any other user may subscribe to everything and send nothing.
     """
     keys = ZenohKeys(site)
     everything = f"myview/{site}/**"
-    found, hears, services = (
+    detections, peer_listeners, services = (
         keys.camera("*", "detections"),
         keys.camera("*", "peer_listener"),
         keys.bestview("**"),
     )
     rules = [
-        _rule("services", "both", [*_SENDS, *_ASKS], [everything]),
-        _rule("all is asked for", "ingress", _ASKS, [everything]),
-        _rule("all is told", "egress", _PASSES, [everything]),
-        _rule("others are asked for", "ingress", _ASKS, [found, hears, services]),
-        _rule("others are told", "egress", _SENDS, [found, hears, services]),
-        _rule("is asked for", "egress", ["declare_subscriber"], [everything]),
-        _rule("tells cameras", "ingress", ["put", "delete"], [keys.camera("*", it) for it in _TOLD])
+        _rule("services", "both", [*_SEND, *_SUBSCRIBE], [everything]),
+        _rule("may subscribe to all", "ingress", _SUBSCRIBE, [everything]),
+        _rule("receives all", "egress", _FORWARD, [everything]),
+        _rule("may subscribe to peers", "ingress", _SUBSCRIBE, [detections, peer_listeners, services]),
+        _rule("receives peers", "egress", _SEND, [detections, peer_listeners, services]),
+        _rule("learns subscriptions", "egress", ["declare_subscriber"], [everything]),
+        _rule(
+            "may not command cameras",
+            "ingress",
+            ["put", "delete"],
+            [keys.camera("*", it) for it in _COMMANDS],
+        )
         | {"permission": "deny"},
     ]
-    further = [bestview_client_name(index) for index in range(1, _SERVICES)]
+    further = [bestview_client_name(index) for index in range(1, _MAX_SERVICES)]
     listeners = [it for it in users if it not in {*cameras, *further, bestview_client_name(0)}]
     subjects = [{"id": "services", "usernames": further}]
     policies = [{"rules": ["services"], "subjects": ["services"]}]
     if listeners:
         subjects.append({"id": "listeners", "usernames": listeners})
-        policies.append({"rules": ["all is asked for", "all is told"], "subjects": ["listeners"]})
+        policies.append({"rules": ["may subscribe to all", "receives all"], "subjects": ["listeners"]})
     for camera in cameras:
         own = [keys.camera(camera, "**"), *([keys.sound] if camera == sounding else [])]
-        rules.append(_rule(f"camera {camera}", "ingress", _SENDS, own))
-        told = [keys.camera(camera, it) for it in _TOLD]
-        rules.append(_rule(f"camera {camera} asks", "ingress", ["declare_subscriber"], told))
-        rules.append(_rule(f"camera {camera} is told", "egress", ["put"], told))
+        rules.append(_rule(f"camera {camera}", "ingress", _SEND, own))
+        commands = [keys.camera(camera, it) for it in _COMMANDS]
+        rules.append(
+            _rule(f"camera {camera} may subscribe to commands", "ingress", ["declare_subscriber"], commands)
+        )
+        rules.append(_rule(f"camera {camera} receives commands", "egress", ["put"], commands))
         subjects.append({"id": f"camera {camera}", "usernames": [camera]})
-        theirs = [f"camera {camera}{what}" for what in ("", " asks", " is told")]
-        theirs += ["tells cameras", "others are asked for", "others are told", "is asked for"]
-        policies.append({"rules": theirs, "subjects": [f"camera {camera}"]})
+        own_rules = [
+            f"camera {camera}{what}" for what in ("", " may subscribe to commands", " receives commands")
+        ]
+        own_rules += [
+            "may not command cameras",
+            "may subscribe to peers",
+            "receives peers",
+            "learns subscriptions",
+        ]
+        policies.append({"rules": own_rules, "subjects": [f"camera {camera}"]})
     return {
         "enabled": True,
         "default_permission": "deny",
@@ -86,7 +100,7 @@ def build_access_control(
 
 
 def _rule(
-    name: str, way: str, messages: Sequence[str], keys: Sequence[str], permission: str = "allow"
+    name: str, direction: str, messages: Sequence[str], keys: Sequence[str], permission: str = "allow"
 ) -> dict[str, Any]:
-    flows = ["ingress", "egress"] if way == "both" else [way]
+    flows = ["ingress", "egress"] if direction == "both" else [direction]
     return {"id": name, "permission": permission, "flows": flows, "messages": messages, "key_exprs": keys}

@@ -1,7 +1,7 @@
 """The epochs of a site: the tracking windows of all cameras end at the same pulses.
 
-Epoch *k* is what a camera knows after its window that ends with pulse ``(k + 1) · stride - 1``. A recording
-that ends in between closes with one more epoch of its own.
+Epoch *k* is the result of the window that ends with pulse ``(k + 1) · stride - 1``. A recording that ends in
+between adds a closing epoch.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ def epoch_of_window(last: int, stride: int) -> int:
 
 
 def closing_epoch(last: int, stride: int) -> int:
-    """Return the epoch in which a recording with the last pulse ``last`` says that it has ended.
+    """Return the closing epoch of a recording with the last pulse ``last``.
 
-    Where ``last`` is a regular end its own epoch is taken, so that the closing one is the next.
+    If ``last`` is a regular end, its own epoch is used already, and the closing one is the next.
     """
     return (last + 1) // stride
 

@@ -1,9 +1,8 @@
-"""Snapshot of people's identities, which cameras keep for a best-view service that restarts.
+"""Snapshot of people's identities, which cameras retain for a best-view service that restarts.
 
-A number means nothing to the next run of the service. But the cameras' processes outlast it, and go on
-following: whoever one of their tracks follows before and after is the same person, as far as a track is ever
-somebody. So each camera is told whose its tracks are, keeps the newest word, unread, and says it to every
-service that comes.
+The cameras' processes continue tracking while the service restarts, so a track before and after is the same
+person. The service therefore sends each camera the person numbers of its tracks; the camera retains the
+newest snapshot, unread, and sends it to every service that starts.
 """
 
 from __future__ import annotations
@@ -15,13 +14,13 @@ import msgspec
 from server.messaging.number_types import Number, Pulse
 
 PERSON_NUMBER_MAX = 999_999_999
-"""As many digits as an address may have."""
+"""Addresses have at most nine digits for it."""
 SNAPSHOT_BYTES_MAX = 1 << 20
-"""Bytes that a camera keeps at most."""
+"""Bytes that a camera retains, at most."""
 ALIASES_MAX = 64
-"""Old numbers of one person that are told; the newest."""
+"""Former numbers of one person, at most; the newest."""
 NAME_LENGTH_MAX = 40
-"""Letters of a name."""
+"""Characters of a name, at most."""
 
 UnixTime = Annotated[float, msgspec.Meta(ge=0, le=1e12)]
 """Seconds."""
@@ -33,12 +32,12 @@ class PersonSnapshot(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tr
 
     number: PersonNumber
     tracks: list[Number]
-    """Those that follow them, by the camera's own numbers."""
+    """The person's tracks, by the camera's own numbers."""
     aliases: Annotated[list[PersonNumber], msgspec.Meta(max_length=ALIASES_MAX)] = []
-    """Numbers that turned out to be theirs."""
+    """Numbers that were merged into this one."""
     name: Annotated[str, msgspec.Meta(max_length=NAME_LENGTH_MAX)] = ""
     manual: bool = False
-    """Somebody said that several numbers are theirs."""
+    """Whether the operator has merged numbers into this one."""
 
 
 class IdentitySnapshot(msgspec.Struct, frozen=True, kw_only=True):
@@ -46,9 +45,9 @@ class IdentitySnapshot(msgspec.Struct, frozen=True, kw_only=True):
 
     pulse: Pulse
     boot: Number
-    """The run of the camera whose tracks are named."""
+    """The boot of the camera that the tracks belong to."""
     next_number: Annotated[int, msgspec.Meta(ge=1, le=PERSON_NUMBER_MAX + 1)]
-    """The first number that nobody was given yet in the whole site."""
+    """The first unused number of the site."""
     numbered_since: UnixTime
-    """When numbers began: since then none was given twice."""
+    """When numbering began: no number was assigned twice since."""
     people: list[PersonSnapshot]

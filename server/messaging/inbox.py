@@ -16,20 +16,20 @@ from logthrottle import LogThrottle
 log = logging.getLogger(__name__)
 
 PENDING_MAX = 4096
-"""Messages of one sender held for a busy event loop: several seconds of the busiest camera."""
+"""Waiting messages of one sender, at most: several seconds of the busiest camera."""
 _BYTES_MAX = 1 << 26
-"""Bytes of one sender that are held for it."""
+"""Waiting bytes of one sender, at most."""
 _SENDERS_MAX = 1024
-"""Senders that are told apart; more of them are taken for one."""
+"""Senders with a queue of their own; further ones share one."""
 DRAIN_SLICE_S = 0.02
-"""How long items are handled at a time, but for the last of them: then others have their turn of the loop."""
+"""How long items are handled in one turn of the event loop."""
 
 Item = TypeVar("Item")
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One message of the bus as it came."""
+    """One message of the bus."""
 
     key: str
     payload: bytes
@@ -37,13 +37,13 @@ class Message:
 
 
 class Inbox(Generic[Item]):
-    """Keeps the newest items of each sender, and hands them on in turns: one of each sender that has some.
+    """Queues items by sender and passes them to a handler on the event loop, round-robin among senders.
 
-    When the loop is too slow the oldest of a sender are lost and counted in ``lost``: memory never grows, no
-    sender waits, and none who sends very much takes the places or the turns of others. A sender's own items
-    stay in order. In one turn of the loop no more are handled than ``turn_s`` seconds take.
+    When the loop is too slow, a sender's oldest items are dropped and counted in ``lost``: memory is bounded,
+    no sender blocks, and a sender that floods does not displace others. A sender's items stay in order. One
+    turn of the loop handles items for ``turn_s`` seconds at most, or one item.
 
-    ``whose`` says who sent an item, ``size`` how many bytes it has.
+    ``sender_of`` returns the sender of an item, ``size`` its bytes.
     """
 
     def __init__(
@@ -52,19 +52,19 @@ class Inbox(Generic[Item]):
         pending_max: int = PENDING_MAX,
         turn_s: float = DRAIN_SLICE_S,
         *,
-        whose: Callable[[Item], str] = lambda _: "",
+        sender_of: Callable[[Item], str] = lambda _: "",
         size: Callable[[Item], int] = lambda _: 0,
     ) -> None:
         self._handler, self._pending_max, self._turn_s = handler, pending_max, turn_s
-        self._whose, self._size = whose, size
+        self._sender_of, self._size = sender_of, size
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
         self._pending: OrderedDict[str, deque[Item]] = OrderedDict()
-        """By sender; whose turn is next is the first. No queue is empty."""
+        """By sender, the next one first. No queue is empty."""
         self._bytes: Counter[str] = Counter()
-        self._woken = False
+        self._is_scheduled = False
         self.lost = 0
-        self._failing = LogThrottle()
+        self._error_log = LogThrottle()
 
     @property
     def waiting(self) -> int:
@@ -73,15 +73,15 @@ class Inbox(Generic[Item]):
             return sum(map(len, self._pending.values()))
 
     def put(self, item: Item) -> None:
-        """Add an item; may be called in any thread."""
+        """Add an item; any thread may call it."""
         with self._lock:
-            self._queue(self._whose(item), item)
-            woken, self._woken = self._woken, True
-        if not woken:
+            self._queue(self._sender_of(item), item)
+            was_scheduled, self._is_scheduled = self._is_scheduled, True
+        if not was_scheduled:
             try:
                 self._loop.call_soon_threadsafe(self._drain)
             except RuntimeError:
-                log.debug("an item came after the event loop had closed")
+                log.debug("an item arrived after the event loop had closed")
 
     def _queue(self, sender: str, item: Item) -> None:
         if sender not in self._pending and len(self._pending) >= _SENDERS_MAX:
@@ -94,10 +94,10 @@ class Inbox(Generic[Item]):
             self.lost += 1
 
     def _take(self) -> Item | None:
-        """Take the next sender's oldest item; None: none waits, and the next that comes wakes the loop."""
+        """Take the next sender's oldest item; None: none waits."""
         with self._lock:
             if not self._pending:
-                self._woken = False
+                self._is_scheduled = False
                 return None
             sender, queue = self._pending.popitem(last=False)
             item = queue.popleft()
@@ -113,9 +113,9 @@ class Inbox(Generic[Item]):
         while (item := self._take()) is not None:
             try:
                 self._handler(item)
-            except Exception as error:  # one bad item must not keep back those behind it
-                if (more := self._failing.record(repr(error))) is not None:
-                    log.exception("handling what came failed%s", more)
+            except Exception as error:  # one bad item must not block the next ones
+                if (more := self._error_log.record(repr(error))) is not None:
+                    log.exception("handling a message failed%s", more)
             if time.perf_counter() >= until:
                 self._loop.call_soon(self._drain)
                 return

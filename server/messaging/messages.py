@@ -1,8 +1,8 @@
 """The messages on the bus, and the keys they travel under.
 
-Everything but pictures is JSON, so that any zenoh subscriber can read it; video travels as plain Annex B
-H.264 (or frames of VP8) with a small JSON head in zenoh's attachment. Numbers survive the way exactly: JSON
-floats are written with as many digits as they need.
+Everything but pictures and audio is JSON, so that any zenoh subscriber can read it; video is plain Annex B
+H.264 (or VP8 frames) with a small JSON header in zenoh's attachment. JSON floats are written with as many
+digits as they need to be read back exactly.
 
 ============================================  ===================================  ==========================
 key                                           payload                              attachment
@@ -50,20 +50,20 @@ class FrameHeader(msgspec.Struct, frozen=True, kw_only=True):
 
     pulse: Pulse
     key: bool
-    """It begins a GOP: SPS, PPS and an IDR picture are inside."""
+    """Whether it begins a GOP: it contains SPS, PPS and an IDR picture."""
     boot: Number
-    """Which run of the camera process: a restarted camera has another one."""
+    """Identifies the run of the camera's process."""
     after: Pulse | None = None
-    """The pulse of the access unit before it, which it is decoded by; null where it is not known."""
+    """The pulse of the access unit that it references; null: unknown."""
     due: Time
     """When the pulse was due."""
     taken: Time
-    """When the picture was there."""
+    """When the picture was taken."""
     encoded: Time
 
 
 HISTOGRAM_BINS_MAX = 1024
-"""Bins of a histogram; more would tell nobody apart better."""
+"""Bins of a histogram, at most; more would not distinguish people better."""
 
 
 class AppearanceHistogram(msgspec.Struct, frozen=True, kw_only=True):
@@ -78,18 +78,18 @@ class AppearanceHistogram(msgspec.Struct, frozen=True, kw_only=True):
 
 
 AUDIO_FRAMES_MAX = 16_384
-"""Frames of sound in one message at most: those of some minutes, whatever a frame lasts."""
+"""Audio frames in one message, at most: some minutes."""
 
 
 class AudioHeader(msgspec.Struct, frozen=True, kw_only=True):
-    """Which frames of the site's sound these are (:mod:`server.media.audio.audio_format`)."""
+    """Header of consecutive audio frames (:mod:`server.media.audio.audio_format`)."""
 
     first: Number
-    """The number of the first: a frame has 1024 samples of AAC, 960 of Opus, counted from pulse 0."""
+    """The number of the first frame, counted from pulse 0; a frame has 1024 samples of AAC, 960 of Opus."""
     sizes: Annotated[
         list[Annotated[int, msgspec.Meta(ge=1, le=8184)]], msgspec.Meta(max_length=AUDIO_FRAMES_MAX)
     ]
-    """Bytes of each; a transport stream can say no more than 8191 with its head."""
+    """Bytes of each; ADTS allows 8191 with its header."""
 
 
 class TrackMessage(msgspec.Struct, frozen=True, kw_only=True):
@@ -101,9 +101,9 @@ class TrackMessage(msgspec.Struct, frozen=True, kw_only=True):
     """One per frame of the window; null where the person is hidden."""
     confidence: Cost
     appearance: list[AppearanceHistogram] = []
-    """Where nobody else was in the boxes, in the frames up to ``final_to``; in their order."""
+    """In frames up to ``final_to`` without other people in the box, in order."""
     sharpness: Annotated[float, msgspec.Meta(ge=0, le=1)] | None = None
-    """How sharp the picture of the person is; null where nobody has measured it."""
+    """Sharpness of the person's picture; null: not measured."""
 
 
 class SolverReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -117,7 +117,7 @@ class SolverReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 TRACKS_MAX = 1000
-"""People that a camera follows in one window at most: more than any picture has room for."""
+"""Tracks of one window, at most: more than any picture has room for."""
 
 
 class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
@@ -126,7 +126,7 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     camera: str
     boot: Number
     size: tuple[Pixels, Pixels]
-    """Width and height of the camera's own picture; boxes are in the site's, which it was scaled into."""
+    """Width and height of the camera's own picture; boxes are in pixels of the site's."""
     epoch: Pulse
     """Which of the site's windows: it ends with pulse (epoch + 1) · stride - 1, or with the recording."""
     first: Pulse
@@ -134,35 +134,35 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     last: Annotated[int, msgspec.Meta(ge=-1, le=PULSE_MAX)]
     """Last frame; -1 or before ``first`` where there was none."""
     final_to: Annotated[int, msgspec.Meta(ge=-PULSE_MAX, le=PULSE_MAX)]
-    """Every frame up to this one never changes again."""
+    """Frames up to this one are final, unless a later message revises them (``revised_from``)."""
     ended: bool
-    """The recording is over: nothing follows."""
+    """Whether the recording has ended: nothing follows."""
     shed: list[Pulse]
-    """Frames of this epoch that were missed or not searched for people because the machine was too busy."""
+    """Frames of this epoch that were missed, or skipped by detection because the machine was too busy."""
     without_detection: list[Pulse] = []
-    """Frames of this epoch in which nobody could have been found: those that are shed, and those before the
-    recording begins or while the detector does not know its background yet."""
+    """Frames of this epoch without detection: shed ones, and those before the recording begins or while the
+    detector learns its background."""
     without_peers: list[Pulse] = []
-    """Frames in which people were followed without what some other camera found: its word was not there."""
+    """Frames tracked without another camera's detections, which had not arrived."""
     tracks: Annotated[list[TrackMessage], msgspec.Meta(max_length=TRACKS_MAX)]
     solve: SolverReport | None
     solved_at: Time = 0.0
     """When the window was solved, unix seconds by the camera's clock; 0 offline."""
     search_s: Duration | None = None
-    """Seconds that it took to look for people in a frame, the mean of this epoch's; null offline."""
+    """Seconds of detection in a frame, the mean of this epoch; null offline."""
     solve_s: Duration | None = None
-    """Seconds that it took to follow everybody to the end of the window; null offline."""
+    """Seconds of tracking to the end of the window; null offline."""
     risk_events: Annotated[list[RiskEvent], msgspec.Meta(max_length=RISK_EVENTS_MAX)] = []
     """Predicted tracking failures, where `track.assist` is on."""
     revised_from: Pulse | None = None
-    """The first frame, final before, that somebody's pointing has changed; null: none has."""
+    """The first final frame that an operator's correction has changed; null: none."""
 
 
 ScoredBox = tuple[Coordinate, Coordinate, Coordinate, Coordinate, Annotated[float, msgspec.Meta(ge=0, le=1)]]
-"""Left, top, right, bottom in pixels of the camera's own picture, and how sure the detector is."""
+"""Left, top, right, bottom in pixels of the camera's own picture, and the detection score."""
 
 FRAME_DETECTIONS_MAX = 100
-"""Boxes that a camera tells the others of one frame at most; those that it is surest of."""
+"""Detections of one frame, at most; those with the highest scores."""
 
 
 class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):
@@ -174,13 +174,13 @@ class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):
     """Width and height of the camera's own picture."""
     pulse: Pulse
     boxes: Annotated[list[ScoredBox], msgspec.Meta(max_length=FRAME_DETECTIONS_MAX)] | None
-    """Null: nobody was looked for, so that it says nothing."""
+    """Null: detection did not run."""
     ended: bool = False
-    """The recording has no frame for this pulse: nothing follows."""
+    """Whether the recording has ended before this pulse: nothing follows."""
 
 
 CameraState = Literal["starting", "live", "away", "ended"]
-"""State of a camera; away: its source gives no pictures now."""
+"""State of a camera; away: its source delivers no pictures now."""
 
 
 class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
@@ -195,26 +195,26 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     missed: Number
     """Pulses without a frame since the start."""
     shed: Number
-    """Frames not searched for people since the start."""
+    """Frames without detection since the start."""
     waiting: Number = 0
-    """Frames that wait to be searched."""
+    """Frames that wait for detection."""
     load_level: Annotated[int, msgspec.Meta(ge=0, le=100)] = 0
-    """How much is left out because the machine has too much to do; 0: nothing."""
+    """Load-shedding level; 0: none."""
     load: Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[ -~]*\Z")] = ""
-    """What is left out, for people: printable, since it stands on pages and in terminals."""
+    """What is left out, for people to read: printable ASCII."""
     position_corrections: Number = 0
-    """Places that an operator pointed at and the tracker was given, since the start."""
+    """Position corrections that the tracker received since the start."""
     bad_messages: Number = 0
-    """Messages to the camera that it could not understand, since the start."""
+    """Invalid messages that the camera received since the start."""
     synchronized: bool
-    """Pulses come from the server; otherwise the camera goes on at its own rate."""
+    """Pulses come from the server; otherwise the camera counts by itself."""
     clock_offset: Time
     """Server's clock minus the camera's, seconds."""
     round_trip: Time
 
 
 class ThumbnailHeader(msgspec.Struct, frozen=True, kw_only=True):
-    """Which person a thumbnail shows."""
+    """The track and frame of a thumbnail."""
 
     track: Number
     boot: Number
@@ -238,7 +238,7 @@ class PersonMerge(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PersonSplit(msgspec.Struct, frozen=True, kw_only=True):
-    """Whom a camera showed as ``kept`` turned out to be ``new_object``, somebody else."""
+    """A camera's track of ``kept`` turned out to be another person, ``new_object``."""
 
     kept: int
     new_object: int
@@ -255,7 +255,7 @@ class GopChoices(msgspec.Struct, frozen=True, kw_only=True):
     """Per camera and frame: object, left, top, right, bottom."""
     cuts: list[ViewCut]
     merged: list[PersonMerge] = []
-    """What has turned out since the GOP before, as ``split``."""
+    """Merges and, in ``split``, splits since the GOP before."""
     split: list[PersonSplit] = []
 
 

@@ -17,15 +17,15 @@ Pixels = Annotated[int, msgspec.Meta(ge=1, le=2**16)]
 Number = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
 
 Time = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
-"""Unix seconds, or a difference of such: sums and differences of them are still numbers."""
+"""Unix seconds, or a difference of them; bounded so that sums stay finite."""
 
 Cost = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
-"""What a solution costs, likewise."""
+"""The cost of a solution, bounded likewise."""
 
 Duration = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 """Seconds."""
 
 COORDINATE_MAX = 1e6
-"""Pixels from a picture's corner, either way; what is farther is as far."""
+"""The largest coordinate in pixels, either way."""
 
 Coordinate = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]

@@ -51,5 +51,5 @@ class PositionCorrections(msgspec.Struct, frozen=True, kw_only=True):
     """Positions of tracked people that an operator marked in one camera's picture."""
 
     boot: Number
-    """The run of the camera whose tracks are named."""
+    """The boot of the camera that the tracks belong to."""
     corrections: Annotated[list[CorrectedPosition], msgspec.Meta(max_length=CORRECTIONS_MAX)]

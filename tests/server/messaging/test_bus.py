@@ -169,7 +169,7 @@ async def test_who_wants_to_hear_the_others_needs_the_router(
     settings: ZenohSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 100)
-    with pytest.raises(UserError, match=r"zenoh\.connect: nobody is at tcp/127"):
+    with pytest.raises(UserError, match=r"zenoh\.connect: no router answers at tcp/127"):
         Bus.hearing(settings)
 
 
@@ -286,7 +286,7 @@ async def test_a_busy_loop_loses_the_oldest_and_counts_them() -> None:
 
 async def test_who_sends_very_much_takes_neither_the_places_nor_the_turns_of_others() -> None:
     got: list[str] = []
-    inbox = Inbox(got.append, pending_max=10, turn_s=PATIENCE, whose=lambda it: it[:2])
+    inbox = Inbox(got.append, pending_max=10, turn_s=PATIENCE, sender_of=lambda it: it[:2])
     for number in range(1000):
         inbox.put(f"c0 {number}")
         if number < 5:
@@ -310,7 +310,7 @@ async def test_what_waits_of_one_sender_has_so_many_bytes_at_most() -> None:
 
 async def test_senders_without_end_are_taken_for_few() -> None:
     got: list[int] = []
-    inbox = Inbox(got.append, pending_max=10, whose=str)
+    inbox = Inbox(got.append, pending_max=10, sender_of=str)
     for number in range(5000):
         inbox.put(number)
     assert inbox.waiting <= 1024 + 10
