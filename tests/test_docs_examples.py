@@ -29,7 +29,7 @@ from server.http.app import make_app, serving
 from server.http.metrics.http_collector import METRICS
 from server.messaging import messages
 from server.service.facade.cameras import CameraInfo
-from server.service.facade.people import ViewSelection
+from server.service.facade.view_selection import ViewSelection
 from server.service.pipeline import BestViewPipeline
 from server.service.service import BestViewService
 

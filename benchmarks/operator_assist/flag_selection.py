@@ -34,7 +34,9 @@ class Desk:
             self._budget.record_risk(now, who, it.risk)
         found = []
         for who, it in sorted(zip(whose, troubles, strict=True), key=lambda it: -it[1].risk):
-            if now - self._raised.get(who, -(10**9)) > self._same and self._budget.is_worth_flag(now, who, it.risk):
+            if now - self._raised.get(who, -(10**9)) > self._same and self._budget.is_worth_flag(
+                now, who, it.risk
+            ):
                 self._budget.record_flag(now, who)
                 self._raised[who] = now
                 found.append(it)

@@ -17,7 +17,7 @@ from server.system.address_redaction import redact_endpoint
 from server.system.errors import UserError
 
 _DROP_AFTER_US = 20_000
-"""How long a message may wait in a full queue; zenoh's default of 1 ms is too short for a keyframe's burst."""
+"""How long a message waits at a full queue; zenoh's default of 1 ms is too short for a keyframe."""
 
 _OPEN_WITHIN_MS = 5_000
 _MESSAGE_MAX = 1 << 25
@@ -118,8 +118,8 @@ class Bus:
             return cls(zenoh.open(config))
         except zenoh.ZError:
             raise UserError(
-                f"zenoh.connect: cannot use {redact_endpoint(settings.connect)}: does zenoh support this protocol, "
-                "and are the options after the port valid?"
+                f"zenoh.connect: cannot use {redact_endpoint(settings.connect)}: does zenoh support "
+                "this protocol, and are the options after the port valid?"
             ) from None
 
     def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
@@ -164,7 +164,7 @@ class Bus:
         self._undeclare.append(self._session.liveliness().declare_token(key).undeclare)
 
     def watch_alive(self, key: str, handler: Callable[[str, bool], None]) -> None:
-        """Call ``handler(key, is_present)`` on the event loop for every token present now, or coming or going."""
+        """Call ``handler(key, is_present)`` on the event loop for tokens that are present, come or go."""
 
         def unpack(message: Message) -> None:
             handler(message.key, message.payload == b"1")
@@ -201,7 +201,7 @@ def _config(settings: ZenohSettings, mode: str, user: str | None) -> zenoh.Confi
     for key, value in {
         "mode": mode,
         "scouting/multicast/enabled": False,  # only configured processes belong to a site
-        "scouting/gossip/enabled": False,  # all traffic goes through the router: cameras need not reach each other
+        "scouting/gossip/enabled": False,  # all traffic goes through the router
         "transport/link/tx/lease": int(settings.lease_s * 1000),
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": _DROP_AFTER_US,
         "transport/link/tx/queue/size/data": 16,

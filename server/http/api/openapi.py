@@ -18,7 +18,7 @@ from server.http.api.query_validation import CAMERA_QUERY, OVERLAY, TIME_SHIFT
 from server.http.api.schema import Cameras, FlagList, Objects, Past, SiteInfo
 from server.http.json_responses import Problem
 from server.http.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
-from server.service.facade.people import ViewSelection
+from server.service.facade.view_selection import ViewSelection
 
 routes = web.RouteTableDef()
 

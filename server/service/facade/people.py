@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import msgspec
-
 from server.messaging.identity_snapshot import NAME_LENGTH_MAX
 from server.messaging.messages import GopChoices
-from server.service.decision_state import reason
 from server.service.facade.errors import (
     ConflictError,
     InvalidCommandError,
     UnknownCameraError,
     UnknownObjectError,
 )
+from server.service.facade.view_selection import ViewSelection, view_selection_of
 from server.service.identity.sharding import shard_address, shard_of
 from server.service.ingest.ingest import Thumbnail
 from server.service.pipeline import BestViewPipeline
@@ -30,7 +28,6 @@ __all__ = [
     "Shard",
     "SplitPerson",
     "Thumbnail",
-    "ViewSelection",
 ]
 
 _THUMBNAIL_RECENT_S = 3
@@ -73,45 +70,6 @@ class Shard:
     """Whether it is this service."""
     server: str | None
     """Its base URL; None where the configuration does not name it."""
-
-
-class ViewSelection(msgspec.Struct, frozen=True):
-    """A person's selected view, and the costs behind it."""
-
-    object: int
-    first: int
-    """First pulse of the newest decided GOP."""
-    frames: int
-    camera: str | None
-    since: int
-    """Pulse of the last cut."""
-    costs: dict[str, float | None]
-    """Mean cost a frame of each camera over the look-ahead; null: cannot be shown."""
-    seen: dict[str, float]
-    """Share of the look-ahead in which each camera sees the person."""
-    quality: dict[str, float | None]
-    """Mean view quality of each camera where it sees the person, 0 to 1; null: it does not."""
-    terms: dict[str, dict[str, float]]
-    """By camera, the mean terms of that quality; empty where it does not see the person."""
-    undetected: dict[str, float]
-    """Share of the look-ahead in which each camera misses the person, whom others locate in its view."""
-    undetected_quality: dict[str, float | None]
-    """Mean quality of these inferred views, times the trust in them; null: there are none."""
-    weights: dict[str, float]
-    """By term: the share of a view's quality that is lost where the term is 0."""
-    before: str | None
-    """The camera of the GOP before; null: there was none."""
-    lookahead: int
-    """Frames of the look-ahead, from `first` on."""
-    switch_cost: float
-    """The cost of a cut, in frames of not seeing the person."""
-    stay: float | None
-    """The cost of the look-ahead with `before`, likewise; null: there is none, or it cannot be shown."""
-    cut: float | None
-    """The cost with the best other camera, the cut included; null: there is none."""
-    cut_to: str | None
-    """That camera."""
-    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,30 +162,7 @@ class PeopleService:
             None: there is no such person, or no reasons of that time.
         """
         selection = self._pipeline.decision_state.explain(number, pulse)
-        if selection is None:
-            return None
-        view, why = selection.view, selection.why
-        return ViewSelection(
-            object=view.choice.number,
-            first=view.first,
-            frames=view.frames,
-            camera=view.choice.camera,
-            since=view.since,
-            costs={camera: it.cost for camera, it in why.views.items()},
-            seen={camera: it.seen for camera, it in why.views.items()},
-            quality={camera: it.quality for camera, it in why.views.items()},
-            terms={camera: it.terms for camera, it in why.views.items()},
-            undetected={camera: it.undetected for camera, it in why.views.items()},
-            undetected_quality={camera: it.undetected_quality for camera, it in why.views.items()},
-            weights=why.weights,
-            before=view.choice.before,
-            lookahead=why.frames,
-            switch_cost=why.switch_cost,
-            stay=why.stay,
-            cut=why.cut,
-            cut_to=why.cut_to,
-            reason=reason(view.choice, why),
-        )
+        return None if selection is None else view_selection_of(selection)
 
     def thumbnail_of(self, number: int) -> Thumbnail | None:
         """Return the newest thumbnail of a person, from the chosen camera where it has a recent one."""

@@ -1,0 +1,73 @@
+"""A person's selected view, and the costs behind it, as HTTP returns it."""
+
+from __future__ import annotations
+
+import msgspec
+
+from server.service.decision_state import reason
+from server.service.view_selection.recent_reasons import SelectionReason
+
+
+class ViewSelection(msgspec.Struct, frozen=True):
+    """A person's selected view, and the costs behind it."""
+
+    object: int
+    first: int
+    """First pulse of the newest decided GOP."""
+    frames: int
+    camera: str | None
+    since: int
+    """Pulse of the last cut."""
+    costs: dict[str, float | None]
+    """Mean cost a frame of each camera over the look-ahead; null: cannot be shown."""
+    seen: dict[str, float]
+    """Share of the look-ahead in which each camera sees the person."""
+    quality: dict[str, float | None]
+    """Mean view quality of each camera where it sees the person, 0 to 1; null: it does not."""
+    terms: dict[str, dict[str, float]]
+    """By camera, the mean terms of that quality; empty where it does not see the person."""
+    undetected: dict[str, float]
+    """Share of the look-ahead in which each camera misses the person, whom others locate in its view."""
+    undetected_quality: dict[str, float | None]
+    """Mean quality of these inferred views, times the trust in them; null: there are none."""
+    weights: dict[str, float]
+    """By term: the share of a view's quality that is lost where the term is 0."""
+    before: str | None
+    """The camera of the GOP before; null: there was none."""
+    lookahead: int
+    """Frames of the look-ahead, from `first` on."""
+    switch_cost: float
+    """The cost of a cut, in frames of not seeing the person."""
+    stay: float | None
+    """The cost of the look-ahead with `before`, likewise; null: there is none, or it cannot be shown."""
+    cut: float | None
+    """The cost with the best other camera, the cut included; null: there is none."""
+    cut_to: str | None
+    """That camera."""
+    reason: str
+
+
+def view_selection_of(selection: SelectionReason) -> ViewSelection:
+    """Return a selected view with the costs behind it."""
+    view, why = selection.view, selection.why
+    return ViewSelection(
+        object=view.choice.number,
+        first=view.first,
+        frames=view.frames,
+        camera=view.choice.camera,
+        since=view.since,
+        costs={camera: it.cost for camera, it in why.views.items()},
+        seen={camera: it.seen for camera, it in why.views.items()},
+        quality={camera: it.quality for camera, it in why.views.items()},
+        terms={camera: it.terms for camera, it in why.views.items()},
+        undetected={camera: it.undetected for camera, it in why.views.items()},
+        undetected_quality={camera: it.undetected_quality for camera, it in why.views.items()},
+        weights=why.weights,
+        before=view.choice.before,
+        lookahead=why.frames,
+        switch_cost=why.switch_cost,
+        stay=why.stay,
+        cut=why.cut,
+        cut_to=why.cut_to,
+        reason=reason(view.choice, why),
+    )
