@@ -17,19 +17,19 @@ from server.service.view_selection.decider import GopDecision
 from server.system.private_files import make_private_folder, open_private
 from tracking.motchallenge import MotRow, format_row
 
-CHOICES_HEAD = "frame,object,camera\n"
-CORRECTIONS_HEAD = "frame,what,object,other,camera\n"
-LATE_HEAD = "frame,camera,what\n"
+CHOICES_HEADER = "frame,object,camera\n"
+CORRECTIONS_HEADER = "frame,what,object,other,camera\n"
+LATE_HEADER = "frame,camera,what\n"
 
 
 class DecisionWriter:
     """Writes decisions: ``tracks/<camera>.txt``, ``choices.csv``, ``corrections.csv``, ``late.csv``.
 
-    ``letterboxes`` grows: a camera is in it from its first window on. A choice is written even while no
-    camera sees the person: it is what their stream shows.
+    ``letterboxes`` may grow: a camera is added with its first window. A choice is written even if no camera
+    sees the person: it is the camera that their stream shows.
 
     Frames count from 1 in all of them, as in MOTChallenge files: frame 1 is pulse 0. Boxes are in pixels of
-    the camera's own picture. An empty ``late.csv`` says that the files are exactly what `myview render`
+    the camera's own picture. If ``late.csv`` is empty, the files are exactly those that `myview render`
     writes for the same recordings.
     """
 
@@ -41,10 +41,10 @@ class DecisionWriter:
         *,
         private: bool = False,
     ) -> None:
-        """Begin new files in a folder, which may exist; ``private``: for this user alone.
+        """Create the files in a folder, which may exist; ``private``: readable by this user alone.
 
         Raises:
-            OSError: one cannot be written.
+            OSError: a file cannot be written.
         """
         self._fits = letterboxes
         if private:
@@ -55,14 +55,18 @@ class DecisionWriter:
         self._choices = folder / "choices.csv"
         self._corrections = folder / "corrections.csv"
         self._late = folder / "late.csv"
-        heads = {self._choices: CHOICES_HEAD, self._corrections: CORRECTIONS_HEAD, self._late: LATE_HEAD}
-        self._files = AtomicFiles(dict.fromkeys(self._tracks.values(), "") | heads, private=private)
+        headers = {
+            self._choices: CHOICES_HEADER,
+            self._corrections: CORRECTIONS_HEADER,
+            self._late: LATE_HEADER,
+        }
+        self._files = AtomicFiles(dict.fromkeys(self._tracks.values(), "") | headers, private=private)
 
     def write(self, decision: GopDecision, late: Sequence[str] = ()) -> None:
         """Write a decision, and rows of ``late.csv``.
 
         Raises:
-            OSError: the files cannot be written; they are unchanged.
+            OSError: the disk does not take it; the files are as before.
         """
         texts: dict[Path, list[str]] = defaultdict(list)
         for camera, frames in decision.boxes.items():
@@ -104,25 +108,25 @@ def _line(correction: Merge | Split) -> str:
 
 
 class AtomicFiles:
-    """Files that are appended to together: each append reaches all of them, or none."""
+    """Text files that are appended to atomically: to all files of one call, or to none."""
 
-    def __init__(self, heads: Mapping[Path, str], *, private: bool = False) -> None:
-        """Create files with their heads, ASCII; ``private``: readable by this user alone.
+    def __init__(self, headers: Mapping[Path, str], *, private: bool = False) -> None:
+        """Create the files with their headers, ASCII; ``private``: readable by this user alone.
 
         Raises:
-            OSError: one cannot be written.
+            OSError: a file cannot be written.
         """
         with contextlib.ExitStack() as opened:
             opener = open_private if private else None
-            self._files = {it: opened.enter_context(FileIO(it, "w", opener=opener)) for it in heads}
-            self.append(heads)
+            self._files = {it: opened.enter_context(FileIO(it, "w", opener=opener)) for it in headers}
+            self.append(headers)
             self._opened = opened.pop_all()
 
     def append(self, texts: Mapping[Path, str]) -> None:
-        """Append ASCII text to some of them; it is handed to the system when this returns.
+        """Append ASCII texts, unbuffered.
 
         Raises:
-            OSError: a file cannot be written; all are unchanged.
+            OSError: the disk does not take all of it; the files are as before.
         """
         before = {it: self._files[it].tell() for it in texts}
         try:
@@ -140,7 +144,7 @@ class AtomicFiles:
         self._opened.close()
 
 
-def _write(file: FileIO, rest: bytes) -> None:
-    """Write all bytes: a nearly full disk takes a part, and reports an error only at the next write."""
-    while rest:
-        rest = rest[file.write(rest) :]
+def _write(file: FileIO, data: bytes) -> None:
+    """Write all of the data: a nearly full disk first takes a part, and fails on the next write."""
+    while data:
+        data = data[file.write(data) :]

@@ -1,4 +1,4 @@
-"""Decision files of a running site: streams continue when the files cannot be written."""
+"""Writes the decisions of a running site to files; a full disk does not stop the site."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class _LateFrame:
-    """A row of ``late.csv``: a frame, and what it lacked."""
+    """A line of ``late.csv``: a frame that came too late, and why."""
 
     pulse: int
     camera: str
@@ -38,16 +38,16 @@ class LiveDecisionWriter:
         """Create the files, readable by this user alone, in a folder, which may exist.
 
         Raises:
-            OSError: one cannot be written.
+            OSError: a file cannot be written.
         """
         self._folder = folder
         self._writer = DecisionWriter(folder, cameras, letterboxes, private=True)
         self._late: list[_LateFrame] = []
         self._missing = range(0)
-        """Pulses that could not be written and are not listed in ``late.csv`` yet."""
+        """Pulses of skipped decisions that ``late.csv`` does not list yet."""
 
-    def late(self, camera: str, pulses: Sequence[int], what: str) -> None:
-        """Record frames that lacked something; they are written with the next decision."""
+    def note_late(self, camera: str, pulses: Sequence[int], what: str) -> None:
+        """Note late frames; they are written with the next decision."""
         self._late += (_LateFrame(it, camera, what) for it in pulses)
 
     def write(self, decision: GopDecision) -> None:
@@ -63,7 +63,7 @@ class LiveDecisionWriter:
         self._late.clear()
 
     def close(self) -> None:
-        """Write the remaining late frames, and close the files."""
+        """Write the pending late frames, and close the files."""
         try:
             self._writer.write_late(self._rows())
         except OSError as error:

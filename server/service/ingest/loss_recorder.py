@@ -53,12 +53,12 @@ class LossRecorder:
         if self.decision_writer is None:
             return
         for camera in epoch.late:
-            self.decision_writer.late(
+            self.decision_writer.note_late(
                 camera, range(epoch.last - self._stride + 1, epoch.last + 1), "tracks late"
             )
         for camera, message in epoch.tracks.items():
-            self.decision_writer.late(camera, message.shed, "not searched")
-            self.decision_writer.late(camera, message.without_peers, "others not heard")
+            self.decision_writer.note_late(camera, message.shed, "not searched")
+            self.decision_writer.note_late(camera, message.without_peers, "others not heard")
 
     def gop(self, decision: GopDecision) -> None:
         """Record pictures missing in a GOP, of cameras that were delivering."""
@@ -69,7 +69,7 @@ class LossRecorder:
             lost = frame_buffer.missing(decision.first, decision.frames)
             self.lost_pictures[camera] += len(lost)
             if self.decision_writer is not None:
-                self.decision_writer.late(camera, lost, "no picture")
+                self.decision_writer.note_late(camera, lost, "no picture")
 
     def _skipped(self, pulses: range) -> None:
         """Record skipped frames, in a single line: there may be millions."""
@@ -77,4 +77,4 @@ class LossRecorder:
             text = "pulses %d to %d are skipped: they are too long ago%s"
             log.warning(text, pulses.start, pulses.stop - 1, more)
         if self.decision_writer is not None:
-            self.decision_writer.late("", [pulses.start], f"not decided up to {pulses.stop}")
+            self.decision_writer.note_late("", [pulses.start], f"not decided up to {pulses.stop}")

@@ -1,1 +1,1 @@
-"""The recording on the disk: written GOP by GOP, found again by pulse, and deleted when it is too old."""
+"""The recording on the disk: written GOP by GOP, indexed by pulse, and deleted when it is too old."""

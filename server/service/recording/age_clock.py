@@ -1,4 +1,4 @@
-"""The age clock of a recording: counts seconds that have certainly passed, and only ever goes forward.
+"""The age clock of a recording: counts seconds that have certainly passed, and never goes back.
 
 The machine's clock may jump: it is set by hand, its battery is empty, or it is wrong until NTP corrects it.
 Deleting old recordings by it might delete everything. So the age of recordings is counted by
@@ -76,7 +76,7 @@ class AgeClockState(msgspec.Struct, frozen=True, kw_only=True):
     """The content of ``clock.json``: the age clock, and the machine's clocks at the same moment."""
 
     id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
-    """Identifies the age clock: ages by one say nothing about ages by another."""
+    """Identifies the age clock: ages of different clocks cannot be compared."""
     seconds: Annotated[float, msgspec.Meta(ge=0, le=1e12)]
     """The age clock."""
     boot: str

@@ -40,7 +40,7 @@ _NOT_SYNC = 0x00010000
 
 @dataclass(frozen=True, slots=True)
 class RecordedGop:
-    """Consecutive frames of one camera that begin with a key frame."""
+    """Consecutive frames of one camera that begin with a keyframe."""
 
     first: int
     fragments: tuple[bytes, ...]
@@ -181,7 +181,7 @@ def read_gops(
 
 def _last_key(file: BinaryIO, offset: int, length: int, fps: float, pulse: int) -> int:
     """Return the offset of the last keyframe up to a pulse; only the heads of fragments are read."""
-    found, at = offset, offset
+    last, at = offset, offset
     while at + _HEAD <= offset + length:
         file.seek(at)
         start = file.read(_HEAD_LENGTH)
@@ -191,9 +191,9 @@ def _last_key(file: BinaryIO, offset: int, length: int, fps: float, pulse: int) 
         if kind == b"moof":
             if pulse_of(start, fps) > pulse:
                 break
-            found = at if is_key(start) else found
+            last = at if is_key(start) else last
         at += max(_HEAD, size)
-    return found
+    return last
 
 
 def is_key(fragment: bytes) -> bool:

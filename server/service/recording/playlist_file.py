@@ -19,7 +19,7 @@ from server.service.recording.segment_index import IndexEntry, SegmentIndex
 from server.system.private_files import write_private
 
 CAMERA_PATTERN = "[A-Za-z0-9][A-Za-z0-9_-]{0,31}"
-"""A camera id (:data:`server.config.sections.base.Identifier`), or the folder of the sound."""
+"""A camera id (:data:`server.config.sections.base.Identifier`), or the folder of the audio."""
 _END = "#EXT-X-ENDLIST\n"
 _ENTRY = re.compile(
     r"#EXTINF:[0-9.]+,p([0-9]{1,15})\+([0-9]{1,15})\n"
@@ -52,7 +52,7 @@ class RecordingPlaylist:
         self._longest_s = longest_s
         self.index = SegmentIndex()
         self._tail: int | None = None
-        """Where EXT-X-ENDLIST begins in the file; None: the file must be written anew."""
+        """Where EXT-X-ENDLIST begins in the file; None: the file must be rewritten."""
         self._end: int | None = None
         self.is_stale = False
         """Whether the file needs :meth:`rewrite`: entries can be joined, or refer to deleted files."""
@@ -89,18 +89,18 @@ class RecordingPlaylist:
         if self._tail is not None and self._append_to_file(lines, self._tail):
             self._tail += len(lines.encode())
         else:
-            self._write_anew(entry)
+            self._write_all(entry)
         self.index.add(entry)
         self._end = entry.end
 
     def rewrite(self) -> None:
-        """Write the file anew from the index, with joined entries; remove it if there are none.
+        """Rewrite the file from the index, with joined entries; remove it if there are none.
 
         Raises:
             OSError: the disk does not take it; the file is as before.
         """
         if self.index.all:
-            self._write_anew()
+            self._write_all()
         else:
             self.path.unlink(missing_ok=True)
             self._tail, self.is_stale = None, False
@@ -116,13 +116,13 @@ class RecordingPlaylist:
                 return False
             write_at(handle, (lines + _END).encode(), tail)
         except OSError:
-            self._tail = None  # it may be written in part: it is written anew next time
+            self._tail = None  # it may be written in part: it is rewritten next time
             raise
         finally:
             os.close(handle)
         return True
 
-    def _write_anew(self, *added: IndexEntry) -> None:
+    def _write_all(self, *added: IndexEntry) -> None:
         self.is_stale = False  # before the index is read: another thread may drop entries meanwhile
         entries = [*self.index.all, *added]
         longest = max([self._longest_s, *(it.frames / self._fps for it in entries)])

@@ -51,7 +51,7 @@ class Recorder:
         """Decided GOPs that wait for late pictures."""
         self._max_late_frames = frames // 2
         self._init_of_parameters: tuple[ParameterSets, InitSegments] | None = None
-        """The init segments of these parameters, kept since every GOP that is played needs them."""
+        """The init segments of these parameters: cached, since every GOP that is played needs them."""
         self.viewers = 0
         """The number of viewers of time shift."""
         record = config.record
@@ -94,7 +94,7 @@ class Recorder:
     def put(
         self, choices: GopChoices, pulse0: float | None, person_numbers_since: float | None = None
     ) -> None:
-        """Record a decision without blocking; the times tell when pulses and person numbers began."""
+        """Record a decision without blocking; the times are those of pulse 0 and the first person number."""
         self.pulse0, self.person_numbers_since = pulse0, person_numbers_since
         self.recent.put(choices)
         if self.writer is None:
@@ -111,7 +111,7 @@ class Recorder:
             self.writer.close()
 
     def _is_settled(self, choices: GopChoices) -> bool:
-        """Return whether no more pictures are expected; a busy camera's may come after the decision."""
+        """Return whether no more pictures are expected; a busy camera's may arrive after the decision."""
         end = choices.first + choices.frames
         if end <= self.recent.end - self._max_late_frames:
             return True
@@ -177,7 +177,7 @@ class Recorder:
     @property
     def _init(self) -> InitSegments | None:
         """The init segments of this service's files; None before the first keyframe."""
-        parameters, site, sound = self._stream_format.parameters, self._config.site, self._config.sound.format
+        parameters, site, audio = self._stream_format.parameters, self._config.site, self._config.sound.format
         if parameters is None:
             return None
         known_init = self._init_of_parameters
@@ -185,7 +185,7 @@ class Recorder:
             pictures = init_segment(parameters, site.width, site.height)
             known_init = (
                 parameters,
-                InitSegments(pictures, b"" if sound is None else audio_init_segment(sound)),
+                InitSegments(pictures, b"" if audio is None else audio_init_segment(audio)),
             )
             self._init_of_parameters = known_init
         return known_init[1]

@@ -21,11 +21,11 @@ from server.service.recording.session_files import (
     SessionInfo,
     SessionPaths,
     file_size,
-    identity_of,
     is_missing,
     media_sizes,
     remove_session_files,
 )
+from server.service.recording.session_info_file import SessionInfoFile
 from server.system.private_files import FOLDER, write_private
 
 
@@ -47,18 +47,24 @@ class RecordingSession:
     ``longest_s`` is the longest duration of a segment.
     """
 
-    def __init__(self, folder: Path, info: SessionInfo, init: InitSegments, longest_s: float) -> None:
-        self.folder, self.info, self.init = folder, info, init
-        self.paths = SessionPaths(folder, info.cameras)
-        self._identity = identity_of(folder)
-        self._info_bytes = file_size(folder / INFO_FILE)
+    def __init__(
+        self, folder: Path, info_file: SessionInfoFile, init: InitSegments, longest_s: float
+    ) -> None:
+        self.folder, self.init = folder, init
+        self._info_file = info_file
+        self.paths = SessionPaths(folder, self.info.cameras)
         self._longest_s = longest_s
         self.segments: list[RecordingSegment] = []
         self.objects: dict[int, RecordingPlaylist] = {}
         self.cameras = {
-            camera: self._playlist(folder / "cameras" / f"{camera}.m3u8") for camera in info.cameras
+            camera: self._playlist(folder / "cameras" / f"{camera}.m3u8") for camera in self.info.cameras
         }
         self.audio = self._playlist(folder / f"{AUDIO}.m3u8", header=f"{AUDIO}/{INIT_FILE}")
+
+    @property
+    def info(self) -> SessionInfo:
+        """The content of ``session.json``."""
+        return self._info_file.info
 
     @classmethod
     def create(
@@ -76,8 +82,7 @@ class RecordingSession:
         if init.audio:
             (folder / AUDIO).mkdir(mode=FOLDER)
             write_private(folder / AUDIO / INIT_FILE, init.audio)
-        write_private(folder / INFO_FILE, _encode(info))
-        return cls(folder, info, init, longest_s)
+        return cls(folder, SessionInfoFile.create(folder, info), init, longest_s)
 
     @classmethod
     def load(cls, folder: Path, longest_s: float) -> RecordingSession:
@@ -86,8 +91,9 @@ class RecordingSession:
         Raises:
             OSError, msgspec.DecodeError: the folder does not hold a session.
         """
-        info = msgspec.json.decode((folder / INFO_FILE).read_bytes(), type=SessionInfo)
-        session = cls(folder, info, SessionPaths(folder, info.cameras).init_segments(), longest_s)
+        info_file = SessionInfoFile.load(folder)
+        init = SessionPaths(folder, info_file.info.cameras).init_segments()
+        session = cls(folder, info_file, init, longest_s)
         for playlist in (*session.cameras.values(), session.audio):
             if playlist.path.exists():
                 playlist.read()
@@ -111,7 +117,7 @@ class RecordingSession:
         Raises:
             OSError: the disk does not take it.
         """
-        self._write_info(msgspec.structs.replace(self.info, person_numbers_since=since))
+        self._info_file.write(msgspec.structs.replace(self.info, person_numbers_since=since))
 
     def set_age_clock(self, clock: str, at_pulse0: float) -> None:
         """Write which age clock applies, and its seconds at pulse 0.
@@ -119,19 +125,9 @@ class RecordingSession:
         Raises:
             OSError: the disk does not take it.
         """
-        self.info = msgspec.structs.replace(self.info, age_clock=clock, age_clock_at_pulse0=at_pulse0)
-        self._write_info(self.info)
-
-    def _write_info(self, info: SessionInfo) -> None:
-        draft = self.folder / f".{INFO_FILE}"
-        try:
-            write_private(draft, _encode(info))
-            draft.replace(self.folder / INFO_FILE)
-        except OSError:
-            with contextlib.suppress(OSError):
-                draft.unlink(missing_ok=True)
-            raise
-        self.info, self._info_bytes = info, len(_encode(info))
+        info = msgspec.structs.replace(self.info, age_clock=clock, age_clock_at_pulse0=at_pulse0)
+        self._info_file.info = info  # it applies even if it cannot be written
+        self._info_file.write(info)
 
     @property
     def end(self) -> int:
@@ -161,20 +157,15 @@ class RecordingSession:
     @property
     def is_in_place(self) -> bool:
         """Whether its folder is still the same one; it may be removed, or another disk be mounted."""
-        return self._identity is not None and identity_of(self.folder) == self._identity
+        return self._info_file.is_folder_in_place
 
     @property
     def exists(self) -> bool:
         """Whether the folder is in place with its ``session.json``, so that a restart finds it."""
-        try:
-            return self.is_in_place and (self.folder / INFO_FILE).stat().st_size == self._info_bytes
-        except MISSING:
-            return False
-        except OSError:
-            return True  # it cannot be found out
+        return self._info_file.exists
 
     def recount(self) -> None:
-        """Count the bytes of all segments anew, and forget segments without any file."""
+        """Recount the bytes of all segments, and forget segments without any file."""
         for segment in self.segments:
             segment.bytes = sum(file_size(path) for path in self.paths.segment_files(segment.first))
         self.segments = [
@@ -184,18 +175,18 @@ class RecordingSession:
         ]
 
     def restore_info(self) -> None:
-        """Write ``session.json`` again: without it the session would not be found after a restart.
+        """Write ``session.json`` again: without it a restart would not find the session.
 
         Raises:
             OSError: the disk does not take it.
         """
-        self._write_info(self.info)
+        self._info_file.write(self.info)
 
     def has_file_of(self, entry: IndexEntry) -> bool:
         """Return whether the frames of an index entry are on the disk, as far as file sizes tell.
 
         Raises:
-            OSError: it cannot be found out: no permission, or the disk fails.
+            OSError: the file cannot be read: no permission, or the disk fails.
         """
         try:
             with self.paths.camera_file(entry.camera, entry.file).open("rb") as file:
@@ -209,7 +200,7 @@ class RecordingSession:
         Segments stay: their files may appear again, and must then be deleted some day.
 
         Raises:
-            OSError: it cannot be found out what there is.
+            OSError: a folder cannot be read.
         """
         entries_of = [
             (playlist, playlist.index.all) for playlist in self._playlists
@@ -289,13 +280,9 @@ class RecordingSession:
         self.objects = {number: it for number, it in self.objects.items() if it.index.all or it.is_stale}
 
     def remove(self) -> None:
-        """Remove the folder if it is in place, but not files that somebody else has put there."""
+        """Remove the session's files, and its folder if nothing else is in it; only if it is in place."""
         if self.is_in_place:
             remove_session_files(self.folder)
 
     def _playlist(self, path: Path, cameras: str = "", header: str = INIT_FILE) -> RecordingPlaylist:
         return RecordingPlaylist(path, cameras, header, self.info.fps, self.info.pulse0, self._longest_s)
-
-
-def _encode(info: SessionInfo) -> bytes:
-    return msgspec.json.format(msgspec.json.encode(info)) + b"\n"

@@ -23,12 +23,12 @@ _MEGA = 1_000_000
 _PASSES = 8
 _MIN_SEGMENTS_PER_PASS = 10
 _LOG_EVERY_S = 3600.0
-"""A full recording loses a segment for each new one: that is logged so seldom."""
+"""A full recording loses a segment for each new one: this is logged once per interval."""
 
 
 @dataclass(frozen=True, slots=True)
 class RetentionLimits:
-    """How much is kept."""
+    """The limits on the age and size of the recording."""
 
     keep_s: float
     max_mb: float
@@ -86,8 +86,8 @@ class RetentionPolicy:
     def expired(self, sessions: Sequence[RecordingSession]) -> ExpiredSegments:
         """Return what must be deleted of sessions that are sorted by age."""
         oldest = self._now() - self._limits.keep_s
-        most = self._limits.max_mb * _MEGA
-        excess = sum(session.size for session in sessions) - (most - most / SEGMENTS_PER_DISK_QUOTA)
+        max_bytes = self._limits.max_mb * _MEGA
+        excess = sum(session.size for session in sessions) - (max_bytes - max_bytes / SEGMENTS_PER_DISK_QUOTA)
         old = sum(it.written < oldest and not it.is_stuck for session in sessions for it in session.segments)
         quota = self._quota(old)
         expired = ExpiredSegments()

@@ -160,7 +160,7 @@ def media_sizes(folder: Path) -> dict[int, int]:
 
 
 def identity_of(folder: Path) -> tuple[int, int] | None:
-    """Return the device and inode of a folder, which tell it from another of the same name."""
+    """Return the device and inode of a folder, which distinguish it from another of the same name."""
     try:
         status = folder.stat()
     except OSError:
@@ -169,7 +169,7 @@ def identity_of(folder: Path) -> tuple[int, int] | None:
 
 
 def is_missing(path: Path) -> bool:
-    """Return whether a file certainly does not exist; False if that cannot be found out."""
+    """Return whether a file certainly does not exist; False if that is not known."""
     try:
         path.lstat()
     except MISSING:

@@ -27,12 +27,12 @@ class Broadcaster:
         return len(self._subscribers)
 
     def publish(self, chunk: Chunk) -> None:
-        """Send a chunk to all subscribers, and keep it for those who subscribe later."""
+        """Send a chunk to all subscribers, and add it to the backlog for new ones."""
         self._backlog.append(chunk)
-        gops = sum(kept.random_access for kept in self._backlog)
+        gops = sum(waiting.random_access for waiting in self._backlog)
         while gops > self._backlog_gops or (self._backlog and not self._backlog[0].random_access):
             gops -= self._backlog.popleft().random_access
-        if chunk.is_filler and sum(kept.is_filler for kept in self._backlog) > self._queue_gops:
+        if chunk.is_filler and sum(waiting.is_filler for waiting in self._backlog) > self._queue_gops:
             self._backlog.clear()
         self.publish_once(chunk)
 

@@ -48,7 +48,7 @@ class FrameBuffer:
         return picture
 
     def missing(self, first: int, frames: int) -> list[int]:
-        """Return the pulses among these that are missing although earlier and later frames have arrived."""
+        """Return which of ``first … first + frames - 1`` are missing between frames that arrived."""
         oldest = next(iter(self._pictures), self.newest + 1)
         pulses = range(max(first, oldest), min(first + frames, self.newest + 1))
         return [pulse for pulse in pulses if pulse not in self._pictures]

@@ -13,7 +13,7 @@ from server.media.stream_format import StreamFormat
 _PER_PULSE_S = 2
 """Gaps up to so long get a picture for every pulse, longer ones a single picture of that duration."""
 LONGEST_GAP_S = 3600
-"""A longer gap is not filled: nobody waits for so long, and the duration would not fit MP4's 32 bits."""
+"""A longer gap is not filled: no viewer waits for so long, and MP4 durations have 32 bits."""
 _RESTART_S = 10
 """A keyframe so far back belongs to pulses that started again; it is not a late one."""
 

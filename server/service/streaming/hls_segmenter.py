@@ -1,7 +1,7 @@
 """Cuts one stream into HLS segments and parts (RFC 8216 and its low-latency successor).
 
 Segments and parts refer to the stream's chunks; nothing is copied. The number of a segment follows from its
-pulses alone: no state about viewers is kept, and after a restart of the service the numbers go on.
+pulses alone: there is no state per viewer, and after a restart of the service the numbers continue.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ class HlsSegmenter:
         self._segments: dict[int, HlsSegment] = {}
         self._lead: MediaChunk | None = None
         self._updated: asyncio.Event | None = None
-        """Set at the next change; None while nobody waits."""
+        """Set at the next change; None if nothing waits for it."""
         self.until = 0
         """The first pulse that is not here yet."""
 

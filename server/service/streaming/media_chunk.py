@@ -33,7 +33,7 @@ class MediaChunk:
         self.audio = audio
         """The audio of the same time; None at a site without audio."""
         self.is_muted = is_muted
-        """Whether a viewer who adds the audio from elsewhere must not hear any meanwhile."""
+        """Whether an output that adds audio of its own must be silent, too."""
 
     @property
     def first(self) -> int:
@@ -67,9 +67,9 @@ class MediaChunk:
 
 
 class TsContinuity:
-    """Counts one stream's MPEG-TS packets, so that the continuity counters go on from chunk to chunk.
+    """Counts one stream's MPEG-TS packets, so that the continuity counters continue from chunk to chunk.
 
-    For streams whose chunks nobody shares: there no padding is needed to keep the counters aligned.
+    For streams that share no chunks: they need no stuffing to align the counters.
     """
 
     def __init__(self, fps: float) -> None:

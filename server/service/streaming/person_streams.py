@@ -38,7 +38,7 @@ class PersonStreams:
                 stream = self._streams[number] = self._new_stream()
                 self.broadcasters[number] = stream.broadcaster
             self._streams[number].show(camera, gop, self._presence(number))
-        # The stream of a number that was merged into another goes on with that person.
+        # The stream of a number that was merged into another continues with that person.
         for lost, kept in merged.items():
             if lost in self._streams and kept in cameras and lost not in cameras:
                 self._streams[lost].show(cameras[kept], gop, self._presence(kept))

@@ -1,7 +1,7 @@
 """Whether a person was seen lately: decides what viewers with access to that person alone are shown.
 
-While no camera sees a person, their best view goes on from where they were seen last: it then shows the room,
-with whoever else is in it.
+While no camera sees a person, their best view stays with the last camera: it then shows the room, and
+other people in it.
 """
 
 from __future__ import annotations

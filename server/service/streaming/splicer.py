@@ -58,7 +58,7 @@ class Splicer:
     """Publishes all live streams; it cuts between cameras by choosing fragments, without decoding.
 
     Viewers with access to one person alone have streams of their own (``scoped``), in which the person's
-    picture gives way to gray while nobody has seen them for long. Only a site with tokens has any.
+    picture is replaced by gray when no camera has seen them for long. Only a site with tokens has any.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Splicer:
     def forget(self, known: Collection[int], merged: Collection[int]) -> None:
         """End the streams of persons that are no longer known, and of numbers that were merged into others.
 
-        The latter go on while they are watched; a later viewer receives the stream of the kept number.
+        The latter continue while they are watched; a later viewer receives the stream of the kept number.
         """
         watched = {number for number in merged if self.viewers_of(number)}
         for streams in (self._persons, self._scoped):

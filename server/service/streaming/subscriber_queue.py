@@ -37,8 +37,8 @@ class BytesChunk:
 class Subscriber:
     """One viewer's queue; iterate over it for the bytes to send.
 
-    At most ``max_gops`` GOPs wait. When the next one comes, the subscriber loses everything queued and goes
-    on with the next random access point, so a slow viewer never slows down the stream or other viewers.
+    At most ``max_gops`` GOPs wait. When the next one comes, the subscriber loses everything queued and
+    continues with the next random access point, so a slow viewer never slows down others.
     """
 
     def __init__(self, backlog: list[Chunk], max_gops: int) -> None:

@@ -70,7 +70,7 @@ def forget_missing_ends(source: PlaybackSource, start: int, end: int | None = No
     So playback begins with a picture; what is missing in between is a gap like others.
 
     Raises:
-        OSError: it cannot be ranges out: no permission, or the disk fails.
+        OSError: it cannot be determined: no permission, or the disk fails.
     """
     for recorded in source.recorded:
         ends = recorded.index.at_or_after(start), recorded.index.before(sys.maxsize if end is None else end)
@@ -81,7 +81,7 @@ def forget_missing(source: PlaybackSource, start: int, end: int) -> None:
     """Check all files of the pulses ``start … end - 1``; drop entries without a file.
 
     Raises:
-        OSError: it cannot be ranges out.
+        OSError: it cannot be determined.
     """
     for recorded in source.recorded:
         _check(recorded, {(it.camera, it.file): it for it in recorded.index.between(start, end)}.values())

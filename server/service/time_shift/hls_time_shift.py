@@ -46,7 +46,7 @@ class SegmentList:
 
 
 class TimeShift:
-    """One stream's recorded segments; ``timeline`` and ``audio`` are made anew for each segment.
+    """One stream's recorded segments; ``timeline`` and ``audio`` return new ones for each segment.
 
     ``gop`` is the length of a GOP in pulses, ``decided`` the pulse after the newest decided one;
     ``has_ended``: the stream gets no new pictures.

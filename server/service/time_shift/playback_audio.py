@@ -87,7 +87,7 @@ def read_audio_frames(
     """Read the frames ``begin … end - 1``, as far as they are in a piece of an audio file.
 
     Frames are numbered by their samples (:mod:`server.media.audio.audio_format`), the time of a fragment: so
-    they are found by number, whatever was shown meanwhile.
+    they are found by number alone.
 
     Raises:
         OSError: the file cannot be read: retention may have deleted it.

@@ -116,9 +116,9 @@ class TimeShiftStream:
 
         They are muted for viewers with access to one person: nothing of that person was recorded then.
         """
-        most = round(_FILL_STEP_S * self._fps)
+        max_step = round(_FILL_STEP_S * self._fps)
         while (at := self._timeline.until) is not None and at < until <= at + LONGEST_GAP_S * self._fps:
-            shown = self._timeline.fill(min(until, at + most))
+            shown = self._timeline.fill(min(until, at + max_step))
             if not shown:
                 return
             yield VisiblePictures(shown, is_muted=self._source.presence is not None)

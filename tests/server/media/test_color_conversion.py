@@ -1,4 +1,4 @@
-"""Pictures are converted as if each was the first one, whatever came before it."""
+"""Reused converters give the same pictures as new ones."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def decoded(seed: int, kind: str = "yuv420p") -> VideoFrame:
     return VideoFrame.from_ndarray(rows, format="yuv420p").reformat(format=kind)
 
 
-def test_pictures_of_many_sizes_and_kinds_by_turns_are_what_each_is_alone() -> None:
+def test_alternating_sizes_and_formats_do_not_affect_each_other() -> None:
     pictures = [decoded(seed, kind) for seed in range(9) for kind in ("yuv420p", "yuvj420p", "gray")]
     for picture in pictures:
         assert np.array_equal(to_bgr(picture), picture.to_ndarray(format="bgr24"))
 
 
-def test_what_is_encoded_is_what_it_would_be_alone() -> None:
+def test_conversion_to_yuv_is_that_of_a_new_converter() -> None:
     for seed in range(9):
         image = decoded(seed).to_ndarray(format="bgr24")
         alone = VideoFrame.from_ndarray(image, format="bgr24").reformat(format="yuv420p")
@@ -36,12 +36,12 @@ def test_what_is_encoded_is_what_it_would_be_alone() -> None:
 def test_threads_do_not_disturb_each_other() -> None:
     pictures = [decoded(seed) for seed in range(200)]
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(to_bgr, pictures))
-    for picture, image in zip(pictures, found, strict=True):
+        converted = list(pool.map(to_bgr, pictures))
+    for picture, image in zip(pictures, converted, strict=True):
         assert np.array_equal(image, picture.to_ndarray(format="bgr24"))
 
 
-def test_colours_that_cannot_be_converted_are_taken_for_the_usual_ones() -> None:
+def test_unsupported_color_spaces_are_converted_by_bt601() -> None:
     usual, unknown = decoded(2), [3, 8, 10, 13, 14, 200]
     usual.colorspace = Colorspace.ITU601
     for number in unknown:
@@ -50,4 +50,4 @@ def test_colours_that_cannot_be_converted_are_taken_for_the_usual_ones() -> None
         assert np.array_equal(to_bgr(picture), to_bgr(usual)), number
     assert np.array_equal(
         to_bgr(decoded(2)), decoded(2).to_ndarray(format="bgr24")
-    )  # as if they had not been
+    )  # the converter still works as before

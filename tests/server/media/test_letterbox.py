@@ -1,4 +1,4 @@
-"""A camera's own picture in the site's, and coordinates there and back."""
+"""Letterboxing of a camera's picture in the site's, and coordinates both ways."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ places = st.lists(st.tuples(*[st.floats(-5000, 5000)] * 4), min_size=1, max_size
 
 
 @given(sizes, sizes, places)
-def test_boxes_come_back_from_the_site_as_they_went(
+def test_boxes_are_the_same_after_mapping_to_the_site_and_back(
     own: tuple[int, int], site: tuple[int, int], boxes: list[tuple[float, float, float, float]]
 ) -> None:
-    fit, given_boxes = Letterbox(own, site), np.array(boxes)
-    np.testing.assert_allclose(fit.boxes_to_own(fit.boxes_to_site(given_boxes)), given_boxes, atol=1e-6)
+    letterbox, own_boxes = Letterbox(own, site), np.array(boxes)
+    np.testing.assert_allclose(
+        letterbox.boxes_to_own(letterbox.boxes_to_site(own_boxes)), own_boxes, atol=1e-6
+    )
 
 
 @given(sizes, sizes)
-def test_the_whole_picture_is_in_the_sites_undistorted_and_touches_two_sides(
+def test_the_whole_picture_is_visible_undistorted_and_touches_two_sides(
     own: tuple[int, int], site: tuple[int, int]
 ) -> None:
     left, top, right, bottom = Letterbox(own, site).boxes_to_site(np.array([[0.0, 0.0, *own]]))[0]
@@ -34,7 +36,7 @@ def test_the_whole_picture_is_in_the_sites_undistorted_and_touches_two_sides(
     assert max((right - left) / site[0], (bottom - top) / site[1]) == pytest.approx(1.0)
 
 
-def test_a_picture_of_the_sites_size_passes_untouched() -> None:
+def test_a_picture_of_the_sites_size_is_unchanged() -> None:
     picture = np.random.default_rng(0).integers(0, 255, (48, 64, 3), dtype=np.uint8)
     assert Letterbox((64, 48), (64, 48)).image(picture) is picture
 
@@ -43,7 +45,7 @@ def test_a_picture_of_the_sites_size_passes_untouched() -> None:
     ("own", "bars"),
     [((64, 64), (slice(None), slice(0, 8))), ((128, 48), (slice(0, 12), slice(None)))],
 )
-def test_what_is_left_over_is_black_and_the_rest_is_the_picture(
+def test_the_bars_are_black_and_the_rest_is_the_picture(
     own: tuple[int, int], bars: tuple[slice, slice]
 ) -> None:
     white = np.full((own[1], own[0], 3), 255, dtype=np.uint8)
@@ -54,17 +56,17 @@ def test_what_is_left_over_is_black_and_the_rest_is_the_picture(
     assert 0.3 < fitted.mean() / 255 < 0.8
 
 
-def test_what_is_at_a_place_of_the_picture_is_at_that_place_in_the_sites() -> None:
+def test_pixels_are_where_their_mapped_coordinates_are() -> None:
     picture = np.zeros((100, 50, 3), dtype=np.uint8)
     picture[60:80, 10:30] = 255
-    fit = Letterbox((50, 100), (200, 200))
-    left, top, right, bottom = fit.boxes_to_site(np.array([[10.0, 60.0, 30.0, 80.0]]))[0]
-    fitted = fit.image(picture)
+    letterbox = Letterbox((50, 100), (200, 200))
+    left, top, right, bottom = letterbox.boxes_to_site(np.array([[10.0, 60.0, 30.0, 80.0]]))[0]
+    fitted = letterbox.image(picture)
     rows, columns = np.nonzero(fitted[:, :, 0] > 127)
     assert (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1) == (left, top, right, bottom)
-    np.testing.assert_array_equal(fit.to_site(np.array([[10.0, 60.0]])), [[left, top]])
+    np.testing.assert_array_equal(letterbox.to_site(np.array([[10.0, 60.0]])), [[left, top]])
 
 
-def test_a_picture_that_changes_its_size_on_the_way_still_fits() -> None:
-    fit = Letterbox((64, 48), (64, 48))
-    assert fit.image(np.zeros((100, 100, 3), np.uint8)).shape == (48, 64, 3)
+def test_a_picture_of_an_unexpected_size_is_scaled_to_the_site() -> None:
+    letterbox = Letterbox((64, 48), (64, 48))
+    assert letterbox.image(np.zeros((100, 100, 3), np.uint8)).shape == (48, 64, 3)

@@ -1,4 +1,4 @@
-"""What a camera encodes comes out of a spliced stream pixel for pixel, at exactly its pulse's time."""
+"""A spliced stream decodes to the cameras' own pixels, each at the time of its pulse."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def decoded_alone(units: list[AccessUnit]) -> list[NDArray[np.uint8]]:
     return [frame.to_ndarray(format="yuv420p") for frame in frames]
 
 
-def test_every_access_unit_comes_at_once_and_gops_begin_where_the_pulse_says() -> None:
+def test_every_access_unit_is_encoded_at_once_and_gops_begin_at_their_pulses() -> None:
     units = encoded(first=6, frames=10)
     assert all(unit.data for unit in units), "no delay in the encoder"
     assert [unit.pulse for unit in units if unit.key] == [6, 8, 12]
@@ -110,7 +110,7 @@ def test_nal_units_split_as_they_were_joined(payloads: list[bytes], long_codes: 
 
 @settings(max_examples=300)
 @given(st.binary(max_size=200))
-def test_any_bytes_are_split_without_an_error(data: bytes) -> None:
+def test_splitting_arbitrary_bytes_raises_no_error(data: bytes) -> None:
     units = nal_units(data)
     parameter_sets(units)
     assert len(join_sample(units)) <= len(data) + len(units)  # a 4-byte length replaces at least 3 bytes
@@ -125,8 +125,6 @@ UNITS = st.binary(min_size=1, max_size=9).filter(lambda it: nal_type(it) != NAL_
 
 
 @given(st.lists(UNITS), st.binary(max_size=9))
-def test_a_sample_is_taken_apart_as_it_was_put_together_and_junk_is_left_out(
-    units: list[bytes], junk: bytes
-) -> None:
+def test_a_sample_splits_into_its_units_and_junk_is_left_out(units: list[bytes], junk: bytes) -> None:
     assert split_sample(join_sample(units)) == units
     assert split_sample(join_sample(units) + junk)[: len(units)] == units

@@ -1,4 +1,4 @@
-"""Transport streams: legal packets, any GOP after any other, the cameras' own pixels at the pulses' times."""
+"""Transport streams: valid packets, any GOP after any other, the cameras' own pixels at the pulses' times."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ sizes = st.lists(st.one_of(st.integers(1, 600), st.integers(1, 70_000)), min_siz
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(sizes, min_size=1, max_size=4), st.integers(0, 10**8), st.booleans())
-def test_packets_are_legal_and_hold_just_what_was_packed(
+def test_packets_are_valid_and_contain_exactly_what_was_packed(
     gops: list[list[int]], pulse: int, live: bool
 ) -> None:
     data, sent, tables, video = b"", [], 0, 0
@@ -73,7 +73,7 @@ def test_packets_are_legal_and_hold_just_what_was_packed(
 
 
 @given(st.integers(0, 2**34 // 3600), st.sampled_from([4, 7.5, 25, 59.94]))
-def test_the_time_reference_comes_often_and_before_its_picture(pulse: int, fps: float) -> None:
+def test_clock_references_are_frequent_and_precede_their_pictures(pulse: int, fps: float) -> None:
     pictures = [picture(pulse, 50, key=True, fps=fps), picture(pulse + 1, 30, duration=40, fps=fps)]
     found = taken_apart(pack(pictures, fps, ContinuityCounters()))
     times = [it.pcr // 300 for it in found if it.pcr is not None]
@@ -112,6 +112,6 @@ def test_a_decoder_shows_the_cameras_own_pixels_across_cuts() -> None:
 
 
 @needs_ffprobe
-def test_ffprobe_has_nothing_to_say(tmp_path: Path) -> None:
+def test_ffprobe_reports_no_errors(tmp_path: Path) -> None:
     (tmp_path / "best.ts").write_bytes(spliced([0, 1, 1, 0])[0])
     assert probed(tmp_path / "best.ts", "nb_read_frames,r_frame_rate") == [["25/1", f"{4 * GOP}"]]

@@ -1,4 +1,4 @@
-"""A grey picture written by hand is grey in every format, and streams go on before and behind it."""
+"""A gray picture is gray in every format, and does not affect the pictures around it."""
 
 from __future__ import annotations
 
@@ -33,30 +33,28 @@ Sizes = st.tuples(st.integers(1, 40), st.integers(1, 24))
 """In macroblocks."""
 
 
-def is_grey(picture: NDArray[np.uint8]) -> bool:
+def is_gray(picture: NDArray[np.uint8]) -> bool:
     return bool((picture == 128).all())
 
 
 @settings(max_examples=25, deadline=None)
 @given(st.sampled_from(PRESETS), Sizes)
-def test_it_is_grey_and_what_is_before_and_behind_it_is_as_it_was(
-    preset: str, blocks: tuple[int, int]
-) -> None:
+def test_it_is_gray_and_the_pictures_around_it_are_unchanged(preset: str, blocks: tuple[int, int]) -> None:
     units = encoded((16 * blocks[0], 16 * blocks[1] + 2), preset, 3)
     samples = [join_sample(nal_units(it.data)) for it in units]
     found, writer = parameter_sets(nal_units(units[0].data)), how(units[0])
     assert found is not None
-    grey = [gray_picture(found, 0), writer.repeat(1, reference=True), gray_picture(found, 1)]
-    shown, alone = decoded([*samples, *grey, *samples]), decoded(samples)
+    gray = [gray_picture(found, 0), writer.repeat(1, reference=True), gray_picture(found, 1)]
+    shown, alone = decoded([*samples, *gray, *samples]), decoded(samples)
     assert len(shown) == 9
-    assert all(map(is_grey, shown[3:6]))
+    assert all(map(is_gray, shown[3:6]))
     for place, picture in enumerate(shown[:3] + shown[6:]):
         np.testing.assert_array_equal(picture, alone[place % 3])
 
 
 @settings(max_examples=10, deadline=None)
 @given(Sizes)
-def test_so_it_is_in_vp8(blocks: tuple[int, int]) -> None:
+def test_it_is_gray_in_vp8(blocks: tuple[int, int]) -> None:
     width, height = 16 * blocks[0], 16 * blocks[1] + 2
     encoder = Encoder(SiteSettings(width=width, height=height, fps=FPS), EncodeSettings(gop=GOP, codec="vp8"))
     noise = np.random.default_rng(0).integers(0, 255, (3, height, width, 3), dtype=np.uint8)
@@ -69,13 +67,13 @@ def test_so_it_is_in_vp8(blocks: tuple[int, int]) -> None:
         ]
 
     shown, alone = seen([*units, gray_frame(width, height), *units]), seen(units)
-    assert is_grey(shown[3])
+    assert is_gray(shown[3])
     for place, picture in enumerate(shown[:3] + shown[4:]):
         np.testing.assert_array_equal(picture, alone[place % 3])
 
 
 @pytest.mark.parametrize("own", [False, True])
-def test_a_grey_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> None:
+def test_a_gray_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> None:
     stream_format = PerCameraStreamFormat() if own else StreamFormat()
     cameras = list(MAKES) if own else list(MAKES)[:1] * 2
     frame_buffers = {camera: FrameBuffer(FPS, 99, stream_format) for camera in cameras}
@@ -101,11 +99,11 @@ def test_a_grey_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> Non
     with av.open(io.BytesIO(data), "r") as stream:
         pictures = [it.to_ndarray(format="yuv420p") for it in stream.decode(video=0)]
     assert len(pictures) == 6 * GOP
-    assert [is_grey(it) for it in pictures[::GOP]] == [True, False, True, False, True, False]
-    assert [is_grey(it) for it in pictures[GOP - 1 :: GOP]] == [True, False, True, False, True, False]
+    assert [is_gray(it) for it in pictures[::GOP]] == [True, False, True, False, True, False]
+    assert [is_gray(it) for it in pictures[GOP - 1 :: GOP]] == [True, False, True, False, True, False]
 
 
-def with_order_said(parameters: ParameterSets) -> ParameterSets:
+def with_explicit_order(parameters: ParameterSets) -> ParameterSets:
     """Change baseline parameter sets so that each picture says its place in the order of showing."""
     sps = BitWriter()
     sps.u(8, 66)
@@ -123,17 +121,17 @@ def with_order_said(parameters: ParameterSets) -> ParameterSets:
     return ParameterSets(escape_payload(0x67, sps.to_bytes()), parameters.pps)
 
 
-def test_where_no_picture_can_be_repeated_one_grey_picture_lasts_for_all_of_it() -> None:
+def test_one_gray_picture_lasts_for_the_gop_where_none_can_be_repeated() -> None:
     parameters = parameter_sets(nal_units(encoded((WIDTH, HEIGHT), "ultrafast", 1)[0].data))
     assert parameters is not None
     stream_format = StreamFormat()
-    stream_format.check(with_order_said(parameters))
-    [grey] = stream_format.blank(None, 10, 5, FPS)
-    assert (grey.pulse, grey.until, grey.key) == (10, 15, True)
-    assert all(map(is_grey, decoded([grey.sample, stream_format.blank(grey, 15, 5, FPS)[0].sample])))
+    stream_format.check(with_explicit_order(parameters))
+    [gray] = stream_format.blank(None, 10, 5, FPS)
+    assert (gray.pulse, gray.until, gray.key) == (10, 15, True)
+    assert all(map(is_gray, decoded([gray.sample, stream_format.blank(gray, 15, 5, FPS)[0].sample])))
 
 
-def test_in_a_format_that_cannot_be_written_there_is_none() -> None:
+def test_an_unsupported_format_has_no_gray_picture() -> None:
     stream_format = StreamFormat()
     assert stream_format.blank(None, 0, 5, FPS) == []
     stream_format.check(ParameterSets(b"\x67\x00\x00\x00", b"\x68"))
@@ -142,12 +140,14 @@ def test_in_a_format_that_cannot_be_written_there_is_none() -> None:
 
 @settings(deadline=None)  # some say that they are very large
 @given(st.binary(min_size=4, max_size=30), st.binary(min_size=1, max_size=10), st.integers(0, 1))
-def test_parameter_sets_of_any_bytes_are_written_for_or_unfit(sps: bytes, pps: bytes, number: int) -> None:
+def test_parameter_sets_of_arbitrary_bytes_are_used_or_unsupported(
+    sps: bytes, pps: bytes, number: int
+) -> None:
     with contextlib.suppress(UnsupportedParametersError):
         assert gray_picture(ParameterSets(sps, pps), number)
 
 
-def test_a_grey_gop_of_vp8_has_no_hole() -> None:
+def test_a_gray_gop_of_vp8_has_no_gap() -> None:
     stream_format: Any = Vp8StreamFormat(WIDTH, HEIGHT)
     pictures = stream_format.blank(None, 10, 5, FPS)
     assert [(it.pulse, it.until, it.key) for it in pictures] == [(n, n + 1, n == 10) for n in range(10, 15)]

@@ -1,4 +1,4 @@
-"""A picture written by hand shows the one before it again, and the stream goes on behind it."""
+"""A repeat picture shows the one before it again, and the stream continues after it."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_the_last_picture_is_shown_for_as_long_as_it_is_repeated(
 
 @settings(max_examples=10, deadline=None)
 @given(st.sampled_from(PRESETS), st.sets(st.integers(1, 5), min_size=1))
-def test_a_picture_can_be_slipped_in_between_two_of_a_camera(preset: str, before: set[int]) -> None:
+def test_a_picture_can_be_inserted_between_two_of_a_camera(preset: str, before: set[int]) -> None:
     units = encoded((64, 48), preset, 6)
     writer = how(units[0])
     alone = decoded([join_sample(nal_units(unit.data)) for unit in units])
@@ -62,7 +62,7 @@ def test_a_picture_can_be_slipped_in_between_two_of_a_camera(preset: str, before
         np.testing.assert_array_equal(picture, alone[place])
 
 
-def test_pictures_are_numbered_one_after_the_other_from_each_key_picture_on() -> None:
+def test_frame_num_counts_from_each_keyframe() -> None:
     units = encoded((64, 48), "ultrafast", 45, gop=40)
     writer = how(units[0])
     numbers = [writer.frame_num(join_sample(nal_units(unit.data))) for unit in units]
@@ -70,13 +70,13 @@ def test_pictures_are_numbered_one_after_the_other_from_each_key_picture_on() ->
     assert all(later == writer.next_num(earlier) for earlier, later in pairwise(numbers[:40]))
 
 
-def test_a_sample_without_a_picture_has_no_number() -> None:
+def test_a_sample_without_a_picture_has_no_frame_num() -> None:
     with pytest.raises(ValueError, match="without a picture"):
         how(encoded((64, 48), "ultrafast", 1)[0]).frame_num(b"\x00\x00\x00\x02\x06\x05")
 
 
 @given(st.binary(min_size=4, max_size=30), st.binary(min_size=1, max_size=10))
-def test_parameter_sets_of_any_bytes_are_read_or_unfit(sps: bytes, pps: bytes) -> None:
+def test_parameter_sets_of_arbitrary_bytes_are_parsed_or_unsupported(sps: bytes, pps: bytes) -> None:
     with contextlib.suppress(UnsupportedParametersError):
         assert parse_repeatable(ParameterSets(sps, pps)).macroblocks > 0
 
@@ -93,7 +93,7 @@ def test_numbers_are_read_as_they_were_written(numbers: list[tuple[str, int]]) -
 
 
 @given(st.lists(st.sampled_from(b"\x00\x01\x03\x80"), min_size=1, max_size=40).map(bytes))
-def test_no_payload_has_a_start_code_in_its_unit(payload: bytes) -> None:
+def test_an_escaped_payload_contains_no_start_code(payload: bytes) -> None:
     unit = escape_payload(1, payload)
     assert not any(code in unit for code in (b"\x00\x00\x00", b"\x00\x00\x01", b"\x00\x00\x02"))
     assert unescape_payload(unit) == payload

@@ -1,4 +1,4 @@
-"""VP8 in WebM: a picture that repeats another, clusters that stand alone, and cameras that do not fit."""
+"""VP8 in WebM: repeated pictures, independent clusters, and cameras of another format."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def decoded(frames: list[bytes], decoder: str) -> list[Pixels]:
 
 @settings(max_examples=25, deadline=None)
 @given(sides, sides, st.lists(st.integers(0, 3), min_size=FRAMES, max_size=FRAMES))
-def test_a_repeat_shows_the_picture_before_and_nothing_after_it_can_tell(
+def test_a_repetition_shows_the_picture_before_and_changes_none_after(
     width: int, height: int, repeats: list[int]
 ) -> None:
     units, again = encoded(width, height), repeat_frame(width, height)
@@ -62,12 +62,12 @@ def test_a_repeat_shows_the_picture_before_and_nothing_after_it_can_tell(
         np.testing.assert_array_equal(decoded(frames, decoder), [plain[n] for n in told], decoder)
 
 
-def test_a_repeat_is_small() -> None:
+def test_a_repetition_is_small() -> None:
     assert len(repeat_frame(640, 360)) < 100
 
 
 @given(st.integers(16, 8192), st.integers(16, 8192))
-def test_the_size_is_read_from_key_frames_alone(width: int, height: int) -> None:
+def test_the_size_is_read_from_keyframes_only(width: int, height: int) -> None:
     key = b"\x10\x00\x00\x9d\x01\x2a" + width.to_bytes(2, "little") + height.to_bytes(2, "little")
     assert keyframe_size(key) == (width, height)
     assert keyframe_size(b"\x11" + key[1:]) is None
@@ -106,7 +106,7 @@ def read(data: bytes) -> list[tuple[float, Pixels]]:
     st.sets(st.integers(0, FRAMES - 1), max_size=6),
     st.integers(0, 10**6),
 )
-def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(
+def test_a_stream_has_a_picture_for_every_pulse_despite_losses(
     missed: set[int], lost: set[int], first: int
 ) -> None:
     """What was not taken costs itself; after what was lost the stream stands up to the next key picture."""
@@ -139,7 +139,7 @@ def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(
     np.testing.assert_array_equal([picture for _, picture in found], [plain[begun[it.pulse]] for it in shown])
 
 
-def test_a_long_hole_is_one_picture_that_lasts() -> None:
+def test_a_long_gap_is_filled_by_one_long_picture() -> None:
     stream_format = Vp8StreamFormat(64, 48)
     time, (first, *_) = GaplessTimeline(stream_format, FPS, GOP), encoded(64, 48)
     shown = time.push(
@@ -157,7 +157,7 @@ def test_a_long_hole_is_one_picture_that_lasts() -> None:
 
 
 @given(st.integers(0, 2**40), st.integers(-1000, 10**9), st.sampled_from([15, 25, 29.97, 30, 50, 60]))
-def test_a_cluster_is_moved_by_its_time_alone(pulse: int, by: int, fps: float) -> None:
+def test_shifting_a_cluster_changes_only_its_time(pulse: int, by: int, fps: float) -> None:
     moved = shift_cluster(cluster(b"frame", pulse, fps, key=True), max(by, 0))
     time = round(pulse * 1000 / fps) + max(0, by)
     assert moved[10:18] == time.to_bytes(8, "big")
@@ -169,7 +169,7 @@ def test_a_cluster_is_moved_by_its_time_alone(pulse: int, by: int, fps: float) -
     st.integers(0, 2**40),
     st.data(),
 )
-def test_frames_come_out_of_clusters_as_they_went_in_and_damage_ends_them(
+def test_demuxing_returns_the_muxed_frames_and_stops_at_damage(
     frames: list[tuple[bytes, bool, int]], first: int, data: st.DataObject
 ) -> None:
     pulse, clusters, expected = first, b"", []
@@ -185,7 +185,7 @@ def test_frames_come_out_of_clusters_as_they_went_in_and_damage_ends_them(
 
 
 @needs_ffprobe
-def test_ffprobe_has_nothing_to_complain_of(tmp_path: Path) -> None:
+def test_ffprobe_reports_no_errors(tmp_path: Path) -> None:
     units = encoded(64, 48)
     data = header(64, 48, FPS, FRAMES) + b"".join(it.fragment for it in shelved(units))
     file = tmp_path / "film.webm"

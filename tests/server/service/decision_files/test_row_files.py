@@ -1,4 +1,4 @@
-"""Files that grow together: what is appended stands in all of them or in none, on a disk of any size."""
+"""Texts are appended to all files or to none, on a disk of any size."""
 
 from __future__ import annotations
 
@@ -19,13 +19,15 @@ rows = st.text(st.sampled_from("0123456789,\n"), max_size=30)
 texts = st.dictionaries(st.sampled_from(NAMES), rows)
 
 
-@given(heads=st.tuples(rows, rows, rows), said=st.lists(texts, max_size=12), most=st.integers(0, 200))
-def test_all_or_none(heads: tuple[str, ...], said: list[dict[str, str]], most: int) -> None:
+@given(heads=st.tuples(rows, rows, rows), appended=st.lists(texts, max_size=12), most=st.integers(0, 200))
+def test_texts_are_appended_to_all_files_or_to_none(
+    heads: tuple[str, ...], appended: list[dict[str, str]], most: int
+) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         files = AtomicFiles({folder / it: head for it, head in zip(NAMES, heads, strict=True)})
         expected = dict(zip(NAMES, heads, strict=True))
-        for it in said:
+        for it in appended:
             longer = {which: expected[which] + it.get(which, "") for which in NAMES}
             letterboxes = all(len(longer[which]) <= most for which in it if it[which])
             refused = contextlib.nullcontext() if letterboxes else pytest.raises(OSError, match="too large")
@@ -36,7 +38,7 @@ def test_all_or_none(heads: tuple[str, ...], said: list[dict[str, str]], most: i
         files.close()
 
 
-def test_after_a_failure_it_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_after_a_failure_appending_continues_where_it_was(tmp_path: Path) -> None:
     one, other = tmp_path / "one", tmp_path / "other"
     files = AtomicFiles({one: "head\n", other: ""})
     with files_of_at_most(8):
@@ -49,7 +51,7 @@ def test_after_a_failure_it_goes_on_where_it_was(tmp_path: Path) -> None:
     assert (one.read_text(), other.read_text()) == ("head\n7\n", "12\n8\n")
 
 
-def test_what_cannot_begin_keeps_no_file_open(tmp_path: Path) -> None:
+def test_a_failed_creation_leaves_no_file_open(tmp_path: Path) -> None:
     opened = len(list(Path("/proc/self/fd").iterdir()))
     for _, missing in itertools.product(range(3), ("no folder/one", "also/none")):
         with pytest.raises(FileNotFoundError):

@@ -1,4 +1,4 @@
-"""What is recorded gets old by time that has certainly passed: a clock that jumps takes nothing away."""
+"""Recordings age by time that has certainly passed: a clock that jumps deletes nothing."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def recorded(folder: Path, clocks: ClocksByHand, gops: int = 10) -> None:
 
 @pytest.mark.parametrize("seconds", [YEAR_S, -YEAR_S, 2 * KEEP_S, -2 * KEEP_S])
 @pytest.mark.parametrize("is_kept", [False, True])
-def test_a_clock_that_is_set_while_it_records_takes_nothing_away_and_keeps_nothing_too_long(
+def test_setting_the_clock_during_recording_neither_deletes_nor_delays_deletion(
     tmp_path: Path, clocks: ClocksByHand, seconds: float, is_kept: bool
 ) -> None:
     store = opened(tmp_path, clocks)
@@ -72,7 +72,7 @@ def test_a_clock_that_is_set_while_it_records_takes_nothing_away_and_keeps_nothi
     store.close()
 
 
-def test_a_clock_that_jumps_while_it_records_is_not_believed_later_either(
+def test_a_clock_that_jumped_during_recording_is_not_trusted_later_either(
     tmp_path: Path, clocks: ClocksByHand
 ) -> None:
     bounds = RetentionLimits(keep_s=3.5 * TRIAL_S, max_mb=1e6, segment_s=0.2)
@@ -98,7 +98,7 @@ def test_a_clock_that_jumps_while_it_records_is_not_believed_later_either(
 
 @pytest.mark.parametrize("seconds", [YEAR_S, 5 * KEEP_S])
 @pytest.mark.parametrize("reboots", [False, True])
-def test_a_clock_that_is_ahead_at_the_start_takes_nothing_away(
+def test_a_clock_that_is_ahead_at_the_start_deletes_nothing(
     tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture, seconds: float, reboots: bool
 ) -> None:
     recorded(tmp_path, clocks)
@@ -119,9 +119,7 @@ def test_a_clock_that_is_ahead_at_the_start_takes_nothing_away(
     store.close()
 
 
-def test_a_clock_that_somebody_sets_right_in_time_takes_nothing_away(
-    tmp_path: Path, clocks: ClocksByHand
-) -> None:
+def test_a_clock_that_is_corrected_in_time_deletes_nothing(tmp_path: Path, clocks: ClocksByHand) -> None:
     recorded(tmp_path, clocks)
     clocks.off(5.0, wrong_by=YEAR_S)
     bounds = RetentionLimits(keep_s=2 * TRIAL_S, max_mb=1e6, segment_s=0.2)
@@ -139,7 +137,7 @@ def test_a_clock_that_somebody_sets_right_in_time_takes_nothing_away(
 
 
 @pytest.mark.parametrize("trusted", [False, True])
-def test_after_a_week_off_what_is_too_old_goes_soon_after_the_start_if_the_clock_is_kept_right(
+def test_after_a_week_off_old_recordings_are_deleted_soon_if_the_clock_is_synchronized(
     tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture, trusted: bool
 ) -> None:
     caplog.set_level(logging.INFO)
@@ -181,7 +179,7 @@ def test_days_off_add_up(tmp_path: Path, clocks: ClocksByHand) -> None:
     store.close()
 
 
-def test_a_service_that_begins_again_counts_on_while_the_machine_goes_on(
+def test_a_restarted_service_continues_the_age_clock_while_the_machine_runs(
     tmp_path: Path, clocks: ClocksByHand
 ) -> None:
     recorded(tmp_path, clocks)
@@ -192,7 +190,7 @@ def test_a_service_that_begins_again_counts_on_while_the_machine_goes_on(
     assert kept(tmp_path) == list(range(5, 10))
 
 
-def test_a_service_that_is_killed_counts_on_from_its_last_segment(
+def test_a_killed_service_continues_the_age_clock_from_its_last_segment(
     tmp_path: Path, clocks: ClocksByHand
 ) -> None:
     store = opened(tmp_path, clocks)
@@ -204,7 +202,7 @@ def test_a_service_that_is_killed_counts_on_from_its_last_segment(
     assert store.session is not None
 
 
-def test_a_machine_without_a_clock_of_its_own_counts_when_the_network_has_told_it(
+def test_a_machine_without_a_battery_clock_counts_time_off_once_synchronized(
     tmp_path: Path, clocks: ClocksByHand
 ) -> None:
     recorded(tmp_path, clocks)
@@ -228,7 +226,7 @@ def test_a_machine_without_a_clock_of_its_own_counts_when_the_network_has_told_i
 
 
 @pytest.mark.parametrize("restarts", [False, True])
-def test_what_was_recorded_before_the_clock_was_believed_is_no_older_for_it(
+def test_recordings_made_before_the_clock_was_trusted_do_not_age_by_time_off(
     tmp_path: Path, clocks: ClocksByHand, restarts: bool
 ) -> None:
     bounds = RetentionLimits(keep_s=2 * TRIAL_S, max_mb=1e6, segment_s=0.2)
@@ -249,7 +247,7 @@ def test_what_was_recorded_before_the_clock_was_believed_is_no_older_for_it(
     assert kept(tmp_path) == [10, 11, 12, 13], "and so it is known later on"
 
 
-def test_what_takes_too_much_goes_by_age_though_the_clock_went_back(
+def test_excess_recordings_are_deleted_by_age_though_the_clock_went_back(
     tmp_path: Path, clocks: ClocksByHand
 ) -> None:
     clocks.wall += YEAR_S
@@ -287,7 +285,7 @@ def test_recordings_of_an_earlier_version_are_dated_once(tmp_path: Path, clocks:
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", PARTLY, ENDLESS])
-def test_a_damaged_ledger_takes_nothing_away(tmp_path: Path, clocks: ClocksByHand, text: str) -> None:
+def test_a_damaged_clock_file_deletes_nothing(tmp_path: Path, clocks: ClocksByHand, text: str) -> None:
     recorded(tmp_path, clocks)
     (tmp_path / "clock.json").write_text(text)
     store = opened(tmp_path, clocks)
@@ -299,7 +297,7 @@ def test_a_damaged_ledger_takes_nothing_away(tmp_path: Path, clocks: ClocksByHan
 
 
 @pytest.mark.parametrize("clock0", [1e9, -1e9])
-def test_a_run_of_another_clock_takes_no_other_one_away_and_is_not_kept_for_ever(
+def test_a_session_of_another_age_clock_deletes_no_other_and_is_deleted_in_time(
     tmp_path: Path, clocks: ClocksByHand, clock0: float
 ) -> None:
     recorded(tmp_path, clocks, 5)
@@ -317,7 +315,7 @@ def test_a_run_of_another_clock_takes_no_other_one_away_and_is_not_kept_for_ever
     assert kept(tmp_path) == []
 
 
-def test_what_a_pass_takes_away_is_told_seldom_and_says_why(
+def test_deletions_are_logged_rarely_and_with_their_reason(
     tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)
@@ -331,7 +329,7 @@ def test_what_a_pass_takes_away_is_told_seldom_and_says_why(
     store.close()
 
 
-def test_a_service_records_by_the_machines_clocks(tmp_path: Path) -> None:
+def test_a_service_uses_the_machines_clocks(tmp_path: Path) -> None:
     service = FedService(small_config(record={"folder": str(tmp_path / "kept"), "trust_clock": True}))
     service.come(*CAMERAS)
     service.recorder.open()

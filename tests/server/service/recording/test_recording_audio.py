@@ -1,4 +1,4 @@
-"""The site's sound is kept once, found again by number, and heard under every picture of the past."""
+"""The site's audio is recorded once, indexed by frame number, and played with all recorded pictures."""
 
 from __future__ import annotations
 
@@ -105,9 +105,7 @@ def unbroken(stream: bytes, kind: str | None = None) -> tuple[float, float]:
     return float(times[0]), float(times[-1])
 
 
-async def test_in_the_past_a_beep_is_with_its_flash_whatever_file_it_is_in(
-    hall: Hall, recording: Path
-) -> None:
+async def test_in_a_recording_each_beep_is_with_its_flash_in_any_file(hall: Hall, recording: Path) -> None:
     own = sends(hall.service, recording)
     shows(hall, recording, range(GOPS))
     await until_written(hall.service, GOPS)
@@ -125,7 +123,7 @@ async def test_in_the_past_a_beep_is_with_its_flash_whatever_file_it_is_in(
 @pytest.mark.parametrize(
     "path", ["/objects/1/best.mp4", "/cameras/c0/live.mp4", "/objects/1/best.ts", "/cameras/c0/live.ts"]
 )
-async def test_where_the_past_meets_the_present_the_sound_goes_on(
+async def test_audio_has_no_gap_where_a_recording_meets_the_live_stream(
     hall: Hall, recording: Path, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.service.time_shift.time_shift_stream._LEAD_S", 60.0)
@@ -151,7 +149,7 @@ async def test_where_the_past_meets_the_present_the_sound_goes_on(
         assert packets(data) == own[: len(packets(data))]
 
 
-async def test_sound_goes_on_where_nobody_is_shown_for_long(hall: Hall, recording: Path) -> None:
+async def test_audio_continues_where_no_picture_is_shown_for_long(hall: Hall, recording: Path) -> None:
     sends(hall.service, recording)
     choices = {gop: A if gop < 2 or gop >= GOPS - 2 else None for gop in range(GOPS)}
     shows(hall, recording, range(GOPS), choices)
@@ -162,7 +160,7 @@ async def test_sound_goes_on_where_nobody_is_shown_for_long(hall: Hall, recordin
     assert unbroken(data)[1] == pytest.approx(FRAMES / FPS, abs=0.03)
 
 
-async def test_what_retention_took_away_or_nobody_kept_is_silent(hall: Hall, recording: Path) -> None:
+async def test_audio_that_was_deleted_or_not_recorded_is_silent(hall: Hall, recording: Path) -> None:
     sends(hall.service, recording, silent=range(30, 60))
     shows(hall, recording, range(GOPS))
     await until_written(hall.service, GOPS)
@@ -182,7 +180,7 @@ async def test_what_retention_took_away_or_nobody_kept_is_silent(hall: Hall, rec
     assert [it for it in beeps(data) if abs(it - gone / FPS) > STEP] == pytest.approx(kept, abs=STEP)
 
 
-async def test_the_sound_of_an_earlier_run_is_heard_after_a_restart(recording: Path, tmp_path: Path) -> None:
+async def test_the_audio_of_an_earlier_session_plays_after_a_restart(recording: Path, tmp_path: Path) -> None:
     record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
     for gops in (range(GOPS - 1), range(GOPS - 1, GOPS)):
         async for hall in opened(
@@ -201,7 +199,7 @@ async def test_the_sound_of_an_earlier_run_is_heard_after_a_restart(recording: P
                 unbroken(data)
 
 
-async def test_sound_goes_with_the_segments_it_is_of(tmp_path: Path) -> None:
+async def test_audio_is_deleted_with_its_segments(tmp_path: Path) -> None:
     clocks = ClocksByHand()
     store = RecordingFolder(tmp_path, RetentionLimits(keep_s=2.0, max_mb=1e6, segment_s=0.4), clocks.machine)
     store.open()
@@ -227,7 +225,7 @@ async def test_sound_goes_with_the_segments_it_is_of(tmp_path: Path) -> None:
 
 
 @needs_ffprobe
-async def test_the_sound_plays_from_the_disk_by_itself(hall: Hall, recording: Path) -> None:
+async def test_the_audio_playlist_plays_from_the_disk(hall: Hall, recording: Path) -> None:
     sends(hall.service, recording)
     shows(hall, recording, range(GOPS))
     await until_written(hall.service, GOPS)
@@ -239,7 +237,7 @@ async def test_the_sound_plays_from_the_disk_by_itself(hall: Hall, recording: Pa
         assert int(frames) >= 18
 
 
-async def test_a_site_without_sound_keeps_none(tmp_path: Path, recording: Path) -> None:
+async def test_a_site_without_audio_records_none(tmp_path: Path, recording: Path) -> None:
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
         hall.service.recorder.open()
         hall.service.come(*CAMERAS)
@@ -254,7 +252,7 @@ async def test_a_site_without_sound_keeps_none(tmp_path: Path, recording: Path) 
 
 @settings(max_examples=100, deadline=None)
 @given(st.data())
-def test_a_damaged_file_gives_what_can_be_read_or_nothing(
+def test_of_a_damaged_file_the_readable_frames_are_read(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     path = tmp_path_factory.mktemp("damaged") / "sound.mp4"
@@ -272,7 +270,7 @@ def test_a_damaged_file_gives_what_can_be_read_or_nothing(
     st.integers(0, 5),
     st.data(),
 )
-def test_frames_are_found_by_their_numbers(
+def test_audio_frames_are_read_by_their_numbers(
     tmp_path_factory: pytest.TempPathFactory, written: list[list[bytes]], first: int, data: st.DataObject
 ) -> None:
     path = tmp_path_factory.mktemp("frames") / "sound.mp4"

@@ -1,4 +1,4 @@
-"""Recording goes on by itself wherever its folder went, and nobody is promised what is gone."""
+"""Recording continues when its folder is lost, and lost recordings are no longer offered."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from server.service.recording.session_files import InitSegments
 
 NOTHING = "nothing of object 1 is recorded from p0 on; there is nothing"
 Harm = Callable[[Path, Path], None]
-"""What somebody does to a folder, and the run in it."""
+"""Damage to a folder and the session in it."""
 
 
 def gone(name: str) -> Harm:
@@ -129,7 +129,7 @@ def shown(folder: Path) -> list[int]:
         ),
     ],
 )
-def test_it_goes_on_at_once_and_leaves_nothing_that_nobody_knows_of(tmp_path: Path, harm: Harm) -> None:
+def test_recording_continues_at_once_and_leaves_no_orphaned_files(tmp_path: Path, harm: Harm) -> None:
     folder = tmp_path / "kept"
     store = RecordingFolder(folder, AMPLE)
     store.open()
@@ -142,7 +142,9 @@ def test_it_goes_on_at_once_and_leaves_nothing_that_nobody_knows_of(tmp_path: Pa
     nothing_is_orphaned(folder)
 
 
-def test_while_a_file_has_the_folders_place_nothing_is_left_and_then_it_goes_on(tmp_path: Path) -> None:
+def test_recording_fails_cleanly_while_a_file_is_in_the_folders_place_and_then_continues(
+    tmp_path: Path,
+) -> None:
     folder = tmp_path / "kept"
     store = RecordingFolder(folder, AMPLE)
     store.open()
@@ -158,7 +160,7 @@ def test_while_a_file_has_the_folders_place_nothing_is_left_and_then_it_goes_on(
     nothing_is_orphaned(folder)
 
 
-def test_a_disk_that_comes_back_is_gone_on_with_and_its_runs_are_known(tmp_path: Path) -> None:
+def test_a_disk_that_is_mounted_again_is_recorded_to_and_its_sessions_are_known(tmp_path: Path) -> None:
     folder, away = tmp_path / "kept", tmp_path / "unmounted"
     store = RecordingFolder(folder, AMPLE)
     store.open()
@@ -177,7 +179,7 @@ def test_a_disk_that_comes_back_is_gone_on_with_and_its_runs_are_known(tmp_path:
     nothing_is_orphaned(folder)
 
 
-def test_who_took_the_folder_meanwhile_has_it(tmp_path: Path) -> None:
+def test_a_folder_that_another_process_locked_meanwhile_is_left_to_it(tmp_path: Path) -> None:
     folder = tmp_path / "kept"
     store, other = RecordingFolder(folder, AMPLE), RecordingFolder(folder, AMPLE)
     store.open()
@@ -195,7 +197,7 @@ def test_who_took_the_folder_meanwhile_has_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("closed", [".", "RUN", "RUN/cameras", "RUN/cameras/c0", "RUN/index", "RUN/objects"])
-def test_where_it_may_not_write_nothing_is_left_and_when_it_may_it_goes_on(closed: str) -> None:
+def test_recording_fails_cleanly_without_permission_and_then_continues(closed: str) -> None:
     with nobodys_folder() as tmp_path:
         folder = tmp_path / "kept"
         store = RecordingFolder(folder, RetentionLimits(1e6, 1e6, 2 * GOP / FPS))
@@ -215,7 +217,7 @@ def test_where_it_may_not_write_nothing_is_left_and_when_it_may_it_goes_on(close
         nothing_is_orphaned(folder)
 
 
-def test_old_recordings_that_cannot_be_taken_away_keep_nobody_from_recording(
+def test_old_recordings_that_cannot_be_deleted_do_not_stop_the_recording(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     with nobodys_folder() as tmp_path:
@@ -239,7 +241,7 @@ def test_old_recordings_that_cannot_be_taken_away_keep_nobody_from_recording(
         store.close()
 
 
-def test_a_full_disk_leaves_nothing_at_any_try_and_then_it_goes_on(tmp_path: Path) -> None:
+def test_a_full_disk_leaves_no_files_at_any_try_and_then_recording_continues(tmp_path: Path) -> None:
     store = RecordingFolder(tmp_path, AMPLE)
     store.open()
     records(store, range(3))
@@ -254,7 +256,7 @@ def test_a_full_disk_leaves_nothing_at_any_try_and_then_it_goes_on(tmp_path: Pat
     nothing_is_orphaned(tmp_path)
 
 
-def test_what_is_left_of_runs_that_hardly_began_goes_and_media_without_a_head_are_told_of(
+def test_remains_without_media_are_removed_and_media_without_session_info_are_logged(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     RecordingSession.create(tmp_path / "20260101T000000Z", head(), InitSegments(b"x"), 1.0)
@@ -273,7 +275,7 @@ def test_what_is_left_of_runs_that_hardly_began_goes_and_media_without_a_head_ar
     assert "20260102T000000Z has no session.json" in caplog.text
 
 
-def test_what_is_lost_without_the_choices_is_kept_and_gets_old(tmp_path: Path) -> None:
+def test_a_session_without_decision_files_stays_and_ages(tmp_path: Path) -> None:
     store = RecordingFolder(tmp_path, AMPLE)
     store.open()
     records(store, range(12))
@@ -287,7 +289,9 @@ def test_what_is_lost_without_the_choices_is_kept_and_gets_old(tmp_path: Path) -
     assert set(shown(tmp_path)) == set(range(12 * GOP))
 
 
-def test_that_a_new_folder_is_begun_is_one_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_starting_a_new_session_folder_is_logged_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     store = RecordingFolder(tmp_path / "kept", AMPLE)
     store.open()
     for gop in range(20):
@@ -335,7 +339,7 @@ async def asked(hall: Hall, path: str) -> tuple[int, bytes]:
 
 
 @pytest.mark.parametrize("harm", [gone("."), gone("RUN"), moved("."), made_anew("RUN"), made_a_file("RUN")])
-async def test_nobody_is_promised_what_is_gone(hall: Hall, harm: Harm) -> None:
+async def test_lost_recordings_are_not_offered(hall: Hall, harm: Harm) -> None:
     store = hall.service.recorder.folder
     assert store is not None
     assert store.session is not None
@@ -368,7 +372,7 @@ async def test_nobody_is_promised_what_is_gone(hall: Hall, harm: Harm) -> None:
         ("/objects/1/hls/0.m4s", 404, "no segment 0: expired, or not there yet"),
     ],
 )  # fmt: skip
-async def test_who_is_nowhere_else_is_gone_with_what_was_recorded(
+async def test_a_person_known_only_from_lost_recordings_is_gone_with_them(
     hall: Hall, path: str, status: int, error: str
 ) -> None:
     store = hall.service.recorder.folder
@@ -382,7 +386,7 @@ async def test_who_is_nowhere_else_is_gone_with_what_was_recorded(
     assert await hall.get(path) == (status, {"error": error})
 
 
-async def test_a_part_that_is_gone_is_a_hole(hall: Hall) -> None:
+async def test_a_lost_segment_is_a_gap(hall: Hall) -> None:
     store = hall.service.recorder.folder
     assert store is not None
     assert store.session is not None
@@ -396,7 +400,7 @@ async def test_a_part_that_is_gone_is_a_hole(hall: Hall) -> None:
     assert len(body) > 1000
 
 
-async def test_what_may_not_be_read_is_told_in_one_line() -> None:
+async def test_unreadable_recordings_are_logged_in_one_line() -> None:
     with nobodys_folder() as tmp_path:
         async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
             await shows(hall)
@@ -411,7 +415,7 @@ async def test_what_may_not_be_read_is_told_in_one_line() -> None:
             assert (await asked(hall, "/cameras/c0/live.mp4?from=p0&to=p10"))[0] == 200
 
 
-async def test_that_recording_stands_is_told_and_that_it_goes_on(hall: Hall) -> None:
+async def test_that_recording_stops_and_that_it_continues_is_reported(hall: Hall) -> None:
     store, writer = hall.service.recorder.folder, hall.service.recorder.writer
     assert store is not None
     assert writer is not None

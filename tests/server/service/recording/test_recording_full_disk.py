@@ -1,4 +1,4 @@
-"""On a full disk what is too old is taken away all the same: nothing that lies there is forgotten."""
+"""Old recordings are deleted from a full disk, too, and no file on it is forgotten."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def files_told(run: RecordingSession) -> set[int]:
     return told
 
 
-def test_what_is_too_old_goes_from_a_disk_that_takes_nothing(tmp_path: Path, clock: ClocksByHand) -> None:
+def test_old_recordings_are_deleted_from_a_full_disk(tmp_path: Path, clock: ClocksByHand) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
     assert on_disk(tmp_path) == [0, 25, 50, 75]
@@ -86,7 +86,7 @@ def test_what_is_too_old_goes_from_a_disk_that_takes_nothing(tmp_path: Path, clo
     store.close()
 
 
-def test_a_disk_that_is_full_at_the_start_is_taken_and_cleared(tmp_path: Path, clock: ClocksByHand) -> None:
+def test_a_disk_that_is_full_at_the_start_is_locked_and_cleared(tmp_path: Path, clock: ClocksByHand) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
     leave(store)
@@ -100,7 +100,7 @@ def test_a_disk_that_is_full_at_the_start_is_taken_and_cleared(tmp_path: Path, c
     again.close()
 
 
-def test_what_gets_too_old_goes_before_a_run_begins(tmp_path: Path, clock: ClocksByHand) -> None:
+def test_old_recordings_are_deleted_before_a_session_begins(tmp_path: Path, clock: ClocksByHand) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
     leave(store)
@@ -112,9 +112,7 @@ def test_what_gets_too_old_goes_before_a_run_begins(tmp_path: Path, clock: Clock
     again.close()
 
 
-def test_what_playlists_refer_to_in_vain_is_not_known_after_a_restart(
-    tmp_path: Path, clock: ClocksByHand
-) -> None:
+def test_playlist_entries_without_files_are_dropped_at_a_restart(tmp_path: Path, clock: ClocksByHand) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
     refused(store, clock, 27)
@@ -128,7 +126,7 @@ def test_what_playlists_refer_to_in_vain_is_not_known_after_a_restart(
     again.close()
 
 
-def test_what_cannot_be_taken_away_is_not_forgotten(
+def test_files_that_cannot_be_deleted_are_not_forgotten(
     tmp_path: Path,
     clock: ClocksByHand,
     monkeypatch: pytest.MonkeyPatch,
@@ -156,7 +154,7 @@ def test_what_cannot_be_taken_away_is_not_forgotten(
     store.close()
 
 
-def test_a_full_disk_does_not_keep_the_service_from_its_start(tmp_path: Path, clock: ClocksByHand) -> None:
+def test_a_full_disk_does_not_stop_the_service_from_starting(tmp_path: Path, clock: ClocksByHand) -> None:
     folder = tmp_path / "kept"
     store = opened(folder, clock)
     record(store, clock, range(20))
@@ -169,9 +167,7 @@ def test_a_full_disk_does_not_keep_the_service_from_its_start(tmp_path: Path, cl
         service.close()
 
 
-def test_a_playlist_that_could_not_be_written_tells_so_until_it_is(
-    tmp_path: Path, clock: ClocksByHand
-) -> None:
+def test_a_playlist_that_could_not_be_written_stays_stale(tmp_path: Path, clock: ClocksByHand) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(12))
     assert store.session is not None

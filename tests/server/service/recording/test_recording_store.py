@@ -1,4 +1,4 @@
-"""What is recorded plays from the disk by itself, goes in order, and takes no more than it may."""
+"""Recordings play from the disk, are deleted in order of age, and stay within their limits."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def only_run(folder: Path) -> Path:
     return run
 
 
-def test_a_persons_playlist_is_the_chosen_cameras_pictures_pixel_for_pixel_across_cuts(
+def test_a_persons_playlist_plays_the_chosen_cameras_pixels_across_cuts(
     tmp_path: Path,
 ) -> None:
     choices = [A, A, B, B, A, B, A, A, A, B, B, A]
@@ -68,7 +68,7 @@ def test_a_camera_is_written_once_however_many_people_it_shows(tmp_path: Path) -
     assert sizes[0] == sizes[1]
 
 
-def test_every_file_and_playlist_decodes_without_errors_even_with_holes(tmp_path: Path) -> None:
+def test_every_file_and_playlist_decodes_without_errors_even_with_gaps(tmp_path: Path) -> None:
     pieces = [piece(gop, {1: A, 2: B} if gop % 4 else {1: A}) for gop in range(12) if gop != 7]
     written(RecordingFolder(tmp_path, AMPLE), pieces).close()
     files = everything_that_plays(tmp_path)
@@ -77,7 +77,7 @@ def test_every_file_and_playlist_decodes_without_errors_even_with_holes(tmp_path
         decodes_without_errors(path)
 
 
-def test_a_playlist_keeps_to_the_rules(tmp_path: Path) -> None:
+def test_a_playlist_conforms_to_rfc_8216(tmp_path: Path) -> None:
     written(
         RecordingFolder(tmp_path, AMPLE),
         [piece(gop, {1: B if gop == 3 else A}) for gop in range(7) if gop != 5],
@@ -99,7 +99,7 @@ def test_a_playlist_keeps_to_the_rules(tmp_path: Path) -> None:
             assert len(data) == length
 
 
-def test_the_index_says_who_was_where(tmp_path: Path) -> None:
+def test_the_decision_file_has_choices_and_boxes(tmp_path: Path) -> None:
     written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(7)]).close()
     first, second = sorted((only_run(tmp_path) / "index").iterdir())
     lines = [json.loads(line) for path in (first, second) for line in path.read_text().splitlines()]
@@ -108,7 +108,7 @@ def test_the_index_says_who_was_where(tmp_path: Path) -> None:
     assert lines[0]["boxes"][B][0] == [[1, 1.0, 2.0, 3.0, 4.0]]
 
 
-def test_of_a_gop_that_did_not_come_whole_the_beginning_is_kept_and_shown_to_nobody(tmp_path: Path) -> None:
+def test_an_incomplete_gop_is_in_the_cameras_playlist_but_in_no_persons(tmp_path: Path) -> None:
     pieces = [piece(0, {1: A}), piece(1, {1: A}, frames=3), piece(2, {1: A})]
     run = written(RecordingFolder(tmp_path, AMPLE), pieces).session
     assert run is not None
@@ -130,7 +130,7 @@ def test_of_a_gop_that_did_not_come_whole_the_beginning_is_kept_and_shown_to_nob
     assert [(it.first, it.end) for it in run.objects[1].index.all] == [(0, 5), (10, 15)]
 
 
-def test_a_service_that_begins_again_goes_on_beside_what_is_there(tmp_path: Path) -> None:
+def test_a_restarted_service_records_a_new_session_beside_the_earlier_one(tmp_path: Path) -> None:
     written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(3)]).close()
     second = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: B}) for gop in range(3)])
     assert len([it for it in tmp_path.iterdir() if it.is_dir()]) == 2
@@ -142,7 +142,7 @@ def test_a_service_that_begins_again_goes_on_beside_what_is_there(tmp_path: Path
             np.testing.assert_array_equal(picture, own_pictures(camera)[pulse])
 
 
-def test_pulses_that_begin_anew_are_another_run(tmp_path: Path) -> None:
+def test_restarted_pulses_begin_a_new_session(tmp_path: Path) -> None:
     store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in (5, 6, 0, 1)])
     assert store.session is not None
     assert [(it.first, it.end) for it in store.session.objects[1].index.all] == [(0, 10)]
@@ -157,7 +157,7 @@ def test_two_processes_do_not_record_into_one_folder(tmp_path: Path) -> None:
     RecordingFolder(tmp_path, AMPLE).open()
 
 
-def test_what_is_too_old_goes_in_whole_segments_with_what_refers_to_it(tmp_path: Path) -> None:
+def test_old_segments_are_deleted_whole_with_their_references(tmp_path: Path) -> None:
     clocks = ClocksByHand()
     store = RecordingFolder(tmp_path, RetentionLimits(keep_s=3.0, max_mb=1e6, segment_s=1.0), clocks.machine)
     store.open()
@@ -179,7 +179,7 @@ def test_what_is_too_old_goes_in_whole_segments_with_what_refers_to_it(tmp_path:
 @given(
     st.lists(st.dictionaries(st.integers(1, 4), st.sampled_from([A, B])), min_size=1, max_size=40), st.data()
 )
-def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_known(
+def test_the_size_stays_bounded_and_a_restart_reads_the_same_indexes(
     tmp_path_factory: pytest.TempPathFactory, shown: list[dict[int, str]], data: st.DataObject
 ) -> None:
     folder = tmp_path_factory.mktemp("bounded")
@@ -197,11 +197,11 @@ def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_
     assert store.session is not None
     found = {number: it.index.all for run in again.earlier for number, it in run.objects.items()}
     assert found == {number: it.index.all for number, it in store.session.objects.items()}
-    for number, tape in found.items():
+    for number, entries in found.items():
         expected = [gop for gop, choices in enumerate(shown) if number in choices]
-        kept = [pulse // GOP for it in tape for pulse in range(it.first, it.end, GOP)]
+        kept = [pulse // GOP for it in entries for pulse in range(it.first, it.end, GOP)]
         assert kept == expected[len(expected) - len(kept) :], "the newest, without a hole of our own"
-        for it in tape:
+        for it in entries:
             path = again.earlier[0].paths.camera_file(it.camera, it.file)
             assert [gop.first for gop in read_gops(path, it.offset, it.length, FPS)] == list(
                 range(it.first, it.end, GOP)
@@ -209,7 +209,7 @@ def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_
     again.close()
 
 
-def test_when_the_disk_is_full_what_is_there_plays_and_later_it_goes_on(tmp_path: Path) -> None:
+def test_on_a_full_disk_earlier_gops_play_and_recording_continues_later(tmp_path: Path) -> None:
     store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(2)])
     assert store.session is not None
     size = store.session.paths.camera_file(A, 0).stat().st_size

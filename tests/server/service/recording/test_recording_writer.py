@@ -1,4 +1,4 @@
-"""A slow or full disk costs the recording GOPs, and nobody else anything."""
+"""A slow or full disk loses GOPs of the recording, and affects nothing else."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from server.system.errors import UserError
 
 
 class Disk:
-    """Takes pieces, when it is let."""
+    """A disk that can be made slow or full."""
 
     def __init__(self) -> None:
         self.taken: list[int] = []
@@ -57,7 +57,7 @@ def writer_on(disk: Disk, most: int = 4, retry_s: float = 0.0) -> WriterThread:
     return writer
 
 
-def test_what_waits_is_written_before_the_end() -> None:
+def test_queued_gops_are_written_before_the_end() -> None:
     disk = Disk()
     writer = writer_on(disk, most=100)
     for gop in range(20):
@@ -67,7 +67,7 @@ def test_what_waits_is_written_before_the_end() -> None:
     assert (writer.written, writer.lost) == (20, 0)
 
 
-def test_a_slow_disk_is_not_waited_for_and_whole_gops_are_left_out() -> None:
+def test_a_slow_disk_loses_whole_gops_without_blocking() -> None:
     disk = Disk()
     disk.open.clear()
     writer = writer_on(disk, most=4)
@@ -81,7 +81,7 @@ def test_a_slow_disk_is_not_waited_for_and_whole_gops_are_left_out() -> None:
     assert disk.taken == [0, 5, 10, 15, 20, -1]
 
 
-def test_a_full_disk_is_told_once_tried_again_and_counted(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_full_disk_is_logged_once_retried_and_counted(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
     disk = Disk()
     disk.refuses = True
@@ -102,7 +102,7 @@ def test_a_full_disk_is_told_once_tried_again_and_counted(caplog: pytest.LogCapt
     assert goes_on.startswith("recording: continues after ")
 
 
-def test_a_disk_that_is_full_again_and_again_is_not_told_of_each_time(
+def test_a_disk_that_is_full_repeatedly_is_not_logged_each_time(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level(logging.INFO)
@@ -125,7 +125,7 @@ def until(condition: Callable[[], bool]) -> None:
         threading.Event().wait(0.001)
 
 
-def test_a_disk_that_does_not_answer_is_told_of() -> None:
+def test_a_disk_that_does_not_respond_is_reported() -> None:
     disk = Disk()
     disk.open.clear()
     writer = writer_on(disk)
@@ -140,7 +140,7 @@ def test_a_disk_that_does_not_answer_is_told_of() -> None:
     writer.close()
 
 
-def test_a_mistake_does_not_end_the_recording(caplog: pytest.LogCaptureFixture) -> None:
+def test_an_internal_error_does_not_end_the_recording(caplog: pytest.LogCaptureFixture) -> None:
     class Mistaken(Disk):
         def write(self, it: GopRecord) -> None:
             if not self.taken:
@@ -158,7 +158,7 @@ def test_a_mistake_does_not_end_the_recording(caplog: pytest.LogCaptureFixture) 
     assert "internal error" in caplog.text
 
 
-def test_a_full_disk_is_left_alone_for_a_while() -> None:
+def test_a_full_disk_is_retried_only_after_a_while() -> None:
     disk = Disk()
     disk.refuses = True
     writer = writer_on(disk, most=100, retry_s=1000.0)

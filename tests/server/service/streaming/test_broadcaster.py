@@ -1,4 +1,4 @@
-"""Viewers share a stream; whoever is slow loses whole GOPs and slows nobody."""
+"""Viewers share a stream; a slow one loses whole GOPs and slows no other."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ def gop(number: int) -> BytesChunk:
 
 
 async def take(viewer: object, count: int) -> list[bytes]:
-    got = []
+    received = []
     async with asyncio.timeout(PATIENCE):
         async for data in viewer:  # type: ignore[attr-defined]
-            got.append(data)
-            if len(got) == count:
+            received.append(data)
+            if len(received) == count:
                 break
-    return got
+    return received
 
 
 async def test_a_viewer_starts_at_once_with_the_newest_gop() -> None:
-    channel = Broadcaster()
+    broadcaster = Broadcaster()
     for number in range(3):
-        channel.publish(gop(number))
-    assert await take(channel.subscribe(), 1) == [b"2"]
+        broadcaster.publish(gop(number))
+    assert await take(broadcaster.subscribe(), 1) == [b"2"]
 
 
 async def test_a_viewer_of_single_frames_starts_where_the_gop_begins() -> None:
-    channel = Broadcaster()
+    broadcaster = Broadcaster()
     for data, start in [(b"I1", True), (b"P2", False), (b"I3", True), (b"P4", False)]:
-        channel.publish(BytesChunk(data, start))
-    assert await take(channel.subscribe(), 2) == [b"I3", b"P4"]
+        broadcaster.publish(BytesChunk(data, start))
+    assert await take(broadcaster.subscribe(), 2) == [b"I3", b"P4"]
 
 
 async def test_a_viewer_that_falls_behind_loses_whole_gops_and_others_lose_none() -> None:
-    channel = Broadcaster(queue_gops=3)
-    slow, quick = channel.subscribe(), channel.subscribe()
+    broadcaster = Broadcaster(queue_gops=3)
+    slow, quick = broadcaster.subscribe(), broadcaster.subscribe()
     seen = []
     for number in range(10):
-        channel.publish(BytesChunk(b"I%d" % number, random_access=True))
-        channel.publish(BytesChunk(b"P%d" % number, random_access=False))
+        broadcaster.publish(BytesChunk(b"I%d" % number, random_access=True))
+        broadcaster.publish(BytesChunk(b"P%d" % number, random_access=False))
         seen += await take(quick, 2)
     assert len(seen) == 20
     assert slow.lost_gops > 0
@@ -56,43 +56,43 @@ async def test_a_viewer_that_falls_behind_loses_whole_gops_and_others_lose_none(
 
 
 async def test_memory_is_bounded_however_slow_a_viewer_is() -> None:
-    channel = Broadcaster(queue_gops=3)
-    slow = channel.subscribe()
+    broadcaster = Broadcaster(queue_gops=3)
+    slow = broadcaster.subscribe()
     for number in range(1000):
-        channel.publish(gop(number))
+        broadcaster.publish(gop(number))
     assert len(slow._queue) <= 3
 
 
 async def test_the_end_comes_after_what_was_queued() -> None:
-    channel = Broadcaster()
-    viewer = channel.subscribe()
-    channel.publish(gop(1))
-    channel.close()
+    broadcaster = Broadcaster()
+    viewer = broadcaster.subscribe()
+    broadcaster.publish(gop(1))
+    broadcaster.close()
     async with asyncio.timeout(PATIENCE):
         assert [data async for data in viewer] == [b"1"]
-    assert channel.viewers == 1
-    channel.unsubscribe(viewer)
-    assert channel.viewers == 0
+    assert broadcaster.viewers == 1
+    broadcaster.unsubscribe(viewer)
+    assert broadcaster.viewers == 0
 
 
-async def test_whoever_joins_after_the_end_gets_what_was_last_and_the_end() -> None:
-    channel = Broadcaster()
-    channel.publish(gop(1))
-    channel.close()
+async def test_a_viewer_that_joins_after_the_end_receives_the_newest_gop_and_the_end() -> None:
+    broadcaster = Broadcaster()
+    broadcaster.publish(gop(1))
+    broadcaster.close()
     async with asyncio.timeout(PATIENCE):
-        assert [data async for data in channel.subscribe()] == [b"1"]
+        assert [data async for data in broadcaster.subscribe()] == [b"1"]
 
 
-@pytest.mark.parametrize("taken", list(product([True, False], repeat=5)))
-async def test_pieces_keep_their_order_whether_they_are_taken_at_once_or_wait(
-    taken: tuple[bool, ...],
+@pytest.mark.parametrize("accepted", list(product([True, False], repeat=5)))
+async def test_chunks_keep_their_order_whether_sent_directly_or_queued(
+    accepted: tuple[bool, ...],
 ) -> None:
-    channel, sent = Broadcaster(queue_gops=10), list[bytes]()
-    viewer, answers = channel.subscribe(), iter(taken)
+    broadcaster, sent = Broadcaster(queue_gops=10), list[bytes]()
+    viewer, answers = broadcaster.subscribe(), iter(accepted)
 
-    def take_at_once(piece: Chunk) -> bool:
+    def send_directly(chunk: Chunk) -> bool:
         ready = next(answers)
-        sent.extend([piece.data] * ready)
+        sent.extend([chunk.data] * ready)
         return ready
 
     async def send() -> None:
@@ -100,35 +100,35 @@ async def test_pieces_keep_their_order_whether_they_are_taken_at_once_or_wait(
             sent.append(data)
             await asyncio.sleep(0)  # what is put now has to wait, although nothing else does
 
-    viewer.direct_send = take_at_once
+    viewer.direct_send = send_directly
     sending = asyncio.create_task(send())
     await asyncio.sleep(0)
     for number in range(5):
-        channel.publish(gop(number))
+        broadcaster.publish(gop(number))
         if number % 2:
             await asyncio.sleep(0)
-    channel.close()
+    broadcaster.close()
     async with asyncio.timeout(PATIENCE):
         await sending
     assert sent == [b"%d" % number for number in range(5)]
 
 
-async def test_who_refuses_at_once_loses_whole_gops_as_ever() -> None:
-    channel = Broadcaster(queue_gops=3)
-    viewer = channel.subscribe()
+async def test_a_viewer_that_refuses_direct_sends_loses_whole_gops() -> None:
+    broadcaster = Broadcaster(queue_gops=3)
+    viewer = broadcaster.subscribe()
     viewer.direct_send = lambda _: False
     for number in range(10):
-        channel.publish(gop(number))
+        broadcaster.publish(gop(number))
     assert viewer.lost_gops > 0
     assert len(viewer._queue) <= 3
 
 
-def test_who_has_lost_something_is_said_once() -> None:
-    channel = Broadcaster(queue_gops=2)
-    viewer = channel.subscribe()
-    channel.publish(BytesChunk(b"1", random_access=True))
-    assert channel.subscribers_with_new_loss() == []
+def test_a_loss_is_reported_once() -> None:
+    broadcaster = Broadcaster(queue_gops=2)
+    viewer = broadcaster.subscribe()
+    broadcaster.publish(BytesChunk(b"1", random_access=True))
+    assert broadcaster.subscribers_with_new_loss() == []
     for number in range(4):
-        channel.publish(BytesChunk(b"%d" % number, random_access=True))
-    assert channel.subscribers_with_new_loss() == [viewer]
-    assert channel.subscribers_with_new_loss() == []
+        broadcaster.publish(BytesChunk(b"%d" % number, random_access=True))
+    assert broadcaster.subscribers_with_new_loss() == [viewer]
+    assert broadcaster.subscribers_with_new_loss() == []

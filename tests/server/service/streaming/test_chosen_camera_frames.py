@@ -35,7 +35,7 @@ async def test_another_cameras_gop_is_noticed(monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.parametrize("cuts", [0, 7, 98])
-def test_cuts_are_as_many_as_asked_for(cuts: int) -> None:
+def test_a_schedule_has_the_requested_number_of_cuts(cuts: int) -> None:
     chosen = schedule(99, cuts, seed=2)
     assert sum(a != b for a, b in pairwise(chosen)) == cuts
 

@@ -1,4 +1,4 @@
-"""A camera's newest frames, each made into a fragment once; frames of other parameters never get in."""
+"""A camera's newest frames, each packed into a fragment once; frames of other parameters are refused."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def put(frame_buffer: FrameBuffer, unit: AccessUnit) -> None:
     frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
 
 
-def test_the_oldest_frames_make_room() -> None:
+def test_the_oldest_frames_are_dropped() -> None:
     frame_buffer = FrameBuffer(FPS, 10, StreamFormat())
     for unit in encoded(0)[:25]:
         put(frame_buffer, unit)
@@ -32,7 +32,7 @@ def test_a_gop_is_the_fragments_of_its_frames_in_order() -> None:
     assert [frame.key for frame in frames if frame is not None] == [True, False, False, False, False]
 
 
-def test_other_parameters_are_refused_and_leave_no_trace() -> None:
+def test_frames_with_other_parameters_are_refused_and_not_stored() -> None:
     stream_format = StreamFormat()
     first, second = FrameBuffer(FPS, 10, stream_format), FrameBuffer(FPS, 10, stream_format)
     put(first, encoded(0)[0])
@@ -41,11 +41,11 @@ def test_other_parameters_are_refused_and_leave_no_trace() -> None:
     assert not second.has(0)
     assert second.newest == -1
     put(second, encoded(1)[5])
-    assert second.has(5), "with the right parameters the same camera is welcome"
+    assert second.has(5), "with the right parameters the same camera is accepted"
 
 
 @pytest.mark.parametrize("data", [b"", b"\x00\x00\x01", b"\x00\x00\x01\x67", b"no H.264 at all"])
-def test_a_key_frame_without_parameter_sets_is_refused(data: bytes) -> None:
+def test_a_keyframe_without_parameter_sets_is_refused(data: bytes) -> None:
     frame_buffer = FrameBuffer(FPS, 10, StreamFormat())
     with pytest.raises(ParameterMismatchError, match="without parameter sets"):
         frame_buffer.put(0, 1, data, key=True)

@@ -1,4 +1,4 @@
-"""Chromium plays on where a camera has nothing to show: to Media Source Extensions there is no hole."""
+"""Chromium plays over a camera's missing pictures: Media Source Extensions see no gap."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from server.service.view_selection.decider import GopDecision, ObjectChoice
 GOPS = 12
 SILENT = (4, 5, 6, 9)
 LOST = 53
-"""A pulse whose picture is lost, in a GOP of which the others have come."""
+"""A pulse whose picture is lost, in an otherwise complete GOP."""
 
 
 @pytest.fixture
 async def hall() -> AsyncIterator[Hall]:
-    """A site in which whoever watches may be as slow as they like."""
+    """A site whose viewers may be slow."""
     async for it in opened(http={"viewer_queue_gops": GOPS}):
         yield it
 
 
 @needs_chromium
-async def test_media_source_extensions_play_over_what_is_missing_to_the_end(hall: Hall) -> None:
+async def test_media_source_extensions_play_over_missing_pictures_to_the_end(hall: Hall) -> None:
     splicer, frame_buffer = hall.service.splicer, hall.service.frame_buffers[A]
     hall.service.come(*CAMERAS)
     hall.service.feed(0, {A: {1: SMALL}})

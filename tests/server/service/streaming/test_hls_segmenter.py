@@ -78,7 +78,7 @@ def own(camera: int) -> list[NDArray[np.uint8]]:
         (30, 1, 0.5, 15, 1),
     ],
 )
-def test_a_segment_is_as_many_whole_gops_as_fit(
+def test_a_segment_has_as_many_whole_gops_as_fit(
     fps: float, gop: int, segment_s: float, frames: int, target: int
 ) -> None:
     found = segment_layout(fps, gop, segment_s, 6.0)
@@ -87,7 +87,7 @@ def test_a_segment_is_as_many_whole_gops_as_fit(
     assert round(frames / fps + 1e-9) <= target
 
 
-def test_segments_are_numbered_by_their_pulses_and_listed_when_they_are_whole() -> None:
+def test_segments_are_numbered_by_their_pulses_and_listed_when_complete() -> None:
     site = Site()
     for gop in range(9):
         site.show(gop, CAMERAS[gop % 2])
@@ -99,7 +99,7 @@ def test_segments_are_numbered_by_their_pulses_and_listed_when_they_are_whole() 
     assert site.reel.playlist_segments[-1].until - site.reel.playlist_segments[-1].first == GOP
 
 
-def test_a_service_that_starts_later_gives_the_same_segments() -> None:
+def test_a_service_that_starts_later_makes_the_same_segments() -> None:
     early, late = Site(), Site(begin=7)
     for gop in range(20):
         early.show(gop, CAMERAS[gop % 3 % 2])
@@ -112,7 +112,7 @@ def test_a_service_that_starts_later_gives_the_same_segments() -> None:
         assert segment.data == other.data
 
 
-def test_what_has_left_the_playlist_stays_for_as_long_as_it_was_in_it_and_no_longer() -> None:
+def test_a_segment_stays_available_for_a_playlists_duration_after_it_left() -> None:
     site = Site()
     listed = site.splicer.layout.playlist_length
     for gop in range(1000):
@@ -139,7 +139,7 @@ def test_people_shown_by_one_camera_share_the_bytes_with_each_other_and_the_came
 
 @settings(max_examples=20, deadline=None)
 @given(st.frozensets(st.integers(1, 15)), st.lists(st.sampled_from(CAMERAS), min_size=16, max_size=16))
-def test_every_segment_decodes_by_itself_and_together_there_is_no_hole(
+def test_every_segment_decodes_by_itself_and_together_they_have_no_gap(
     silent: frozenset[int], wishes: list[str]
 ) -> None:
     site, alone = Site(silent), [own(camera) for camera in range(2)]
@@ -170,7 +170,7 @@ def check(
                 np.testing.assert_array_equal(picture, shown[pulse])
 
 
-def test_the_end_of_somebody_forgotten_can_be_fetched_for_a_while() -> None:
+def test_the_last_segments_of_a_forgotten_person_stay_available_for_a_while() -> None:
     site = Site()
     for gop in range(5):
         site.show(gop, CAMERAS[0])
@@ -184,7 +184,7 @@ def test_the_end_of_somebody_forgotten_can_be_fetched_for_a_while() -> None:
 
 
 @pytest.mark.parametrize("absent", [1, 4, 20, 100_000])
-def test_numbers_follow_each_other_whatever_was_not_decided(absent: int) -> None:
+def test_segment_numbers_are_consecutive_despite_missing_decisions(absent: int) -> None:
     site = Site()
     for gop in [*range(7), *range(7 + absent, 9 + absent)]:
         site.show(gop, CAMERAS[0])

@@ -1,4 +1,4 @@
-"""Cameras with parameter sets of their own: a cut from one to the other is right, and so is what bridges."""
+"""Cameras with parameter sets of their own: cuts between them and filled gaps are correct."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def config(**changes: Any) -> Config:
     return small_config(**OWN, http={"viewer_queue_gops": 100}, **changes)
 
 
-def test_the_cameras_do_differ() -> None:
+def test_the_cameras_have_different_parameter_sets() -> None:
     one, other = (parameter_sets(nal_units(sent(camera)[0].data)) for camera in MAKES)
     assert one is not None
     assert other is not None
@@ -60,7 +60,7 @@ def test_the_cameras_do_differ() -> None:
 
 
 @pytest.mark.parametrize("form", ["mp4", "mpegts"])
-async def test_every_frame_is_the_chosen_cameras_and_holes_stand_still(form: str) -> None:
+async def test_every_frame_is_the_chosen_cameras_and_gaps_repeat_the_last_picture(form: str) -> None:
     mp4, ts = await spliced(config())
     with av.open(io.BytesIO(mp4 if form == "mp4" else ts), format=form) as container:
         seen = [(frame.time, frame.to_ndarray(format="yuv420p")) for frame in container.decode(video=0)]
@@ -81,7 +81,7 @@ async def test_ffmpeg_plays_it_without_a_warning(tmp_path: Path) -> None:
         np.testing.assert_array_equal(pictures, expected(), name)
 
 
-async def test_where_they_must_be_equal_the_second_camera_is_refused() -> None:
+async def test_a_second_camera_with_other_parameter_sets_is_refused_if_they_must_be_equal() -> None:
     with pytest.raises(ParameterMismatchError, match="differ from the other cameras'"):
         await spliced(small_config())
 

@@ -1,4 +1,4 @@
-"""A stream in which a camera is preferred: that one while it sees the person, and else the best."""
+"""A stream with a preferred camera shows it while it sees the person, else the best view."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ async def test_a_preferred_camera_is_shown_while_it_sees_the_person(seen: Sequen
     assert await site.cameras(viewer) == shown
 
 
-async def test_everybody_elses_stream_is_as_it_was() -> None:
+async def test_other_streams_are_unchanged() -> None:
     site = Site()
     site.decide(GOP)
     preferring, other = (
@@ -90,7 +90,7 @@ async def test_everybody_elses_stream_is_as_it_was() -> None:
     assert (await site.cameras(preferring), await site.cameras(other)) == ("00", "11")
 
 
-async def test_whoever_prefers_the_same_shares_a_stream_that_ends_with_the_last_of_them() -> None:
+async def test_viewers_with_one_preference_share_a_stream_that_ends_with_the_last_of_them() -> None:
     site = Site()
     site.decide(GOP)
     channel = site.splicer.preferred.broadcaster(1, A)
@@ -104,7 +104,7 @@ async def test_whoever_prefers_the_same_shares_a_stream_that_ends_with_the_last_
     assert site.splicer.preferred.broadcaster(1, A) is not channel
 
 
-async def test_it_goes_on_with_whom_the_person_turned_out_to_be() -> None:
+async def test_the_stream_of_a_merged_person_continues_with_the_kept_one() -> None:
     site = Site()
     site.decide(GOP)
     viewer = site.splicer.preferred.broadcaster(1, A).subscribe()
@@ -114,7 +114,7 @@ async def test_it_goes_on_with_whom_the_person_turned_out_to_be() -> None:
     assert await site.cameras(viewer) == "000"
 
 
-async def test_the_stream_of_somebody_forgotten_ends() -> None:
+async def test_the_stream_of_a_forgotten_person_ends() -> None:
     site = Site()
     site.decide(GOP)
     viewer = site.splicer.preferred.broadcaster(1, A).subscribe()

@@ -1,4 +1,4 @@
-"""Who was seen by no camera for long is held, and then absent, by whatever number they go."""
+"""A person whom no camera sees is frozen and then absent, by any of their numbers."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def log() -> PresenceLog:
     return PresenceLog(UNSEEN)
 
 
-def test_who_was_never_seen_is_absent(log: PresenceLog) -> None:
+def test_a_person_who_was_never_seen_is_absent(log: PresenceLog) -> None:
     log.update(decision(0, {1: [0]}))
     assert log.presence_of(1) is Presence.PRESENT
     assert log.presence_of(2) is Presence.ABSENT
 
 
 @pytest.mark.parametrize(("place", "present"), [(0, 2), (GOP - 1, 2)])
-def test_who_leaves_is_present_for_a_while_then_held_then_absent(
+def test_a_person_who_leaves_is_present_for_a_while_then_frozen_then_absent(
     log: PresenceLog, place: int, present: int
 ) -> None:
     log.update(decision(0, {1: [place]}))
@@ -46,13 +46,13 @@ def test_who_leaves_is_present_for_a_while_then_held_then_absent(
     assert len(held) == 2
 
 
-def test_one_glimpse_by_any_camera_is_enough(log: PresenceLog) -> None:
+def test_one_box_in_any_camera_makes_a_person_present(log: PresenceLog) -> None:
     log.update(decision(0, {1: [0]}))
     log.update(decision(9, {1: [GOP - 1]}, camera=B))
     assert log.presence_of(1) is Presence.PRESENT
 
 
-def test_what_two_numbers_were_seen_by_is_one_persons_when_they_are_merged(log: PresenceLog) -> None:
+def test_merged_numbers_share_when_they_were_seen(log: PresenceLog) -> None:
     log.update(decision(0, {1: [0], 2: [0]}))
     log.update(decision(4, {2: [0]}))
     log.update(decision(5, {}, merged={2: 1}))
@@ -61,20 +61,20 @@ def test_what_two_numbers_were_seen_by_is_one_persons_when_they_are_merged(log: 
     assert log.presence_of(1) is Presence.PRESENT, "also by boxes that still have the other number"
 
 
-def test_pulses_that_begin_anew_make_everybody_absent(log: PresenceLog) -> None:
+def test_restarted_pulses_make_all_persons_absent(log: PresenceLog) -> None:
     log.update(decision(100, {1: [0]}))
     log.update(decision(0, {}))
     assert log.presence_of(1) is Presence.ABSENT
 
 
-def test_who_is_forgotten_is_absent(log: PresenceLog) -> None:
+def test_a_forgotten_person_is_absent(log: PresenceLog) -> None:
     log.update(decision(0, {1: [0], 2: [0]}))
     log.forget({2})
     assert log.presence_of(1) is Presence.ABSENT
     assert log.presence_of(2) is Presence.PRESENT
 
 
-def test_without_a_while_only_who_is_seen_in_a_gop_is_present_in_it() -> None:
+def test_without_hide_time_a_person_is_present_only_in_gops_that_show_them() -> None:
     log = PresenceLog(0)
     log.update(decision(0, {1: [GOP - 1]}))
     assert log.presence_of(1) is Presence.PRESENT

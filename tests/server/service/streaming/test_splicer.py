@@ -1,4 +1,4 @@
-"""A person's stream is the chosen cameras' own bytes, GOP by GOP, for as long as anybody knows them."""
+"""A person's stream is the chosen cameras' own bytes, GOP by GOP, until the person is forgotten."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ async def test_people_shown_by_one_camera_share_the_bytes() -> None:
     assert (await received(one))[0] is (await received(two))[0]
 
 
-async def test_where_nobody_can_be_shown_the_camera_from_before_goes_on() -> None:
+async def test_without_a_choice_the_last_camera_continues() -> None:
     splicer, frame_buffers = filled()
     splicer.publish_decision(decision(0, choice(1, A)))
     viewer = splicer.persons[1].subscribe()
@@ -73,7 +73,7 @@ async def test_a_partial_gop_at_the_end_is_sent() -> None:
     assert await received(splicer.persons[1].subscribe()) == [frame_buffers[A].gop(0, 3)]
 
 
-async def test_the_stream_of_a_number_that_was_anothers_goes_on_with_that_person() -> None:
+async def test_the_stream_of_a_merged_number_continues_with_the_kept_person() -> None:
     splicer, frame_buffers = filled()
     splicer.publish_decision(decision(0, choice(1, A), choice(2, B)))
     viewer = splicer.persons[2].subscribe()
@@ -84,7 +84,7 @@ async def test_the_stream_of_a_number_that_was_anothers_goes_on_with_that_person
     assert await received(viewer) == gops(frame_buffers, [B, A, A, B])
 
 
-async def test_the_stream_of_a_number_that_was_anothers_ends_when_nobody_watches_it_any_more() -> None:
+async def test_the_stream_of_a_merged_number_ends_with_its_last_viewer() -> None:
     splicer, _ = filled()
     splicer.publish_decision(decision(0, choice(1, A), choice(2, B), choice(3, B)))
     viewer = splicer.persons[2].subscribe()
@@ -96,7 +96,7 @@ async def test_the_stream_of_a_number_that_was_anothers_ends_when_nobody_watches
     assert list(splicer.persons) == [1]
 
 
-async def test_the_streams_of_the_forgotten_end() -> None:
+async def test_the_streams_of_forgotten_persons_end() -> None:
     splicer, frame_buffers = filled()
     splicer.publish_decision(decision(0, choice(1, A), choice(2, B)))
     viewer = splicer.persons[2].subscribe()
@@ -106,7 +106,7 @@ async def test_the_streams_of_the_forgotten_end() -> None:
     assert list(splicer.persons) == [1]
 
 
-async def test_a_cameras_own_stream_begins_with_a_key_frame_and_is_every_frame() -> None:
+async def test_a_cameras_own_stream_begins_with_a_keyframe_and_has_every_frame() -> None:
     splicer, frame_buffers = filled()
     early = splicer.cameras[A].subscribe()
     frames = [shelved for pulse in range(2, 13) if (shelved := frame_buffers[A].get(pulse)) is not None]
@@ -118,7 +118,7 @@ async def test_a_cameras_own_stream_begins_with_a_key_frame_and_is_every_frame()
     assert await received(late) == [frame.fragment for frame in frames[8:]], "from pulse 10 on"
 
 
-async def test_the_end_ends_every_stream() -> None:
+async def test_closing_the_splicer_ends_every_stream() -> None:
     splicer, _ = filled()
     splicer.publish_decision(decision(0, choice(1, A)))
     viewers = [splicer.persons[1].subscribe(), splicer.cameras[A].subscribe()]

@@ -1,4 +1,4 @@
-"""No stream has a hole in its time: where a picture is missing, a decoder shows the last one again."""
+"""No stream has a gap in its time: in place of a missing picture, a decoder shows the last one again."""
 
 from __future__ import annotations
 
@@ -117,9 +117,7 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
         if not pieces:
             continue
         pictures = shown(head, pieces)
-        assert [it.pulse for it in pictures[1:]] == [it.pulse + it.duration for it in pictures[:-1]], (
-            "no hole"
-        )
+        assert [it.pulse for it in pictures[1:]] == [it.pulse + it.duration for it in pictures[:-1]], "no gap"
         before: NDArray[np.uint8] | None = None
         for it in pictures:
             possible = [own[camera][it.pulse] for camera in cameras if it.pulse in own[camera]]
@@ -145,7 +143,7 @@ def decide(splicer: Splicer, gop: int, camera: str | None) -> None:
     splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
-async def test_a_picture_that_the_camera_did_not_take_costs_only_itself() -> None:
+async def test_a_skipped_frame_affects_no_other_picture() -> None:
     splicer, frame_buffers, head = splicing()
     units = taken(1, frozenset({7, 8}), "ultrafast")
     for unit in units:
@@ -160,7 +158,7 @@ async def test_a_picture_that_the_camera_did_not_take_costs_only_itself() -> Non
         np.testing.assert_array_equal(it.picture, own[pulse])
 
 
-async def test_a_camera_that_fell_silent_stands_still_until_it_comes_back() -> None:
+async def test_the_last_picture_of_a_silent_camera_stays_until_it_returns() -> None:
     splicer, _, head = splicing()
     viewer = splicer.cameras["c0"].subscribe()
     units = taken(0, frozenset(), "ultrafast")
@@ -178,7 +176,7 @@ async def test_a_camera_that_fell_silent_stands_still_until_it_comes_back() -> N
         np.testing.assert_array_equal(it.picture, alone(units)[GOP + 1])
 
 
-async def test_whoever_comes_while_nothing_can_be_shown_for_long_waits_and_no_queue_grows() -> None:
+async def test_a_viewer_who_joins_in_a_long_gap_waits_and_no_queue_grows() -> None:
     splicer, _, _ = splicing()
     decide(splicer, 0, "c0")
     slow = splicer.persons[1].subscribe()
@@ -189,7 +187,7 @@ async def test_whoever_comes_while_nothing_can_be_shown_for_long_waits_and_no_qu
     assert not late._queue
 
 
-async def test_after_hours_without_a_picture_the_stream_goes_on_all_the_same() -> None:
+async def test_a_stream_continues_after_hours_without_a_picture() -> None:
     splicer, frame_buffers, _ = splicing()
     decide(splicer, 0, "c0")
     viewer = splicer.persons[1].subscribe()
@@ -200,7 +198,7 @@ async def test_after_hours_without_a_picture_the_stream_goes_on_all_the_same() -
     assert len(await received(viewer)) == 2
 
 
-async def test_pulses_that_begin_anew_begin_the_stream_anew() -> None:
+async def test_restarted_pulses_restart_the_stream() -> None:
     splicer, frame_buffers, _ = splicing()
     units = taken(0, frozenset(), "ultrafast")
     for unit in units[:GOP]:
