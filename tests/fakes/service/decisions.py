@@ -1,4 +1,4 @@
-"""Decisions of a best-view service, made up and collected."""
+"""Decisions of a best-view service: invented ones, and collected ones."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EPOCHS = 8
 
 
 def behind() -> FedService:
-    """Return a service that has heard all cameras, and decided nothing."""
+    """Return a service that has received all epochs, and decided none."""
     service = FedService(small_config())
     service.come(*CAMERAS)
     for epoch in range(EPOCHS):
@@ -39,7 +39,7 @@ def behind() -> FedService:
 
 
 def noted(service: FedService) -> list[GopDecision]:
-    """Collect what a service decides."""
+    """Return a list that collects the decisions of a service."""
     decided: list[GopDecision] = []
     publish = service._publish
 
@@ -58,9 +58,9 @@ def decision(
     corrections: tuple[Merge | Split, ...] = (),
     **boxes: list[list[NumberedBox]],
 ) -> GopDecision:
-    nobody: list[list[NumberedBox]] = [[]] * frames
-    shown = {it: boxes.get(it, nobody) for it in CAMERAS}
-    return GopDecision(gop * GOP, frames, choices, shown, {}, corrections, NO_REASON)
+    empty: list[list[NumberedBox]] = [[]] * frames
+    boxes_of_camera = {it: boxes.get(it, empty) for it in CAMERAS}
+    return GopDecision(gop * GOP, frames, choices, boxes_of_camera, {}, corrections, NO_REASON)
 
 
 def choice(number: int, camera: str | None, before: str | None = None, *, away: bool = False) -> ObjectChoice:

@@ -24,19 +24,19 @@ Picture = NDArray[np.uint8]
 Codec = Literal["h264", "vp8"]
 
 EPOCHS, GONE = 24, range(4, 16)
-"""Epochs that there are, and those in which object 1 is in no camera."""
+"""The number of epochs, and those in which object 1 is in no camera."""
 UNSEEN = 2 * GOP
-"""Frames after which object 1 is not shown any more."""
+"""Frames after which object 1 is frozen."""
 ACCESS = {"hide_after_s": UNSEEN / FPS}
-PATIENT = {"viewer_queue_gops": 100}  # with who reads slowly
-GREY = 128
+PATIENT = {"viewer_queue_gops": 100}  # for slow readers
+GRAY = 128
 ELSEWHERE: Box = (40.0, 10.0, 46.0, 28.0)
 """Where object 2 is."""
 
 
 @asynccontextmanager
 async def left(folder: Path, **changes: Any) -> AsyncIterator[Hall]:
-    """Serve that site; nothing has been seen yet."""
+    """Serve the site, before the first frame."""
     changes = {"access": ACCESS, "http": PATIENT, **changes}
     async with locked(folder, **changes) as hall:
         hall.service.frames = EPOCHS * GOP
@@ -45,25 +45,25 @@ async def left(folder: Path, **changes: Any) -> AsyncIterator[Hall]:
 
 
 def go_on(hall: Hall, epochs: range) -> list[GopChoices]:
-    """Let the cameras see some epochs; give what is decided meanwhile."""
-    told: list[GopChoices] = []
-    hall.service.on_decision.append(told.append)
+    """Feed some epochs; return the decisions made meanwhile."""
+    decisions: list[GopChoices] = []
+    hall.service.on_decision.append(decisions.append)
     for epoch in epochs:
         there = epoch not in GONE
-        seen_by_a = {1: SMALL if there else None, 2: ELSEWHERE}  # who is named first is object 1
+        seen_by_a = {1: SMALL if there else None, 2: ELSEWHERE}  # the first one becomes object 1
         hall.service.feed(epoch, {A: seen_by_a, B: {1: LARGE if there else None}})
-    hall.service.on_decision.remove(told.append)
-    return told
+    hall.service.on_decision.remove(decisions.append)
+    return decisions
 
 
-def expected(told: list[GopChoices], codec: Codec = "h264", *, holds: bool = True) -> dict[int, Picture]:
-    """Return what who may see object 1 alone is to see, by pulse, of decisions from the first one on.
+def expected(decisions: list[GopChoices], codec: Codec = "h264", *, holds: bool = True) -> dict[int, Picture]:
+    """Return the pictures for a viewer with access to object 1 alone, by pulse, of all decisions.
 
-    ``holds``: before it is grey, the last picture stands.
+    ``holds``: before it turns gray, the last picture stays.
     """
     shown: dict[int, Picture] = {}
     seen_last = -1 - 2 * UNSEEN
-    for gop in told:
+    for gop in decisions:
         camera = gop.choices[1]
         seen = [
             gop.first + place
@@ -79,7 +79,7 @@ def expected(told: list[GopChoices], codec: Codec = "h264", *, holds: bool = Tru
             elif holds and ago <= 2 * UNSEEN:
                 shown[pulse] = shown[pulse - 1]
             else:
-                shown[pulse] = np.full_like(own(camera)[pulse], GREY)
+                shown[pulse] = np.full_like(own(camera)[pulse], GRAY)
     return shown
 
 
@@ -93,7 +93,7 @@ def own(camera: str, codec: Codec = "h264") -> list[Picture]:
 
 
 def decoded(data: bytes) -> dict[int, Picture]:
-    """Decode a stream: the picture of each pulse; what cannot be decoded is an error."""
+    """Decode a stream strictly; return the picture of each pulse."""
     with av.open(io.BytesIO(data), "r", options={"err_detect": "explode"}) as stream:
         stream.streams.video[0].codec_context.options = {"err_detect": "explode"}
         frames = list(stream.decode(video=0))
@@ -101,24 +101,24 @@ def decoded(data: bytes) -> dict[int, Picture]:
 
 
 def equal(shown: dict[int, Picture], right: dict[int, Picture]) -> None:
-    """Compare pictures by their pulses; there must be no hole in them, and they reach as far."""
+    """Assert that pictures are equal by pulse, without a gap, up to the same end."""
     assert list(shown) == list(range(min(shown), len(right)))
     for pulse, picture in shown.items():
         np.testing.assert_array_equal(picture, right[pulse], str(pulse))
 
 
-def chosen(told: list[GopChoices], codec: Codec = "h264") -> dict[int, Picture]:
-    """Return what everybody else sees."""
-    cameras = {pulse: it.choices[1] for it in told for pulse in range(it.first, it.first + it.frames)}
+def chosen(decisions: list[GopChoices], codec: Codec = "h264") -> dict[int, Picture]:
+    """Return the pictures for viewers with access to all persons."""
+    cameras = {pulse: it.choices[1] for it in decisions for pulse in range(it.first, it.first + it.frames)}
     return {pulse: own(camera, codec)[pulse] for pulse, camera in cameras.items()}
 
 
-def is_grey(picture: Picture) -> bool:
-    return bool((picture == GREY).all())
+def is_gray(picture: Picture) -> bool:
+    return bool((picture == GRAY).all())
 
 
 async def begun(hall: Hall, path: str, who: str) -> aiohttp.ClientResponse:
-    """Begin to watch."""
+    """Open a stream."""
     answer = await hall.session.get(path, headers=bearer(who))
     assert answer.status == 200, await answer.text()
     return answer
@@ -130,6 +130,6 @@ async def fetched(hall: Hall, path: str, who: str) -> bytes:
 
 
 async def to_the_end(hall: Hall, *answers: aiohttp.ClientResponse) -> list[bytes]:
-    """End all streams, and give what was sent."""
+    """End all streams; return what was sent."""
     hall.service.splicer.close()
     return await asyncio.gather(*(it.read() for it in answers))

@@ -1,4 +1,4 @@
-"""A site that shows the synthetic room with true boxes, fed by hand, and readers of what it draws."""
+"""A site of the synthetic room with true boxes, fed by hand, and readers of its rendered streams."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ START = 200
 """The scene's frame at pulse 0: people are in sight."""
 
 MOST = 150
-"""Frames that there are."""
+"""The number of frames."""
 
 Image = NDArray[np.uint8]
 
@@ -51,20 +51,20 @@ def room() -> Scene:
 
 @cache
 def units(camera: int, frames: int) -> tuple[AccessUnit, ...]:
-    """Encode what a camera of the room sees from pulse 0 on."""
+    """Encode the frames of a camera of the room from pulse 0 on."""
     site = small_config(site={"width": SIZE[0], "height": SIZE[1]})
     encoder = Encoder(site.site, site.encode)
     return tuple(encoder.encode(pulse, room().image(camera, START + pulse)) for pulse in range(frames))
 
 
 def boxes(camera: int, first: int, frames: int) -> dict[int, list[Box | None]]:
-    """Return where everybody is, by person and frame."""
-    found: dict[int, list[Box | None]] = {}
+    """Return the true boxes, by person and frame."""
+    boxes_by_person: dict[int, list[Box | None]] = {}
     for place in range(frames):
         truth = room().truth(START + first + place)[camera]
         for person, box in zip(truth.ids.tolist(), truth.boxes.tolist(), strict=True):
-            found.setdefault(person, [None] * frames)[place] = tuple(box)
-    return found
+            boxes_by_person.setdefault(person, [None] * frames)[place] = tuple(box)
+    return boxes_by_person
 
 
 @dataclass
@@ -158,7 +158,7 @@ class Part:
 
 
 async def parts(answer: aiohttp.ClientResponse) -> AsyncGenerator[Part, None]:
-    """Read multipart JPEG as RFC 2046 has it: by its boundary and the lengths it tells."""
+    """Parse multipart JPEG (RFC 2046) by its boundary and Content-Length."""
     boundary = "--" + answer.headers["Content-Type"].partition("boundary=")[2]
     stream = answer.content
     assert await stream.readline() == boundary.encode() + b"\r\n"

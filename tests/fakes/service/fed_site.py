@@ -19,7 +19,7 @@ A, B = CAMERAS
 
 
 class Hall:
-    """A served site, a session to ask it with, and the port."""
+    """A served site, an HTTP session for it, and its port."""
 
     def __init__(self, service: FedService, session: aiohttp.ClientSession, port: int) -> None:
         self.service, self.session, self.port = service, session, port
@@ -47,7 +47,7 @@ async def opened(*, patience: float = PATIENCE, **changes: Any) -> AsyncIterator
 
 
 def see(hall: Hall) -> None:
-    """Let object 1 be in both cameras, larger in c1, and object 2 in c0 alone, until two GOPs are decided."""
+    """Show object 1 to both cameras, larger in c1, and object 2 to c0 alone, until two GOPs are decided."""
     hall.service.come(*CAMERAS)
     for epoch in range(3):
         hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})

@@ -19,9 +19,9 @@ from server.service.view_selection.decider import GopDecision, ObjectChoice
 GOPS = 12
 OWN = {"encode": {"parameters": "own"}}
 MAKES: dict[str, dict[str, Any]] = {A: {"preset": "ultrafast"}, B: {"preset": "medium", "crf": 30}}
-"""CAVLC without and CABAC with the rest of profile High: as different as two makes."""
+"""CAVLC without and CABAC with the rest of profile High: as different as two brands."""
 MISSING = {(B, 3), (A, 6), (A, 7), (B, 10)}
-"""GOPs that do not come."""
+"""GOPs that are lost."""
 
 
 @cache
@@ -50,7 +50,7 @@ def shown(gop: int) -> tuple[str, int]:
 
 
 def expected() -> list[NDArray[np.uint8]]:
-    """Return what is to be seen: where a GOP does not come, the last picture before it."""
+    """Return the expected pictures: in place of a lost GOP, the last picture before it."""
     own, seen = {camera: alone(camera) for camera in MAKES}, []
     for gop in range(GOPS):
         camera, real = shown(gop)
@@ -58,11 +58,11 @@ def expected() -> list[NDArray[np.uint8]]:
     return seen
 
 
-def put(shelves: dict[str, FrameBuffer]) -> None:
-    for camera, shelf in shelves.items():
+def put(frame_buffers: dict[str, FrameBuffer]) -> None:
+    for camera, frame_buffer in frame_buffers.items():
         for unit in sent(camera):
             if (camera, unit.pulse // GOP) not in MISSING:
-                shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+                frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
 
 
 def decision(gop: int) -> GopDecision:

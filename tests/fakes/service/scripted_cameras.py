@@ -1,4 +1,4 @@
-"""Cameras whose every frame and word a test decides, and a small site to send them to."""
+"""Cameras whose frames and messages a test decides, and a small site that receives them."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ CAMERAS = ("c0", "c1")
 SMALL: Box = (10.0, 10.0, 16.0, 28.0)
 LARGE: Box = (20.0, 4.0, 36.0, 44.0)
 NO_REASON = cast("SelectionReasons", None)
-"""Of decisions that a test makes up: nobody will ask why."""
+"""The reasons of invented decisions, which no test reads."""
 
 
 def small_config(cameras: Sequence[str | dict[str, Any]] = CAMERAS, **changes: Any) -> Config:
-    """Return a site in which every epoch is a GOP, and whoever is seen once is somebody."""
+    """Return a site in which every epoch is a GOP, and one detection confirms a person."""
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
         "encode": {"gop": GOP},
@@ -75,12 +75,12 @@ def encoded(
 
 
 def look(person: int) -> list[float]:
-    """Return a histogram by which a person can be told from others."""
+    """Return a color histogram that distinguishes a person from others."""
     return [1.0 if place == person % 8 else 0.0 for place in range(8)]
 
 
 def word(camera: str, epoch: int, boxes: Mapping[int, Box | None], **changes: Any) -> CameraTracks:
-    """Return a camera's word on an epoch: where each track is, all epoch long."""
+    """Return a camera's track message of an epoch in which each track has one box throughout."""
     last = end_of_epoch(epoch, STRIDE)
     message = CameraTracks(
         camera=camera,
@@ -114,25 +114,25 @@ def epoch_of(number: int, *words: CameraTracks) -> Epoch:
 
 
 def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
-    """Return a frame as it comes from the bus."""
+    """Return a frame as received from the bus."""
     head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=boot, due=0.0, taken=0.0, encoded=0.0)
     return Message(ZenohKeys("hall").camera(camera, "video"), unit.data, msgspec.json.encode(head))
 
 
 def tracks(message: CameraTracks) -> Message:
-    """Return a word as it comes from the bus."""
+    """Return a track message as received from the bus."""
     return Message(ZenohKeys("hall").camera(message.camera, "tracks"), msgspec.json.encode(message), b"")
 
 
 def thumbnail(camera: str, track: int, jpeg: bytes, pulse: int = 0, boot: int = 1) -> Message:
-    """Return a small picture as it comes from the bus."""
+    """Return a thumbnail as received from the bus."""
     head = ThumbnailHeader(track=track, boot=boot, pulse=pulse)
     return Message(ZenohKeys("hall").camera(camera, f"thumbs/{track}"), jpeg, msgspec.json.encode(head))
 
 
 def status(camera: str, **changes: Any) -> Message:
-    """Return a status as it comes from the bus."""
-    told = CameraStatus(
+    """Return a status message as received from the bus."""
+    status = CameraStatus(
         camera=camera,
         boot=1,
         state="live",
@@ -144,7 +144,7 @@ def status(camera: str, **changes: Any) -> Message:
         clock_offset=0.0,
         round_trip=0.001,
     )
-    payload = msgspec.json.encode(msgspec.structs.replace(told, **changes))
+    payload = msgspec.json.encode(msgspec.structs.replace(status, **changes))
     return Message(ZenohKeys("hall").camera(camera, "status"), payload, b"")
 
 
@@ -159,19 +159,19 @@ class TrackNumbers:
     def update(
         self, tracks: Sequence[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
-        """Return everybody their number."""
+        """Return each track's number as the person's."""
         del last_frame, pictures
         return IdentityUpdate({TrackletKey(*it.key, 0): it.local_id for it in tracks}, (), (), (), (), ())
 
 
 class FedService(BestViewPipeline):
-    """The best-view service without a bus: a test hands it what cameras would send."""
+    """The best-view pipeline without a bus: a test passes it the cameras' messages."""
 
     frames = 40
-    """As many pictures as each camera has."""
+    """The number of frames of each camera."""
 
     def come(self, *cameras: str) -> None:
-        """Let cameras be there, which remember nobody."""
+        """Connect cameras that have no retained identities."""
         for camera in cameras:
             for part in (self.ingest, self.state_replication):
                 part.alive(ZenohKeys("hall").camera(camera, "alive"), is_present=True)
@@ -180,7 +180,7 @@ class FedService(BestViewPipeline):
             )
 
     def feed(self, epoch: int, seen: Mapping[str, Mapping[int, Box | None]]) -> None:
-        """Send an epoch's frames and words of the cameras in ``seen``, and decide."""
+        """Send an epoch's frames and track messages of the cameras in ``seen``, and decide."""
         for seed, camera in enumerate(self.config.camera_ids):
             if camera not in seen:
                 continue

@@ -1,4 +1,4 @@
-"""People whose tracks' identities the test decides."""
+"""A person tracker whose identities the test decides."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def people(**settings: int) -> PersonTracker:
 
 
 class Dictated:
-    """An identity registry that says what a test wants."""
+    """An identity registry that returns the updates of a test."""
 
     def __init__(self, *updates: IdentityUpdate) -> None:
         self._updates = list(updates)
@@ -29,7 +29,7 @@ class Dictated:
 
 
 def boxes(it: PersonTracker, camera: str, pulse: int) -> dict[int, Box]:
-    """Return everybody's box in one frame by number."""
+    """Return all boxes in one frame by person number."""
     [rows] = it.boxes(camera, pulse, 1)
     numbers = [number for number, *_ in rows]
     assert numbers == sorted(set(numbers))

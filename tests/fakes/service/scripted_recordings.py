@@ -1,4 +1,4 @@
-"""A recording whose every GOP a test decides."""
+"""Recordings whose GOPs a test decides."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ A, B = CAMERAS
 FRAMES = 200
 PULSE0 = 1_763_700_000.0
 AMPLE = RetentionLimits(keep_s=1e6, max_mb=1e6, segment_s=1.0)
-"""Nothing is taken away; five GOPs in a segment."""
+"""Nothing is deleted; five GOPs per segment."""
 
 Picture = NDArray[np.uint8]
 
 
-class ClocksByHand:
-    """A machine's clocks as a test says. They stand still until :attr:`now` is set: then time passes."""
+class ManualClocks:
+    """Machine clocks that a test sets; time passes only when :attr:`now` is set."""
 
     def __init__(self, now: float = PULSE0) -> None:
         self.wall, self.steady = now, 1000.0
         self.boot = "first"
-        self.is_kept = True
+        self.is_synchronized = True
         self.machine = MachineClocks(
-            lambda: self.wall, lambda: self.steady, lambda: self.boot, lambda: self.is_kept
+            lambda: self.wall, lambda: self.steady, lambda: self.boot, lambda: self.is_synchronized
         )
 
     @property
@@ -52,20 +52,20 @@ class ClocksByHand:
         self.wall = now
 
     def jump(self, seconds: float) -> None:
-        """Set the clock, as somebody does by hand: nobody keeps it any more."""
+        """Set the wall clock by hand: it is not synchronized any more."""
         self.wall += seconds
-        self.is_kept = False
+        self.is_synchronized = False
 
     def off(self, seconds: float, *, wrong_by: float = 0.0) -> None:
-        """Switch the machine off for a while; when it is on again its clock is wrong by so much."""
+        """Switch the machine off for a while; afterwards its wall clock is off by ``wrong_by``."""
         self.wall += seconds + wrong_by
         self.steady = 10.0
         self.boot += " and the next"
 
 
 @cache
-def filled() -> tuple[dict[str, FrameBuffer], bytes]:
-    """Return a shelf per camera with all its frames, and what every file begins with."""
+def filled_buffers() -> tuple[dict[str, FrameBuffer], bytes]:
+    """Return a frame buffer per camera with all its frames, and the init segment."""
     stream_format = StreamFormat()
     frame_buffers = {camera: FrameBuffer(FPS, FRAMES, stream_format) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
@@ -85,7 +85,7 @@ def own_pictures(camera: str) -> list[Picture]:
     ]
 
 
-def head(began: float = PULSE0, numbers_since: float | None = None) -> SessionInfo:
+def session_info(began: float = PULSE0, numbers_since: float | None = None) -> SessionInfo:
     return SessionInfo(
         site="hall",
         fps=FPS,
@@ -99,40 +99,42 @@ def head(began: float = PULSE0, numbers_since: float | None = None) -> SessionIn
     )
 
 
-def piece(
+def gop_record(
     gop: int, choices: Mapping[int, str], cameras: tuple[str, ...] = CAMERAS, frames: int = GOP
 ) -> GopRecord:
-    """Return a GOP as it was decided; ``frames``: as many of it have come."""
+    """Return the record of a decided GOP, of which the first ``frames`` have arrived."""
     first = gop * GOP
-    delivered = {}
+    arrived = {}
     for camera in cameras:
-        taken = [filled()[0][camera].get(pulse) for pulse in range(first, first + frames)]
-        delivered[camera] = RecordedGop(first, tuple(it.fragment for it in taken if it is not None))
+        taken = [filled_buffers()[0][camera].get(pulse) for pulse in range(first, first + frames)]
+        arrived[camera] = RecordedGop(first, tuple(it.fragment for it in taken if it is not None))
     boxes = {camera: [[(1, 1.0, 2.0, 3.0, 4.0)]] * GOP for camera in cameras}
     return GopRecord(
-        GopChoices(first=first, frames=GOP, choices=dict(choices), boxes=boxes, cuts=[]), delivered
+        GopChoices(first=first, frames=GOP, choices=dict(choices), boxes=boxes, cuts=[]), arrived
     )
 
 
-def written(store: RecordingFolder, pieces: list[GopRecord], began: float = PULSE0) -> RecordingFolder:
-    """Open a store and write the pieces."""
+def written_folder(
+    store: RecordingFolder, records: list[GopRecord], began: float = PULSE0
+) -> RecordingFolder:
+    """Open a recording folder and write GOPs to it."""
     store.open()
-    for it in pieces:
-        store.write(it, head(began), InitSegments(filled()[1]))
+    for it in records:
+        store.write(it, session_info(began), InitSegments(filled_buffers()[1]))
     return store
 
 
 def fragments(data: bytes) -> list[bytes]:
-    """Cut a piece of a stream into its fragments."""
+    """Split a part of a stream into its fragments."""
     return list(_fragments(io.BytesIO(data).read, len(data)))
 
 
 def pictures(path: Path) -> Iterator[tuple[int, Picture]]:
-    """Play a file or playlist from the disk: pulse and picture, frame by frame."""
+    """Yield pulse and picture of each frame of a file or playlist on the disk."""
     with av.open(str(path), "r") as container:
         for frame in container.decode(video=0):
             yield round(float(frame.time or 0) * FPS), frame.to_ndarray(format="yuv420p")
 
 
-def everything_that_plays(folder: Path) -> list[Path]:
+def playable_files(folder: Path) -> list[Path]:
     return [it for it in sorted([*folder.rglob("*.m3u8"), *folder.rglob("*.mp4")]) if it.name != "init.mp4"]

@@ -13,7 +13,7 @@ from fakes.service.fed_site import A, B, Hall, opened
 from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, encoded
 
 EPOCHS = 8
-"""As many as a camera by hand has pictures of."""
+"""The epochs for which a scripted camera has frames."""
 
 
 @pytest.fixture

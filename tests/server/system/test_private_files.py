@@ -12,7 +12,14 @@ import pytest
 
 from fakes.service.decisions import choice, decision
 from fakes.service.scripted_cameras import CAMERAS, GOP, HEIGHT, SMALL, WIDTH, FedService, small_config
-from fakes.service.scripted_recordings import AMPLE, A, filled, head, piece, written
+from fakes.service.scripted_recordings import (
+    AMPLE,
+    A,
+    filled_buffers,
+    gop_record,
+    session_info,
+    written_folder,
+)
 from fakes.system.unprivileged import nobodys_folder
 from server.cli.doctor.disk import disk_findings
 from server.cli.doctor.findings import Level
@@ -55,8 +62,8 @@ def modes(folder: Path) -> dict[bool, set[int]]:
 @pytest.mark.parametrize("mask", [0o000, 0o022, 0o077])
 def test_recordings_are_closed_to_others(tmp_path: Path, who: str, mask: int) -> None:
     with folder_of(who, tmp_path) as around, umask(mask):
-        store = written(
-            RecordingFolder(around / "site" / "kept", AMPLE), [piece(gop, {1: A}) for gop in range(7)]
+        store = written_folder(
+            RecordingFolder(around / "site" / "kept", AMPLE), [gop_record(gop, {1: A}) for gop in range(7)]
         )
         assert modes(around) == {True: {0o700}, False: {0o600}}
         assert store.session is not None
@@ -106,7 +113,7 @@ def test_a_folder_that_was_there_is_left_as_it_is_and_told_of(
 
 
 def test_runs_that_an_earlier_version_left_open_are_closed_and_nobody_elses(tmp_path: Path) -> None:
-    written(RecordingFolder(tmp_path, AMPLE), [piece(0, {1: A})]).close()
+    written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(0, {1: A})]).close()
     (run,) = (it for it in tmp_path.iterdir() if it.is_dir())
     run.chmod(0o755)
     other = tmp_path / "holiday"
@@ -114,7 +121,7 @@ def test_runs_that_an_earlier_version_left_open_are_closed_and_nobody_elses(tmp_
     other.chmod(0o755)
     again = RecordingFolder(tmp_path, AMPLE)
     again.open()
-    again.write(piece(1, {1: A}), head(), InitSegments(filled()[1]))
+    again.write(gop_record(1, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
     again.close()
     assert stat.S_IMODE(run.stat().st_mode) == 0o700
     assert stat.S_IMODE(other.stat().st_mode) == 0o755

@@ -23,7 +23,7 @@ from fakes.service.departure import (
     expected,
     fetched,
     go_on,
-    is_grey,
+    is_gray,
     left,
     own,
     to_the_end,
@@ -53,7 +53,7 @@ async def test_the_picture_stands_and_then_is_grey_and_comes_back_with_the_perso
         )
     equal(narrow, right)
     equal(full, chosen(told, codec))
-    grey = [pulse for pulse in narrow if is_grey(narrow[pulse])]
+    grey = [pulse for pulse in narrow if is_gray(narrow[pulse])]
     assert grey == list(range(grey[0], grey[-1] + 1))
     assert len(grey) > 3 * GOP
     assert np.array_equal(narrow[grey[0] - 1], narrow[grey[0] - 2]), "before it is grey, it stands"
@@ -66,7 +66,7 @@ async def test_who_comes_while_the_person_is_away_begins_with_grey(tmp_path: Pat
         theirs = await begun(hall, "/objects/1/best.mp4", "family")
         told += go_on(hall, range(14, EPOCHS))
         shown = decoded((await to_the_end(hall, theirs))[0])
-    assert is_grey(shown[min(shown)])
+    assert is_gray(shown[min(shown)])
     equal(shown, expected(told))
 
 
@@ -76,8 +76,8 @@ async def test_a_camera_that_is_preferred_is_grey_without_the_person_too(tmp_pat
         theirs = await begun(hall, "/objects/1/best.mp4?prefer=c0", "family")
         told += go_on(hall, range(3, EPOCHS))
         shown = decoded((await to_the_end(hall, theirs))[0])
-    is_as_expected = {pulse: is_grey(picture) for pulse, picture in expected(told).items() if pulse in shown}
-    assert {pulse: is_grey(picture) for pulse, picture in shown.items()} == is_as_expected
+    is_as_expected = {pulse: is_gray(picture) for pulse, picture in expected(told).items() if pulse in shown}
+    assert {pulse: is_gray(picture) for pulse, picture in shown.items()} == is_as_expected
     np.testing.assert_array_equal(shown[max(shown)], own("c0")[max(shown)])
 
 
@@ -101,7 +101,7 @@ async def test_segments_and_their_parts_are_grey_too_and_everybody_elses_are_not
         standing = narrow[max(it for it in narrow if it <= pulse)]
         np.testing.assert_array_equal(standing, right[pulse], str(pulse))
     equal(full, {pulse: picture for pulse, picture in chosen(told).items() if pulse < until})
-    assert any(map(is_grey, narrow.values()))
+    assert any(map(is_gray, narrow.values()))
 
 
 async def test_the_room_is_not_heard_without_the_person(tmp_path: Path) -> None:

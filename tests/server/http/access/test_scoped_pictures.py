@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fakes.http.tokens import bearer, line_of, write_tokens
-from fakes.service.departure import GREY, begun, fetched, go_on, left
+from fakes.service.departure import GRAY, begun, fetched, go_on, left
 from fakes.service.drawn_site import Drawn, Image, drawn_room, parts, read_film
 from fakes.service.scripted_cameras import GOP
 
@@ -21,7 +21,7 @@ NEARLY = 3
 
 
 def is_nearly_grey(image: Image) -> bool:
-    return bool(np.abs(image.astype(np.int16) - GREY).max() <= NEARLY)
+    return bool(np.abs(image.astype(np.int16) - GRAY).max() <= NEARLY)
 
 
 def picture_of(jpeg: bytes) -> Image:

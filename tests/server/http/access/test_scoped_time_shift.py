@@ -23,7 +23,7 @@ from fakes.service.departure import (
     expected,
     fetched,
     go_on,
-    is_grey,
+    is_gray,
     left,
     to_the_end,
 )
@@ -67,7 +67,7 @@ async def test_what_was_is_grey_without_the_person(kept: Kept, form: str) -> Non
         narrow, full = ({pulse - min(it): shown for pulse, shown in it.items()} for it in (narrow, full))
     equal(narrow, expected(told, holds=False))
     equal(full, chosen(told))
-    assert sum(map(is_grey, narrow.values())) > 8 * GOP
+    assert sum(map(is_gray, narrow.values())) > 8 * GOP
 
 
 async def test_what_begins_in_the_past_goes_on_with_what_is_shown_now(tmp_path: Path) -> None:
@@ -80,7 +80,7 @@ async def test_what_begins_in_the_past_goes_on_with_what_is_shown_now(tmp_path: 
         shown = decoded((await to_the_end(hall, theirs))[0])
     right = expected(told, holds=False)
     assert min(shown) == 25
-    assert [is_grey(shown[it]) for it in (29, 30, 79, 80)] == [False, True, True, False]
+    assert [is_gray(shown[it]) for it in (29, 30, 79, 80)] == [False, True, True, False]
     equal(shown, right)
 
 
@@ -102,7 +102,7 @@ async def test_segments_of_the_past_are_grey_without_the_person(
     for who, pictures in shown.items():
         for pulse, picture in pictures.items():
             np.testing.assert_array_equal(picture, right[who][pulse], f"{who} {pulse}")
-    assert sum(map(is_grey, shown["family"].values())) > 8 * GOP
+    assert sum(map(is_gray, shown["family"].values())) > 8 * GOP
 
 
 @pytest.mark.parametrize("hls", [False, True])

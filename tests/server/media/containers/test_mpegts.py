@@ -49,11 +49,11 @@ def test_packets_are_valid_and_contain_exactly_what_was_packed(
         pulse, tables = pulse + len(gop), tables + 1
         video += sum(count_packets(it) for it in pictures) if live else 0
         sent += pictures
-    found = taken_apart(data)
-    check_counters(found)
-    assert {packet.pid for packet in found[:2]} == {0, 0x1000}, "tables first"
+    packets = taken_apart(data)
+    check_counters(packets)
+    assert {packet.pid for packet in packets[:2]} == {0, 0x1000}, "tables first"
     contents: list[bytes] = []
-    for packet in [it for it in found if it.pid == 0x100]:
+    for packet in [it for it in packets if it.pid == 0x100]:
         contents[len(contents) :] = [b""] if packet.begins else []
         contents[-1] += packet.payload
     assert len(contents) == len(sent)
@@ -68,18 +68,18 @@ def test_packets_are_valid_and_contain_exactly_what_was_packed(
         assert stamp[0] & 1 == stamp[2] & 1 == stamp[4] & 1 == 1, "marker bits"
         assert content[14:20] == b"\x00\x00\x00\x01\x09\xf0"
         assert content[20:] == b"\x00\x00\x00\x01" + it.sample[4:]
-    for packet in found:
+    for packet in packets:
         assert not packet.key or packet.begins
 
 
 @given(st.integers(0, 2**34 // 3600), st.sampled_from([4, 7.5, 25, 59.94]))
 def test_clock_references_are_frequent_and_precede_their_pictures(pulse: int, fps: float) -> None:
     pictures = [picture(pulse, 50, key=True, fps=fps), picture(pulse + 1, 30, duration=40, fps=fps)]
-    found = taken_apart(pack(pictures, fps, ContinuityCounters()))
-    times = [it.pcr // 300 for it in found if it.pcr is not None]
+    packets = taken_apart(pack(pictures, fps, ContinuityCounters()))
+    times = [it.pcr // 300 for it in packets if it.pcr is not None]
     assert all(0 < (later - earlier) % CLOCK <= 9000 for earlier, later in pairwise(times))
     assert 0 < (ticks(pulse, fps) - times[0]) % CLOCK <= 90_000
-    check_counters(found)
+    check_counters(packets)
 
 
 def spliced(cameras: list[int]) -> tuple[bytes, list[tuple[int, int]]]:

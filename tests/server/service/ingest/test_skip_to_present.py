@@ -24,7 +24,7 @@ from fakes.service.scripted_cameras import (
     video,
     word,
 )
-from fakes.service.scripted_recordings import everything_that_plays
+from fakes.service.scripted_recordings import playable_files
 from server.media.audio.aac import SAMPLES
 from server.media.audio.audio_format import AudioFormat
 from server.messaging.epochs import end_of_epoch
@@ -86,7 +86,7 @@ def test_who_slept_decides_what_is_of_now_and_nothing_of_what_is_long_past(
     assert len(rows) < 50
     assert service.recorder.writer is not None
     assert (service.recorder.writer.written, service.recorder.writer.lost) == (len(decided), 0)
-    for path in everything_that_plays(tmp_path / "kept"):
+    for path in playable_files(tmp_path / "kept"):
         decodes_without_errors(path)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, FedService, small_config
-from fakes.service.scripted_recordings import A, ClocksByHand, filled, head, piece
+from fakes.service.scripted_recordings import A, ManualClocks, filled_buffers, gop_record, session_info
 from server.service.recording.recording_folder import RecordingFolder
 from server.service.recording.retention import RetentionLimits
 from server.service.recording.session_files import InitSegments
@@ -26,29 +26,29 @@ ENDLESS = '{"id": "x", "seconds": 1e300, "boot": "", "steady": 0, "origin": null
 
 
 @pytest.fixture
-def clocks() -> ClocksByHand:
-    return ClocksByHand()
+def clocks() -> ManualClocks:
+    return ManualClocks()
 
 
-def opened(folder: Path, clocks: ClocksByHand, bounds: RetentionLimits = BOUNDS) -> RecordingFolder:
+def opened(folder: Path, clocks: ManualClocks, bounds: RetentionLimits = BOUNDS) -> RecordingFolder:
     store = RecordingFolder(folder, bounds, clocks.machine)
     store.open()
     return store
 
 
-def records(store: RecordingFolder, clocks: ClocksByHand, gops: range) -> None:
+def records(store: RecordingFolder, clocks: ManualClocks, gops: range) -> None:
     """Write GOPs in real time."""
     for gop in gops:
-        store.write(piece(gop, {1: A}), head(clocks.wall), InitSegments(filled()[1]))
+        store.write(gop_record(gop, {1: A}), session_info(clocks.wall), InitSegments(filled_buffers()[1]))
         clocks.now += STEP_S
 
 
-def kept(folder: Path) -> list[int]:
+def segments_on_disk(folder: Path) -> list[int]:
     """Return the GOPs whose pictures are on the disk."""
     return sorted(int(it.stem) // GOP for it in folder.glob("*/cameras/c0/*.mp4"))
 
 
-def recorded(folder: Path, clocks: ClocksByHand, gops: int = 10) -> None:
+def recorded(folder: Path, clocks: ManualClocks, gops: int = 10) -> None:
     """Let a service record some GOPs and end."""
     store = opened(folder, clocks)
     records(store, clocks, range(gops))
@@ -58,22 +58,24 @@ def recorded(folder: Path, clocks: ClocksByHand, gops: int = 10) -> None:
 @pytest.mark.parametrize("seconds", [YEAR_S, -YEAR_S, 2 * KEEP_S, -2 * KEEP_S])
 @pytest.mark.parametrize("is_kept", [False, True])
 def test_setting_the_clock_during_recording_neither_deletes_nor_delays_deletion(
-    tmp_path: Path, clocks: ClocksByHand, seconds: float, is_kept: bool
+    tmp_path: Path, clocks: ManualClocks, seconds: float, is_kept: bool
 ) -> None:
     store = opened(tmp_path, clocks)
     records(store, clocks, range(10))
     clocks.jump(seconds)
-    clocks.is_kept = is_kept
+    clocks.is_synchronized = is_kept
     records(store, clocks, range(10, 20))
-    assert kept(tmp_path) == list(range(20))
+    assert segments_on_disk(tmp_path) == list(range(20))
     clocks.now += KEEP_S - 10.5 * STEP_S
     records(store, clocks, range(20, 21))
-    assert kept(tmp_path) == list(range(10, 21)), "ten have had their time, whatever the clock says"
+    assert segments_on_disk(tmp_path) == list(range(10, 21)), (
+        "ten have had their time, whatever the clock says"
+    )
     store.close()
 
 
 def test_a_clock_that_jumped_during_recording_is_not_trusted_later_either(
-    tmp_path: Path, clocks: ClocksByHand
+    tmp_path: Path, clocks: ManualClocks
 ) -> None:
     bounds = RetentionLimits(keep_s=3.5 * TRIAL_S, max_mb=1e6, segment_s=0.2)
     store = opened(tmp_path, clocks, bounds)
@@ -89,37 +91,39 @@ def test_a_clock_that_jumped_during_recording_is_not_trusted_later_either(
     store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S
     records(store, clocks, range(6, 7))
-    assert kept(tmp_path) == list(range(7))
+    assert segments_on_disk(tmp_path) == list(range(7))
     clocks.now += 0.75 * TRIAL_S
     records(store, clocks, range(7, 8))
-    assert kept(tmp_path) == [4, 5, 6, 7], "that it was off counts, that its clock jumped does not"
+    assert segments_on_disk(tmp_path) == [4, 5, 6, 7], (
+        "that it was off counts, that its clock jumped does not"
+    )
     store.close()
 
 
 @pytest.mark.parametrize("seconds", [YEAR_S, 5 * KEEP_S])
 @pytest.mark.parametrize("reboots", [False, True])
 def test_a_clock_that_is_ahead_at_the_start_deletes_nothing(
-    tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture, seconds: float, reboots: bool
+    tmp_path: Path, clocks: ManualClocks, caplog: pytest.LogCaptureFixture, seconds: float, reboots: bool
 ) -> None:
     recorded(tmp_path, clocks)
     if reboots:
         clocks.off(1.0)
     clocks.jump(seconds)
     store = opened(tmp_path, clocks)
-    assert kept(tmp_path) == list(range(10))
+    assert segments_on_disk(tmp_path) == list(range(10))
     (told,) = [it for it in caplog.messages if "does not count" in it]
     assert "the clock is not synchronized (NTP)" in told
     for gop in range(10, 18):
         records(store, clocks, range(gop, gop + 1))
         clocks.now += TRIAL_S / 1000
-    assert kept(tmp_path) == list(range(18)), "as long as nobody vouches for it"
+    assert segments_on_disk(tmp_path) == list(range(18)), "as long as nobody vouches for it"
     clocks.now += KEEP_S
     records(store, clocks, range(20, 21))
-    assert not set(range(8)) & set(kept(tmp_path)), "but it is not kept for ever"
+    assert not set(range(8)) & set(segments_on_disk(tmp_path)), "but it is not kept for ever"
     store.close()
 
 
-def test_a_clock_that_is_corrected_in_time_deletes_nothing(tmp_path: Path, clocks: ClocksByHand) -> None:
+def test_a_clock_that_is_corrected_in_time_deletes_nothing(tmp_path: Path, clocks: ManualClocks) -> None:
     recorded(tmp_path, clocks)
     clocks.off(5.0, wrong_by=YEAR_S)
     bounds = RetentionLimits(keep_s=2 * TRIAL_S, max_mb=1e6, segment_s=0.2)
@@ -127,35 +131,35 @@ def test_a_clock_that_is_corrected_in_time_deletes_nothing(tmp_path: Path, clock
     clocks.now += TRIAL_S / 2
     records(store, clocks, range(10, 11))
     clocks.jump(-YEAR_S)
-    clocks.is_kept = True
+    clocks.is_synchronized = True
     clocks.now += TRIAL_S
     records(store, clocks, range(11, 12))
     clocks.now += TRIAL_S / 4
     records(store, clocks, range(12, 13))
-    assert kept(tmp_path) == list(range(13))
+    assert segments_on_disk(tmp_path) == list(range(13))
     store.close()
 
 
 @pytest.mark.parametrize("trusted", [False, True])
 def test_after_a_week_off_old_recordings_are_deleted_soon_if_the_clock_is_synchronized(
-    tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture, trusted: bool
+    tmp_path: Path, clocks: ManualClocks, caplog: pytest.LogCaptureFixture, trusted: bool
 ) -> None:
     caplog.set_level(logging.INFO)
     bounds = RetentionLimits(keep_s=86_400.0, max_mb=1e6, segment_s=0.2, trust_clock=trusted)
-    clocks.is_kept = not trusted
+    clocks.is_synchronized = not trusted
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(30))
     store.close()
     clocks.off(7 * 86_400.0)
     store = opened(tmp_path, clocks, bounds)
-    assert kept(tmp_path) == list(range(30)), "there is time to set a clock right that is wrong"
+    assert segments_on_disk(tmp_path) == list(range(30)), "there is time to set a clock right that is wrong"
     assert [it for it in caplog.messages if "was off for 7.0 days" in it and "UTC on that counts" in it]
     clocks.now += TRIAL_S
-    gone = []
+    deleted = []
     for gop in range(30, 34):
         records(store, clocks, range(gop, gop + 1))
-        gone.append(30 - len([it for it in kept(tmp_path) if it < 30]))
-    assert gone == [10, 20, 30, 30], "in parts"
+        deleted.append(30 - len([it for it in segments_on_disk(tmp_path) if it < 30]))
+    assert deleted == [10, 20, 30, 30], "in parts"
     told = [it for it in caplog.messages if "deleted the oldest" in it]
     assert (
         "10 older than record.keep_s (86400 s); 20 more are too old and are deleted in the next passes"
@@ -164,7 +168,7 @@ def test_after_a_week_off_old_recordings_are_deleted_soon_if_the_clock_is_synchr
     store.close()
 
 
-def test_days_off_add_up(tmp_path: Path, clocks: ClocksByHand) -> None:
+def test_days_off_add_up(tmp_path: Path, clocks: ManualClocks) -> None:
     bounds = RetentionLimits(keep_s=2.5 * 86_400.0, max_mb=1e6, segment_s=0.2)
     for day in range(4):
         store = opened(tmp_path, clocks, bounds)
@@ -175,59 +179,61 @@ def test_days_off_add_up(tmp_path: Path, clocks: ClocksByHand) -> None:
     store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S
     records(store, clocks, range(4, 5))
-    assert kept(tmp_path) == [2, 3, 4]
+    assert segments_on_disk(tmp_path) == [2, 3, 4]
     store.close()
 
 
 def test_a_restarted_service_continues_the_age_clock_while_the_machine_runs(
-    tmp_path: Path, clocks: ClocksByHand
+    tmp_path: Path, clocks: ManualClocks
 ) -> None:
     recorded(tmp_path, clocks)
-    clocks.is_kept = False
+    clocks.is_synchronized = False
     clocks.now += KEEP_S - 4.5 * STEP_S
     clocks.jump(-YEAR_S)
     opened(tmp_path, clocks).close()
-    assert kept(tmp_path) == list(range(5, 10))
+    assert segments_on_disk(tmp_path) == list(range(5, 10))
 
 
 def test_a_killed_service_continues_the_age_clock_from_its_last_segment(
-    tmp_path: Path, clocks: ClocksByHand
+    tmp_path: Path, clocks: ManualClocks
 ) -> None:
     store = opened(tmp_path, clocks)
     records(store, clocks, range(10))
     (tmp_path / ".lock").unlink()  # as if its process had ended without a word
     clocks.now += KEEP_S - 4.5 * STEP_S
     opened(tmp_path, clocks).close()
-    assert kept(tmp_path) == list(range(5, 10))
+    assert segments_on_disk(tmp_path) == list(range(5, 10))
     assert store.session is not None
 
 
 def test_a_machine_without_a_battery_clock_counts_time_off_once_synchronized(
-    tmp_path: Path, clocks: ClocksByHand
+    tmp_path: Path, clocks: ManualClocks
 ) -> None:
     recorded(tmp_path, clocks)
     clocks.off(7 * 86_400.0, wrong_by=-7 * 86_400.0)
-    clocks.is_kept = False
+    clocks.is_synchronized = False
     store = opened(tmp_path, clocks)
     clocks.now += 15.0
     records(store, clocks, range(10, 11))
-    assert kept(tmp_path) == list(range(11))
+    assert segments_on_disk(tmp_path) == list(range(11))
     clocks.jump(7 * 86_400.0)
-    clocks.is_kept = True
+    clocks.is_synchronized = True
     bounds = RetentionLimits(keep_s=2 * TRIAL_S, max_mb=1e6, segment_s=0.2)
     store.close()
     store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S
     records(store, clocks, range(11, 12))
-    assert kept(tmp_path) == [10, 11], "it was there for a week, as the clock says that is right now"
+    assert segments_on_disk(tmp_path) == [10, 11], (
+        "it was there for a week, as the clock says that is right now"
+    )
     records(store, clocks, range(12, 14))
-    assert kept(tmp_path) == [10, 11, 12, 13], "but for what was recorded since the machine is on"
+    assert segments_on_disk(tmp_path) == [10, 11, 12, 13], "but for what was recorded since the machine is on"
     store.close()
 
 
 @pytest.mark.parametrize("restarts", [False, True])
 def test_recordings_made_before_the_clock_was_trusted_do_not_age_by_time_off(
-    tmp_path: Path, clocks: ClocksByHand, restarts: bool
+    tmp_path: Path, clocks: ManualClocks, restarts: bool
 ) -> None:
     bounds = RetentionLimits(keep_s=2 * TRIAL_S, max_mb=1e6, segment_s=0.2)
     store = opened(tmp_path, clocks, bounds)
@@ -241,14 +247,14 @@ def test_recordings_made_before_the_clock_was_trusted_do_not_age_by_time_off(
         store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S
     records(store, clocks, range(12, 14))
-    assert kept(tmp_path) == [10, 11, 12, 13]
+    assert segments_on_disk(tmp_path) == [10, 11, 12, 13]
     store.close()
     opened(tmp_path, clocks, bounds).close()
-    assert kept(tmp_path) == [10, 11, 12, 13], "and so it is known later on"
+    assert segments_on_disk(tmp_path) == [10, 11, 12, 13], "and so it is known later on"
 
 
 def test_excess_recordings_are_deleted_by_age_though_the_clock_went_back(
-    tmp_path: Path, clocks: ClocksByHand
+    tmp_path: Path, clocks: ManualClocks
 ) -> None:
     clocks.wall += YEAR_S
     recorded(tmp_path, clocks)
@@ -259,15 +265,15 @@ def test_excess_recordings_are_deleted_by_age_though_the_clock_went_back(
     store.close()
     early = next(it.name for it in tmp_path.iterdir() if it.is_dir() and it.name != late)
     assert early < late, "names are by the clock"
-    size = sum(run.size for run in (*store.earlier, store.session) if run is not None)
+    size = sum(session.size for session in (*store.earlier, store.session) if session is not None)
     again = opened(tmp_path, clocks, RetentionLimits(KEEP_S, size / 1e6, 0.2))
-    gone = sorted(set(range(20)) - set(kept(tmp_path)))
-    assert gone
-    assert gone == list(range(len(gone)))
+    deleted = sorted(set(range(20)) - set(segments_on_disk(tmp_path)))
+    assert deleted
+    assert deleted == list(range(len(deleted)))
     again.close()
 
 
-def test_recordings_of_an_earlier_version_are_dated_once(tmp_path: Path, clocks: ClocksByHand) -> None:
+def test_recordings_of_an_earlier_version_are_dated_once(tmp_path: Path, clocks: ManualClocks) -> None:
     recorded(tmp_path, clocks)
     (tmp_path / "clock.json").unlink()
     (path,) = tmp_path.glob("*/session.json")
@@ -281,24 +287,24 @@ def test_recordings_of_an_earlier_version_are_dated_once(tmp_path: Path, clocks:
     assert "age_clock_at_pulse0" in json.loads(path.read_bytes())
     clocks.now += KEEP_S / 2 - 4.5 * STEP_S
     opened(tmp_path, clocks).close()
-    assert kept(tmp_path) == list(range(5, 10)), "by when they were written"
+    assert segments_on_disk(tmp_path) == list(range(5, 10)), "by when they were written"
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", PARTLY, ENDLESS])
-def test_a_damaged_clock_file_deletes_nothing(tmp_path: Path, clocks: ClocksByHand, text: str) -> None:
+def test_a_damaged_clock_file_deletes_nothing(tmp_path: Path, clocks: ManualClocks, text: str) -> None:
     recorded(tmp_path, clocks)
     (tmp_path / "clock.json").write_text(text)
     store = opened(tmp_path, clocks)
-    assert kept(tmp_path) == list(range(10))
+    assert segments_on_disk(tmp_path) == list(range(10))
     clocks.now += KEEP_S - 4.5 * STEP_S
     records(store, clocks, range(10, 11))
-    assert kept(tmp_path) == list(range(5, 11)), "its end is new, and gets old"
+    assert segments_on_disk(tmp_path) == list(range(5, 11)), "its end is new, and gets old"
     store.close()
 
 
 @pytest.mark.parametrize("clock0", [1e9, -1e9])
 def test_a_session_of_another_age_clock_deletes_no_other_and_is_deleted_in_time(
-    tmp_path: Path, clocks: ClocksByHand, clock0: float
+    tmp_path: Path, clocks: ManualClocks, clock0: float
 ) -> None:
     recorded(tmp_path, clocks, 5)
     (path,) = tmp_path.glob("*/session.json")
@@ -309,14 +315,14 @@ def test_a_session_of_another_age_clock_deletes_no_other_and_is_deleted_in_time(
     store = opened(tmp_path, clocks)
     records(store, clocks, range(10, 15))
     store.close()
-    assert kept(tmp_path) == [*range(5), *range(10, 15)]
+    assert segments_on_disk(tmp_path) == [*range(5), *range(10, 15)]
     clocks.now += KEEP_S + 1.0
     opened(tmp_path, clocks).close()
-    assert kept(tmp_path) == []
+    assert segments_on_disk(tmp_path) == []
 
 
 def test_deletions_are_logged_rarely_and_with_their_reason(
-    tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, clocks: ManualClocks, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)
     store = opened(tmp_path, clocks, RetentionLimits(1.0, 1e6, 0.2))
@@ -334,7 +340,7 @@ def test_a_service_uses_the_machines_clocks(tmp_path: Path) -> None:
     service.come(*CAMERAS)
     service.recorder.open()
     service.close()
-    ledger = json.loads((tmp_path / "kept" / "clock.json").read_bytes())
-    assert ledger["seconds"] >= 0
-    assert ledger["origin"] is not None
-    assert ledger["steady"] > 0
+    clock_state = json.loads((tmp_path / "kept" / "clock.json").read_bytes())
+    assert clock_state["seconds"] >= 0
+    assert clock_state["origin"] is not None
+    assert clock_state["steady"] > 0

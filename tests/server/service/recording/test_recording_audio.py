@@ -29,7 +29,7 @@ from fakes.media.mpegts import check_counters, taken_apart
 from fakes.programs import needs_ffprobe
 from fakes.service.fed_site import A, Hall, opened
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, FedService, video
-from fakes.service.scripted_recordings import AMPLE, PULSE0, ClocksByHand, head, piece
+from fakes.service.scripted_recordings import AMPLE, PULSE0, ManualClocks, gop_record, session_info
 from server.media.audio.aac import SAMPLES as FRAME
 from server.media.audio.audio_chunk import AudioChunk
 from server.media.audio.audio_format import AudioFormat
@@ -165,10 +165,10 @@ async def test_audio_that_was_deleted_or_not_recorded_is_silent(hall: Hall, reco
     shows(hall, recording, range(GOPS))
     await until_written(hall.service, GOPS)
     forget(hall.service)
-    run = hall.service.recorder.session
-    assert run is not None
-    gone = run.segments[6].first
-    run.paths.audio_file(gone).unlink()
+    session = hall.service.recorder.session
+    assert session is not None
+    gone = session.segments[6].first
+    session.paths.audio_file(gone).unlink()
     data = await download(hall, f"/objects/1/best.mp4?from=p0&to=p{FRAMES}")
     unbroken(data)
     _, samples = heard(data)
@@ -200,28 +200,30 @@ async def test_the_audio_of_an_earlier_session_plays_after_a_restart(recording: 
 
 
 async def test_audio_is_deleted_with_its_segments(tmp_path: Path) -> None:
-    clocks = ClocksByHand()
+    clocks = ManualClocks()
     store = RecordingFolder(tmp_path, RetentionLimits(keep_s=2.0, max_mb=1e6, segment_s=0.4), clocks.machine)
     store.open()
     for gop in range(GOPS):
         clocks.now = PULSE0 + gop * GOP / FPS
-        it = piece(gop, {1: A})
+        it = gop_record(gop, {1: A})
         begin, end = (FORM.frame_at(pulse, FPS) for pulse in (gop * GOP, (gop + 1) * GOP))
         heard = AudioChunk(begin, tuple(bytes([number % 251]) * 9 for number in range(begin, end)), FORM)
-        store.write(GopRecord(it.choices, it.cameras, heard), head(), InitSegments(b"pictures", b"sound"))
-    run = store.session
-    assert run is not None
-    firsts = [it.first for it in run.segments]
+        store.write(
+            GopRecord(it.choices, it.cameras, heard), session_info(), InitSegments(b"pictures", b"sound")
+        )
+    session = store.session
+    assert session is not None
+    firsts = [it.first for it in session.segments]
     assert firsts[0] > 0
-    assert sorted(int(it.stem) for it in (run.folder / "sound").glob("0*.mp4")) == firsts
-    assert run.audio.index.all[0].first == firsts[0]
-    assert run.size == pytest.approx(
-        sum(it.stat().st_size for it in run.folder.rglob("*") if it.is_file()), abs=3000
+    assert sorted(int(it.stem) for it in (session.folder / "sound").glob("0*.mp4")) == firsts
+    assert session.audio.index.all[0].first == firsts[0]
+    assert session.size == pytest.approx(
+        sum(it.stat().st_size for it in session.folder.rglob("*") if it.is_file()), abs=3000
     )
     store.close()
     again = RecordingFolder(tmp_path, AMPLE)
     again.open()
-    assert again.earlier[0].audio.index.all == run.audio.index.all
+    assert again.earlier[0].audio.index.all == session.audio.index.all
 
 
 @needs_ffprobe
@@ -229,9 +231,9 @@ async def test_the_audio_playlist_plays_from_the_disk(hall: Hall, recording: Pat
     sends(hall.service, recording)
     shows(hall, recording, range(GOPS))
     await until_written(hall.service, GOPS)
-    run = hall.service.recorder.session
-    assert run is not None
-    for path in (run.audio.path, run.paths.audio_file(0)):
+    session = hall.service.recorder.session
+    assert session is not None
+    for path in (session.audio.path, session.paths.audio_file(0)):
         ((codec, frames, *_),) = probed(path, "codec_name,nb_read_frames")
         assert codec == "aac"
         assert int(frames) >= 18
@@ -243,10 +245,10 @@ async def test_a_site_without_audio_records_none(tmp_path: Path, recording: Path
         hall.service.come(*CAMERAS)
         shows(hall, recording, range(4))
         await until_written(hall.service, 4)
-        run = hall.service.recorder.session
-        assert run is not None
-        assert not (run.folder / "sound").exists()
-        assert not run.audio.path.exists()
+        session = hall.service.recorder.session
+        assert session is not None
+        assert not (session.folder / "sound").exists()
+        assert not session.audio.path.exists()
         assert b"soun" not in await download(hall, "/objects/1/best.mp4?from=p0&to=p20")
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from fakes.service.fed_site import Hall, opened
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL
-from fakes.service.scripted_recordings import AMPLE, A, B, filled, head, pictures, piece
+from fakes.service.scripted_recordings import AMPLE, A, B, filled_buffers, gop_record, pictures, session_info
 from fakes.system.full_disk import files_of_at_most
 from fakes.system.unprivileged import nobodys_folder
 from server.service.recording.recording_folder import RecordingFolder
@@ -26,26 +26,26 @@ Harm = Callable[[Path, Path], None]
 
 
 def gone(name: str) -> Harm:
-    """Remove something below the folder: ``RUN`` stands for the run's."""
+    """Remove something below the folder: ``RUN`` stands for the session's folder."""
 
-    def harm(folder: Path, run: Path) -> None:
-        path = Path(str(folder / name).replace("RUN", run.name))
+    def harm(folder: Path, session: Path) -> None:
+        path = Path(str(folder / name).replace("RUN", session.name))
         shutil.rmtree(path) if path.is_dir() else path.unlink()
 
     return harm
 
 
 def made_a_file(name: str) -> Harm:
-    def harm(folder: Path, run: Path) -> None:
-        gone(name)(folder, run)
-        Path(str(folder / name).replace("RUN", run.name)).write_text("somebody's\n")
+    def harm(folder: Path, session: Path) -> None:
+        gone(name)(folder, session)
+        Path(str(folder / name).replace("RUN", session.name)).write_text("somebody's\n")
 
     return harm
 
 
 def moved(name: str) -> Harm:
-    def harm(folder: Path, run: Path) -> None:
-        path = Path(str(folder / name).replace("RUN", run.name))
+    def harm(folder: Path, session: Path) -> None:
+        path = Path(str(folder / name).replace("RUN", session.name))
         path.rename(folder.parent / "elsewhere")
 
     return harm
@@ -54,16 +54,16 @@ def moved(name: str) -> Harm:
 def made_anew(name: str) -> Harm:
     """Remove a folder and make an empty one: so looks one whose disk was unmounted."""
 
-    def harm(folder: Path, run: Path) -> None:
-        gone(name)(folder, run)
-        Path(str(folder / name).replace("RUN", run.name)).mkdir()
+    def harm(folder: Path, session: Path) -> None:
+        gone(name)(folder, session)
+        Path(str(folder / name).replace("RUN", session.name)).mkdir()
 
     return harm
 
 
 def cut_short(name: str) -> Harm:
-    def harm(folder: Path, run: Path) -> None:
-        Path(str(folder / name).replace("RUN", run.name)).write_bytes(b"")
+    def harm(folder: Path, session: Path) -> None:
+        Path(str(folder / name).replace("RUN", session.name)).write_bytes(b"")
 
     return harm
 
@@ -82,7 +82,7 @@ FILES = [
 def records(store: RecordingFolder, gops: range) -> None:
     for gop in gops:
         try:
-            store.write(piece(gop, {1: A, 2: B}), head(), InitSegments(filled()[1]))
+            store.write(gop_record(gop, {1: A, 2: B}), session_info(), InitSegments(filled_buffers()[1]))
         except OSError:
             store.abandon()  # as the writer does
 
@@ -95,12 +95,17 @@ def nothing_is_orphaned(folder: Path) -> None:
     store.close()
     assert {it for it in folder.rglob("*") if it.is_file()} == before, "nothing had to be tidied up"
     named = {
-        it for run in store.earlier for first in run.segments for it in run.paths.segment_files(first.first)
+        it
+        for session in store.earlier
+        for first in session.segments
+        for it in session.paths.segment_files(first.first)
     }
-    lists = {it.path for run in store.earlier for it in (*run.cameras.values(), *run.objects.values())}
+    lists = {
+        it.path for session in store.earlier for it in (*session.cameras.values(), *session.objects.values())
+    }
     fixed = {
-        run.folder / it
-        for run in store.earlier
+        session.folder / it
+        for session in store.earlier
         for it in ("session.json", "cameras/init.mp4", "sound/init.mp4")
     }
     strange = before - named - lists - fixed - {folder / ".lock", folder / "clock.json"}
@@ -112,7 +117,7 @@ def shown(folder: Path) -> list[int]:
     store = RecordingFolder(folder, AMPLE)
     store.open()
     store.close()
-    found = [run.cameras[A].path for run in store.earlier if run.cameras[A].path.exists()]
+    found = [session.cameras[A].path for session in store.earlier if session.cameras[A].path.exists()]
     return [pulse for path in found for pulse, _ in pictures(path)]
 
 
@@ -188,7 +193,7 @@ def test_a_folder_that_another_process_locked_meanwhile_is_left_to_it(tmp_path: 
     other.open()
     records(other, range(3))
     with pytest.raises(BlockingIOError, match="another process records there"):
-        store.write(piece(3, {1: A}), head(), InitSegments(filled()[1]))
+        store.write(gop_record(3, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
     store.abandon()
     other.close()
     records(store, range(4, 6))
@@ -246,7 +251,7 @@ def test_a_full_disk_leaves_no_files_at_any_try_and_then_recording_continues(tmp
     store.open()
     records(store, range(3))
     before = {it for it in tmp_path.rglob("*") if it.is_file()}
-    for size in (0, 100, len(filled()[1]) + 100):
+    for size in (0, 100, len(filled_buffers()[1]) + 100):
         with files_of_at_most(size):
             records(store, range(5, 8))
         assert {it for it in tmp_path.rglob("*") if it.is_file()} == before
@@ -259,7 +264,7 @@ def test_a_full_disk_leaves_no_files_at_any_try_and_then_recording_continues(tmp
 def test_remains_without_media_are_removed_and_media_without_session_info_are_logged(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    RecordingSession.create(tmp_path / "20260101T000000Z", head(), InitSegments(b"x"), 1.0)
+    RecordingSession.create(tmp_path / "20260101T000000Z", session_info(), InitSegments(b"x"), 1.0)
     (tmp_path / "20260101T000000Z" / "session.json").unlink()
     media = tmp_path / "20260102T000000Z" / "cameras" / "c0" / "000000000000.mp4"
     mine = tmp_path / "holiday" / "notes.txt"
@@ -400,7 +405,7 @@ async def test_a_lost_segment_is_a_gap(hall: Hall) -> None:
     assert len(body) > 1000
 
 
-async def test_unreadable_recordings_are_logged_in_one_line() -> None:
+async def test_requests_for_unreadable_recordings_are_answered_with_an_error() -> None:
     with nobodys_folder() as tmp_path:
         async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
             await shows(hall)

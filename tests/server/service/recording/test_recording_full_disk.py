@@ -7,7 +7,16 @@ from pathlib import Path
 import pytest
 
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, FedService, small_config
-from fakes.service.scripted_recordings import AMPLE, PULSE0, A, ClocksByHand, filled, head, pictures, piece
+from fakes.service.scripted_recordings import (
+    AMPLE,
+    PULSE0,
+    A,
+    ManualClocks,
+    filled_buffers,
+    gop_record,
+    pictures,
+    session_info,
+)
 from fakes.system.full_disk import files_of_at_most
 from server.service.recording.recording_folder import RecordingFolder
 from server.service.recording.recording_session import RecordingSession
@@ -20,18 +29,18 @@ SEGMENT = 25  # pulses
 
 
 @pytest.fixture
-def clock() -> ClocksByHand:
-    return ClocksByHand()
+def clock() -> ManualClocks:
+    return ManualClocks()
 
 
-def record(store: RecordingFolder, clock: ClocksByHand, gops: range) -> None:
+def record(store: RecordingFolder, clock: ManualClocks, gops: range) -> None:
     """Write GOPs of person 1 in a camera, in real time."""
     for gop in gops:
         clock.now = PULSE0 + gop * GOP / FPS
-        store.write(piece(gop, {1: A}), head(), InitSegments(filled()[1]))
+        store.write(gop_record(gop, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
 
 
-def opened(folder: Path, clock: ClocksByHand, bounds: RetentionLimits = BOUNDS) -> RecordingFolder:
+def opened(folder: Path, clock: ManualClocks, bounds: RetentionLimits = BOUNDS) -> RecordingFolder:
     store = RecordingFolder(folder, bounds, clock.machine)
     store.open()
     return store
@@ -42,7 +51,7 @@ def leave(store: RecordingFolder) -> None:
     store.close()
 
 
-def refused(store: RecordingFolder, clock: ClocksByHand, gop: int) -> None:
+def refused(store: RecordingFolder, clock: ManualClocks, gop: int) -> None:
     """Try to write a GOP on a disk that takes not a byte; it is given up, as the writer does."""
     with files_of_at_most(0), pytest.raises(OSError, match="large"):
         record(store, clock, range(gop, gop + 1))
@@ -54,39 +63,39 @@ def on_disk(folder: Path) -> list[int]:
     return sorted({int(it.stem) for it in folder.glob("*/cameras/*/*.mp4")})
 
 
-def files_in(run: RecordingSession) -> set[int]:
+def files_in(session: RecordingSession) -> set[int]:
     """Return the files that the playlists in memory refer to."""
-    tapes = [it.index for it in (*run.cameras.values(), *run.objects.values())]
+    tapes = [it.index for it in (*session.cameras.values(), *session.objects.values())]
     return {stretch.file for tape in tapes for stretch in tape.all}
 
 
-def files_told(run: RecordingSession) -> set[int]:
+def files_in_playlists(session: RecordingSession) -> set[int]:
     """Return the files that the playlists on the disk refer to."""
     told: set[int] = set()
-    for path in run.folder.rglob("*.m3u8"):
+    for path in session.folder.rglob("*.m3u8"):
         told |= {int(line[-16:-4]) for line in path.read_text().splitlines() if line[:1] not in ("#", "")}
     return told
 
 
-def test_old_recordings_are_deleted_from_a_full_disk(tmp_path: Path, clock: ClocksByHand) -> None:
+def test_old_recordings_are_deleted_from_a_full_disk(tmp_path: Path, clock: ManualClocks) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
     assert on_disk(tmp_path) == [0, 25, 50, 75]
     refused(store, clock, 27)
-    run = store.session
-    assert run is not None
+    session = store.session
+    assert session is not None
     assert on_disk(tmp_path) == [50, 75], "those before ended more than three seconds ago"
-    assert [it.first for it in run.segments if it.bytes] == [50, 75]
-    assert files_in(run) == {50, 75}
-    assert files_told(run) == {0, 25, 50, 75}, "the playlists could not be written"
+    assert [it.first for it in session.segments if it.bytes] == [50, 75]
+    assert files_in(session) == {50, 75}
+    assert files_in_playlists(session) == {0, 25, 50, 75}, "the playlists could not be written"
     record(store, clock, range(29, 30))
-    assert files_told(run) == {50, 75, 145}
-    played = [pulse for pulse, _ in pictures(run.objects[1].path)]
+    assert files_in_playlists(session) == {50, 75, 145}
+    played = [pulse for pulse, _ in pictures(session.objects[1].path)]
     assert played == [*range(50, 100), *range(145, 150)]
     store.close()
 
 
-def test_a_disk_that_is_full_at_the_start_is_locked_and_cleared(tmp_path: Path, clock: ClocksByHand) -> None:
+def test_a_disk_that_is_full_at_the_start_is_locked_and_cleared(tmp_path: Path, clock: ManualClocks) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
     leave(store)
@@ -100,7 +109,7 @@ def test_a_disk_that_is_full_at_the_start_is_locked_and_cleared(tmp_path: Path, 
     again.close()
 
 
-def test_old_recordings_are_deleted_before_a_session_begins(tmp_path: Path, clock: ClocksByHand) -> None:
+def test_old_recordings_are_deleted_before_a_session_begins(tmp_path: Path, clock: ManualClocks) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
     leave(store)
@@ -112,33 +121,33 @@ def test_old_recordings_are_deleted_before_a_session_begins(tmp_path: Path, cloc
     again.close()
 
 
-def test_playlist_entries_without_files_are_dropped_at_a_restart(tmp_path: Path, clock: ClocksByHand) -> None:
+def test_playlist_entries_without_files_are_dropped_at_a_restart(tmp_path: Path, clock: ManualClocks) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
     refused(store, clock, 27)
     assert store.session is not None
     with files_of_at_most(0):
         leave(store)
-    assert files_told(store.session) == {0, 25, 50, 75}
+    assert files_in_playlists(store.session) == {0, 25, 50, 75}
     again = opened(tmp_path, clock, AMPLE)
     (earlier,) = again.earlier
-    assert files_in(earlier) == {50, 75} == files_told(earlier)
+    assert files_in(earlier) == {50, 75} == files_in_playlists(earlier)
     again.close()
 
 
 def test_files_that_cannot_be_deleted_are_not_forgotten(
     tmp_path: Path,
-    clock: ClocksByHand,
+    clock: ManualClocks,
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
-    run, real = store.session, Path.unlink
-    assert run is not None
+    session, real = store.session, Path.unlink
+    assert session is not None
 
     def unlink(path: Path, *, missing_ok: bool = False) -> None:
-        if path == run.paths.camera_file(A, 0):
+        if path == session.paths.camera_file(A, 0):
             raise PermissionError(1, "Operation not permitted", str(path))
         real(path, missing_ok=missing_ok)
 
@@ -146,15 +155,15 @@ def test_files_that_cannot_be_deleted_are_not_forgotten(
         patch.setattr(Path, "unlink", unlink)
         record(store, clock, range(27, 28))
     assert on_disk(tmp_path) == [0, 50, 75, 135], "and it is recorded all the same"
-    assert [it.first for it in run.segments] == [0, 50, 75, 135]
-    assert files_in(run) == {50, 75, 135}, "its pictures are not played any more"
-    assert f"{run.paths.camera_file(A, 0)}: Operation not permitted" in caplog.text
+    assert [it.first for it in session.segments] == [0, 50, 75, 135]
+    assert files_in(session) == {50, 75, 135}, "its pictures are not played any more"
+    assert f"{session.paths.camera_file(A, 0)}: Operation not permitted" in caplog.text
     record(store, clock, range(33, 34))
     assert on_disk(tmp_path) == [75, 135, 165]
     store.close()
 
 
-def test_a_full_disk_does_not_stop_the_service_from_starting(tmp_path: Path, clock: ClocksByHand) -> None:
+def test_a_full_disk_does_not_stop_the_service_from_starting(tmp_path: Path, clock: ManualClocks) -> None:
     folder = tmp_path / "kept"
     store = opened(folder, clock)
     record(store, clock, range(20))
@@ -167,7 +176,7 @@ def test_a_full_disk_does_not_stop_the_service_from_starting(tmp_path: Path, clo
         service.close()
 
 
-def test_a_playlist_that_could_not_be_written_stays_stale(tmp_path: Path, clock: ClocksByHand) -> None:
+def test_a_playlist_that_could_not_be_written_stays_stale(tmp_path: Path, clock: ManualClocks) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(12))
     assert store.session is not None

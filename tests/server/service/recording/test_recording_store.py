@@ -19,14 +19,14 @@ from fakes.service.scripted_recordings import (
     PULSE0,
     A,
     B,
-    ClocksByHand,
-    everything_that_plays,
-    filled,
-    head,
+    ManualClocks,
+    filled_buffers,
+    gop_record,
     own_pictures,
     pictures,
-    piece,
-    written,
+    playable_files,
+    session_info,
+    written_folder,
 )
 from fakes.system.full_disk import files_of_at_most
 from server.service.recording.media_files import MediaFile, read_gops
@@ -36,16 +36,16 @@ from server.service.recording.session_files import InitSegments
 
 
 def only_run(folder: Path) -> Path:
-    (run,) = (it for it in folder.iterdir() if it.is_dir())
-    return run
+    (session,) = (it for it in folder.iterdir() if it.is_dir())
+    return session
 
 
 def test_a_persons_playlist_plays_the_chosen_cameras_pixels_across_cuts(
     tmp_path: Path,
 ) -> None:
     choices = [A, A, B, B, A, B, A, A, A, B, B, A]
-    store = written(
-        RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: camera}) for gop, camera in enumerate(choices)]
+    store = written_folder(
+        RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: camera}) for gop, camera in enumerate(choices)]
     )
     during = list(pictures(only_run(tmp_path) / "objects" / "1.m3u8"))
     store.close()
@@ -57,10 +57,12 @@ def test_a_persons_playlist_plays_the_chosen_cameras_pixels_across_cuts(
 
 
 def test_a_camera_is_written_once_however_many_people_it_shows(tmp_path: Path) -> None:
-    few = written(RecordingFolder(tmp_path / "few", AMPLE), [piece(gop, {1: A}) for gop in range(4)])
-    many = written(
+    few = written_folder(
+        RecordingFolder(tmp_path / "few", AMPLE), [gop_record(gop, {1: A}) for gop in range(4)]
+    )
+    many = written_folder(
         RecordingFolder(tmp_path / "many", AMPLE),
-        [piece(gop, dict.fromkeys(range(50), A)) for gop in range(4)],
+        [gop_record(gop, dict.fromkeys(range(50), A)) for gop in range(4)],
     )
     few.close()
     many.close()
@@ -69,18 +71,18 @@ def test_a_camera_is_written_once_however_many_people_it_shows(tmp_path: Path) -
 
 
 def test_every_file_and_playlist_decodes_without_errors_even_with_gaps(tmp_path: Path) -> None:
-    pieces = [piece(gop, {1: A, 2: B} if gop % 4 else {1: A}) for gop in range(12) if gop != 7]
-    written(RecordingFolder(tmp_path, AMPLE), pieces).close()
-    files = everything_that_plays(tmp_path)
+    pieces = [gop_record(gop, {1: A, 2: B} if gop % 4 else {1: A}) for gop in range(12) if gop != 7]
+    written_folder(RecordingFolder(tmp_path, AMPLE), pieces).close()
+    files = playable_files(tmp_path)
     assert len(files) == 2 + 2 + 3 * 2, "two people, two cameras, three files each"
     for path in files:
         decodes_without_errors(path)
 
 
 def test_a_playlist_conforms_to_rfc_8216(tmp_path: Path) -> None:
-    written(
+    written_folder(
         RecordingFolder(tmp_path, AMPLE),
-        [piece(gop, {1: B if gop == 3 else A}) for gop in range(7) if gop != 5],
+        [gop_record(gop, {1: B if gop == 3 else A}) for gop in range(7) if gop != 5],
     )
     text = (only_run(tmp_path) / "objects" / "1.m3u8").read_text()
     lines = text.splitlines()
@@ -100,7 +102,7 @@ def test_a_playlist_conforms_to_rfc_8216(tmp_path: Path) -> None:
 
 
 def test_the_decision_file_has_choices_and_boxes(tmp_path: Path) -> None:
-    written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(7)]).close()
+    written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(7)]).close()
     first, second = sorted((only_run(tmp_path) / "index").iterdir())
     lines = [json.loads(line) for path in (first, second) for line in path.read_text().splitlines()]
     assert [line["first"] for line in lines] == [gop * GOP for gop in range(7)]
@@ -109,10 +111,10 @@ def test_the_decision_file_has_choices_and_boxes(tmp_path: Path) -> None:
 
 
 def test_an_incomplete_gop_is_in_the_cameras_playlist_but_in_no_persons(tmp_path: Path) -> None:
-    pieces = [piece(0, {1: A}), piece(1, {1: A}, frames=3), piece(2, {1: A})]
-    run = written(RecordingFolder(tmp_path, AMPLE), pieces).session
-    assert run is not None
-    assert [pulse for pulse, _ in pictures(run.cameras[A].path)] == [
+    pieces = [gop_record(0, {1: A}), gop_record(1, {1: A}, frames=3), gop_record(2, {1: A})]
+    session = written_folder(RecordingFolder(tmp_path, AMPLE), pieces).session
+    assert session is not None
+    assert [pulse for pulse, _ in pictures(session.cameras[A].path)] == [
         0,
         1,
         2,
@@ -127,30 +129,32 @@ def test_an_incomplete_gop_is_in_the_cameras_playlist_but_in_no_persons(tmp_path
         13,
         14,
     ]
-    assert [(it.first, it.end) for it in run.objects[1].index.all] == [(0, 5), (10, 15)]
+    assert [(it.first, it.end) for it in session.objects[1].index.all] == [(0, 5), (10, 15)]
 
 
 def test_a_restarted_service_records_a_new_session_beside_the_earlier_one(tmp_path: Path) -> None:
-    written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(3)]).close()
-    second = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: B}) for gop in range(3)])
+    written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(3)]).close()
+    second = written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: B}) for gop in range(3)])
     assert len([it for it in tmp_path.iterdir() if it.is_dir()]) == 2
     (earlier,) = second.earlier
     assert [(it.first, it.end) for it in earlier.objects[1].index.all] == [(0, 15)]
-    for run, camera in ((earlier, A), (second.session, B)):
-        assert run is not None
-        for pulse, picture in pictures(run.objects[1].path):
+    for session, camera in ((earlier, A), (second.session, B)):
+        assert session is not None
+        for pulse, picture in pictures(session.objects[1].path):
             np.testing.assert_array_equal(picture, own_pictures(camera)[pulse])
 
 
 def test_restarted_pulses_begin_a_new_session(tmp_path: Path) -> None:
-    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in (5, 6, 0, 1)])
+    store = written_folder(
+        RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in (5, 6, 0, 1)]
+    )
     assert store.session is not None
     assert [(it.first, it.end) for it in store.session.objects[1].index.all] == [(0, 10)]
     assert [(it.first, it.end) for it in store.earlier[0].objects[1].index.all] == [(25, 35)]
 
 
 def test_two_processes_do_not_record_into_one_folder(tmp_path: Path) -> None:
-    store = written(RecordingFolder(tmp_path, AMPLE), [])
+    store = written_folder(RecordingFolder(tmp_path, AMPLE), [])
     with pytest.raises(BlockingIOError):
         RecordingFolder(tmp_path, AMPLE).open()
     store.close()
@@ -158,21 +162,25 @@ def test_two_processes_do_not_record_into_one_folder(tmp_path: Path) -> None:
 
 
 def test_old_segments_are_deleted_whole_with_their_references(tmp_path: Path) -> None:
-    clocks = ClocksByHand()
+    clocks = ManualClocks()
     store = RecordingFolder(tmp_path, RetentionLimits(keep_s=3.0, max_mb=1e6, segment_s=1.0), clocks.machine)
     store.open()
     for gop in range(40):
         clocks.now = PULSE0 + gop * GOP / FPS
-        store.write(piece(gop, {1: A, 2 if gop < 10 else 3: B}), head(), InitSegments(filled()[1]))
+        store.write(
+            gop_record(gop, {1: A, 2 if gop < 10 else 3: B}),
+            session_info(),
+            InitSegments(filled_buffers()[1]),
+        )
     store.close()
-    run = store.session
-    assert run is not None
-    assert [it.first for it in run.segments] == [100, 125, 150, 175]
-    assert sorted(run.objects) == [1, 3]
-    assert not (run.folder / "objects" / "2.m3u8").exists()
-    kept = sorted(int(it.stem) for it in (run.folder / "cameras" / A).iterdir())
-    assert kept == [100, 125, 150, 175] == sorted(int(it.stem) for it in (run.folder / "index").iterdir())
-    assert [pulse for pulse, _ in pictures(run.objects[1].path)] == list(range(100, 200))
+    session = store.session
+    assert session is not None
+    assert [it.first for it in session.segments] == [100, 125, 150, 175]
+    assert sorted(session.objects) == [1, 3]
+    assert not (session.folder / "objects" / "2.m3u8").exists()
+    kept = sorted(int(it.stem) for it in (session.folder / "cameras" / A).iterdir())
+    assert kept == [100, 125, 150, 175] == sorted(int(it.stem) for it in (session.folder / "index").iterdir())
+    assert [pulse for pulse, _ in pictures(session.objects[1].path)] == list(range(100, 200))
 
 
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -188,14 +196,14 @@ def test_the_size_stays_bounded_and_a_restart_reads_the_same_indexes(
     store.open()
     slack = 2 * 8_000  # bytes: a GOP of both cameras, its line, its references
     for gop, choices in enumerate(shown):
-        store.write(piece(gop, choices), head(), InitSegments(filled()[1]))
+        store.write(gop_record(gop, choices), session_info(), InitSegments(filled_buffers()[1]))
         on_disk = sum(it.stat().st_size for it in folder.rglob("*") if it.is_file())
         assert on_disk <= max_mb * 1e6 + slack
     store.close()
     again = RecordingFolder(folder, AMPLE)
     again.open()
     assert store.session is not None
-    found = {number: it.index.all for run in again.earlier for number, it in run.objects.items()}
+    found = {number: it.index.all for session in again.earlier for number, it in session.objects.items()}
     assert found == {number: it.index.all for number, it in store.session.objects.items()}
     for number, entries in found.items():
         expected = [gop for gop, choices in enumerate(shown) if number in choices]
@@ -210,21 +218,21 @@ def test_the_size_stays_bounded_and_a_restart_reads_the_same_indexes(
 
 
 def test_on_a_full_disk_earlier_gops_play_and_recording_continues_later(tmp_path: Path) -> None:
-    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(2)])
+    store = written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(2)])
     assert store.session is not None
     size = store.session.paths.camera_file(A, 0).stat().st_size
     with files_of_at_most(size + 300), pytest.raises(OSError, match="large") as refused:
-        store.write(piece(2, {1: A}), head(), InitSegments(filled()[1]))
+        store.write(gop_record(2, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
     assert refused.value.errno == errno.EFBIG
     store.abandon()
     assert store.session.paths.camera_file(A, 0).stat().st_size == size
-    with files_of_at_most(len(filled()[1]) + 300), pytest.raises(OSError, match="large"):
-        store.write(piece(3, {1: A}), head(), InitSegments(filled()[1]))
+    with files_of_at_most(len(filled_buffers()[1]) + 300), pytest.raises(OSError, match="large"):
+        store.write(gop_record(3, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
     store.abandon()
-    store.write(piece(4, {1: A}), head(), InitSegments(filled()[1]))
+    store.write(gop_record(4, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
     store.close()
     assert [pulse // GOP for pulse, _ in pictures(store.session.objects[1].path)][::GOP] == [0, 1, 4]
-    for path in everything_that_plays(tmp_path):
+    for path in playable_files(tmp_path):
         decodes_without_errors(path)
 
 
@@ -232,9 +240,9 @@ def test_on_a_full_disk_earlier_gops_play_and_recording_continues_later(tmp_path
 def test_a_writer_killed_in_the_middle_of_a_gop_leaves_a_file_that_plays(
     tmp_path: Path, share: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    gop_of = piece(0, {}).cameras[A], piece(1, {}).cameras[A]
+    gop_of = gop_record(0, {}).cameras[A], gop_record(1, {}).cameras[A]
     path = tmp_path / "0.mp4"
-    file = MediaFile(path, filled()[1])
+    file = MediaFile(path, filled_buffers()[1])
     file.append(gop_of[0])
 
     class KilledError(BaseException):

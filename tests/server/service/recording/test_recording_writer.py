@@ -19,7 +19,7 @@ from fakes.service.scripted_cameras import (
     small_config,
     video,
 )
-from fakes.service.scripted_recordings import A, B, pictures, piece
+from fakes.service.scripted_recordings import A, B, gop_record, pictures
 from fakes.timeouts import PATIENCE
 from server.service.recording.recording_folder import GopRecord
 from server.service.recording.writer_thread import WriterThread
@@ -61,7 +61,7 @@ def test_queued_gops_are_written_before_the_end() -> None:
     disk = Disk()
     writer = writer_on(disk, most=100)
     for gop in range(20):
-        writer.put(piece(gop, {1: A}))
+        writer.put(gop_record(gop, {1: A}))
     writer.close()
     assert disk.taken == [*range(0, 20 * GOP, GOP), -1]
     assert (writer.written, writer.lost) == (20, 0)
@@ -71,10 +71,10 @@ def test_a_slow_disk_loses_whole_gops_without_blocking() -> None:
     disk = Disk()
     disk.open.clear()
     writer = writer_on(disk, most=4)
-    writer.put(piece(0, {1: A}))
+    writer.put(gop_record(0, {1: A}))
     assert disk.asked.acquire(timeout=PATIENCE), "the first one is being written"
     for gop in range(1, 20):
-        writer.put(piece(gop, {1: A}))
+        writer.put(gop_record(gop, {1: A}))
     assert writer.lost == 15
     disk.open.set()
     writer.close()
@@ -87,13 +87,13 @@ def test_a_full_disk_is_logged_once_retried_and_counted(caplog: pytest.LogCaptur
     disk.refuses = True
     writer = writer_on(disk, most=100)
     for gop in range(3):
-        writer.put(piece(gop, {1: A}))
+        writer.put(gop_record(gop, {1: A}))
         assert disk.asked.acquire(timeout=PATIENCE)
     while writer.lost < 3:
         threading.Event().wait(0.001)
     assert writer.error_text == "No space left on device"
     disk.refuses = False
-    writer.put(piece(3, {1: A}))
+    writer.put(gop_record(3, {1: A}))
     writer.close()
     assert (disk.taken, disk.abandoned) == ([15, -1], 3)
     assert (writer.written, writer.lost, writer.error_text) == (1, 3, "")
@@ -110,10 +110,10 @@ def test_a_disk_that_is_full_repeatedly_is_not_logged_each_time(
     writer = writer_on(disk, most=100)
     for gop in range(0, 20, 2):
         disk.refuses = True
-        writer.put(piece(gop, {1: A}))
+        writer.put(gop_record(gop, {1: A}))
         until(lambda gop=gop: writer.lost == gop // 2 + 1)
         disk.refuses = False
-        writer.put(piece(gop + 1, {1: A}))
+        writer.put(gop_record(gop + 1, {1: A}))
         until(lambda gop=gop: writer.written == gop // 2 + 1)
     writer.close()
     assert len(caplog.messages) == 2
@@ -129,7 +129,7 @@ def test_a_disk_that_does_not_respond_is_reported() -> None:
     disk = Disk()
     disk.open.clear()
     writer = writer_on(disk)
-    writer.put(piece(0, {1: A}))
+    writer.put(gop_record(0, {1: A}))
     assert disk.asked.acquire(timeout=PATIENCE)
     assert writer._writing_since is not None
     writer._writing_since -= 1000.0
@@ -151,7 +151,7 @@ def test_an_internal_error_does_not_end_the_recording(caplog: pytest.LogCaptureF
     disk = Mistaken()
     writer = writer_on(disk, most=100)
     for gop in range(3):
-        writer.put(piece(gop, {1: A}))
+        writer.put(gop_record(gop, {1: A}))
     writer.close()
     assert disk.taken == [-2, 5, 10, -1]
     assert (writer.written, writer.lost, writer.error_text) == (2, 1, "")
@@ -163,7 +163,7 @@ def test_a_full_disk_is_retried_only_after_a_while() -> None:
     disk.refuses = True
     writer = writer_on(disk, most=100, retry_s=1000.0)
     for gop in range(10):
-        writer.put(piece(gop, {1: A}))
+        writer.put(gop_record(gop, {1: A}))
     writer.close()
     assert (disk.abandoned, writer.lost) == (1, 10)
 
@@ -181,10 +181,10 @@ def test_a_service_records_what_it_decides(tmp_path: Path) -> None:
     for epoch in range(7):
         service.feed(epoch, {A: {1: SMALL}, B: {}})
     service.close()
-    run = service.recorder.session
-    assert run is not None
-    assert [pulse for pulse, _ in pictures(run.objects[1].path)] == list(range(6 * GOP))
-    assert [pulse for pulse, _ in pictures(run.cameras[B].path)] == list(range(6 * GOP))
+    session = service.recorder.session
+    assert session is not None
+    assert [pulse for pulse, _ in pictures(session.objects[1].path)] == list(range(6 * GOP))
+    assert [pulse for pulse, _ in pictures(session.cameras[B].path)] == list(range(6 * GOP))
 
 
 def test_pictures_that_come_after_the_decision_are_recorded_too(tmp_path: Path) -> None:
@@ -196,12 +196,12 @@ def test_pictures_that_come_after_the_decision_are_recorded_too(tmp_path: Path) 
         service.ingest.video(video(B, unit))
     service.feed(7, {A: {1: SMALL}})
     service.close()
-    run = service.recorder.session
-    assert run is not None
+    session = service.recorder.session
+    assert session is not None
     decided = service.recorder.recent.end
     assert decided >= 5 * GOP
     for camera in CAMERAS:
-        assert [pulse for pulse, _ in pictures(run.cameras[camera].path)] == list(range(decided))
+        assert [pulse for pulse, _ in pictures(session.cameras[camera].path)] == list(range(decided))
 
 
 def test_a_folder_that_cannot_be_used_is_told_in_one_line(tmp_path: Path) -> None:

@@ -24,12 +24,12 @@ from fakes.service.scripted_recordings import (
     A,
     B,
     Picture,
-    filled,
+    filled_buffers,
     fragments,
-    head,
+    gop_record,
     own_pictures,
-    piece,
-    written,
+    session_info,
+    written_folder,
 )
 from server.media.containers.mpegts import ContinuityCounters
 from server.media.picture import EncodedPicture as Shown
@@ -291,7 +291,7 @@ class OnDisk:
 
 def site_of(store: RecordingFolder) -> tuple[StreamFormat, bytes]:
     del store
-    frame_buffers, header = filled()
+    frame_buffers, header = filled_buffers()
     return frame_buffers[A]._stream_format, header
 
 
@@ -305,8 +305,8 @@ async def test_any_part_of_any_past_is_played_without_a_hole(
     tmp_path_factory: pytest.TempPathFactory, shown: list[str | None], start: int, frames: int
 ) -> None:
     folder = tmp_path_factory.mktemp("part")
-    pieces = [piece(gop, {} if camera is None else {1: camera}) for gop, camera in enumerate(shown)]
-    store = written(RecordingFolder(folder, AMPLE), pieces)
+    pieces = [gop_record(gop, {} if camera is None else {1: camera}) for gop, camera in enumerate(shown)]
+    store = written_folder(RecordingFolder(folder, AMPLE), pieces)
     assert store.session is not None
     tapes = (
         [SessionEntries(store.session, store.session.objects[1].index)] if 1 in store.session.objects else []
@@ -337,7 +337,7 @@ async def test_any_part_of_any_past_is_played_without_a_hole(
 
 
 async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -> None:
-    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(12)])
+    store = written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(12)])
     assert store.session is not None
     store.session.paths.camera_file(A, 25).unlink()
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=60)
@@ -351,8 +351,9 @@ async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -
 @pytest.mark.parametrize("end", [2 * GOP + 1, 10 * GOP])
 async def test_who_is_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, end: int) -> None:
     now = 10 * GOP + FPS
-    store = written(
-        RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(now // GOP)]
+    store = written_folder(
+        RecordingFolder(tmp_path, AMPLE),
+        [gop_record(gop, {1: A} if gop < 2 else {}) for gop in range(now // GOP)],
     )
     assert store.session is not None
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=now)
@@ -365,13 +366,13 @@ async def test_who_is_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, e
 
 
 async def test_who_comes_back_after_the_end_does_not_make_the_past_longer(tmp_path: Path) -> None:
-    store = written(
-        RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(4)]
+    store = written_folder(
+        RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A} if gop < 2 else {}) for gop in range(4)]
     )
     assert store.session is not None
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=4 * GOP)
     stream_format, header = site_of(store)
-    channel, back = Broadcaster(), piece(8, {1: A}).cameras[A]
+    channel, back = Broadcaster(), gop_record(8, {1: A}).cameras[A]
     came = [Shown(back.first + at, not at, it, boot=1) for at, it in enumerate(back.fragments)]
     channel.publish(MediaChunk(came, FPS, ContinuityCounters()))
     stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: channel)
@@ -383,7 +384,7 @@ async def test_who_comes_back_after_the_end_does_not_make_the_past_longer(tmp_pa
 async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(40)])
+    store = written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(40)])
     assert store.session is not None
     now, loop = [100.0], asyncio.get_running_loop()
 
@@ -403,7 +404,9 @@ async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
 
 
 async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path: Path) -> None:
-    written(RecordingFolder(tmp_path / "kept", AMPLE), [piece(gop, {1: A}) for gop in range(4)]).close()
+    written_folder(
+        RecordingFolder(tmp_path / "kept", AMPLE), [gop_record(gop, {1: A}) for gop in range(4)]
+    ).close()
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
         hall.service.pulse0 = PULSE0 + 0.01
         hall.service.recorder.open()
@@ -433,9 +436,11 @@ async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path
 async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tmp_path: Path) -> None:
     folder, since = tmp_path / "kept", PULSE0 - 9.0
     store = RecordingFolder(folder, AMPLE)
-    written(store, [piece(gop, {}) for gop in range(1)])
+    written_folder(store, [gop_record(gop, {}) for gop in range(1)])
     for gop in range(1, 4):  # numbers began when the first camera came
-        store.write(piece(gop, {1: A}), head(numbers_since=since), InitSegments(filled()[1]))
+        store.write(
+            gop_record(gop, {1: A}), session_info(numbers_since=since), InitSegments(filled_buffers()[1])
+        )
     store.close()
     async for hall in opened(record={"folder": str(folder), "segment_s": 0.4}):
         hall.service.pulse0 = PULSE0 + 0.01
