@@ -22,39 +22,39 @@ from tracking.evaluation import Scores, average_scores
 
 
 @dataclass(frozen=True, slots=True)
-class Term:
+class Ablation:
     """Something the tracker does, and the settings without it."""
 
     name: str
     off: TrackSettings = field(default_factory=dict)
 
 
-DEFAULT = Term("all of it")
+DEFAULT = Ablation("all of it")
 
 TERMS = (
-    Term("no confidence in the cost", {"costs": {"confidence": 0.0}}),
-    Term("leaving is free", {"costs": {"disappearance": 0.0}}),
-    Term("off course is free", {"costs": {"motion": 0.0}}),
-    Term("out of hiding anywhere", {"costs": {"reappearance": 0.0}}),
-    Term("steps of any length", {"costs": {"gate": None}}),
-    Term("new people from weak boxes alone", {"window": {"birth_min_peak_score": 0.0}}),
-    Term("hidden moments are left out", {"window": {"max_interpolated_gap": 0}}),
-    Term("no displacement", {"costs": {"displacement": 0.0}}),
-    Term(
+    Ablation("no confidence in the cost", {"costs": {"confidence": 0.0}}),
+    Ablation("leaving is free", {"costs": {"disappearance": 0.0}}),
+    Ablation("off course is free", {"costs": {"motion": 0.0}}),
+    Ablation("out of hiding anywhere", {"costs": {"reappearance": 0.0}}),
+    Ablation("steps of any length", {"costs": {"gate": None}}),
+    Ablation("new people from weak boxes alone", {"window": {"birth_min_peak_score": 0.0}}),
+    Ablation("hidden moments are left out", {"window": {"max_interpolated_gap": 0}}),
+    Ablation("no displacement", {"costs": {"displacement": 0.0}}),
+    Ablation(
         "displacement in pixels",
         {"costs": {"displacement_unit": "pixels", "displacement": 0.01, "gate": None}},
     ),
-    Term("no change of appearance", {"costs": {"appearance": 0.0}}),
-    Term("conflicts by corners", {"costs": {"conflict_rule": "corners"}}),
-    Term("conflict rows of II.D", {"costs": {"conflict_rows": "star"}}),
-    Term(
+    Ablation("no change of appearance", {"costs": {"appearance": 0.0}}),
+    Ablation("conflicts by corners", {"costs": {"conflict_rule": "corners"}}),
+    Ablation("conflict rows of II.D", {"costs": {"conflict_rows": "star"}}),
+    Ablation(
         "anybody anywhere (no reach)",
         {"window": {"gate_heights": 1e3, "gate_growth": 1e3, "max_height_ratio": 1e3}},
     ),
-    Term("boxes of one window: 5 frames", {"window": {"window": 5, "birth_window": 5}}),
-    Term("no return after long", {"window": {"reidentify_max_distance": 0.0}}),
-    Term("templates stay as they were", {"window": {"template_update_rate": 0.0}}),
-    Term("the paper's costs", {"costs": asdict(PAPER_COSTS)}),
+    Ablation("boxes of one window: 5 frames", {"window": {"window": 5, "birth_window": 5}}),
+    Ablation("no return after long", {"window": {"reidentify_max_distance": 0.0}}),
+    Ablation("templates stay as they were", {"window": {"template_update_rate": 0.0}}),
+    Ablation("the paper's costs", {"costs": asdict(PAPER_COSTS)}),
 )
 """What is switched off, one at a time."""
 
@@ -63,7 +63,7 @@ _NAMES = {"idf1": "IDF1, %", "hota": "HOTA, %", "mota": "MOTA, %", "switches": "
 
 
 @dataclass(frozen=True, slots=True)
-class Input:
+class InputSequence:
     """A recording, with its pictures or without."""
 
     recording: Recording
@@ -75,13 +75,13 @@ class Input:
         return f"{self.recording.name}, pictures" if self.pictures else self.recording.name
 
 
-def inputs(recordings: list[Recording]) -> list[Input]:
+def inputs(recordings: list[Recording]) -> list[InputSequence]:
     """Return every recording's detections, with and without the pictures that appearance needs."""
-    alone = [Input(it) for it in recordings]
-    return alone + [Input(it, pictures=True) for it in recordings if it.video and it.video.is_file()]
+    alone = [InputSequence(it) for it in recordings]
+    return alone + [InputSequence(it, pictures=True) for it in recordings if it.video and it.video.is_file()]
 
 
-def score(term: Term, given: Input) -> Scores:
+def score(term: Ablation, given: InputSequence) -> Scores:
     """Track without the term, and score it."""
     return given.recording.score(track(given.recording, term.off, pictures=given.pictures))
 
@@ -129,7 +129,7 @@ def run(recordings: list[Recording], out: Path, jobs: int) -> None:
     report.save(out / "ablation.txt")
 
 
-def _all_scores(pairs: list[tuple[Term, Input]], jobs: int) -> list[Scores]:
+def _all_scores(pairs: list[tuple[Ablation, InputSequence]], jobs: int) -> list[Scores]:
     if jobs == 1:
         return [score(term, given) for term, given in pairs]
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:

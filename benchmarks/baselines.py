@@ -39,7 +39,7 @@ _VIEWS = (("pets09", "view1", 7.0), ("terrace", "c0", 25.0), ("terrace", "c1", 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class SearchedView:
     """One camera's pictures, what was found in them, and who is really there."""
 
     name: str
@@ -57,7 +57,7 @@ class View:
         ]
 
 
-def views(data: Path, most: int | None) -> list[View]:
+def views(data: Path, most: int | None) -> list[SearchedView]:
     """Search the first `most` frames of every view there is.
 
     Raises:
@@ -73,13 +73,13 @@ def views(data: Path, most: int | None) -> list[View]:
                 if most is None or it.number < most
             ]
             rows = [row for row in read_rows(truth) if row.frame <= len(frames)]
-            found.append(View(f"{scene} {name}", frames, rows, rate))
+            found.append(SearchedView(f"{scene} {name}", frames, rows, rate))
     if not found:
         raise CannotRunError(f"needs pets09 or terrace in {data}; --data or MYVIEW_TEST_DATA say where")
     return found
 
 
-def follow(name: str, view: View) -> tuple[list[MotRow], float]:
+def follow(name: str, view: SearchedView) -> tuple[list[MotRow], float]:
     """Return a tracker's tracks, and the milliseconds that it took for each frame."""
     frames = view.frames
     tracker = create_tracker(

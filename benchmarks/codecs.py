@@ -37,7 +37,7 @@ _PEAK = 255.0
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class StreamVariant:
     """One way to a camera's stream."""
 
     name: str
@@ -46,7 +46,7 @@ class Way:
 
 
 @dataclass(frozen=True, slots=True)
-class Cost:
+class StreamCost:
     """What it costs and gives; milliseconds are of processor time, for a frame."""
 
     taken: float
@@ -65,12 +65,12 @@ class Cost:
 
 
 WAYS = (
-    Way("H.264 (the default)", {}),
-    Way("H.264, preset veryfast", {"preset": "veryfast"}),
-    Way("H.264, max_kbps 500", {"max_kbps": 500}),
-    Way("VP8 (quantizer 16, speed 10)", {"codec": "vp8"}),
-    Way("VP8, quantizer 24", {"codec": "vp8", "quantizer": 24}),
-    Way("its own H.264, passed through", {}, "pass"),
+    StreamVariant("H.264 (the default)", {}),
+    StreamVariant("H.264, preset veryfast", {"preset": "veryfast"}),
+    StreamVariant("H.264, max_kbps 500", {"max_kbps": 500}),
+    StreamVariant("VP8 (quantizer 16, speed 10)", {"codec": "vp8"}),
+    StreamVariant("VP8, quantizer 24", {"codec": "vp8", "quantizer": 24}),
+    StreamVariant("its own H.264, passed through", {}, "pass"),
 )
 
 
@@ -85,7 +85,7 @@ def record(path: Path, site: SiteSettings, frames: int) -> Path:
     return path
 
 
-def measure(way: Way, film: Path, site: SiteSettings, frames: int) -> Cost:
+def measure(way: StreamVariant, film: Path, site: SiteSettings, frames: int) -> StreamCost:
     """Run a camera over a recording."""
     pipeline = CameraPipeline(_config(way, film, site), "c0")
     spent, sizes, error = np.zeros(3), 0, 0.0
@@ -108,14 +108,14 @@ def measure(way: Way, film: Path, site: SiteSettings, frames: int) -> Cost:
     pipeline.close()
     taken, encoded, tracked = _MS * spent / frames
     quality = 10 * np.log10(_PEAK**2 * frames / error) if error else float("inf")
-    return Cost(taken, encoded, tracked, sizes * 8 * site.fps / frames / 1e3, float(quality))
+    return StreamCost(taken, encoded, tracked, sizes * 8 * site.fps / frames / 1e3, float(quality))
 
 
 def _squared(one: NDArray[Any], other: NDArray[Any]) -> float:
     return float(np.mean((one.astype(np.float32) - other.astype(np.float32)) ** 2))
 
 
-def _config(way: Way, film: Path, site: SiteSettings) -> Config:
+def _config(way: StreamVariant, film: Path, site: SiteSettings) -> Config:
     content = {
         "site": site.model_dump(),
         "encode": way.encode,
@@ -124,9 +124,9 @@ def _config(way: Way, film: Path, site: SiteSettings) -> Config:
     return build_config(content, where="codecs", folder=film.parent)
 
 
-def middle(costs: Sequence[Cost]) -> Cost:
+def middle(costs: Sequence[StreamCost]) -> StreamCost:
     """Return the median of each number."""
-    return Cost(
+    return StreamCost(
         statistics.median(it.taken for it in costs),
         statistics.median(it.encoded for it in costs),
         statistics.median(it.tracked for it in costs),

@@ -40,7 +40,7 @@ _LOOK_S = 0.003
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class ViewerLoad:
     """Who watches what."""
 
     name: str
@@ -49,7 +49,7 @@ class Wish:
 
 
 @dataclass(frozen=True, slots=True)
-class Cost:
+class RenderingCost:
     """What a wish costs; milliseconds of processor time a frame, but for the start."""
 
     start_s: float
@@ -60,7 +60,7 @@ class Cost:
     """Resident memory of the drawing process."""
 
 
-class Stage:
+class RoomStream:
     """A stream of the room with true boxes."""
 
     def __init__(self, site: SiteSettings, encode: EncodeSettings) -> None:
@@ -105,7 +105,7 @@ class Stage:
         return GopOverlay(first, [self._boxes[pulse % _DRAWN] for pulse in range(first, first + self.gop)], 1)
 
 
-async def measure(stage: Stage, wish: Wish, gops: int) -> Cost:
+async def measure(stage: RoomStream, wish: ViewerLoad, gops: int) -> RenderingCost:
     """Let a process draw; every GOP is given when the one before is done."""
     stream = Broadcaster()
     source = RenderedStream("the room", stream, stage.told, stage.settings, live=True, queue_gops=8)
@@ -126,7 +126,7 @@ async def measure(stage: Stage, wish: Wish, gops: int) -> Cost:
         while source.newest < _last(stage, chunk):  # noqa: ASYNC110 — a service does not wait for this
             await asyncio.sleep(_LOOK_S)
     frames = gops * stage.gop
-    cost = Cost(
+    cost = RenderingCost(
         start,
         _MS * (_processor_seconds(pid) - drawing) / frames,
         _MS * (time.process_time() - service) / frames,
@@ -143,7 +143,7 @@ async def _read(viewer: Subscriber) -> None:
         del data
 
 
-def _last(stage: Stage, chunk: BytesChunk) -> int:
+def _last(stage: RoomStream, chunk: BytesChunk) -> int:
     return first_pulse(chunk.data, stage.site.fps) + stage.gop - 1
 
 
@@ -158,18 +158,18 @@ def _resident_megabytes(pid: int) -> float:
     return int(line.split()[1]) / 1024
 
 
-def wishes(fps: float) -> list[Wish]:
+def wishes(fps: float) -> list[ViewerLoad]:
     """List what is measured."""
     plain, boxed = MjpegVariant(fps, boxed=False), MjpegVariant(fps, boxed=True)
     return [
-        Wish("decoded only, for stills"),
-        Wish("boxes burnt in, one viewer", 1),
-        Wish(f"boxes burnt in, {_MANY} viewers", _MANY),
-        Wish("JPEG, one viewer", 0, [plain]),
-        Wish(f"JPEG, {_MANY} viewers", 0, [plain] * _MANY),
-        Wish("JPEG with boxes, one viewer", 0, [boxed]),
-        Wish("JPEG, 5 a second", 0, [MjpegVariant(5.0, boxed=False)]),
-        Wish("all of these at once", _MANY, [plain] * _MANY + [boxed] * _MANY),
+        ViewerLoad("decoded only, for stills"),
+        ViewerLoad("boxes burnt in, one viewer", 1),
+        ViewerLoad(f"boxes burnt in, {_MANY} viewers", _MANY),
+        ViewerLoad("JPEG, one viewer", 0, [plain]),
+        ViewerLoad(f"JPEG, {_MANY} viewers", 0, [plain] * _MANY),
+        ViewerLoad("JPEG with boxes, one viewer", 0, [boxed]),
+        ViewerLoad("JPEG, 5 a second", 0, [MjpegVariant(5.0, boxed=False)]),
+        ViewerLoad("all of these at once", _MANY, [plain] * _MANY + [boxed] * _MANY),
     ]
 
 
@@ -182,7 +182,7 @@ def main() -> None:
     chosen = options.parse_args()
     width, height = map(int, chosen.size.split("x"))
     report = Report()
-    stage = Stage(SiteSettings(width=width, height=height), EncodeSettings())
+    stage = RoomStream(SiteSettings(width=width, height=height), EncodeSettings())
     rows = []
     for wish in wishes(stage.site.fps):
         costs = [asyncio.run(measure(stage, wish, chosen.gops)) for _ in range(chosen.runs)]

@@ -51,7 +51,7 @@ MILESTONES = (
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class StartupStep:
     """What a part took, and when it was over."""
 
     name: str
@@ -59,13 +59,13 @@ class Part:
     over: float
 
 
-def measure(clone: Path) -> list[Part]:
+def measure(clone: Path) -> list[StartupStep]:
     """Run `make demo` in a fresh clone until it shows somebody; return the seconds of every part.
 
     Raises:
         RuntimeError: it ended before.
     """
-    found: list[Part] = []
+    found: list[StartupStep] = []
     said: list[str] = []
     began = last = time.monotonic()
     with _demo(clone) as lines:
@@ -76,7 +76,7 @@ def measure(clone: Path) -> list[Part]:
             seen += bool(waiting[0].line.search(said[-1]))
             if seen >= waiting[0].times:
                 now = time.monotonic()
-                found.append(Part(waiting.pop(0).part, now - last, now - began))
+                found.append(StartupStep(waiting.pop(0).part, now - last, now - began))
                 last, seen = now, 0
             if not waiting:
                 return found
@@ -108,7 +108,7 @@ def _demo(clone: Path) -> Iterator[Iterator[str]]:
         process.communicate()
 
 
-def plot(parts: Sequence[Part], path: Path) -> None:
+def plot(parts: Sequence[StartupStep], path: Path) -> None:
     """Draw a bar for every part, each from when the one before was over."""
     figure = Figure(figsize=(8, 3), layout="constrained")
     FigureCanvasAgg(figure)

@@ -36,19 +36,19 @@ from pathlib import Path
 import cv2
 
 from benchmarks.bestview.association_baselines import own_tracks
-from benchmarks.bestview.camera_tracks import Watched, followed
-from benchmarks.bestview.identity_errors import Met
-from benchmarks.bestview.methods import LEAST_IOU, Outcome, Seen, Way, outcome, ways
-from benchmarks.bestview.parameter_sweep import Swept, sweep, sweep_tables
+from benchmarks.bestview.camera_tracks import SceneDetections, followed
+from benchmarks.bestview.identity_errors import MatchedBoxes
+from benchmarks.bestview.methods import LEAST_IOU, MethodResult, MethodScores, SearchedScene, outcome, ways
+from benchmarks.bestview.parameter_sweep import SweepResult, sweep, sweep_tables
 from benchmarks.bestview.plots import plot_sweeps, plot_ways
-from benchmarks.bestview.scenes import Case, auditorium, gallery, room, terrace
+from benchmarks.bestview.scenes import BenchmarkScene, auditorium, gallery, room, terrace
 from benchmarks.bestview.track_calibration import CannotCalibrateError, calibrated
-from benchmarks.bestview.visibility_losses import Losses, losses
+from benchmarks.bestview.visibility_losses import VisibilityLosses, losses
 from benchmarks.common.environment import CannotRunError, parser
 from benchmarks.common.report import Report
 from benchmarks.other_trackers.virtual_environment import (
-    PeerEnvironment,
-    PeersAwayError,
+    OtherTrackerEnvironment,
+    OtherTrackersUnavailableError,
     default_folder,
     peer_environment,
 )
@@ -68,7 +68,7 @@ WHO = ["", "whole", "pure", *(word for it in LATER_S for word in (f"{it:g} s: wh
 WHY = ["", "Visible", "choice", "number", "missed"]
 
 
-def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator[Case]:
+def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator[BenchmarkScene]:
     """Yield the scenes one after the other; those that are not there are said."""
     wanted = options.scene or SCENES
     for name, find in (("terrace", terrace), ("auditorium", auditorium)):
@@ -84,12 +84,12 @@ def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator
         yield gallery(folder, *(QUICK_GALLERY if options.quick else GALLERY))
 
 
-def as_live(case: Case) -> Case:
+def as_live(case: BenchmarkScene) -> BenchmarkScene:
     """Return the scene as cameras would show it: nothing is known of it before its first frame."""
     return replace(case, content={**case.content, "detect": {"prescan_frames": 0}})
 
 
-def row_of(it: Outcome) -> list[str]:
+def row_of(it: MethodScores) -> list[str]:
     """Return a row of the table: percent, cuts a minute, and the shortest shot in frames."""
     idf1 = (
         ["", ""] if it.tracks is None else [f"{100 * s.idf1:.1f}" for s in (it.tracks.joint, it.tracks.mean)]
@@ -106,35 +106,37 @@ def row_of(it: Outcome) -> list[str]:
     ]
 
 
-def losses_of(name: str, it: Losses) -> list[str]:
+def losses_of(name: str, it: VisibilityLosses) -> list[str]:
     """Return a row of the other table, percent."""
     return [name, *(f"{100 * share:.1f}" for share in (it.visible, it.choice, it.number, it.missed))]
 
 
-def agreements_of(case: Case, way: Way) -> list[str]:
+def agreements_of(case: BenchmarkScene, way: MethodResult) -> list[str]:
     """Return a row of the table of who is who, percent."""
-    met = Met.of(way.rendering.tracks, case.gt, LEAST_IOU)
+    met = MatchedBoxes.of(way.rendering.tracks, case.gt, LEAST_IOU)
     fps = float(case.content["site"]["fps"])
     told = (met.at_once(), *(met.later(round(seconds * fps)) for seconds in LATER_S))
     return [way.name, *(f"{100 * share:.1f}" for it in told for share in (it.whole, it.pure))]
 
 
-def peers_of(options: argparse.Namespace, report: Report) -> PeerEnvironment | None:
+def peers_of(options: argparse.Namespace, report: Report) -> OtherTrackerEnvironment | None:
     """Return the other trackers' environment, or say why there is none."""
     if options.no_peers or options.quick:
         return None
     try:
         return peer_environment(default_folder())
-    except PeersAwayError as problem:
+    except OtherTrackersUnavailableError as problem:
         report.say(f"without other trackers, which cannot be installed here: {problem}")
         return None
 
 
-def walked_of(case: Case, blind: Watched, folder: Path, report: Report) -> Seen | None:
+def walked_of(
+    case: BenchmarkScene, blind: SceneDetections, folder: Path, report: Report
+) -> SearchedScene | None:
     """Return the scene calibrated by its own tracks, or say why it cannot be."""
     try:
         walked = calibrated(case, own_tracks(followed(case.config(ground=False), blind.frames)), folder)
-        return Seen(walked, walked.watch())
+        return SearchedScene(walked, walked.watch())
     except CannotCalibrateError as problem:
         report.say(f"{case.name}: not calibrated by its own tracks: {problem}")
         return None
@@ -145,8 +147,8 @@ def measure(options: argparse.Namespace) -> None:
     cv2.setNumThreads(1)
     report = Report()
     peers = peers_of(options, report)
-    found: dict[str, list[Outcome]] = {}
-    swept: dict[str, list[Swept]] = {}
+    found: dict[str, list[MethodScores]] = {}
+    swept: dict[str, list[SweepResult]] = {}
     with tempfile.TemporaryDirectory(prefix="myview-bestview-") as name:
         for found_case in cases(options, Path(name), report):
             case = as_live(found_case) if options.as_live else found_case

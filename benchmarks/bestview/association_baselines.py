@@ -21,13 +21,13 @@ LEAST_COMMON = 5
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class _Key:
+class _TrackKey:
     camera: str
     id: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Walk:
+class _GroundTrack:
     """Where a track stands: `(F,)` frames, `(F, 2)` feet on the ground."""
 
     frames: np.ndarray[tuple[int], np.dtype[np.int64]]
@@ -55,10 +55,10 @@ def own_tracks(messages: Messages) -> dict[str, list[MotRow]]:
 
 def not_joined(rows: Rows) -> dict[str, list[MotRow]]:
     """Return every track of every camera a number of its own."""
-    keys = sorted({_Key(camera, row.id) for camera, found in rows.items() for row in found})
+    keys = sorted({_TrackKey(camera, row.id) for camera, found in rows.items() for row in found})
     number = {key: place for place, key in enumerate(keys, start=1)}
     return {
-        camera: [replace(row, id=number[_Key(camera, row.id)]) for row in found]
+        camera: [replace(row, id=number[_TrackKey(camera, row.id)]) for row in found]
         for camera, found in rows.items()
     }
 
@@ -86,14 +86,16 @@ def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[
             group.update(dict.fromkeys(theirs, ours))
     alone = not_joined(rows)
     number = {
-        _Key(camera, it.id): new.id
+        _TrackKey(camera, it.id): new.id
         for camera in rows
         for it, new in zip(rows[camera], alone[camera], strict=True)
     }
     joined = {key: min(number[member] for member in members) for key, members in group.items()}
     return {
         camera: [
-            replace(row, id=joined.get(key, number[key])) for row in found for key in (_Key(camera, row.id),)
+            replace(row, id=joined.get(key, number[key]))
+            for row in found
+            for key in (_TrackKey(camera, row.id),)
         ]
         for camera, found in rows.items()
     }
@@ -158,25 +160,25 @@ def _first_of_each(rows: Sequence[MotRow]) -> list[MotRow]:
     return list(kept.values())
 
 
-def _walks(rows: Rows, ground: Mapping[str, Floats]) -> tuple[dict[_Key, _Walk], float]:
+def _walks(rows: Rows, ground: Mapping[str, Floats]) -> tuple[dict[_TrackKey, _GroundTrack], float]:
     """Return where each track stands, and the height of a person in ground units."""
-    tracks: dict[_Key, list[MotRow]] = defaultdict(list)
+    tracks: dict[_TrackKey, list[MotRow]] = defaultdict(list)
     for camera, found in rows.items():
         for row in found:
-            tracks[_Key(camera, row.id)].append(row)
+            tracks[_TrackKey(camera, row.id)].append(row)
     walks, heights = {}, []
     for key, found in tracks.items():
         if key.camera not in ground:
             continue
         boxes = np.array([row.box for row in found])
         places = to_ground(ground[key.camera], foot_points(boxes))
-        walks[key] = _Walk(np.array([row.frame for row in found]), places)
+        walks[key] = _GroundTrack(np.array([row.frame for row in found]), places)
         heights.append(person_heights(ground[key.camera], boxes))
     known = np.concatenate(heights) if heights else np.zeros(0)
     return walks, float(np.nanmedian(known)) if known.size else 0.0
 
 
-def _apart(one: _Walk, other: _Walk) -> float:
+def _apart(one: _GroundTrack, other: _GroundTrack) -> float:
     """Return the median distance in the frames that both are in; infinite where these are few."""
     _, here, there = np.intersect1d(one.frames, other.frames, return_indices=True)
     distances = np.linalg.norm(one.feet[here] - other.feet[there], axis=1)
@@ -184,7 +186,9 @@ def _apart(one: _Walk, other: _Walk) -> float:
     return float(np.median(distances)) if len(distances) >= LEAST_COMMON else np.inf
 
 
-def _clash(ours: Sequence[_Key], theirs: Sequence[_Key], walks: Mapping[_Key, _Walk]) -> bool:
+def _clash(
+    ours: Sequence[_TrackKey], theirs: Sequence[_TrackKey], walks: Mapping[_TrackKey, _GroundTrack]
+) -> bool:
     return any(
         one.camera == other.camera and np.intersect1d(walks[one].frames, walks[other].frames).size > 0
         for one in ours

@@ -30,7 +30,7 @@ _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
-class Frames:
+class CameraDetections:
     """What one camera found, frame by frame.
 
     Attributes:
@@ -45,7 +45,7 @@ class Frames:
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
+class SceneDetections:
     """What the cameras of a scene found, each by itself.
 
     Attributes:
@@ -53,14 +53,14 @@ class Watched:
         boxes: the detections that other trackers get: those of a file, or what the detector is sure of.
     """
 
-    frames: Mapping[str, Frames]
+    frames: Mapping[str, CameraDetections]
     boxes: Rows
 
 
-def in_pictures(config: Config, camera: str) -> Frames:
+def in_pictures(config: Config, camera: str) -> CameraDetections:
     """Search a recording as a camera's process does, without encoding anything."""
     pipeline = CameraPipeline(config, camera)
-    frames = Frames(pipeline.source.size, [], [])
+    frames = CameraDetections(pipeline.source.size, [], [])
     for pulse in count():
         try:
             searched = pipeline.detect(pulse, pipeline.take(pulse))
@@ -72,20 +72,20 @@ def in_pictures(config: Config, camera: str) -> Frames:
     return frames
 
 
-def in_file(config: Config, path: Path) -> Frames:
+def in_file(config: Config, path: Path) -> CameraDetections:
     """Read detections without pictures, as `myview track --det` does."""
     detector = MotFileDetector(path)
     found = [detector.detect(_NO_PICTURE, pulse) for pulse in range(detector.last_frame + 1)]
-    return Frames((config.site.width, config.site.height), found, [True] * len(found))
+    return CameraDetections((config.site.width, config.site.height), found, [True] * len(found))
 
 
-def sure_rows(frames: Frames) -> list[MotRow]:
+def sure_rows(frames: CameraDetections) -> list[MotRow]:
     """Return what the detector is sure of."""
     rows = (row for pulse, found in enumerate(frames.found) for row in rows_of(pulse, found))
     return [row for row in rows if row.confidence >= SURE]
 
 
-def followed(config: Config, frames: Mapping[str, Frames]) -> dict[str, list[CameraTracks]]:
+def followed(config: Config, frames: Mapping[str, CameraDetections]) -> dict[str, list[CameraTracks]]:
     """Follow everybody in all cameras, in step, as `myview render` does; give what each of them says."""
     cameras = {camera: _Camera(config, camera, it) for camera, it in frames.items()}
     messages: dict[str, list[CameraTracks]] = {camera: [] for camera in frames}
@@ -112,7 +112,7 @@ def followed(config: Config, frames: Mapping[str, Frames]) -> dict[str, list[Cam
 class _Camera:
     """What one camera follows people with."""
 
-    def __init__(self, config: Config, camera: str, frames: Frames) -> None:
+    def __init__(self, config: Config, camera: str, frames: CameraDetections) -> None:
         track = config.track
         self.tracker = OnlineTracker(track.window, track.costs, create_solver(track.solver))
         self.reporter = TrackMessageBuilder(camera, 0, frames.size, track.window.stride)

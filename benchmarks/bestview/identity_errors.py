@@ -16,7 +16,7 @@ Ints = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 
 @dataclass(frozen=True, slots=True)
-class Agreement:
+class PairScores:
     """What numbers are worth where there are two boxes to compare.
 
     Attributes:
@@ -29,7 +29,7 @@ class Agreement:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Met:
+class MatchedBoxes:
     """The boxes that are at somebody.
 
     Attributes:
@@ -45,7 +45,7 @@ class Met:
     number: Ints
 
     @classmethod
-    def of(cls, tracks: Rows, gt: Rows, least_iou: float) -> Met:
+    def of(cls, tracks: Rows, gt: Rows, least_iou: float) -> MatchedBoxes:
         """Find them: in each frame one box for a person at most, for the largest total overlap.
 
         Raises:
@@ -60,17 +60,17 @@ class Met:
                 found += [(camera, number, person, track) for person, track in pairs]
         return cls(*np.array(found, dtype=np.int64).reshape(-1, 4).T)
 
-    def at_once(self) -> Agreement:
+    def at_once(self) -> PairScores:
         """Compare the cameras with each other, frame by frame."""
         people = _pairs(self.frame, self.person)
         numbers = _pairs(self.frame, self.number)
-        return _stream_format(people, numbers, _pairs(self.frame, self.person, self.number))
+        return _pair_scores(people, numbers, _pairs(self.frame, self.person, self.number))
 
-    def later(self, frames: int) -> Agreement:
+    def later(self, frames: int) -> PairScores:
         """Compare each camera with itself so many frames later."""
         people = self._still(frames, self.person)
         numbers = self._still(frames, self.number)
-        return _stream_format(people, numbers, self._still(frames, self.person, self.number))
+        return _pair_scores(people, numbers, self._still(frames, self.person, self.number))
 
     def _still(self, frames: int, *names: Ints) -> int:
         """Count what has these names and is there in the same camera so many frames later."""
@@ -78,8 +78,8 @@ class Met:
         return len(now.intersection(_rows(self.camera, self.frame + frames, *names)))
 
 
-def _stream_format(people: int, numbers: int, both: int) -> Agreement:
-    return Agreement(both / people if people else np.nan, both / numbers if numbers else np.nan)
+def _pair_scores(people: int, numbers: int, both: int) -> PairScores:
+    return PairScores(both / people if people else np.nan, both / numbers if numbers else np.nan)
 
 
 def _pairs(*names: Ints) -> int:

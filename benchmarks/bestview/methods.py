@@ -15,13 +15,13 @@ from benchmarks.bestview.association_baselines import (
     own_tracks,
     tracks_by_truth,
 )
-from benchmarks.bestview.camera_tracks import Rows, Watched, followed
+from benchmarks.bestview.camera_tracks import Rows, SceneDetections, followed
 from benchmarks.bestview.occupancy.foreground_masks import CannotMapError
 from benchmarks.bestview.occupancy.reference_tracker import occupancy_rows
-from benchmarks.bestview.scenes import Case
+from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.bestview.service_decisions import Rendering, decide, decide_given, largest
 from benchmarks.bestview.tracklet_cuts import own_parts
-from benchmarks.other_trackers.virtual_environment import PEERS, PeerEnvironment
+from benchmarks.other_trackers.virtual_environment import PEERS, OtherTrackerEnvironment
 from bestview import ViewScore
 from server.cli.evaluate.choices_file import Choice
 from server.cli.evaluate.ground_truth import SceneTruth, people_of_objects
@@ -43,7 +43,7 @@ MAP = "occupancy map"
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class MethodResult:
     """One way's boxes by the person's number, and its choices."""
 
     name: str
@@ -53,7 +53,7 @@ class Way:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class MethodScores:
     """How good it is."""
 
     name: str
@@ -61,7 +61,7 @@ class Outcome:
     views: ViewScore
 
 
-def visible_rows(case: Case, truth: SceneTruth) -> dict[str, list[MotRow]]:
+def visible_rows(case: BenchmarkScene, truth: SceneTruth) -> dict[str, list[MotRow]]:
     """Return the true boxes of those who are visible: what a camera that misses nothing would find."""
     place = {person: index for index, person in enumerate(truth.people)}
     return {
@@ -75,7 +75,7 @@ def visible_rows(case: Case, truth: SceneTruth) -> dict[str, list[MotRow]]:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class SearchedScene:
     """A scene as its cameras see it, whose search for people knows the ground.
 
     Attributes:
@@ -83,18 +83,18 @@ class Seen:
         watched: what they find.
     """
 
-    case: Case
-    watched: Watched
+    case: BenchmarkScene
+    watched: SceneDetections
 
 
 def ways(
-    case: Case,
+    case: BenchmarkScene,
     truth: SceneTruth,
-    seen: Watched,
-    blind: Watched,
-    peers: PeerEnvironment | None,
-    walked: Seen | None,
-) -> Iterator[Way]:
+    seen: SceneDetections,
+    blind: SceneDetections,
+    peers: OtherTrackerEnvironment | None,
+    walked: SearchedScene | None,
+) -> Iterator[MethodResult]:
     """Yield them, truth first.
 
     Args:
@@ -115,50 +115,50 @@ def ways(
         return Rendering(_lists(rows), largest(rows, case.sizes, frames))
 
     there = visible_rows(case, truth)
-    yield Way(TRUE, chosen(there), given=True)
-    yield Way(TRUE_LARGEST, simple(there), given=True)
+    yield MethodResult(TRUE, chosen(there), given=True)
+    yield MethodResult(TRUE_LARGEST, simple(there), given=True)
     said = followed(config, seen.frames)
     own = own_tracks(said)
     named = boxes_by_truth(own, case.gt)
-    yield Way("own boxes, true ids", chosen(named))
-    yield Way("  and gaps bridged", chosen(bridged(named, BRIDGE)))
-    yield Way("own parts, true joins", chosen(tracks_by_truth(own_parts(config, said), case.gt)))
-    yield Way("own tracks, true joins", chosen(tracks_by_truth(own, case.gt)))
-    yield Way("own tracks, not joined", simple(not_joined(own)))
+    yield MethodResult("own boxes, true ids", chosen(named))
+    yield MethodResult("  and gaps bridged", chosen(bridged(named, BRIDGE)))
+    yield MethodResult("own parts, true joins", chosen(tracks_by_truth(own_parts(config, said), case.gt)))
+    yield MethodResult("own tracks, true joins", chosen(tracks_by_truth(own, case.gt)))
+    yield MethodResult("own tracks, not joined", simple(not_joined(own)))
     uncalibrated = case.config(ground=False)
     bare_said = followed(uncalibrated, blind.frames)
     bare = decide(uncalibrated, bare_said)
-    yield Way(WITHOUT, bare)
+    yield MethodResult(WITHOUT, bare)
     if case.apart:
-        yield Way("  looks alone", decide(case.config(ground=False, view=LOOKS_ALONE), bare_said))
+        yield MethodResult("  looks alone", decide(case.config(ground=False, view=LOOKS_ALONE), bare_said))
     if not case.calibrated:
-        yield Way(f"{WITHOUT}, largest", simple(bare.tracks))
-    for name, sight in ((OURS, Seen(case, seen) if case.calibrated else None), (CALIBRATED, walked)):
+        yield MethodResult(f"{WITHOUT}, largest", simple(bare.tracks))
+    for name, sight in ((OURS, SearchedScene(case, seen) if case.calibrated else None), (CALIBRATED, walked)):
         if sight is None:
             continue
         scene, found = sight.case, sight.watched
         said = said if scene is case else followed(scene.config(), found.frames)
         apart = followed(uncalibrated, found.frames)
         ours = decide(scene.config(), said)
-        yield Way(name, ours)
-        yield Way(f"{name}, found only", decide(scene.config(view=FOUND_ONLY), said))
-        yield Way(f"{name}, no evidence", decide(scene.config(), apart))
+        yield MethodResult(name, ours)
+        yield MethodResult(f"{name}, found only", decide(scene.config(view=FOUND_ONLY), said))
+        yield MethodResult(f"{name}, no evidence", decide(scene.config(), apart))
         if case.apart:
-            yield Way(f"{name}, looks alone", decide(scene.config(view=LOOKS_ALONE), said))
-        yield Way(f"{name}, again", chosen(ours.tracks))
-        yield Way(f"{name}, largest", simple(ours.tracks))
+            yield MethodResult(f"{name}, looks alone", decide(scene.config(view=LOOKS_ALONE), said))
+        yield MethodResult(f"{name}, again", chosen(ours.tracks))
+        yield MethodResult(f"{name}, largest", simple(ours.tracks))
         ground = {camera: it for camera, it in camera_homographies(scene.config()).items() if it is not None}
         short = "nearest feet" if scene is case else "nearest feet, calibr."
-        yield Way(short, simple(by_nearest_feet(own_tracks(apart), ground)))
+        yield MethodResult(short, simple(by_nearest_feet(own_tracks(apart), ground)))
         if case.detections is None and not case.apart:
             title = MAP if scene is case else f"{MAP}, calibr."
-            yield from (Way(title, chosen(rows)) for rows in _mapped(scene, found))
+            yield from (MethodResult(title, chosen(rows)) for rows in _mapped(scene, found))
         if peers is not None:
             theirs = by_nearest_feet(_peer_tracks(peers, found.boxes), ground)
-            yield Way(f"{PEER}, {short}", simple(theirs))
+            yield MethodResult(f"{PEER}, {short}", simple(theirs))
 
 
-def _mapped(scene: Case, found: Watched) -> Iterator[Rows]:
+def _mapped(scene: BenchmarkScene, found: SceneDetections) -> Iterator[Rows]:
     """Yield what the occupancy map finds; where there can be none, say why."""
     try:
         yield occupancy_rows(scene, found.boxes)
@@ -170,7 +170,7 @@ def _lists(rows: Rows) -> dict[str, list[MotRow]]:
     return {camera: list(found) for camera, found in rows.items()}
 
 
-def outcome(case: Case, truth: SceneTruth, way: Way) -> Outcome:
+def outcome(case: BenchmarkScene, truth: SceneTruth, way: MethodResult) -> MethodScores:
     """Score a way."""
     recordings = {camera: TruthAndTracks(case.gt[camera], way.rendering.tracks[camera]) for camera in case.gt}
     if way.given:
@@ -178,11 +178,11 @@ def outcome(case: Case, truth: SceneTruth, way: Way) -> Outcome:
     else:
         scores = evaluate_cameras(recordings, LEAST_IOU)
         person_of = people_of_objects(truth.people, recordings, LEAST_IOU)
-    return Outcome(way.name, scores, score_choices(case, truth, way.rendering.choices, person_of))
+    return MethodScores(way.name, scores, score_choices(case, truth, way.rendering.choices, person_of))
 
 
 def score_choices(
-    case: Case, truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int]
+    case: BenchmarkScene, truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int]
 ) -> ViewScore:
     """Score choices against the truth, as `myview evaluate --views` does."""
     config = case.config()
@@ -190,11 +190,11 @@ def score_choices(
     return evaluate_views(truth, choices, person_of, facts).total
 
 
-def _peer_tracks(peers: PeerEnvironment, boxes: Rows) -> dict[str, list[MotRow]]:
+def _peer_tracks(peers: OtherTrackerEnvironment, boxes: Rows) -> dict[str, list[MotRow]]:
     """Return the peer's tracks of every camera's detections.
 
     Raises:
-        PeersAwayError: it failed.
+        OtherTrackersUnavailableError: it failed.
     """
     peer = next(it for it in PEERS if it.name == PEER)
     tracks = {}

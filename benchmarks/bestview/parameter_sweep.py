@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.bestview.methods import visible_rows
-from benchmarks.bestview.scenes import Case
+from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.bestview.service_decisions import decide_given
 from benchmarks.common.report import Report
 from bestview import NO_CAMERA, ViewScore, score_views, select_views
@@ -29,7 +29,7 @@ DEFAULT_SWITCH_COST_S, DEFAULT_EXTRAPOLATE_S = ViewSettings().switch_cost_s, Vie
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class SweepSetting:
     """What is varied; a look-ahead of None: the whole recording is known."""
 
     lookahead: int | None
@@ -43,31 +43,31 @@ class Setting:
 
 
 @dataclass(frozen=True, slots=True)
-class Swept:
+class SweepResult:
     """A setting and how good its choices are, beside the frame-exact optimum at the same cost of a cut."""
 
-    setting: Setting
+    setting: SweepSetting
     delay_s: float
     score: ViewScore
 
 
-def settings_of(*, quick: bool) -> Iterator[Setting]:
+def settings_of(*, quick: bool) -> Iterator[SweepSetting]:
     """Yield the settings: look-ahead by GOP; at their defaults, the cost of a cut and what goes on."""
     gops = QUICK_GOPS if quick else GOPS
     for gop in gops:
         for lookahead in QUICK_LOOKAHEADS if quick else LOOKAHEADS:
             if lookahead >= gop:
-                yield Setting(lookahead, gop, DEFAULT_SWITCH_COST_S)
-        yield Setting(None, gop, DEFAULT_SWITCH_COST_S)
+                yield SweepSetting(lookahead, gop, DEFAULT_SWITCH_COST_S)
+        yield SweepSetting(None, gop, DEFAULT_SWITCH_COST_S)
     for cost in QUICK_SWITCH_COSTS_S if quick else SWITCH_COSTS_S:
         if cost != DEFAULT_SWITCH_COST_S:
-            yield Setting(DEFAULT_LOOKAHEAD, DEFAULT_GOP, cost)
+            yield SweepSetting(DEFAULT_LOOKAHEAD, DEFAULT_GOP, cost)
     for extrapolate_s in QUICK_EXTRAPOLATE_S if quick else EXTRAPOLATE_S:
         if extrapolate_s != DEFAULT_EXTRAPOLATE_S:
-            yield Setting(DEFAULT_LOOKAHEAD, DEFAULT_GOP, DEFAULT_SWITCH_COST_S, extrapolate_s)
+            yield SweepSetting(DEFAULT_LOOKAHEAD, DEFAULT_GOP, DEFAULT_SWITCH_COST_S, extrapolate_s)
 
 
-def sweep(case: Case, truth: SceneTruth, *, quick: bool) -> list[Swept]:
+def sweep(case: BenchmarkScene, truth: SceneTruth, *, quick: bool) -> list[SweepResult]:
     """Try them all."""
     fps = case.config().site.fps
     rows = visible_rows(case, truth)
@@ -91,7 +91,7 @@ def sweep(case: Case, truth: SceneTruth, *, quick: bool) -> list[Swept]:
             same = {person: person for person in truth.people}
             views = views_of(choices, same, truth.people, truth.cameras, frames)
         score = score_views(truth.views.cost, truth.views.visible, views, switch_cost, fps)
-        results.append(Swept(setting, setting.delay_s(fps), score))
+        results.append(SweepResult(setting, setting.delay_s(fps), score))
     return results
 
 
@@ -104,7 +104,7 @@ def _known_whole(
     return select_views(truth.views.cost, np.full(people, NO_CAMERA), switch_cost, starts).views
 
 
-def sweep_tables(report: Report, swept: Mapping[str, Sequence[Swept]]) -> None:
+def sweep_tables(report: Report, swept: Mapping[str, Sequence[SweepResult]]) -> None:
     """Print a table for each scene."""
     for name, found in swept.items():
         report.table(

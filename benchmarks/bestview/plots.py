@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.bestview.methods import Outcome
+from benchmarks.bestview.methods import MethodScores
 from benchmarks.bestview.parameter_sweep import (
     DEFAULT_EXTRAPOLATE_S,
     DEFAULT_GOP,
     DEFAULT_LOOKAHEAD,
     DEFAULT_SWITCH_COST_S,
-    Swept,
+    SweepResult,
 )
 from server.cli.render.plots import new_figure, save_figure
 
 
-def plot_ways(found: Mapping[str, Sequence[Outcome]], out: Path) -> None:
+def plot_ways(found: Mapping[str, Sequence[MethodScores]], out: Path) -> None:
     """Draw joint IDF1, agreement and visibility of every way, a row for each scene."""
     most = max(len(outcomes) for outcomes in found.values())
     figure = new_figure((12.0, 0.8 + (0.8 + 0.2 * most) * len(found)))
@@ -41,7 +41,7 @@ def plot_ways(found: Mapping[str, Sequence[Outcome]], out: Path) -> None:
     save_figure(figure, out)
 
 
-def plot_sweeps(swept: Mapping[str, Sequence[Swept]], out: Path) -> None:
+def plot_sweeps(swept: Mapping[str, Sequence[SweepResult]], out: Path) -> None:
     """Draw regret over delay for each GOP, over the GOP, and cuts over the cost of a cut."""
     figure = new_figure((12.0, 0.8 + 3.0 * len(swept)))
     axes = figure.subplots(len(swept), 3, squeeze=False)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.bestview.camera_tracks import Rows, Watched, in_file, in_pictures, sure_rows
+from benchmarks.bestview.camera_tracks import Rows, SceneDetections, in_file, in_pictures, sure_rows
 from benchmarks.common.environment import CannotRunError
-from benchmarks.common.recorded_views import Views, find_views
+from benchmarks.common.recorded_views import RecordedViews, find_views
 from server.cli.evaluate.ground_truth import SceneTruth, build_truth
 from server.cli.render.video_info import Size
 from server.config.loader import build_config
@@ -24,7 +24,7 @@ _GALLERY_SIZE = (384, 216)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Case:
+class BenchmarkScene:
     """One scene.
 
     Attributes:
@@ -67,20 +67,20 @@ class Case:
         """Return how well everybody could be seen."""
         return build_truth(self.gt, self.sizes, self.least_shown)
 
-    def watch(self, *, ground: bool = True) -> Watched:
+    def watch(self, *, ground: bool = True) -> SceneDetections:
         """Let every camera look for people by itself; how tall they are where it may know from the ground."""
         config = self.config(ground=ground)
         if self.detections is not None:
             files = self.detections
-            return Watched(
+            return SceneDetections(
                 {camera: in_file(config, files[camera]) for camera in self.gt},
                 {camera: read_rows(files[camera]) for camera in self.gt},
             )
         frames = {camera: in_pictures(config, camera) for camera in self.gt}
-        return Watched(frames, {camera: sure_rows(it) for camera, it in frames.items()})
+        return SceneDetections(frames, {camera: sure_rows(it) for camera, it in frames.items()})
 
 
-def terrace(data: Path) -> Case:
+def terrace(data: Path) -> BenchmarkScene:
     """Two views, searched by background subtraction, the watermark masked.
 
     Raises:
@@ -89,10 +89,10 @@ def terrace(data: Path) -> Case:
     views = find_views(data, "terrace")
     folder = data / "terrace"
     gt = {video.stem: read_rows(folder / "gt" / f"{video.stem}.txt") for video in views.videos}
-    return Case("terrace", "two views, background subtraction", _content(views), gt, 0.25)
+    return BenchmarkScene("terrace", "two views, background subtraction", _content(views), gt, 0.25)
 
 
-def auditorium(data: Path) -> Case:
+def auditorium(data: Path) -> BenchmarkScene:
     """Four views without pictures or calibration, by public detections.
 
     Its flag of who is hidden is set for nearly everybody in two cameras, so that it says nothing: whoever
@@ -111,30 +111,32 @@ def auditorium(data: Path) -> Case:
     }
     gt = {camera: read_rows(folder / "gt" / f"{camera}.txt.gz") for camera in _AUDITORIUM}
     detections = {camera: folder / "det" / f"{camera}.txt.gz" for camera in _AUDITORIUM}
-    return Case("auditorium", "four views, public detections, no calibration", content, gt, 0.0, detections)
+    return BenchmarkScene(
+        "auditorium", "four views, public detections, no calibration", content, gt, 0.0, detections
+    )
 
 
-def room(folder: Path, cameras: int, people: int, seconds: float) -> Case:
+def room(folder: Path, cameras: int, people: int, seconds: float) -> BenchmarkScene:
     """Draw the synthetic room into a new folder."""
     return _drawn(folder, Scene("room", cameras, people, _ROOM_SEED, *_ROOM_SIZE, _ROOM_FPS), seconds)
 
 
-def gallery(folder: Path, people: int, seconds: float) -> Case:
+def gallery(folder: Path, people: int, seconds: float) -> BenchmarkScene:
     """Draw the synthetic gallery, whose three cameras have no floor in common, into a new folder."""
     scene = Scene("gallery", 3, people, _ROOM_SEED, *_GALLERY_SIZE, _ROOM_FPS)
     return replace(_drawn(folder, scene, seconds), apart=True)
 
 
-def _drawn(folder: Path, scene: Scene, seconds: float) -> Case:
+def _drawn(folder: Path, scene: Scene, seconds: float) -> BenchmarkScene:
     name = f"{scene.name}-{scene.cameras}-{scene.objects}"
     write_recording(scene, folder / name, seconds)
     views = find_views(folder, name)
     gt = {video.stem: read_rows(folder / name / "gt" / f"{video.stem}.txt") for video in views.videos}
     about = f"synthetic, {scene.cameras} cameras, {scene.objects} people, {seconds:g} s"
-    return Case(name, about, _content(views), gt, 0.25)
+    return BenchmarkScene(name, about, _content(views), gt, 0.25)
 
 
-def _content(views: Views) -> dict[str, Any]:
+def _content(views: RecordedViews) -> dict[str, Any]:
     content = {"site": views.site, "cameras": views.cameras}
     if views.ground is not None:
         content["ground"] = str(views.ground.absolute())

@@ -31,7 +31,7 @@ class Rendering:
     choices: list[Choice]
 
 
-class GivenNumbers:
+class GroundTruthRegistry:
     """A registry that knows who everybody is: a track's place is its person's, in every camera."""
 
     def __init__(self, people: Sequence[int]) -> None:
@@ -54,7 +54,7 @@ def decide(config: Config, messages: Messages, people: Sequence[int] | None = No
         config, camera_homographies(config), lambda camera, pulse: 0 <= pulse <= last[camera]
     )
     if people is not None:
-        decider.people._registry = GivenNumbers(people)  # type: ignore[assignment]  # noqa: SLF001 — truth in its place
+        decider.people._registry = GroundTruthRegistry(people)  # type: ignore[assignment]  # noqa: SLF001 — truth in its place
     for camera in config.camera_ids:
         aligner.camera_connected(camera)
         aligner.frame_received(camera, messages[camera][0].boot, 0)

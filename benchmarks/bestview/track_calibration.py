@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.bestview.camera_tracks import Rows
-from benchmarks.bestview.scenes import Case
+from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.common.environment import ROOT, one_thread_environment
 from tracking.motchallenge import write_rows
 
@@ -19,7 +19,7 @@ class CannotCalibrateError(Exception):
     """There are no homographies; the text says why."""
 
 
-def calibrated(case: Case, own: Rows, folder: Path) -> Case:
+def calibrated(case: BenchmarkScene, own: Rows, folder: Path) -> BenchmarkScene:
     """Return the scene with the homographies that its cameras' own tracks give, in place of any it has.
 
     Raises:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.bestview.methods import LEAST_IOU, Way
-from benchmarks.bestview.scenes import Case
+from benchmarks.bestview.methods import LEAST_IOU, MethodResult
+from benchmarks.bestview.scenes import BenchmarkScene
 from server.cli.evaluate.choices_file import views_of
 from server.cli.evaluate.ground_truth import SceneTruth, people_of_objects
 from tracking.boxes import iou
@@ -19,7 +19,7 @@ Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True, slots=True)
-class Losses:
+class VisibilityLosses:
     """Shares of the frames in which somebody is visible in some camera.
 
     Attributes:
@@ -35,7 +35,7 @@ class Losses:
     missed: float
 
 
-def losses(case: Case, truth: SceneTruth, way: Way) -> Losses:
+def losses(case: BenchmarkScene, truth: SceneTruth, way: MethodResult) -> VisibilityLosses:
     """Classify what keeps people from being visible in the chosen view.
 
     Raises:
@@ -54,7 +54,7 @@ def losses(case: Case, truth: SceneTruth, way: Way) -> Losses:
     wrong = lost & ~own & others
     frames = max(int(np.count_nonzero(truth.views.evaluated)), 1)
     counts = (truth.views.evaluated & shown, mine, wrong, lost & ~own & ~others)
-    return Losses(*(np.count_nonzero(it) / frames for it in counts))
+    return VisibilityLosses(*(np.count_nonzero(it) / frames for it in counts))
 
 
 def _met(

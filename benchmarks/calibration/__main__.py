@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from benchmarks.calibration.calibration_errors import Agreement, agreement, error_of_known, in_common
+from benchmarks.calibration.calibration_errors import GroundAgreement, agreement, error_of_known, in_common
 from benchmarks.common.environment import CannotRunError, parser
 from benchmarks.common.public_detections import Recording, track
-from benchmarks.common.recorded_views import Views, find_views
+from benchmarks.common.recorded_views import RecordedViews, find_views
 from benchmarks.common.report import Report
 from bestview.calibration import CalibrationError, Walk, WalkCalibration, WalkTrack, calibrate_from_walks
 from server.cli.calibrate.walk_input import VideoFormat, walks_from_tracks
@@ -42,7 +42,7 @@ _AUDITORIUM = ("HC3", "HC4", "IP2", "IP5")
 
 
 @dataclass(frozen=True, slots=True)
-class Room:
+class RoomWalk:
     """A walk of some people in the drawn room, and where its cameras really are."""
 
     people: int
@@ -51,14 +51,14 @@ class Room:
     from_tracks: tuple[Walk, ...]
 
 
-def draw(folder: Path, people: int) -> Room:
+def draw(folder: Path, people: int) -> RoomWalk:
     """Draw a minute, and track it."""
     scene = Scene("room", 3, people, 1, *_ROOM_SIZE, _ROOM_FPS)
     write_recording(scene, folder, _ROOM_S, lambda _done, _total: None)
     tracks = _tracked(find_views(folder.parent, folder.name), folder / "tracked", None)
     picture = VideoFormat(_ROOM_SIZE, _ROOM_FPS)
     matrices = json.loads((folder / "ground.json").read_text(encoding="ascii"))["homography"]
-    return Room(
+    return RoomWalk(
         people,
         {name: np.array(matrix) for name, matrix in matrices.items()},
         walks_from_tracks([folder / "gt"], picture).walks,
@@ -66,7 +66,7 @@ def draw(folder: Path, people: int) -> Room:
     )
 
 
-def _tracked(views: Views, out: Path, config: Path | None) -> Path:
+def _tracked(views: RecordedViews, out: Path, config: Path | None) -> Path:
     out.mkdir()
     for video in views.videos:
         track_one(video, None, out / f"{video.stem}.txt", config, None, lambda _: None)
@@ -170,7 +170,7 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
         report.say(f"auditorium: {it.camera} is left out: {it.reason}")
 
 
-def _cells(seen: Agreement) -> Sequence[str]:
+def _cells(seen: GroundAgreement) -> Sequence[str]:
     return [f"{seen.median:.2f}", f"{seen.most:.2f}", f"{100 * seen.right:.0f}"]
 
 

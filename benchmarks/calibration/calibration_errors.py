@@ -23,7 +23,7 @@ _EDGE = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Agreement:
+class GroundAgreement:
     """How far apart two cameras have people who are known to be the same.
 
     Attributes:
@@ -38,7 +38,7 @@ class Agreement:
 
 
 @dataclass(frozen=True, slots=True)
-class Common:
+class CameraOverlap:
     """What two cameras have in common, whoever looks for it.
 
     Attributes:
@@ -68,7 +68,7 @@ def error_of_known(found: WalkCalibration, truth: Mapping[str, Floats], walks: S
     return np.asarray(np.abs(x * np.exp(1j * np.angle((np.conj(x) * y).sum())) - y), dtype=np.float64)
 
 
-def agreement(ground: Path, truth: Path, size: tuple[int, int]) -> dict[tuple[str, str], Agreement]:
+def agreement(ground: Path, truth: Path, size: tuple[int, int]) -> dict[tuple[str, str], GroundAgreement]:
     """Compare every two cameras of a file at the boxes of people who have one number in both."""
     matrices = json.loads(ground.read_text(encoding="utf-8"))["homography"]
     people = {name: _people(path, size) for name in matrices if (path := _file(truth, name)) is not None}
@@ -82,7 +82,9 @@ def agreement(ground: Path, truth: Path, size: tuple[int, int]) -> dict[tuple[st
     return found
 
 
-def in_common(truth: Path, cameras: Sequence[str], size: tuple[int, int]) -> dict[tuple[str, str], Common]:
+def in_common(
+    truth: Path, cameras: Sequence[str], size: tuple[int, int]
+) -> dict[tuple[str, str], CameraOverlap]:
     """Return for every pair of cameras whether they have anything in common to be aligned by."""
     people = {name: _people(path, size) for name in cameras if (path := _file(truth, name)) is not None}
     found = {}
@@ -90,7 +92,7 @@ def in_common(truth: Path, cameras: Sequence[str], size: tuple[int, int]) -> dic
         both = sorted(people[one].keys() & people[other].keys())
         here, there = (np.array([people[name][key] for key in both]) for name in (one, other))
         off = _off_plane(here, there) if both else float("nan")
-        found[one, other] = Common(len({person for _, person in both}), len(both), off)
+        found[one, other] = CameraOverlap(len({person for _, person in both}), len(both), off)
     return found
 
 
@@ -118,7 +120,7 @@ _Boxes = Mapping[tuple[int, int], tuple[float, float, float, float]]
 
 def _of_two(
     one: Floats, here: _Boxes, other: Floats, there: _Boxes, both: Sequence[tuple[int, int]]
-) -> Agreement:
+) -> GroundAgreement:
     mine, its = (np.array([boxes[key] for key in both]) for boxes in (here, there))
     tall = float(np.nanmedian(np.concatenate([person_heights(one, mine), person_heights(other, its)])))
     at = to_ground(one, foot_points(mine))
@@ -131,7 +133,7 @@ def _of_two(
     for (frame, person), place in zip(both, at, strict=True):
         far = {it: np.hypot(*(places[frame, it] - place)) for it in by_frame[frame]}
         right += min(far, key=lambda it: np.nan_to_num(far[it], nan=np.inf)) == person
-    return Agreement(float(np.median(apart)), float(np.quantile(apart, 0.9)), right / len(both))
+    return GroundAgreement(float(np.median(apart)), float(np.quantile(apart, 0.9)), right / len(both))
 
 
 def _people(path: Path, size: tuple[int, int]) -> _Boxes:

@@ -21,20 +21,20 @@ OTHER = "other work"
 
 
 @dataclass(frozen=True, slots=True)
-class Busy:
+class ProcessorUsage:
     """Processor seconds up to a moment."""
 
     at: float
     used: Mapping[str, float]
     """By what a process is; :data:`OTHER` is everything else on the machine."""
 
-    def cores_since(self, earlier: Busy) -> dict[str, float]:
+    def cores_since(self, earlier: ProcessorUsage) -> dict[str, float]:
         """Return how many cores were in use since an earlier moment, by what used them."""
         passed = self.at - earlier.at
         return {name: (used - earlier.used.get(name, 0.0)) / passed for name, used in self.used.items()}
 
 
-def busy_now() -> Busy:
+def busy_now() -> ProcessorUsage:
     """Read how much this process and all below it have used, and the rest of the machine."""
     found = {int(entry.name): _stat(entry) for entry in _PROC.iterdir() if entry.name.isdecimal()}
     running = {pid: stat for pid, stat in found.items() if stat}
@@ -46,7 +46,7 @@ def busy_now() -> Busy:
     numbers = [int(word) for word in (_PROC / "stat").read_text().split("\n", 1)[0].split()[1:]]
     all_used = sum(number for place, number in enumerate(numbers[:_COUNTED]) if place not in _IDLE) / _TICKS
     used[OTHER] = all_used - sum(used.values())
-    return Busy(time.monotonic(), used)
+    return ProcessorUsage(time.monotonic(), used)
 
 
 def _stat(entry: Path) -> list[str]:

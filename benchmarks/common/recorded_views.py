@@ -21,7 +21,7 @@ _WATERMARKED = ("campus4", "terrace")
 
 
 @dataclass(frozen=True, slots=True)
-class Views:
+class RecordedViews:
     """Views of one scene, frame-synchronous."""
 
     name: str
@@ -52,7 +52,7 @@ class Views:
         return total
 
 
-def find_views(data: Path, name: str) -> Views:
+def find_views(data: Path, name: str) -> RecordedViews:
     """Find a scene's views in the folder of recordings.
 
     Raises:
@@ -63,10 +63,10 @@ def find_views(data: Path, name: str) -> Views:
     if not videos:
         raise CannotRunError(f"needs the recordings {folder}/c*.mp4; --data or MYVIEW_TEST_DATA say where")
     ground = folder / "ground.json"
-    return Views(name, videos, ground if ground.exists() else None)
+    return RecordedViews(name, videos, ground if ground.exists() else None)
 
 
-def draw_room(folder: Path, seconds: float) -> Views:
+def draw_room(folder: Path, seconds: float) -> RecordedViews:
     """Record the demo's scene into a new folder."""
     size = (_ROOM_WIDTH, _ROOM_HEIGHT, _ROOM_FPS)
     scene = Scene(ROOM, _ROOM_CAMERAS, _ROOM_PEOPLE, _ROOM_SEED, *size)

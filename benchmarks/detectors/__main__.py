@@ -24,9 +24,9 @@ import cv2
 from benchmarks.common.environment import CannotRunError, finish, parser
 from benchmarks.common.report import Report
 from benchmarks.detectors.annotated_pictures import save_pictures
-from benchmarks.detectors.compared_detectors import OBSERVERS, SURE, Observer, Seen, watch
+from benchmarks.detectors.compared_detectors import OBSERVERS, SURE, ComparedDetector, DetectorRun, watch
 from benchmarks.detectors.scored_views import (
-    View,
+    ScoredView,
     ViewScores,
     oracle,
     scores_of_boxes,
@@ -35,9 +35,9 @@ from benchmarks.detectors.scored_views import (
 )
 from benchmarks.other_trackers.virtual_environment import (
     PEERS,
-    Peer,
-    PeerEnvironment,
-    PeersAwayError,
+    OtherTracker,
+    OtherTrackerEnvironment,
+    OtherTrackersUnavailableError,
     default_folder,
     peer_environment,
 )
@@ -49,7 +49,7 @@ BY_EYE = "campus4"
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ScoreRow:
     """A row of the table: boxes of all views, scored."""
 
     name: str
@@ -59,28 +59,30 @@ class Row:
     """MyView's tracks: the time to make them is known."""
 
 
-def rows_of(observer: Observer, seen: dict[str, Seen], peers: PeerEnvironment | None) -> Iterator[Row]:
+def rows_of(
+    observer: ComparedDetector, seen: dict[str, DetectorRun], peers: OtherTrackerEnvironment | None
+) -> Iterator[ScoreRow]:
     """Yield the rows of one observer: its hypotheses, those it is sure of, and everybody's tracks of them.
 
     Raises:
-        PeersAwayError: a peer failed.
+        OtherTrackersUnavailableError: a peer failed.
     """
     hypotheses = {name: it.hypotheses for name, it in seen.items()}
-    yield Row(observer.name, hypotheses, tracks=False)
+    yield ScoreRow(observer.name, hypotheses, tracks=False)
     if observer is OBSERVERS[0]:
         sure = {name: [row for row in rows if row.confidence >= SURE] for name, rows in hypotheses.items()}
         hypotheses = sure
-        yield Row(f"  score from {SURE:g}", sure, tracks=False)
-    yield Row("  MyView's tracks", {name: it.tracks for name, it in seen.items()}, tracks=True)
+        yield ScoreRow(f"  score from {SURE:g}", sure, tracks=False)
+    yield ScoreRow("  MyView's tracks", {name: it.tracks for name, it in seen.items()}, tracks=True)
     if peers is None or not observer.with_peers:
         return
     for peer in PEERS:
         if peer.name in TRACKERS:
-            yield Row(f"  {peer.name}", peer_tracks(peers, peer, hypotheses), tracks=True, ours=False)
+            yield ScoreRow(f"  {peer.name}", peer_tracks(peers, peer, hypotheses), tracks=True, ours=False)
 
 
 def peer_tracks(
-    peers: PeerEnvironment, peer: Peer, boxes: dict[str, list[MotRow]]
+    peers: OtherTrackerEnvironment, peer: OtherTracker, boxes: dict[str, list[MotRow]]
 ) -> dict[str, list[MotRow]]:
     """Return a peer's tracks of the boxes of every view."""
     tracks = {}
@@ -93,7 +95,7 @@ def peer_tracks(
 
 
 def measure_scene(
-    report: Report, scene: str, options: argparse.Namespace, peers: PeerEnvironment | None
+    report: Report, scene: str, options: argparse.Namespace, peers: OtherTrackerEnvironment | None
 ) -> None:
     """Print the table of a scene."""
     views = [view for view in views_of(options.data, scene) if view.truth]
@@ -110,7 +112,7 @@ def measure_scene(
     report.table(f"{scene}: {width}x{rows}, {_frames(views, options)} frames", columns, table)
 
 
-def _cells(row: Row, truths: dict[str, list[MotRow]], seen: list[Seen]) -> list[str]:
+def _cells(row: ScoreRow, truths: dict[str, list[MotRow]], seen: list[DetectorRun]) -> list[str]:
     """Return the cells of a row; of hypotheses the time to find them, of tracks that to make them as well."""
     scored: list[ViewScores] = [
         (scores_of_tracks if row.tracks else scores_of_boxes)(truth, row.boxes[name])
@@ -125,7 +127,7 @@ def _cells(row: Row, truths: dict[str, list[MotRow]], seen: list[Seen]) -> list[
     return [row.name, *shares, idf1, joint, *times]
 
 
-def _frames(views: list[View], options: argparse.Namespace) -> str:
+def _frames(views: list[ScoredView], options: argparse.Namespace) -> str:
     counts = [sum(1 for _ in view.images(options.frames)) for view in views]
     return " and ".join(map(str, counts))
 
@@ -138,7 +140,7 @@ def measure(options: argparse.Namespace) -> None:
     if not options.no_peers:
         try:
             peers = peer_environment(default_folder())
-        except PeersAwayError as problem:
+        except OtherTrackersUnavailableError as problem:
             report.say(f"without other trackers, which cannot be installed here: {problem}")
     for scene in options.scene or SCENES:
         measure_scene(report, scene, options, peers)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from benchmarks.detectors.compared_detectors import OBSERVERS, watch
-from benchmarks.detectors.scored_views import View
+from benchmarks.detectors.scored_views import ScoredView
 from tracking.detectors import Image
 from tracking.motchallenge import MotRow
 
@@ -19,7 +19,7 @@ _PALETTE = ((60, 180, 75), (60, 60, 230), (0, 165, 255), (230, 50, 240), (240, 2
 _FAINT = (170, 170, 170)
 
 
-def save_pictures(views: list[View], folder: Path) -> Iterator[Path]:
+def save_pictures(views: list[ScoredView], folder: Path) -> Iterator[Path]:
     """Write a sheet per view: each observer's hypotheses (grey) and tracks (a colour a person) over time."""
     folder.mkdir(parents=True, exist_ok=True)
     for view in views:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from benchmarks.detectors.scored_views import View
+from benchmarks.detectors.scored_views import ScoredView
 from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 from tracking.detectors import (
     BackgroundDetector,
@@ -32,7 +32,7 @@ class BlobDetector:
 
     LEAST_HEIGHT = 0.1  # of the picture's
 
-    def __init__(self, view: View) -> None:
+    def __init__(self, view: ScoredView) -> None:
         self._view = view
         self._model = cv2.createBackgroundSubtractorMOG2(500, 16.0, True)  # noqa: FBT003 — detectShadows
         self._visible: Image | None = None
@@ -53,35 +53,35 @@ class BlobDetector:
 
 
 @dataclass(frozen=True, slots=True)
-class Observer:
+class ComparedDetector:
     """A detector of the comparison."""
 
     name: str
-    make: Callable[[View], Detector]
+    make: Callable[[ScoredView], Detector]
     with_peers: bool = True
     """Other trackers get its boxes, too."""
 
 
-def _background(view: View) -> BackgroundSettings:
+def _background(view: ScoredView) -> BackgroundSettings:
     return BackgroundSettings(ignore=view.ignore)
 
 
 OBSERVERS = (
-    Observer("MyView", lambda view: BackgroundDetector(_background(view))),
-    Observer(
+    ComparedDetector("MyView", lambda view: BackgroundDetector(_background(view))),
+    ComparedDetector(
         "the paper's box filters",
         lambda view: BackgroundDetector(paper_settings(_background(view))),
         with_peers=False,
     ),
-    Observer("MOG2 + connected components", BlobDetector),
-    Observer(
+    ComparedDetector("MOG2 + connected components", BlobDetector),
+    ComparedDetector(
         "OpenCV's HOG", lambda view: HogDetector(HogSettings(min_height=view.smallest), ignore=view.ignore)
     ),
 )
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class DetectorRun:
     """What an observer found in a view."""
 
     hypotheses: list[MotRow]
@@ -92,7 +92,7 @@ class Seen:
     track_s: float
 
 
-def watch(observer: Observer, view: View, frames: int | None) -> Seen:
+def watch(observer: ComparedDetector, view: ScoredView, frames: int | None) -> DetectorRun:
     """Show a view to an observer, and its boxes to the tracker."""
     detector = observer.make(view)
     tracker = OnlineTracker(WindowSettings(), CostSettings(), create_solver("columns"))
@@ -109,7 +109,7 @@ def watch(observer: Observer, view: View, frames: int | None) -> Seen:
         tracks += final_rows(result)
         count += 1
     tracks += final_rows(tracker.flush())
-    return Seen(boxes, tracks, count, detecting, following)
+    return DetectorRun(boxes, tracks, count, detecting, following)
 
 
 def rows_of(number: int, found: Detections) -> list[MotRow]:

@@ -22,7 +22,7 @@ _SMALLEST = {"pets09": 0.12}
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class ScoredView:
     """One camera's recording."""
 
     name: str
@@ -50,7 +50,7 @@ class View:
         return [row for row in read_rows(self.truth) if frames is None or row.frame <= frames]
 
 
-def views_of(data: Path, scene: str) -> list[View]:
+def views_of(data: Path, scene: str) -> list[ScoredView]:
     """Return the views of a scene.
 
     Raises:
@@ -61,7 +61,7 @@ def views_of(data: Path, scene: str) -> list[View]:
     for video in sorted(folder.glob("*.mp4")):
         truth = folder / "gt" / f"{video.stem}.txt"
         marked, smallest = scene in {"terrace", "campus4"}, _SMALLEST.get(scene, 0.25)
-        views.append(View(video.stem, video, truth if truth.exists() else None, marked, smallest))
+        views.append(ScoredView(video.stem, video, truth if truth.exists() else None, marked, smallest))
     if not views:
         raise CannotRunError(f"needs the recordings {folder}/*.mp4; --data or MYVIEW_TEST_DATA say where")
     return views

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
 from benchmarks.endurance.endless_crowd import crowd
-from benchmarks.endurance.memory_samples import SPAN, Samples
+from benchmarks.endurance.memory_samples import SPAN, MemorySamples
 from benchmarks.paper_experiments.scene import HEIGHT, WIDTH
 from tracking import CostSettings, OnlineTracker, WindowSettings, create_solver
 from tracking.solvers.base import DEFAULT_SOLVER
@@ -37,20 +37,20 @@ _SITE = {
 
 
 @dataclass(slots=True)
-class Run:
+class EnduranceRun:
     """One long run."""
 
     name: str
-    samples: Samples
+    samples: MemorySamples
     objects: int = 0
     """Numbers given to objects."""
 
 
-def run_tracker(frames: int) -> Run:
+def run_tracker(frames: int) -> EnduranceRun:
     """Push so many frames of a crowd into a tracker."""
     tracker = OnlineTracker(WindowSettings(), CostSettings(), create_solver(DEFAULT_SOLVER))
     scene = crowd(_PEOPLE, seed=1)
-    run = Run("tracker", Samples())
+    run = EnduranceRun("tracker", MemorySamples())
 
     def step(number: int) -> None:
         result = tracker.push(number, next(scene))
@@ -61,14 +61,14 @@ def run_tracker(frames: int) -> Run:
     return run
 
 
-def run_pipeline(frames: int) -> Run:
+def run_pipeline(frames: int) -> EnduranceRun:
     """Put so many frames through a camera's source, encoder, detector and tracker."""
     # Loaded only now: the tracker's memory is measured without the server's libraries.
     from server.camera.pipeline import CameraPipeline  # noqa: PLC0415
     from server.config.loader import build_config  # noqa: PLC0415
 
     pipeline = CameraPipeline(build_config(_SITE, where="endurance", folder=Path()), "c0")
-    run = Run("camera pipeline", Samples())
+    run = EnduranceRun("camera pipeline", MemorySamples())
 
     def step(number: int) -> None:
         image = pipeline.take(number)
@@ -83,14 +83,14 @@ def run_pipeline(frames: int) -> Run:
     return run
 
 
-def _endure(run: Run, frames: int, step: Callable[[int], None]) -> None:
+def _endure(run: EnduranceRun, frames: int, step: Callable[[int], None]) -> None:
     for number in range(frames):
         step(number)
         if (number + 1) % _EVERY == 0:
             run.samples.take(number + 1)
 
 
-def describe(report: Report, run: Run) -> None:
+def describe(report: Report, run: EnduranceRun) -> None:
     """Print a row for each span of frames, and the growth after the first."""
     rows = []
     for start, stop in spans(run.samples.frames[-1]):
@@ -122,7 +122,7 @@ def spans(frames: int) -> Iterator[tuple[int, int]]:
     return itertools.pairwise(range(0, frames + 1, span))
 
 
-def plot(runs: list[Run], path: Path) -> None:
+def plot(runs: list[EnduranceRun], path: Path) -> None:
     """Draw the resident memory of each run."""
     figure = Figure(figsize=(9, 3.2 * len(runs)))
     axes = figure.subplots(len(runs), 1, squeeze=False)[:, 0]

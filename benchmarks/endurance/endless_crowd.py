@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.paper_experiments.grey_histograms import visible, wardrobe
-from benchmarks.paper_experiments.noisy_detections import Cast, detect
-from benchmarks.paper_experiments.walking_people import Walker, Walking, inside, people_at
+from benchmarks.paper_experiments.noisy_detections import SceneParameters, detect
+from benchmarks.paper_experiments.walking_people import Walker, WalkParameters, inside, people_at
 from tracking import Detections
 
-_WALKING = Walking(3.0, 0.15, stay=(150, 500), away=(20, 200))
+_WALKING = WalkParameters(3.0, 0.15, stay=(150, 500), away=(20, 200))
 
 
 def crowd(most: int, seed: int) -> Iterator[Detections]:
@@ -22,7 +22,7 @@ def crowd(most: int, seed: int) -> Iterator[Detections]:
     forgotten all the time.
     """
     rng = np.random.default_rng(seed)
-    cast = Cast(tuple(range(most)), 0, _WALKING)
+    cast = SceneParameters(tuple(range(most)), 0, _WALKING)
     clothes = wardrobe(cast.kits, rng)
     walkers = [Walker(_WALKING, np.array([rng.uniform(0, 300), 200.0]), rng) for _ in range(most)]
     away = np.zeros(most, dtype=np.bool_)

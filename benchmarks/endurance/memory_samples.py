@@ -27,7 +27,7 @@ def resident_megabytes() -> float:
 
 
 @dataclass(slots=True)
-class Samples:
+class MemorySamples:
     """What was in use after so many frames."""
 
     frames: list[int] = field(default_factory=list)
@@ -45,10 +45,10 @@ class Samples:
         self.seconds.append(time.process_time())
         self.blocks.append(sys.getallocatedblocks())
 
-    def between(self, start: int, stop: int) -> Samples:
+    def between(self, start: int, stop: int) -> MemorySamples:
         """Return the samples after `start` frames and up to `stop`."""
         kept = [n for n, frames in enumerate(self.frames) if start < frames <= stop]
-        return Samples(
+        return MemorySamples(
             [self.frames[n] for n in kept],
             [self.megabytes[n] for n in kept],
             [self.seconds[n] for n in kept],

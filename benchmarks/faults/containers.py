@@ -27,8 +27,16 @@ from benchmarks.faults.injection.process_pairs import SHOWN
 from benchmarks.faults.outcomes.measurement import measure
 from benchmarks.faults.outcomes.promise_table import describe
 from benchmarks.faults.site.compose_site import PLAIN, ComposeError, ComposeSite, composed, missing
-from benchmarks.faults.site.fault_site import LEASE_S, SETTINGS, Ended, Fault, Inject, Stand, listening
-from benchmarks.faults.video.stamped_views import CAMERAS, Views
+from benchmarks.faults.site.fault_site import (
+    LEASE_S,
+    SETTINGS,
+    Fault,
+    FaultSite,
+    Inject,
+    ProcessExit,
+    listening,
+)
+from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews
 
 _FILMS, _KEPT = "/site/films", "/site/kept"
 _AWAY_S = 4.0
@@ -37,7 +45,7 @@ _GRACE_S = 10
 
 
 @contextlib.asynccontextmanager
-async def with_containers(views: Views, folder: Path) -> AsyncIterator[Stand]:
+async def with_containers(views: StampedViews, folder: Path) -> AsyncIterator[FaultSite]:
     """Run the films in containers; in the end tell all of them to end.
 
     Raises:
@@ -59,12 +67,12 @@ async def with_containers(views: Views, folder: Path) -> AsyncIterator[Stand]:
         opened = composed((*PLAIN, over), MYVIEW_CONFIG="../faults.yaml")
         site = await asyncio.to_thread(stack.enter_context, opened)
         url = f"http://{await asyncio.to_thread(site.address)}/"
-        stand = Stand(url, folder, 0, control=site, recorded=kept)
+        stand = FaultSite(url, folder, 0, control=site, recorded=kept)
         async with listening(stand):
             yield stand
 
 
-def _site(views: Views) -> dict[str, Any]:
+def _site(views: StampedViews) -> dict[str, Any]:
     """Return the configuration, with the films where containers find them."""
     cameras = [
         {**it, **{key: f"{_FILMS}/{Path(it[key]).name}" for key in ("source", "detections")}}
@@ -78,7 +86,7 @@ def _site(views: Views) -> dict[str, Any]:
     }
 
 
-def _named(stand: Stand, name: str) -> tuple[ComposeSite, str, str]:
+def _named(stand: FaultSite, name: str) -> tuple[ComposeSite, str, str]:
     """Return the site, the service and its container."""
     site: ComposeSite = stand.control
     service = stand.shown()[0] if name == SHOWN else name
@@ -91,7 +99,7 @@ def killed(*names: str) -> Inject:
     `docker kill` would tell the engine that the container was meant to end.
     """
 
-    async def inject(stand: Stand) -> None:
+    async def inject(stand: FaultSite) -> None:
         for name in names:
             site, _, container = _named(stand, name)
             with contextlib.suppress(ComposeError):  # the shell that does it dies, too
@@ -103,7 +111,7 @@ def killed(*names: str) -> Inject:
 def paused(name: str, seconds: float = _AWAY_S) -> Inject:
     """Stop all processes of a container for a while."""
 
-    async def inject(stand: Stand) -> None:
+    async def inject(stand: FaultSite) -> None:
         site, _, container = _named(stand, name)
         await site.docker("pause", container)
         try:
@@ -117,13 +125,13 @@ def paused(name: str, seconds: float = _AWAY_S) -> Inject:
 def restarted(name: str) -> Inject:
     """Stop a container, measure how it stops, and start it again."""
 
-    async def inject(stand: Stand) -> None:
+    async def inject(stand: FaultSite) -> None:
         site, service, container = _named(stand, name)
         begun = time.time()
         await site.docker("stop", "--time", f"{_GRACE_S}", container)
         state = await asyncio.to_thread(site.state, service)
         ended = datetime.fromisoformat(state["FinishedAt"]).timestamp()
-        stand.ended.append(Ended(service, ended - begun, state["ExitCode"]))
+        stand.ended.append(ProcessExit(service, ended - begun, state["ExitCode"]))
         await site.docker("start", container)
 
     return inject
@@ -132,7 +140,7 @@ def restarted(name: str) -> Inject:
 def cut_off(name: str, seconds: float = _AWAY_S) -> Inject:
     """Take a container off the site's network for a while."""
 
-    async def inject(stand: Stand) -> None:
+    async def inject(stand: FaultSite) -> None:
         site, service, container = _named(stand, name)
         await site.docker("network", "disconnect", site.network, container)
         try:

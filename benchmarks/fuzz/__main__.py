@@ -23,7 +23,7 @@ from pathlib import Path
 
 from benchmarks.common.environment import ROOT
 from benchmarks.common.report import Report
-from benchmarks.fuzz.engine.runner import Attempt, Crash, Plan, Runner, Tally
+from benchmarks.fuzz.engine.runner import Crash, FuzzPlan, InputFeeder, TargetResult, TargetRunner
 from benchmarks.fuzz.engine.target import Target
 
 PARTS = {
@@ -47,7 +47,9 @@ def targets_of(part: str) -> tuple[type[Target], ...]:
     return found
 
 
-def side_by_side(targets: Sequence[type[Target]], plan: Plan, jobs: int) -> Iterator[tuple[int, Tally]]:
+def side_by_side(
+    targets: Sequence[type[Target]], plan: FuzzPlan, jobs: int
+) -> Iterator[tuple[int, TargetResult]]:
     """Run targets, so many at a time; give each one's place and what came of it, as they end."""
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("fork")) as pool:
         running = {pool.submit(_run, it, plan): place for place, it in enumerate(targets)}
@@ -55,8 +57,8 @@ def side_by_side(targets: Sequence[type[Target]], plan: Plan, jobs: int) -> Iter
             yield running[done], done.result()
 
 
-def _run(target: type[Target], plan: Plan) -> Tally:
-    return Runner(target, target.name, plan).run()
+def _run(target: type[Target], plan: FuzzPlan) -> TargetResult:
+    return TargetRunner(target, target.name, plan).run()
 
 
 def replay(path: Path) -> int:
@@ -67,7 +69,7 @@ def replay(path: Path) -> int:
     if kind is None:
         sys.exit(f"{path}: no saved input of this name; they are called TARGET.KIND.NUMBER.bin")
     target = kind()
-    attempt = Attempt(target)
+    attempt = InputFeeder(target)
     with attempt.watching():
         found = attempt.feed(path.read_bytes())
     target.close()
@@ -78,7 +80,7 @@ def replay(path: Path) -> int:
     return 0
 
 
-def row(name: str, tally: Tally) -> list[str]:
+def row(name: str, tally: TargetResult) -> list[str]:
     """Return a line of the table."""
     counts, rate = tally.counts, tally.counts.messages / tally.seconds if tally.seconds else 0.0
     numbers = (counts.inputs, counts.messages, round(rate), counts.refused, counts.accepted, counts.crashes)
@@ -112,7 +114,7 @@ def main() -> None:
     ]
     if not targets:
         options.error("no target of these parts has such a name")
-    plan = Plan(
+    plan = FuzzPlan(
         inputs=chosen.inputs,
         seconds=chosen.seconds,
         seed=chosen.seed,
@@ -120,7 +122,7 @@ def main() -> None:
         messages=MESSAGES if chosen.inputs is None and chosen.messages is None else chosen.messages,
         first=chosen.first,
     )
-    tallies: dict[int, Tally] = {}
+    tallies: dict[int, TargetResult] = {}
     for place, tally in side_by_side(targets, plan, max(1, chosen.jobs)):
         tallies[place] = tally
         print("  ".join(row(targets[place].name, tally)), file=sys.stderr, flush=True)

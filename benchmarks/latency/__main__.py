@@ -19,12 +19,12 @@ from matplotlib.figure import Figure
 
 from benchmarks.common.browser import check_chromium, chromium
 from benchmarks.common.environment import CannotRunError, finish, parser
-from benchmarks.common.recorded_views import ROOM, Views, draw_room, find_views
+from benchmarks.common.recorded_views import ROOM, RecordedViews, draw_room, find_views
 from benchmarks.common.report import Report
-from benchmarks.latency.bus_subscriber import Marks, listening
+from benchmarks.latency.bus_subscriber import BusTimestamps, listening
 from benchmarks.latency.running_site import LOG, running_site
-from benchmarks.latency.shown_frames import Shown, watch_page
-from benchmarks.latency.stage_delays import STAGES, Delays, split
+from benchmarks.latency.shown_frames import ShownFrames, watch_page
+from benchmarks.latency.stage_delays import STAGES, StageDelays, split
 
 _START_S = 15.0
 """Of recording before what is measured: starting, learning the background, meeting people."""
@@ -32,7 +32,9 @@ _SLOW = 95
 _COLOURS = ("#9ecae1", "#6baed6", "#3182bd", "#d9d9d9", "#fd8d3c", "#e6550d", "#74c476")
 
 
-async def watch(views: Views, folder: Path, settle_s: float, seconds: float) -> tuple[Marks, Shown]:
+async def watch(
+    views: RecordedViews, folder: Path, settle_s: float, seconds: float
+) -> tuple[BusTimestamps, ShownFrames]:
     """Run the site, listen to its bus and watch its page.
 
     Raises:
@@ -44,7 +46,7 @@ async def watch(views: Views, folder: Path, settle_s: float, seconds: float) -> 
         return marks, shown
 
 
-def describe(report: Report, name: str, delays: Delays, shown: Shown, shed: int) -> None:
+def describe(report: Report, name: str, delays: StageDelays, shown: ShownFrames, shed: int) -> None:
     """Print the table."""
     declared = shown.lookahead / shown.fps
     rows = [_row(stage, delays.stages[:, place], what) for place, (stage, what) in enumerate(STAGES.items())]
@@ -73,7 +75,7 @@ def _row(name: str, seconds: np.ndarray, what: str) -> list[str]:
     return [name, *(f"{1e3 * value:.0f}" for value in (seconds.mean(), middle, late)), what]
 
 
-def plot(delays: Delays, shown: Shown, path: Path, name: str) -> None:
+def plot(delays: StageDelays, shown: ShownFrames, path: Path, name: str) -> None:
     """Draw the stages of the mean frame and of the slowest, and the delay over time."""
     figure = Figure(figsize=(9, 5.5))
     bars, line = figure.subplots(2, 1, height_ratios=(3, 2))

@@ -15,7 +15,7 @@ from server.messaging.messages import CameraTracks, FrameHeader, GopChoices, cam
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class FrameTimes:
     """One access unit of one camera. All times are unix seconds."""
 
     due: float
@@ -25,7 +25,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
-class Decision:
+class DecisionRecord:
     """One GOP's choices."""
 
     first: int
@@ -36,20 +36,20 @@ class Decision:
 
 
 @dataclass(slots=True)
-class Marks:
+class BusTimestamps:
     """What was heard on the bus."""
 
-    frames: dict[tuple[str, int], Frame] = field(default_factory=dict)
+    frames: dict[tuple[str, int], FrameTimes] = field(default_factory=dict)
     """By camera and pulse."""
     solved: dict[int, dict[str, float]] = field(default_factory=dict)
     """By last pulse of the window: when each camera had solved it."""
-    decisions: list[Decision] = field(default_factory=list)
+    decisions: list[DecisionRecord] = field(default_factory=list)
     shed: int = 0
     """Frames that were missed or not searched for people, all cameras together."""
 
     def video(self, camera: str, head: FrameHeader, received: float) -> None:
         """Note a frame."""
-        self.frames[camera, head.pulse] = Frame(head.due, head.taken, head.encoded, received)
+        self.frames[camera, head.pulse] = FrameTimes(head.due, head.taken, head.encoded, received)
 
     def tracks(self, message: CameraTracks) -> None:
         """Note a window."""
@@ -58,13 +58,13 @@ class Marks:
 
     def choices(self, message: GopChoices, received: float) -> None:
         """Note a decision."""
-        self.decisions.append(Decision(message.first, message.frames, message.choices, received))
+        self.decisions.append(DecisionRecord(message.first, message.frames, message.choices, received))
 
 
 @contextlib.contextmanager
-def listening(address: str) -> Iterator[Marks]:
+def listening(address: str) -> Iterator[BusTimestamps]:
     """Listen to the site whose router is at the address, as any outsider could."""
-    marks = Marks()
+    marks = BusTimestamps()
     head, tracks = msgspec.json.Decoder(FrameHeader), msgspec.json.Decoder(CameraTracks)
     choices = msgspec.json.Decoder(GopChoices)
 

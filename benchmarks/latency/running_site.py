@@ -23,7 +23,7 @@ _START_S = 150.0
 _END_S = 15.0
 
 
-class Played(Protocol):
+class PlayedViews(Protocol):
     """What the configuration of a site needs to know of the views that it plays."""
 
     @property
@@ -40,7 +40,7 @@ class Played(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Site:
+class RunningSite:
     """A site that is running."""
 
     url: str
@@ -51,11 +51,11 @@ class Site:
 
 @contextlib.asynccontextmanager
 async def running_site(
-    views: Played,
+    views: PlayedViews,
     folder: Path,
     environment: Mapping[str, str] | None = None,
     settings: Mapping[str, Mapping[str, Any]] | None = None,
-) -> AsyncIterator[Site]:
+) -> AsyncIterator[RunningSite]:
     """Run `myview up` on the views; its log goes into the folder.
 
     `environment` and `settings`, by section, are set besides.
@@ -85,7 +85,7 @@ async def running_site(
             stdout=log,
             stderr=log,
         )
-    site = Site(f"http://127.0.0.1:{http}/", address, process)
+    site = RunningSite(f"http://127.0.0.1:{http}/", address, process)
     try:
         await _until_up(site)
         yield site
@@ -93,7 +93,7 @@ async def running_site(
         await _end(process)
 
 
-async def _until_up(site: Site) -> None:
+async def _until_up(site: RunningSite) -> None:
     """Wait until the best-view service answers: before the first pulse, which it is waited for."""
     loop = asyncio.get_running_loop()
     give_up = loop.time() + _START_S

@@ -15,7 +15,7 @@ _READ_EVERY_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class ShownFrames:
     """What the page showed while it was measured."""
 
     object: int
@@ -28,7 +28,7 @@ class Shown:
     """Cores in use meanwhile, by what used them."""
 
 
-async def watch_page(browser: Browser, url: str, settle_s: float, seconds: float) -> Shown:
+async def watch_page(browser: Browser, url: str, settle_s: float, seconds: float) -> ShownFrames:
     """Open the page, let it play for a while, and note the frames of the seconds after that."""
     # The page's policy forbids eval, which it is asked with here.
     page = await browser.new_page(viewport={"width": 1280, "height": 800}, bypass_csp=True)
@@ -50,6 +50,6 @@ async def watch_page(browser: Browser, url: str, settle_s: float, seconds: float
         cores = busy_now().cores_since(before)
         site = await page.evaluate("myview.site")
         number = await page.evaluate("myview.object")
-        return Shown(int(number), at, int(site["lookahead_frames"]), float(site["fps"]), cores)
+        return ShownFrames(int(number), at, int(site["lookahead_frames"]), float(site["fps"]), cores)
     finally:
         await page.close()

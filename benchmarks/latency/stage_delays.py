@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.latency.bus_subscriber import Decision, Marks
-from benchmarks.latency.shown_frames import Shown
+from benchmarks.latency.bus_subscriber import BusTimestamps, DecisionRecord
+from benchmarks.latency.shown_frames import ShownFrames
 
 STAGES = {
     "taken": "from when the pulse is due to the picture",
@@ -28,7 +28,7 @@ STAGES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Delays:
+class StageDelays:
     """Seconds of every frame that was shown and whose way is known."""
 
     pulses: NDArray[np.int64]
@@ -51,7 +51,7 @@ class Delays:
         return total
 
 
-def split(marks: Marks, shown: Shown) -> Delays:
+def split(marks: BusTimestamps, shown: ShownFrames) -> StageDelays:
     """Split the delay of every frame that was shown.
 
     Raises:
@@ -62,7 +62,7 @@ def split(marks: Marks, shown: Shown) -> Delays:
         raise ValueError("no frame was shown whose way is known")
     first, last = min(shown.at), max(shown.at)
     decisions = [it for it in marks.decisions if first <= it.first <= last]
-    return Delays(
+    return StageDelays(
         pulses=np.array([pulse for pulse, _ in rows]),
         stages=np.array([stages for _, stages in rows]),
         shown_share=len(shown.at) / (last - first + 1),
@@ -72,7 +72,7 @@ def split(marks: Marks, shown: Shown) -> Delays:
     )
 
 
-def _rows(marks: Marks, shown: Shown) -> Iterator[tuple[int, list[float]]]:
+def _rows(marks: BusTimestamps, shown: ShownFrames) -> Iterator[tuple[int, list[float]]]:
     for decision in marks.decisions:
         camera = decision.choices.get(shown.object)
         if camera is None:
@@ -91,7 +91,7 @@ def _rows(marks: Marks, shown: Shown) -> Iterator[tuple[int, list[float]]]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Solved:
+class _SolvedWindows:
     last: int
     """The window's last pulse."""
     at: float | None
@@ -100,7 +100,7 @@ class _Solved:
     """Some camera was not."""
 
 
-def _solved(marks: Marks, decision: Decision, lookahead: int) -> _Solved:
+def _solved(marks: BusTimestamps, decision: DecisionRecord, lookahead: int) -> _SolvedWindows:
     """Find the first window that reaches to the end of a decision's look-ahead.
 
     Cameras that had not solved it when the decision was heard of were decided without.
@@ -109,4 +109,4 @@ def _solved(marks: Marks, decision: Decision, lookahead: int) -> _Solved:
     last = min((last for last in marks.solved if last >= needed), default=needed)
     times = marks.solved.get(last, {}).values()
     in_time = [at for at in times if at <= decision.received]
-    return _Solved(last, max(in_time, default=None), len(in_time) < len(times))
+    return _SolvedWindows(last, max(in_time, default=None), len(in_time) < len(times))

@@ -20,14 +20,20 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.common.environment import CannotRunError, finish, parser
-from benchmarks.common.process_load import OTHER, Busy, busy_now
+from benchmarks.common.process_load import OTHER, ProcessorUsage, busy_now
 from benchmarks.common.recorded_views import ROOM
 from benchmarks.common.report import Report
-from benchmarks.latency.bus_subscriber import Marks, listening
+from benchmarks.latency.bus_subscriber import BusTimestamps, listening
 from benchmarks.latency.running_site import LOG, running_site
-from benchmarks.live_cameras.frame_counters import Counts, read_counts
-from benchmarks.live_cameras.looped_views import CAMERAS, CROWD, FPS, Live, live_views, usual_views
-from benchmarks.live_cameras.stage_times import REST, STAGES, StageTimes, hooked_environment, read_stages
+from benchmarks.live_cameras.frame_counters import FrameCounts, read_counts
+from benchmarks.live_cameras.looped_views import CAMERAS, CROWD, FPS, LoopedViews, live_views, usual_views
+from benchmarks.live_cameras.stage_times import (
+    REST,
+    STAGES,
+    CameraStageTimes,
+    hooked_environment,
+    read_stages,
+)
 from tracking.boxes import Floats
 
 _OWN = "measuring"
@@ -41,21 +47,21 @@ _WAITS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class SiteSnapshot:
     """All that is read at one moment."""
 
-    busy: Busy
-    counts: Counts
-    stages: Mapping[str, StageTimes]
+    busy: ProcessorUsage
+    counts: FrameCounts
+    stages: Mapping[str, CameraStageTimes]
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
+class LiveRun:
     """A run between two moments."""
 
-    start: Moment
-    stop: Moment
-    marks: Marks
+    start: SiteSnapshot
+    stop: SiteSnapshot
+    marks: BusTimestamps
     first_pulse: int
 
     @property
@@ -67,7 +73,7 @@ class Watched:
         }
 
     @property
-    def counts(self) -> Counts:
+    def counts(self) -> FrameCounts:
         """What was counted between."""
         return self.stop.counts.since(self.start.counts)
 
@@ -84,7 +90,7 @@ class Watched:
         return np.array(rows, dtype=np.float64).reshape(-1, 2)
 
 
-async def watch(live: Live, folder: Path, settle_s: float, seconds: float) -> Watched:
+async def watch(live: LoopedViews, folder: Path, settle_s: float, seconds: float) -> LiveRun:
     """Run the site and watch it.
 
     Raises:
@@ -93,8 +99,8 @@ async def watch(live: Live, folder: Path, settle_s: float, seconds: float) -> Wa
     times = folder / "stages"
     times.mkdir()
 
-    async def moment() -> Moment:
-        return Moment(busy_now(), await read_counts(site.url), read_stages(times))
+    async def moment() -> SiteSnapshot:
+        return SiteSnapshot(busy_now(), await read_counts(site.url), read_stages(times))
 
     async with running_site(live, folder, hooked_environment(times)) as site:
         with listening(site.bus) as marks:
@@ -105,10 +111,10 @@ async def watch(live: Live, folder: Path, settle_s: float, seconds: float) -> Wa
             stop = await moment()
     if not start.stages:
         raise RuntimeError("the cameras did not start in time; --settle gives them longer")
-    return Watched(start, stop, marks, first_pulse)
+    return LiveRun(start, stop, marks, first_pulse)
 
 
-def describe(report: Report, name: str, watched: Watched) -> None:
+def describe(report: Report, name: str, watched: LiveRun) -> None:
     """Print the tables and the verdict."""
     counts = watched.counts
     report.table(
@@ -144,7 +150,7 @@ def _cores(used: Mapping[str, Mapping[str, float]], stages: list[str]) -> str:
     return f"{FPS / _MS * sum(camera[stage] for camera in used.values() for stage in stages):.2f}"
 
 
-def _describe_waits(report: Report, watched: Watched) -> None:
+def _describe_waits(report: Report, watched: LiveRun) -> None:
     frames = [it for (_, pulse), it in watched.marks.frames.items() if pulse >= watched.first_pulse]
     times = np.array([(it.due, it.taken, it.encoded, it.received) for it in frames]).reshape(-1, 4)
     waits = [*np.diff(times, axis=1).T, watched.solved[:, 1]]
@@ -155,7 +161,7 @@ def _describe_waits(report: Report, watched: Watched) -> None:
     report.table("by the clock, ms", ["stage", "p50", "p95", "most", "what"], rows)
 
 
-def plot(watched: Watched, name: str, path: Path) -> None:
+def plot(watched: LiveRun, name: str, path: Path) -> None:
     """Draw what each stage costs, and how long windows took over time."""
     figure = Figure(figsize=(9, 6))
     bars, line = figure.subplots(2, 1)

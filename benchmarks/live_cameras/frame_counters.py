@@ -12,7 +12,7 @@ _COUNTED = ("frames", "missed", "shed", "bad_messages")
 
 
 @dataclass(frozen=True, slots=True)
-class Counts:
+class FrameCounts:
     """Counters of the best-view service.
 
     Attributes:
@@ -23,7 +23,7 @@ class Counts:
     cameras: Mapping[str, Mapping[str, int]]
     late: int
 
-    def since(self, earlier: Counts) -> Counts:
+    def since(self, earlier: FrameCounts) -> FrameCounts:
         """Return what was counted since an earlier moment."""
         cameras = {
             camera: {
@@ -31,7 +31,7 @@ class Counts:
             }
             for camera, it in self.cameras.items()
         }
-        return Counts(cameras, self.late - earlier.late)
+        return FrameCounts(cameras, self.late - earlier.late)
 
     @property
     def dropped(self) -> int:
@@ -39,7 +39,7 @@ class Counts:
         return sum(it["missed"] + it["shed"] for it in self.cameras.values())
 
 
-def counts_in(metrics: str, late: int) -> Counts:
+def counts_in(metrics: str, late: int) -> FrameCounts:
     """Read the text of `/metrics`."""
     cameras: dict[str, dict[str, int]] = {}
     for family in text_string_to_metric_families(metrics):
@@ -49,10 +49,10 @@ def counts_in(metrics: str, late: int) -> Counts:
                 cameras.setdefault(sample.labels["camera"], dict.fromkeys(_COUNTED, 0))[what] = int(
                     sample.value
                 )
-    return Counts(dict(sorted(cameras.items())), late)
+    return FrameCounts(dict(sorted(cameras.items())), late)
 
 
-async def read_counts(url: str) -> Counts:
+async def read_counts(url: str) -> FrameCounts:
     """Ask a running site."""
     async with aiohttp.ClientSession() as session:
         async with session.get(f"{url}metrics") as answer:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.common.environment import CannotRunError
-from benchmarks.common.recorded_views import ROOM, Views, find_views
+from benchmarks.common.recorded_views import ROOM, RecordedViews, find_views
 from benchmarks.paper_experiments.scene import HEIGHT, WIDTH
 from synthetic import Scene, write_recording
 
@@ -19,11 +19,11 @@ _ROOM_PEOPLE, _ROOM_SEED, _ROOM_S = 5, 1, 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class Live:
+class LoopedViews:
     """Cameras that never end."""
 
     name: str
-    views: tuple[Views, ...]
+    views: tuple[RecordedViews, ...]
 
     @property
     def ground(self) -> Path | None:
@@ -43,7 +43,7 @@ class Live:
         return {"name": "bench", "fps": FPS, "width": WIDTH, "height": HEIGHT}
 
 
-def live_views(name: str, data: Path, folder: Path) -> Live:
+def live_views(name: str, data: Path, folder: Path) -> LoopedViews:
     """Return the cameras of that name; the scene is recorded into the folder first.
 
     Raises:
@@ -52,8 +52,8 @@ def live_views(name: str, data: Path, folder: Path) -> Live:
     if name == ROOM:
         scene = Scene(ROOM, CAMERAS, _ROOM_PEOPLE, _ROOM_SEED, WIDTH, HEIGHT, FPS)
         write_recording(scene, folder / ROOM, _ROOM_S, lambda _done, _total: None)
-        return Live(name, (find_views(folder, ROOM),))
-    return Live(name, tuple(find_views(data, scene) for scene in _SCENES))
+        return LoopedViews(name, (find_views(folder, ROOM),))
+    return LoopedViews(name, tuple(find_views(data, scene) for scene in _SCENES))
 
 
 def usual_views(data: Path) -> str:

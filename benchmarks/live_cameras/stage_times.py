@@ -38,7 +38,7 @@ REST = "rest"
 
 
 @dataclass(frozen=True, slots=True)
-class StageTimes:
+class CameraStageTimes:
     """What a camera process has used since it started.
 
     Attributes:
@@ -51,7 +51,7 @@ class StageTimes:
     seconds: Mapping[str, float]
     process: float
 
-    def milliseconds_since(self, earlier: StageTimes) -> dict[str, float]:
+    def milliseconds_since(self, earlier: CameraStageTimes) -> dict[str, float]:
         """Return processor milliseconds per frame of each stage and of the rest since an earlier moment."""
         frames = max(self.frames - earlier.frames, 1)
         found = {name: 1e3 * (self.seconds[name] - earlier.seconds[name]) / frames for name in STAGES}
@@ -65,15 +65,15 @@ def hooked_environment(folder: Path) -> dict[str, str]:
     return {"PYTHONPATH": os.pathsep.join(filter(None, path)), FOLDER_VARIABLE: str(folder)}
 
 
-def read_stages(folder: Path) -> dict[str, StageTimes]:
+def read_stages(folder: Path) -> dict[str, CameraStageTimes]:
     """Read what the cameras have written last."""
     return {
-        file.stem: StageTimes(**json.loads(file.read_text(encoding="utf-8")))
+        file.stem: CameraStageTimes(**json.loads(file.read_text(encoding="utf-8")))
         for file in sorted(folder.glob("*.json"))
     }
 
 
-class ThreadWatch:
+class ThreadStopwatch:
     """Adds up each stage's own processor time, thread by thread: stages of two threads run side by side."""
 
     def __init__(self, stages: Iterable[str] = STAGES) -> None:
@@ -112,7 +112,7 @@ def time_camera(folder: str, camera: str) -> None:
     from tracking import DEFAULT_SOLVER, OnlineTracker, create_solver  # noqa: PLC0415
     from tracking.detectors import BackgroundDetector  # noqa: PLC0415
 
-    watch, frames = ThreadWatch(), 0
+    watch, frames = ThreadStopwatch(), 0
     path = Path(folder) / f"{camera}.json"
 
     def taken() -> None:

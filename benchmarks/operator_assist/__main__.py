@@ -25,22 +25,22 @@ from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
 from benchmarks.operator_assist import outcome_table as assist_table
 from benchmarks.operator_assist import recall_curve as assist_curve
-from benchmarks.operator_assist.assisted_tracking import Watched, watch
-from benchmarks.operator_assist.clip_kinds import Kind, kinds
-from benchmarks.operator_assist.flag_outcomes import CAUSES, Cases, count
-from benchmarks.operator_assist.flag_selection import Desk
-from benchmarks.operator_assist.simulated_operator import Person
+from benchmarks.operator_assist.assisted_tracking import TrackedClip, watch
+from benchmarks.operator_assist.clip_kinds import ClipKind, kinds
+from benchmarks.operator_assist.flag_outcomes import CAUSES, OutcomeCounts, count
+from benchmarks.operator_assist.flag_selection import FlagSelector
+from benchmarks.operator_assist.simulated_operator import OperatorProfile
 from server.config.sections import FlagSettings
 
 _ANY = 600
 """Flags a minute: as many as there are."""
 _SWEEP = (
-    ("points exactly", Person(error=0.0)),
-    ("points badly: 2/3 of a body", Person(error=2.0 / 3.0)),
-    ("quick: 0.2 s", Person(reaction_s=0.2)),
-    ("slow: 1 s", Person(reaction_s=1.0)),
-    ("picture not late", Person(delay_s=0.0)),
-    ("sees nothing again", Person(back_s=0.0)),
+    ("points exactly", OperatorProfile(error=0.0)),
+    ("points badly: 2/3 of a body", OperatorProfile(error=2.0 / 3.0)),
+    ("quick: 0.2 s", OperatorProfile(reaction_s=0.2)),
+    ("slow: 1 s", OperatorProfile(reaction_s=1.0)),
+    ("picture not late", OperatorProfile(delay_s=0.0)),
+    ("sees nothing again", OperatorProfile(back_s=0.0)),
 )
 
 
@@ -48,13 +48,13 @@ def measure(options: argparse.Namespace) -> None:
     """Measure, print and save."""
     report, kind = Report(), kinds(options.objects, options.seconds)[options.kind]
     alone = [watch(clip, kind.setup) for clip in kind.clips(options.clips, first=0 if options.even else 1)]
-    points = assist_curve.curve(alone, Person())
+    points = assist_curve.curve(alone, OperatorProfile())
     few, any_number = (
         FlagSettings(per_minute=most, risk=options.risk) for most in (options.per_minute, _ANY)
     )
     people = [
-        (f"{few.per_minute} flags a minute", Person(), few),
-        ("any number of flags", Person(), any_number),
+        (f"{few.per_minute} flags a minute", OperatorProfile(), few),
+        ("any number of flags", OperatorProfile(), any_number),
     ]
     if options.sweep:
         people += [(name, person, any_number) for name, person in _SWEEP]
@@ -73,14 +73,14 @@ def measure(options: argparse.Namespace) -> None:
 
 
 def _helped(
-    alone: list[Watched], kind: Kind, person: Person, flags: FlagSettings
-) -> list[tuple[Watched, Watched]]:
+    alone: list[TrackedClip], kind: ClipKind, person: OperatorProfile, flags: FlagSettings
+) -> list[tuple[TrackedClip, TrackedClip]]:
     """Watch the clips once more, one after the other, with somebody at the screen."""
-    desk = Desk(flags, alone[0].clip.fps)
+    desk = FlagSelector(flags, alone[0].clip.fps)
     return [(it, watch(it.clip, kind.setup, person, desk)) for it in alone]
 
 
-def _tell(report: Report, found: dict[str, Cases], *, thesis: bool) -> None:
+def _tell(report: Report, found: dict[str, OutcomeCounts], *, thesis: bool) -> None:
     report.table(
         "What helping is worth",
         ["operator", "flags/min", "failures", "foreseen", "with help", "avoided", "new", "saved"],
@@ -91,7 +91,7 @@ def _tell(report: Report, found: dict[str, Cases], *, thesis: bool) -> None:
         report.table(title, assist_table.head(thesis=thesis), assist_table.texts(cases, thesis=thesis))
 
 
-def _row(cases: Cases) -> list[str]:
+def _row(cases: OutcomeCounts) -> list[str]:
     before, after = cases.unaided.total(), cases.left.total()
     return [
         f"{cases.flags_a_minute:.1f}",
@@ -108,7 +108,7 @@ def _share(part: int, whole: int) -> str:
     return f"{100.0 * part / whole:.0f} %" if whole else "-"
 
 
-def _plot(found: dict[str, Cases], path: Path) -> None:
+def _plot(found: dict[str, OutcomeCounts], path: Path) -> None:
     """Draw the failures without help, and with it by why they are left."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure, axes = plt.subplots(figsize=(8, 0.7 + 0.6 * (len(found) + 1)))

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.operator_assist.clips import Clip
-from benchmarks.operator_assist.flag_selection import Desk
-from benchmarks.operator_assist.identity_failures import Failure, failures
-from benchmarks.operator_assist.simulated_operator import Flag, Operator, Person
+from benchmarks.operator_assist.flag_selection import FlagSelector
+from benchmarks.operator_assist.identity_failures import IdentityFailure, failures
+from benchmarks.operator_assist.simulated_operator import OperatorFlag, OperatorProfile, SimulatedOperator
 from server.config.sections import FlagSettings
 from tracking import CostSettings, WindowResult, WindowSettings, create_solver
 from tracking.boxes import Floats
@@ -23,7 +23,7 @@ _BATCH = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
+class TrackingSetup:
     """How a camera tracks."""
 
     window: WindowSettings
@@ -31,7 +31,7 @@ class Setup:
     assist: InteractiveSettings
 
 
-FISH = Setup(
+FISH = TrackingSetup(
     WindowSettings(
         max_height_ratio=2.5,
         gate_heights=1.0,
@@ -48,12 +48,12 @@ FISH = Setup(
 
 Nobody comes or goes: who is new where somebody is known is a part of them."""
 
-PLAYERS = Setup(WindowSettings(), CostSettings(), InteractiveSettings(enabled=True))
+PLAYERS = TrackingSetup(WindowSettings(), CostSettings(), InteractiveSettings(enabled=True))
 """MyView's defaults."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Watched:
+class TrackedClip:
     """What came of a clip.
 
     Attributes:
@@ -65,21 +65,23 @@ class Watched:
     """
 
     clip: Clip
-    failures: list[Failure]
+    failures: list[IdentityFailure]
     troubles: list[tuple[int, RiskEvent]]
-    flags: list[Flag]
+    flags: list[OperatorFlag]
     tracks: dict[int, dict[int, Floats]]
 
 
-def watch(clip: Clip, setup: Setup, person: Person | None = None, desk: Desk | None = None) -> Watched:
+def watch(
+    clip: Clip, setup: TrackingSetup, person: OperatorProfile | None = None, desk: FlagSelector | None = None
+) -> TrackedClip:
     """Track a clip as a camera does, frame by frame; nobody helps where there is no person.
 
     Flags are raised at the desk; without one, for all that is foreseen.
     """
-    desk = desk or Desk(_ALL, clip.fps)
+    desk = desk or FlagSelector(_ALL, clip.fps)
     desk.begin()
     tracker = InteractiveTracker(setup.window, setup.costs, create_solver(DEFAULT_SOLVER), setup.assist)
-    operator = Operator(person, desk, clip.truth, clip.fps, clip.seed) if person else None
+    operator = SimulatedOperator(person, desk, clip.truth, clip.fps, clip.seed) if person else None
     shown: dict[int, dict[int, Floats]] = {}
     troubles: list[tuple[int, RiskEvent]] = []
     waiting: list[PositionCorrection] = []
@@ -102,7 +104,7 @@ def watch(clip: Clip, setup: Setup, person: Person | None = None, desk: Desk | N
     _show(shown, tracker.flush())
     _show(shown, tracker.apply_corrections(waiting))
     failed = failures(clip.truth, shown, clip.fps)
-    return Watched(clip, failed, troubles, operator.flags if operator else [], shown)
+    return TrackedClip(clip, failed, troubles, operator.flags if operator else [], shown)
 
 
 def _show(shown: dict[int, dict[int, Floats]], result: WindowResult | None) -> None:

@@ -27,7 +27,7 @@ _AROUND = np.ones((5, 5), dtype=np.uint8)
 """Pixels around the foreground that belong to neither: its edges are of mixed colours."""
 
 
-class FamiliarColours:
+class ForegroundColors:
     """How often each colour was foreground where it was seen."""
 
     def __init__(self, seen: Iterable[tuple[Image, Mask]]) -> None:

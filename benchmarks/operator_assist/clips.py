@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from benchmarks.paper_experiments.scene import Truth
+from benchmarks.paper_experiments.scene import ObjectTruth
 from tracking import Detections
 
 
@@ -22,7 +22,7 @@ class Clip:
     seed: int
     fps: float
     seen: tuple[Detections, ...]
-    truth: Truth
+    truth: ObjectTruth
 
     @property
     def minutes(self) -> float:

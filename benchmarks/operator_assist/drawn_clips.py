@@ -17,9 +17,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.operator_assist.background_colors import FamiliarColours
+from benchmarks.operator_assist.background_colors import ForegroundColors
 from benchmarks.operator_assist.clips import Clip
-from benchmarks.paper_experiments.scene import Truth
+from benchmarks.paper_experiments.scene import ObjectTruth
 from synthetic import Scene
 from tracking import Detections
 from tracking.boxes import BOX_SIDES, Floats
@@ -44,7 +44,7 @@ _LEAST_PART = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class Film:
+class ClipScene:
     """What clips are made of."""
 
     scene: str
@@ -55,7 +55,7 @@ class Film:
     people: bool = False
 
 
-class Blobs:
+class ForegroundBlobDetector:
     """Finds pieces of foreground."""
 
     def __init__(self, ahead: Sequence[Image]) -> None:
@@ -63,7 +63,7 @@ class Blobs:
         self._looks = AppearanceExtractor()
         self._round = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
         self._wide = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
-        self._familiar = FamiliarColours((image, self._differing(image, background)) for image in ahead)
+        self._familiar = ForegroundColors((image, self._differing(image, background)) for image in ahead)
 
     def _differing(self, image: Image, background: Image) -> Mask:
         """Return what differs from the background, `(H, W)`."""
@@ -136,7 +136,7 @@ def _inside(table: Floats, boxes: Floats) -> Floats:
     return np.asarray(table[bottom, right] - table[top, right] - table[bottom, left] + table[top, left])
 
 
-def drawn(film: Film, seed: int) -> Clip:
+def drawn(film: ClipScene, seed: int) -> Clip:
     """Return a clip of the first camera of a scene."""
     played = Scene(film.scene, 1, film.objects, seed, *film.size, film.fps)
     count = round(film.seconds * film.fps)
@@ -149,12 +149,12 @@ def drawn(film: Film, seed: int) -> Clip:
         there = played.truth(t)[0]
         boxes[there.ids - 1, t] = there.boxes
         visible[there.ids - 1, t] = there.visibility
-    return Clip(seed, film.fps, tuple(seen), Truth(boxes, visible))
+    return Clip(seed, film.fps, tuple(seen), ObjectTruth(boxes, visible))
 
 
-def _detector(film: Film, ahead: Sequence[Image]) -> Blobs | BackgroundDetector:
+def _detector(film: ClipScene, ahead: Sequence[Image]) -> ForegroundBlobDetector | BackgroundDetector:
     if not film.people:
-        return Blobs(ahead)
+        return ForegroundBlobDetector(ahead)
     detector = BackgroundDetector()
     detector.prepare(ahead, _EVERY)
     return detector

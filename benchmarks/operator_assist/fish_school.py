@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.operator_assist.clips import Clip
-from benchmarks.paper_experiments.scene import Truth
+from benchmarks.paper_experiments.scene import ObjectTruth
 from tracking import Detections
 from tracking.boxes import Floats
 
@@ -35,7 +35,7 @@ def school(seed: int, fish: int = 9, seconds: float = 20.0) -> Clip:
     boxes = _boxes(places, headings)
     shares = np.stack([_visible(boxes[:, t], places[:, t, 2]) for t in range(boxes.shape[1])], axis=1)
     seen = tuple(_found(boxes[:, t], shares[:, t], places[:, t, 2], rng) for t in range(boxes.shape[1]))
-    return Clip(seed, FPS, seen, Truth(boxes, shares))
+    return Clip(seed, FPS, seen, ObjectTruth(boxes, shares))
 
 
 def _swim(fish: int, frames: int, rng: np.random.Generator) -> tuple[Floats, Floats]:

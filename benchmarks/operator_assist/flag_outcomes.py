@@ -10,9 +10,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.operator_assist.assisted_tracking import Watched
-from benchmarks.operator_assist.identity_failures import Failure, Kind, involved, kind_of, matches
-from benchmarks.operator_assist.simulated_operator import Flag, Person
+from benchmarks.operator_assist.assisted_tracking import TrackedClip
+from benchmarks.operator_assist.identity_failures import IdentityFailure, Kind, involved, kind_of, matches
+from benchmarks.operator_assist.simulated_operator import OperatorFlag, OperatorProfile
 from tracking.interactive import RiskEvent
 
 Outcome = Literal["helped", "not needed", "harmed", "no help"]
@@ -30,7 +30,7 @@ _BEFORE_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Cases:
+class OutcomeCounts:
     """The counts of some clips.
 
     Attributes:
@@ -61,7 +61,7 @@ class Cases:
         return self.flags.total() / self.minutes if self.minutes else 0.0
 
 
-def count(pairs: Sequence[tuple[Watched, Watched]], person: Person) -> Cases:
+def count(pairs: Sequence[tuple[TrackedClip, TrackedClip]], person: OperatorProfile) -> OutcomeCounts:
     """Count over clips that were watched twice: without help, and with it."""
     flags: Counter[tuple[Kind, Outcome]] = Counter()
     unaided: Counter[Kind] = Counter()
@@ -83,10 +83,10 @@ def count(pairs: Sequence[tuple[Watched, Watched]], person: Person) -> Cases:
             left[_cause(failure, helped, found)] += 1
             made += not _again(failure, alone.failures, fps)
     minutes = sum(alone.clip.minutes for alone, _ in pairs)
-    return Cases(minutes, len(pairs), flags, unaided, foreseen, left, kinds, avoided, made)
+    return OutcomeCounts(minutes, len(pairs), flags, unaided, foreseen, left, kinds, avoided, made)
 
 
-def _about(flag: Flag, found: NDArray[np.int64]) -> set[int]:
+def _about(flag: OperatorFlag, found: NDArray[np.int64]) -> set[int]:
     """Return the fish that a flag is about: on whom its tracks were when it was raised, or last before.
 
     And who was followed, whom the operator took for one of them. Nobody, where the tracks were on no fish.
@@ -99,19 +99,19 @@ def _about(flag: Flag, found: NDArray[np.int64]) -> set[int]:
     return about
 
 
-def _kind(flag: Flag, about: set[int], helped: Watched) -> Kind:
+def _kind(flag: OperatorFlag, about: set[int], helped: TrackedClip) -> Kind:
     """Return whether others occluded a flagged person between the flag and its risk event."""
     first, last = sorted((flag.trouble.frame, flag.raised))
     return kind_of(involved(helped.clip.truth, about, first, last, helped.clip.fps))
 
 
-def _outcome(flag: Flag, about: set[int], alone: Watched, helped: Watched) -> Outcome:
+def _outcome(flag: OperatorFlag, about: set[int], alone: TrackedClip, helped: TrackedClip) -> Outcome:
     """Return what a flag was good for: whom it was about failed without help, with it, both, or neither."""
     fps = helped.clip.fps
     ended = flag.until if flag.ended is None else max(flag.ended, flag.until)
     first, last = min(flag.trouble.frame, flag.raised) - _BEFORE_S * fps, max(ended, flag.raised) + fps
 
-    def failed(watched: Watched) -> bool:
+    def failed(watched: TrackedClip) -> bool:
         return any(about & {*it.fish} and it.before <= last and it.frame >= first for it in watched.failures)
 
     without, with_help = failed(alone), failed(helped)
@@ -120,7 +120,9 @@ def _outcome(flag: Flag, about: set[int], alone: Watched, helped: Watched) -> Ou
     return "harmed" if with_help else "not needed"
 
 
-def tells(trouble: RiskEvent, newest: int, failure: Failure, fps: float, person: Person) -> bool:
+def tells(
+    trouble: RiskEvent, newest: int, failure: IdentityFailure, fps: float, person: OperatorProfile
+) -> bool:
     """Return whether a risk event is about a failure, and early enough for the operator to see it."""
     early = newest - person.delay_s * fps + person.reaction_s * fps <= failure.frame
     return bool(
@@ -128,7 +130,7 @@ def tells(trouble: RiskEvent, newest: int, failure: Failure, fps: float, person:
     )
 
 
-def _again(failure: Failure, others: Sequence[Failure], fps: float) -> bool:
+def _again(failure: IdentityFailure, others: Sequence[IdentityFailure], fps: float) -> bool:
     """Return whether a failure is among those of the other run: the same fish, at about the same time."""
     return any(
         {*failure.fish} & {*it.fish} and it.before <= failure.frame + fps and it.frame >= failure.before - fps
@@ -136,7 +138,7 @@ def _again(failure: Failure, others: Sequence[Failure], fps: float) -> bool:
     )
 
 
-def _cause(failure: Failure, helped: Watched, found: NDArray[np.int64]) -> Cause:
+def _cause(failure: IdentityFailure, helped: TrackedClip, found: NDArray[np.int64]) -> Cause:
     """Return why a failure is left; `found` is which track each fish was matched with, `(n, T)`."""
     fps, mine = helped.clip.fps, {*failure.tracks}
     first, last = failure.before - _BEFORE_S * fps, failure.frame + fps
@@ -158,7 +160,7 @@ def _cause(failure: Failure, helped: Watched, found: NDArray[np.int64]) -> Cause
     return "no flag" if told else "not foreseen"
 
 
-def _right(flag: Flag, found: NDArray[np.int64]) -> bool:
+def _right(flag: OperatorFlag, found: NDArray[np.int64]) -> bool:
     """Return whether the fish that was followed is the one that the named track was on before."""
     before = found[flag.fish, : max(flag.looks[0], 1)]
     known = before[before > 0]

@@ -12,7 +12,7 @@ _MOST = 1000
 """Numbers that people of one clip have at most."""
 
 
-class Desk:
+class FlagSelector:
     """Raises flags. The clips follow each other as if they were one recording."""
 
     def __init__(self, settings: FlagSettings, fps: float) -> None:

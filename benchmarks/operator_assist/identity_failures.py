@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.paper_experiments.scene import Truth
+from benchmarks.paper_experiments.scene import ObjectTruth
 from tracking.assignment import assign_pairs
 from tracking.boxes import Floats, iou
 
@@ -32,7 +32,7 @@ Tracks = Mapping[int, Mapping[int, Floats]]
 
 
 @dataclass(frozen=True, slots=True)
-class Failure:
+class IdentityFailure:
     """One identity failure.
 
     Attributes:
@@ -60,7 +60,7 @@ def kind_of(together: int) -> Kind:
     return "alone" if together < 2 else "2 way" if together == 2 else "3 way"
 
 
-def involved(truth: Truth, fish: Collection[int], first: int, last: int, fps: float) -> int:
+def involved(truth: ObjectTruth, fish: Collection[int], first: int, last: int, fps: float) -> int:
     """Count who is in whose way: those of some fish whom others overlap, and these others; 1: nobody.
 
     From a third of a second before the frame `first` to as long after the frame `last`.
@@ -76,7 +76,7 @@ def involved(truth: Truth, fish: Collection[int], first: int, last: int, fps: fl
     return max(1, len(together))
 
 
-def matches(truth: Truth, tracks: Tracks) -> NDArray[np.int64]:
+def matches(truth: ObjectTruth, tracks: Tracks) -> NDArray[np.int64]:
     """Return the number of the track that each fish is matched with, `(n, T)`; 0: none.
 
     In each frame the assignment with the largest overlap of those that keep most pairs of the frame before.
@@ -96,7 +96,7 @@ def matches(truth: Truth, tracks: Tracks) -> NDArray[np.int64]:
     return found
 
 
-def failures(truth: Truth, tracks: Tracks, fps: float) -> list[Failure]:
+def failures(truth: ObjectTruth, tracks: Tracks, fps: float) -> list[IdentityFailure]:
     """Return the failures of a clip, in their order."""
     found = matches(truth, tracks)
     least, together = round(_LASTS_S * fps), _TOGETHER_S * fps
@@ -139,9 +139,11 @@ def _changes(numbers: NDArray[np.int64], least: int) -> list[tuple[int, int, int
     return [(old[2], new[1], old[0], new[0]) for old, new in pairwise(lasting)]
 
 
-def _failure(truth: Truth, group: Sequence[tuple[int, int, int, int, int]], fps: float) -> Failure:
+def _failure(
+    truth: ObjectTruth, group: Sequence[tuple[int, int, int, int, int]], fps: float
+) -> IdentityFailure:
     fish = sorted({it[2] for it in group})
     first, last = min(it[1] for it in group), max(it[0] for it in group)
     tracks = sorted({number for it in group for number in it[3:]})
     crossed = involved(truth, fish, first, last, fps)
-    return Failure(min(it[0] for it in group), first, tuple(fish), tuple(tracks), crossed)
+    return IdentityFailure(min(it[0] for it in group), first, tuple(fish), tuple(tracks), crossed)

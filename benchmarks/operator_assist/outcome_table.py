@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import get_args
 
-from benchmarks.operator_assist.flag_outcomes import CAUSES, Cases, Outcome
+from benchmarks.operator_assist.flag_outcomes import CAUSES, Outcome, OutcomeCounts
 from benchmarks.operator_assist.identity_failures import Kind
 
 _CLIPS_MINUTES = 56 * 20.0 / 60.0
@@ -21,7 +21,7 @@ _WORDS: dict[Outcome, str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class OutcomeRow:
     """One row: what was counted, and the thesis's count, where it counted the same."""
 
     name: str
@@ -30,7 +30,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
+class _FlagGroup:
     """Flags by whether others were in the way; the thesis's counts of them, and of the two outcomes."""
 
     name: str
@@ -40,18 +40,18 @@ class _Part:
 
 
 _RIGHT = (
-    _Part("  crossings", ("2 way", "3 way"), 44, (11, 33)),
-    _Part("  alone", ("alone",), 9),
+    _FlagGroup("  crossings", ("2 way", "3 way"), 44, (11, 33)),
+    _FlagGroup("  alone", ("alone",), 9),
 )
 _WRONG = (
-    _Part("  2 way", ("2 way",), 8, (4, 4)),
-    _Part("  3 way", ("3 way",)),
-    _Part("  alone", ("alone",), 6),
+    _FlagGroup("  2 way", ("2 way",), 8, (4, 4)),
+    _FlagGroup("  3 way", ("3 way",)),
+    _FlagGroup("  alone", ("alone",), 6),
 )
 _LEFT: Sequence[tuple[Kind, int]] = (("2 way", 15), ("3 way", 15), ("alone", 9))
 
 
-def table2(cases: Cases) -> list[Row]:
+def table2(cases: OutcomeCounts) -> list[OutcomeRow]:
     """Return the counts in the thesis's order.
 
     It counts cases, of which each has a flag at most; of failures of more than two it does not say how many
@@ -59,13 +59,13 @@ def table2(cases: Cases) -> list[Row]:
     crossings of two only.
     """
     return [
-        Row("flagged, tracked rightly", _sum(cases, ("helped", "not needed")), 53),
+        OutcomeRow("flagged, tracked rightly", _sum(cases, ("helped", "not needed")), 53),
         *_split(cases, _RIGHT, ("helped", "not needed")),
-        Row("flagged, tracked wrongly", _sum(cases, ("harmed", "no help"))),
+        OutcomeRow("flagged, tracked wrongly", _sum(cases, ("harmed", "no help"))),
         *_split(cases, _WRONG, ("harmed", "no help")),
-        Row("failures with help", cases.left.total(), 39),
-        *(Row(f"  {kind}", cases.kinds[kind], thesis) for kind, thesis in _LEFT),
-        *(Row(f"  {cause}", cases.left[cause]) for cause in CAUSES),
+        OutcomeRow("failures with help", cases.left.total(), 39),
+        *(OutcomeRow(f"  {kind}", cases.kinds[kind], thesis) for kind, thesis in _LEFT),
+        *(OutcomeRow(f"  {cause}", cases.left[cause]) for cause in CAUSES),
     ]
 
 
@@ -74,7 +74,7 @@ def head(*, thesis: bool) -> list[str]:
     return ["", "count", *(["as 56 clips", "thesis"] if thesis else [])]
 
 
-def texts(cases: Cases, *, thesis: bool) -> list[list[str]]:
+def texts(cases: OutcomeCounts, *, thesis: bool) -> list[list[str]]:
     """Return the rows as words; `thesis`: with its counts, and ours for as many minutes as it has."""
     scale = _CLIPS_MINUTES / cases.minutes
     return [
@@ -87,13 +87,15 @@ def texts(cases: Cases, *, thesis: bool) -> list[list[str]]:
     ]
 
 
-def _split(cases: Cases, parts: Sequence[_Part], outcomes: tuple[Outcome, Outcome]) -> Iterator[Row]:
+def _split(
+    cases: OutcomeCounts, parts: Sequence[_FlagGroup], outcomes: tuple[Outcome, Outcome]
+) -> Iterator[OutcomeRow]:
     """Yield flags of these outcomes by whether others were in the way, and by outcome."""
     for it in parts:
-        yield Row(it.name, _sum(cases, outcomes, it.kinds), it.thesis)
+        yield OutcomeRow(it.name, _sum(cases, outcomes, it.kinds), it.thesis)
         for outcome, theirs in zip(outcomes, it.theirs, strict=True):
-            yield Row(f"    {_WORDS[outcome]}", _sum(cases, (outcome,), it.kinds), theirs)
+            yield OutcomeRow(f"    {_WORDS[outcome]}", _sum(cases, (outcome,), it.kinds), theirs)
 
 
-def _sum(cases: Cases, outcomes: Sequence[Outcome], kinds: Sequence[Kind] = get_args(Kind)) -> int:
+def _sum(cases: OutcomeCounts, outcomes: Sequence[Outcome], kinds: Sequence[Kind] = get_args(Kind)) -> int:
     return sum(cases.flags[kind, outcome] for kind in kinds for outcome in outcomes)

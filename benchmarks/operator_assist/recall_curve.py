@@ -8,10 +8,10 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from benchmarks.operator_assist.assisted_tracking import Watched
+from benchmarks.operator_assist.assisted_tracking import TrackedClip
 from benchmarks.operator_assist.flag_outcomes import tells
-from benchmarks.operator_assist.flag_selection import Desk
-from benchmarks.operator_assist.simulated_operator import Person
+from benchmarks.operator_assist.flag_selection import FlagSelector
+from benchmarks.operator_assist.simulated_operator import OperatorProfile
 from server.config.sections import FlagSettings
 from tracking.interactive import RiskEvent
 
@@ -22,7 +22,7 @@ _MANY = 600
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class RecallPoint:
     """What flags of one risk foresee.
 
     Attributes:
@@ -50,14 +50,14 @@ class Point:
         return min(self.flags / self.failures, 1.0) if self.failures else 0.0
 
 
-def curve(watched: Sequence[Watched], person: Person) -> list[Point]:
+def curve(watched: Sequence[TrackedClip], person: OperatorProfile) -> list[RecallPoint]:
     """Return what is foreseen from each of the risks on in clips that nobody helped with."""
     return [_point(watched, person, FlagSettings(per_minute=_MANY, risk=risk)) for risk in RISKS]
 
 
-def _point(watched: Sequence[Watched], person: Person, settings: FlagSettings) -> Point:
+def _point(watched: Sequence[TrackedClip], person: OperatorProfile, settings: FlagSettings) -> RecallPoint:
     flags = foreseen = 0
-    desk = Desk(settings, watched[0].clip.fps)
+    desk = FlagSelector(settings, watched[0].clip.fps)
     for it in watched:
         desk.begin()
         raised = _raised(it, desk)
@@ -68,10 +68,10 @@ def _point(watched: Sequence[Watched], person: Person, settings: FlagSettings) -
             for used in about[:1]:
                 raised.remove(used)
     failures = sum(len(it.failures) for it in watched)
-    return Point(settings.risk, flags, foreseen, failures, sum(it.clip.minutes for it in watched))
+    return RecallPoint(settings.risk, flags, foreseen, failures, sum(it.clip.minutes for it in watched))
 
 
-def _raised(watched: Watched, desk: Desk) -> list[tuple[int, RiskEvent]]:
+def _raised(watched: TrackedClip, desk: FlagSelector) -> list[tuple[int, RiskEvent]]:
     """Return the flags of a clip, each with the newest frame when it was raised."""
     windows: dict[int, list[RiskEvent]] = {}
     for newest, it in watched.troubles:
@@ -79,7 +79,7 @@ def _raised(watched: Watched, desk: Desk) -> list[tuple[int, RiskEvent]]:
     return [(newest, it) for newest, told in windows.items() for it in desk.raised(newest, told)]
 
 
-def rows(points: Sequence[Point]) -> list[list[str]]:
+def rows(points: Sequence[RecallPoint]) -> list[list[str]]:
     """Return the points as rows of a table: flags, failures, foreseen, the most that is possible."""
     return [
         [
@@ -94,7 +94,7 @@ def rows(points: Sequence[Point]) -> list[list[str]]:
     ]
 
 
-def plot(points: Sequence[Point], path: Path) -> None:
+def plot(points: Sequence[RecallPoint], path: Path) -> None:
     """Draw the share that is foreseen against flags a minute, below what is possible."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure, axes = plt.subplots(figsize=(7, 4))

@@ -19,10 +19,10 @@ import numpy as np
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from benchmarks.operator_assist.assisted_tracking import Watched, watch
+from benchmarks.operator_assist.assisted_tracking import TrackedClip, watch
 from benchmarks.operator_assist.clip_kinds import kinds
 from benchmarks.operator_assist.flag_outcomes import tells
-from benchmarks.operator_assist.simulated_operator import Person
+from benchmarks.operator_assist.simulated_operator import OperatorProfile
 from tracking.boxes import Floats
 from tracking.interactive import RiskFeatures, RiskReason
 
@@ -43,9 +43,9 @@ def fitted(terms: Floats, wrong: Floats) -> Floats:
     return weights
 
 
-def examples(watched: Sequence[Watched], reason: RiskReason) -> tuple[Floats, Floats]:
+def examples(watched: Sequence[TrackedClip], reason: RiskReason) -> tuple[Floats, Floats]:
     """Return the terms `(N, D)` of the troubles of a reason, and 1 where they went wrong `(N,)`."""
-    rows, wrong, person = [], [], Person()
+    rows, wrong, person = [], [], OperatorProfile()
     for it in watched:
         for newest, trouble in it.troubles:
             if trouble.reason == reason:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.operator_assist.flag_selection import Desk
-from benchmarks.paper_experiments.scene import Truth
+from benchmarks.operator_assist.flag_selection import FlagSelector
+from benchmarks.paper_experiments.scene import ObjectTruth
 from tracking.boxes import Floats, iou
 from tracking.interactive import PositionCorrection, RiskEvent
 
@@ -32,7 +32,7 @@ _FOUND = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class Person:
+class OperatorProfile:
     """How an operator is.
 
     Attributes:
@@ -49,7 +49,7 @@ class Person:
 
 
 @dataclass(slots=True)
-class Flag:
+class OperatorFlag:
     """One flag.
 
     Attributes:
@@ -77,10 +77,12 @@ class Flag:
     likely: dict[tuple[int, int], float] = field(default_factory=dict)
 
 
-class Operator:
+class SimulatedOperator:
     """Follows whom flags name, one at a time, on a picture that is late; never mistakes whom they follow."""
 
-    def __init__(self, person: Person, desk: Desk, truth: Truth, fps: float, seed: int) -> None:
+    def __init__(
+        self, person: OperatorProfile, desk: FlagSelector, truth: ObjectTruth, fps: float, seed: int
+    ) -> None:
         self._desk = desk
         self._person, self._truth, self._fps = person, truth, fps
         self._rng = np.random.default_rng(seed)
@@ -88,8 +90,8 @@ class Operator:
         self._reaction = round(person.reaction_s * fps)
         self._back = round(person.back_s * fps)
         self._before = round(_BACK_S * fps) + self._reaction
-        self.flags: list[Flag] = []
-        self._now: Flag | None = None
+        self.flags: list[OperatorFlag] = []
+        self._now: OperatorFlag | None = None
         """Which the operator sees to."""
 
     @property
@@ -107,7 +109,9 @@ class Operator:
                 now.until = max(now.until, it.frame)
             else:
                 others.append(it)
-        self.flags += [Flag(it, it.objects[0], newest, it.frame) for it in self._desk.raised(newest, others)]
+        self.flags += [
+            OperatorFlag(it, it.objects[0], newest, it.frame) for it in self._desk.raised(newest, others)
+        ]
 
     def look(self, newest: int, shown: Mapping[int, Mapping[int, Floats]]) -> PositionCorrection | None:
         """Look at the screen and point at whom the flag names, if anybody can be seen there."""
@@ -119,7 +123,7 @@ class Operator:
             self._now = None
         return pointing
 
-    def _next(self, newest: int, screen: int) -> Flag | None:
+    def _next(self, newest: int, screen: int) -> OperatorFlag | None:
         """Turn to the flag that is due first; where none is ahead, back to what is over on the screen."""
         waiting = [it for it in self.flags if it.begun is None and it.ended is None]
         over = {id(it) for it in waiting if it.until < screen}
@@ -135,7 +139,7 @@ class Operator:
         return flag
 
     def _see_to(
-        self, flag: Flag, begun: int, newest: int, shown: Mapping[int, Mapping[int, Floats]]
+        self, flag: OperatorFlag, begun: int, newest: int, shown: Mapping[int, Mapping[int, Floats]]
     ) -> PositionCorrection | None:
         screen = newest - flag.lag
         if flag.fish is None:
@@ -153,7 +157,7 @@ class Operator:
         flag.looks.append(screen)
         return self._pointing(flag, screen)
 
-    def _recognise(self, flag: Flag, boxes: Mapping[int, Floats], screen: int) -> None:
+    def _recognise(self, flag: OperatorFlag, boxes: Mapping[int, Floats], screen: int) -> None:
         """See whose boxes the tracks' are on the screen, while the hand is on its way."""
         numbers = list(boxes)
         if not numbers:
@@ -168,7 +172,7 @@ class Operator:
                 it = numbers[best], fish
                 flag.likely[it] = flag.likely.get(it, 0.0) + float(row[best])
 
-    def _follow(self, flag: Flag, newest: int, box: Floats | None) -> None:
+    def _follow(self, flag: OperatorFlag, newest: int, box: Floats | None) -> None:
         """Let go once all is over: who is followed has been alone for a while, with the right box around."""
         screen = newest - flag.lag
         if flag.fish is not None:
@@ -181,7 +185,7 @@ class Operator:
         if over or newest - (flag.begun or 0) > _LONGEST_S * self._fps + flag.lag:
             flag.ended = screen
 
-    def _pointing(self, flag: Flag, screen: int) -> PositionCorrection:
+    def _pointing(self, flag: OperatorFlag, screen: int) -> PositionCorrection:
         box = self._truth.boxes[flag.fish, screen]
         size = float(np.sqrt((box[2] - box[0]) * (box[3] - box[1])))
         off = self._rng.normal(0.0, self._person.error * size / np.sqrt(2.0), 2)

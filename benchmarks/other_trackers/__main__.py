@@ -22,8 +22,8 @@ from benchmarks.other_trackers.plots import plot
 from benchmarks.other_trackers.virtual_environment import (
     PACKAGES,
     PEERS,
-    PeerEnvironment,
-    PeersAwayError,
+    OtherTrackerEnvironment,
+    OtherTrackersUnavailableError,
     default_folder,
     peer_environment,
 )
@@ -50,17 +50,17 @@ Table = dict[str, dict[str, Scores]]
 """By sequence, then by tracker."""
 
 
-def environment(folder: Path, report: Report) -> PeerEnvironment | None:
+def environment(folder: Path, report: Report) -> OtherTrackerEnvironment | None:
     """Return the peers' environment, or say why there is none."""
     try:
         return peer_environment(folder)
-    except PeersAwayError as problem:
+    except OtherTrackersUnavailableError as problem:
         report.say(f"without the peers, which cannot be installed here: {problem}")
         return None
 
 
 def tracks_of(
-    sequence: Recording, peers: PeerEnvironment | None, report: Report, *, pictures: bool
+    sequence: Recording, peers: OtherTrackerEnvironment | None, report: Report, *, pictures: bool
 ) -> Iterator[tuple[str, list[MotRow]]]:
     """Yield everybody's tracks of a sequence, MyView's first and perfect association's last."""
     yield OURS, track(sequence)
@@ -72,16 +72,18 @@ def tracks_of(
 
 
 def _peers_tracks(
-    sequence: Recording, peers: PeerEnvironment, report: Report
+    sequence: Recording, peers: OtherTrackerEnvironment, report: Report
 ) -> Iterator[tuple[str, list[MotRow]]]:
     for peer in PEERS:
         try:
             yield peer.name, peers.track(peer, sequence.detections)
-        except PeersAwayError as problem:
+        except OtherTrackersUnavailableError as problem:
             report.say(f"{sequence.name}: without {peer.name}: {problem}")
 
 
-def difference(peers: PeerEnvironment, sequence: Recording, tracks: list[MotRow], scores: Scores) -> float:
+def difference(
+    peers: OtherTrackerEnvironment, sequence: Recording, tracks: list[MotRow], scores: Scores
+) -> float:
     """Return by how much the peers' own evaluation, which follows TrackEval, differs from ours at most."""
     theirs = peers.score(read_rows(sequence.truth), tracks)
     return max(abs(float(getattr(scores, name)) - value) for name, value in theirs.items())

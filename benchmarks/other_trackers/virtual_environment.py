@@ -23,7 +23,7 @@ _RUN_S = 600.0
 
 
 @dataclass(frozen=True, slots=True)
-class Peer:
+class OtherTracker:
     """Another tracker."""
 
     name: str
@@ -32,29 +32,29 @@ class Peer:
 
 
 PEERS = (
-    Peer("C-BIoU", "CBIoUTracker"),
-    Peer("OC-SORT", "OCSORTTracker"),
-    Peer("ByteTrack", "ByteTrackTracker"),
-    Peer("SORT", "SORTTracker"),
-    Peer("motile", "motile"),
+    OtherTracker("C-BIoU", "CBIoUTracker"),
+    OtherTracker("OC-SORT", "OCSORTTracker"),
+    OtherTracker("ByteTrack", "ByteTrackTracker"),
+    OtherTracker("SORT", "SORTTracker"),
+    OtherTracker("motile", "motile"),
 )
 
 
-class PeersAwayError(Exception):
+class OtherTrackersUnavailableError(Exception):
     """The other trackers cannot be installed, or do not run; the text says why in one line."""
 
 
 @dataclass(frozen=True, slots=True)
-class PeerEnvironment:
+class OtherTrackerEnvironment:
     """An environment in which the other trackers are installed."""
 
     python: Path
 
-    def track(self, peer: Peer, detections: Path) -> list[MotRow]:
+    def track(self, peer: OtherTracker, detections: Path) -> list[MotRow]:
         """Return a peer's tracks.
 
         Raises:
-            PeersAwayError: it failed.
+            OtherTrackersUnavailableError: it failed.
         """
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "tracks.txt"
@@ -65,7 +65,7 @@ class PeerEnvironment:
         """Return HOTA, MOTA, IDF1 and switches by the peers' own evaluation.
 
         Raises:
-            PeersAwayError: it failed.
+            OtherTrackersUnavailableError: it failed.
         """
         with tempfile.TemporaryDirectory() as folder:
             there, found = Path(folder) / "truth.txt", Path(folder) / "tracks.txt"
@@ -86,7 +86,7 @@ class PeerEnvironment:
                 check=True,
             )
         except subprocess.SubprocessError as error:
-            raise PeersAwayError(f"{words[1]}: {_last_line(error)}") from error
+            raise OtherTrackersUnavailableError(f"{words[1]}: {_last_line(error)}") from error
         return done.stdout
 
 
@@ -97,11 +97,11 @@ def default_folder() -> Path:
     return cache / "myview" / f"peers-{wanted}"
 
 
-def peer_environment(folder: Path) -> PeerEnvironment:
+def peer_environment(folder: Path) -> OtherTrackerEnvironment:
     """Return environment in the folder; it is made, which takes a network and a minute, if it is not there.
 
     Raises:
-        PeersAwayError: it cannot be made.
+        OtherTrackersUnavailableError: it cannot be made.
     """
     python = folder / "bin" / "python"
     done = folder / ".done"  # written last: without it the folder is half an environment
@@ -123,8 +123,8 @@ def peer_environment(folder: Path) -> PeerEnvironment:
                 subprocess.run(command, capture_output=True, text=True, timeout=_INSTALL_S, check=True)
             done.touch()
         except (OSError, subprocess.SubprocessError) as error:
-            raise PeersAwayError(_last_line(error)) from error
-    return PeerEnvironment(python)
+            raise OtherTrackersUnavailableError(_last_line(error)) from error
+    return OtherTrackerEnvironment(python)
 
 
 def _last_line(error: Exception) -> str:

@@ -21,9 +21,9 @@ import numpy as np
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from benchmarks.overload.growing_site import FPS, LOG, Crowded, running
+from benchmarks.overload.growing_site import FPS, LOG, GrowingSite, running
 from benchmarks.overload.overload_report import describe, plot
-from benchmarks.overload.samples import RECOVERED_S, Loaded, Sample, Step
+from benchmarks.overload.samples import RECOVERED_S, LoadStep, OverloadResult, SiteSample
 from benchmarks.soak.visitors import Visitors
 
 _STRIDE = 5
@@ -35,11 +35,11 @@ _CALM = 5
 """Samples in a row at which nothing is left out, for the way back to be over."""
 
 
-class Watch:
+class SiteSampler:
     """Samples a site."""
 
     def __init__(
-        self, site: Crowded, visitors: Visitors, watching: asyncio.Task[None], found: Loaded
+        self, site: GrowingSite, visitors: Visitors, watching: asyncio.Task[None], found: OverloadResult
     ) -> None:
         self._site, self._visitors, self._watching, self._found = site, visitors, watching, found
         self._began = time.monotonic()
@@ -49,7 +49,7 @@ class Watch:
         """Seconds since the beginning."""
         return time.monotonic() - self._began
 
-    async def sample(self, session: aiohttp.ClientSession, seconds: float) -> list[Sample]:
+    async def sample(self, session: aiohttp.ClientSession, seconds: float) -> list[SiteSample]:
         """Take samples for a while.
 
         Raises:
@@ -68,13 +68,13 @@ class Watch:
         self._found.samples += taken
         return taken
 
-    def _sample(self, cameras: Sequence[dict[str, Any]]) -> Sample:
+    def _sample(self, cameras: Sequence[dict[str, Any]]) -> SiteSample:
         person, camera = self._visitors.person, self._visitors.camera
         delays = tuple(person.delays)
         person.delays.clear()
         camera.delays.clear()
         sums = {what: sum(it[what] for it in cameras) for what in ("pulse", "shed", "missed", "late")}
-        return Sample(
+        return SiteSample(
             at=self.now,
             levels=tuple(it["load_level"] for it in cameras),
             pulses=sums["pulse"],
@@ -86,13 +86,13 @@ class Watch:
         )
 
 
-def step_of(cameras: int, before: Sequence[Sample], samples: Sequence[Sample]) -> Step:
+def step_of(cameras: int, before: Sequence[SiteSample], samples: Sequence[SiteSample]) -> LoadStep:
     """Sum up the samples of so many cameras; ``before`` are those while they settled."""
     first, last = samples[0], samples[-1]
     frames = max(last.pulses - first.pulses, 1)
     delays = [it for sample in samples[1:] for it in sample.delays] or [np.nan]
     levels = [it for sample in samples for it in sample.levels] or [0]
-    return Step(
+    return LoadStep(
         cameras=cameras,
         levels=(float(np.median(levels)), max(levels)),
         searched=1.0 - (last.shed - first.shed + last.missed - first.missed) / frames,
@@ -103,16 +103,16 @@ def step_of(cameras: int, before: Sequence[Sample], samples: Sequence[Sample]) -
     )
 
 
-async def load(site: Crowded, most: int, settle: float, seconds: float) -> Loaded:
+async def load(site: GrowingSite, most: int, settle: float, seconds: float) -> OverloadResult:
     """Add cameras until there are too many by half; kill them, and wait until the rest is well."""
-    found = Loaded()
+    found = OverloadResult()
     site.add()
     async with aiohttp.ClientSession() as session:
         await _first(session, site)
         visitors = Visitors(site.url, FPS, seed=1, coming=0)
         watching = asyncio.create_task(visitors.watch())
         try:
-            watch = Watch(site, visitors, watching, found)
+            watch = SiteSampler(site, visitors, watching, found)
             while True:
                 found.started.append((watch.now, len(site.cameras)))
                 before = await watch.sample(session, settle)
@@ -131,7 +131,7 @@ async def load(site: Crowded, most: int, settle: float, seconds: float) -> Loade
     return found
 
 
-async def _first(session: aiohttp.ClientSession, site: Crowded) -> None:
+async def _first(session: aiohttp.ClientSession, site: GrowingSite) -> None:
     """Wait until the first camera is live.
 
     Raises:
@@ -146,7 +146,7 @@ async def _first(session: aiohttp.ClientSession, site: Crowded) -> None:
     raise RuntimeError(f"the first camera was not live after {_FIRST_S:.0f} s")
 
 
-async def _way_back(watch: Watch, session: aiohttp.ClientSession) -> float | None:
+async def _way_back(watch: SiteSampler, session: aiohttp.ClientSession) -> float | None:
     began = watch.now
     calm = 0
     while watch.now < began + RECOVERED_S:

@@ -29,7 +29,7 @@ _POLL_S = 0.2
 LOG = "site.log"
 
 
-class Crowded:
+class GrowingSite:
     """A site that is running; its cameras are its caller's matter."""
 
     def __init__(self, config: Path, url: str, log: IO[bytes]) -> None:
@@ -53,7 +53,7 @@ class Crowded:
 
 
 @contextlib.contextmanager
-def running(most: int, folder: Path) -> Iterator[Crowded]:
+def running(most: int, folder: Path) -> Iterator[GrowingSite]:
     """Run a site for at most so many cameras, of which none is there yet."""
     films = folder / "films"
     scene = Scene("room", _FILMS, _PEOPLE, _SEED, WIDTH, HEIGHT, FPS)
@@ -74,7 +74,7 @@ def running(most: int, folder: Path) -> Iterator[Crowded]:
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
     with (folder / LOG).open("wb") as log:
         started = [_start(log, it, str(config)) for it in ("bestview", "sync")]
-        site = Crowded(config, f"http://127.0.0.1:{http}/", log)
+        site = GrowingSite(config, f"http://127.0.0.1:{http}/", log)
         try:
             _until_up(site.url)
             yield site

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 
 from benchmarks.common.report import Report
 from benchmarks.overload.growing_site import FPS
-from benchmarks.overload.samples import RECOVERED_S, Loaded
+from benchmarks.overload.samples import RECOVERED_S, OverloadResult
 
 
-def describe(report: Report, found: Loaded) -> None:
+def describe(report: Report, found: OverloadResult) -> None:
     """Print the table."""
     report.table(
         f"cameras of 352x288 at {FPS:g} a second: what is left out, and what a viewer of a person sees",
@@ -42,7 +42,7 @@ def describe(report: Report, found: Loaded) -> None:
     report.say(f"all but one killed: nothing is left out any more after {back}")
 
 
-def plot(found: Loaded, path: Path) -> None:
+def plot(found: OverloadResult, path: Path) -> None:
     """Draw levels and delay over time."""
     figure = Figure(figsize=(9, 6))
     levels, delay = figure.subplots(2, 1, sharex=True)

@@ -40,7 +40,7 @@ _SETTLED = 2 / 3
 
 
 @dataclass(slots=True)
-class Asked:
+class Responsiveness:
     """What came of asking one site.
 
     Attributes:
@@ -85,10 +85,10 @@ def lag_below(share: float, lags: Sequence[tuple[float, float]]) -> float:
     return next((bound for bound, count in lags if count >= share * lags[-1][1]), np.nan)
 
 
-async def ask(config: Path, port: int, niceness: int, seconds: float, log: Path) -> Asked:
+async def ask(config: Path, port: int, niceness: int, seconds: float, log: Path) -> Responsiveness:
     """Run a site for so long, and ask it from its start on."""
     environment = {**one_thread_environment(), "MYVIEW_SITE__NICENESS": str(niceness)}
-    url, asked = f"http://127.0.0.1:{port}/", Asked(seconds)
+    url, asked = f"http://127.0.0.1:{port}/", Responsiveness(seconds)
     with log.open("ab") as said:
         site = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "server.cli.main", "up", str(config)),
@@ -119,7 +119,7 @@ async def ask(config: Path, port: int, niceness: int, seconds: float, log: Path)
     return asked
 
 
-async def _ask(session: aiohttp.ClientSession, url: str, asked: Asked, began: float) -> None:
+async def _ask(session: aiohttp.ClientSession, url: str, asked: Responsiveness, began: float) -> None:
     at, took = time.monotonic() - began, None
     with contextlib.suppress(aiohttp.ClientConnectorError):  # nobody listens yet
         try:
@@ -130,7 +130,7 @@ async def _ask(session: aiohttp.ClientSession, url: str, asked: Asked, began: fl
             asked.waits.append((at, took))
 
 
-async def _metrics(session: aiohttp.ClientSession, url: str, asked: Asked, began: float) -> None:
+async def _metrics(session: aiohttp.ClientSession, url: str, asked: Responsiveness, began: float) -> None:
     while True:
         with contextlib.suppress(aiohttp.ClientError):
             async with session.get(f"{url}metrics") as answer:
@@ -185,7 +185,7 @@ def write_site(folder: Path, films: Path, cameras: int) -> tuple[Path, int]:
     return path, http
 
 
-def row(cameras: int, niceness: int, asked: Asked) -> list[str]:
+def row(cameras: int, niceness: int, asked: Responsiveness) -> list[str]:
     """Return a row of the table."""
     [family] = asked.own.histogram.collect()
     own = [(float(it.labels["le"]), it.value) for it in family.samples if it.name.endswith("_bucket")]

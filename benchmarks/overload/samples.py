@@ -11,7 +11,7 @@ _CARRIED = 0.99
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class SiteSample:
     """The site at one moment.
 
     Attributes:
@@ -36,7 +36,7 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class LoadStep:
     """So many cameras, once they have settled.
 
     Attributes:
@@ -59,11 +59,11 @@ class Step:
 
 
 @dataclass(slots=True)
-class Loaded:
+class OverloadResult:
     """What was found."""
 
-    samples: list[Sample] = field(default_factory=list)
-    steps: list[Step] = field(default_factory=list)
+    samples: list[SiteSample] = field(default_factory=list)
+    steps: list[LoadStep] = field(default_factory=list)
     started: list[tuple[float, int]] = field(default_factory=list)
     """When there were how many cameras."""
     back: float | None = None

@@ -45,7 +45,7 @@ _BUFFERED = (
 
 
 @dataclass(frozen=True, slots=True)
-class Visit:
+class PageVisit:
     """What a visit to the page was like.
 
     Attributes:
@@ -63,7 +63,7 @@ class Visit:
     delays: np.ndarray
 
 
-async def visit(url: str, switches: int, minutes: float) -> Visit:
+async def visit(url: str, switches: int, minutes: float) -> PageVisit:
     """Open the page, switch from person to person, and then watch."""
     async with chromium() as browser:
         # The page's policy forbids eval, which it is asked with here.
@@ -87,7 +87,7 @@ async def visit(url: str, switches: int, minutes: float) -> Visit:
         for _ in range(round(4 * minutes)):
             await asyncio.sleep(15.0)
             readings.append(await _reading(page, tools))
-        return Visit(np.array(took), *np.array(readings).T)
+        return PageVisit(np.array(took), *np.array(readings).T)
 
 
 async def _switch(page: Page, turn: int) -> list[float]:
@@ -117,7 +117,7 @@ async def _reading(page: Page, tools: CDPSession) -> tuple[float, float, float, 
     )
 
 
-def describe(report: Report, it: Visit) -> None:
+def describe(report: Report, it: PageVisit) -> None:
     """Print the tables."""
     middle, late = np.percentile(it.switches, [50, 95])
     report.table(
@@ -143,7 +143,7 @@ def describe(report: Report, it: Visit) -> None:
     )
 
 
-def plot(it: Visit, path: Path) -> None:
+def plot(it: PageVisit, path: Path) -> None:
     """Draw how long switches took, and memory and delay over the visit."""
     figure = Figure(figsize=(9, 6))
     took, memory = figure.subplots(2, 1)
@@ -162,7 +162,7 @@ def plot(it: Visit, path: Path) -> None:
     figure.savefig(path, dpi=120)
 
 
-async def run(options: argparse.Namespace) -> Visit:
+async def run(options: argparse.Namespace) -> PageVisit:
     """Run the demo and visit it."""
     async with demo_at(options.fps) as url:
         return await visit(url, options.switches, options.minutes)

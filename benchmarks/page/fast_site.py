@@ -34,7 +34,7 @@ _AHEAD = 2 * _GOP
 
 
 @dataclass(frozen=True, slots=True)
-class Clock:
+class FastClock:
     """Seconds of the site, ``speed`` for each of the world's."""
 
     speed: float
@@ -52,7 +52,7 @@ class Clock:
 class FastSite:
     """Serves the page and what it needs: pictures that were encoded once, again and again at new times."""
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: FastClock) -> None:
         self._clock = clock
         self._stream_format = StreamFormat()
         self._fragments = [self._loop(seed) for seed in range(len(_CAMERAS))]
@@ -218,7 +218,7 @@ async def _file(request: web.Request) -> web.StreamResponse:
 
 
 @contextlib.asynccontextmanager
-async def serving(clock: Clock) -> AsyncIterator[str]:
+async def serving(clock: FastClock) -> AsyncIterator[str]:
     """Serve the site on a port that the system chooses; give its address."""
     site = await asyncio.to_thread(FastSite, clock)
     runner = web.AppRunner(site.app(), shutdown_timeout=0.05, handler_cancellation=True)

@@ -17,7 +17,7 @@ from playwright.async_api import CDPSession, Page
 
 from benchmarks.common.browser import chromium
 from benchmarks.common.report import Report
-from benchmarks.page.fast_site import Clock, serving
+from benchmarks.page.fast_site import FastClock, serving
 
 _READINGS = 16
 _PLAYING_MS = 60_000
@@ -61,7 +61,7 @@ _WATCHED = """() => { window.shown = 0;
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class BrowserSample:
     """The browser at one moment.
 
     Attributes:
@@ -89,9 +89,9 @@ class Reading:
     load: float
 
 
-async def play(hours: float, speed: float) -> list[Reading]:
+async def play(hours: float, speed: float) -> list[BrowserSample]:
     """Play so many hours; switch to who came last now and then, as a viewer does."""
-    clock = Clock(speed, time.time())
+    clock = FastClock(speed, time.time())
     async with serving(clock) as url, chromium() as browser:
         page = await browser.new_page(viewport={"width": 1280, "height": 800})
         await page.add_init_script(
@@ -114,13 +114,13 @@ async def play(hours: float, speed: float) -> list[Reading]:
     return readings
 
 
-async def _read(page: Page, tools: CDPSession, hours: float) -> Reading:
+async def _read(page: Page, tools: CDPSession, hours: float) -> BrowserSample:
     await tools.send("HeapProfiler.collectGarbage")
     heap = (await tools.send("Runtime.getHeapUsage"))["usedSize"] / 1e6
     metrics = {it["name"]: it["value"] for it in (await tools.send("Performance.getMetrics"))["metrics"]}
     state = await page.evaluate(_STATE)
     behind = [it for it in state["delays"] if it is not None]
-    return Reading(
+    return BrowserSample(
         hours,
         heap,
         int(metrics["Nodes"]),
@@ -134,7 +134,7 @@ async def _read(page: Page, tools: CDPSession, hours: float) -> Reading:
     )
 
 
-def describe(report: Report, readings: list[Reading], speed: float) -> None:
+def describe(report: Report, readings: list[BrowserSample], speed: float) -> None:
     """Print the table, and what grew from the first half to the second."""
     report.table(
         f"the page over hours, {speed:g} times as fast",

@@ -16,11 +16,11 @@ import numpy as np
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from benchmarks.paper_experiments.experiment_list import EXPERIMENTS, Experiment, Setting
-from benchmarks.paper_experiments.label_errors import Labels, judge, per_frame
+from benchmarks.paper_experiments.experiment_list import EXPERIMENTS, Experiment, TrackerSetting
+from benchmarks.paper_experiments.label_errors import LabelErrors, judge, per_frame
 from benchmarks.paper_experiments.plots import plot
-from benchmarks.paper_experiments.scene import Scene
-from benchmarks.paper_experiments.windowed_tracking import Followed, follow
+from benchmarks.paper_experiments.scene import ExperimentScene
+from benchmarks.paper_experiments.windowed_tracking import TrackedLabels, follow
 from tracking import create_solver
 
 _PLOTTED = ("columns", "greedy-dp", "separate-dp")
@@ -29,11 +29,11 @@ _LINEAR = ("columns", "exact")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+class SolverOutcome:
     """What one solver made of one scene."""
 
-    followed: Followed
-    labels: Labels
+    followed: TrackedLabels
+    labels: LabelErrors
 
     @property
     def integral(self) -> int:
@@ -41,13 +41,13 @@ class Outcome:
         return sum(report.integral for report in self.followed.reports)
 
 
-def attempt(scene: Scene, setting: Setting, solver: str) -> Outcome:
+def attempt(scene: ExperimentScene, setting: TrackerSetting, solver: str) -> SolverOutcome:
     """Follow everybody in a scene, and judge the labels."""
     followed = follow(scene, setting.costs, setting.window, create_solver(solver))
-    return Outcome(followed, judge(scene, followed.boxes))
+    return SolverOutcome(followed, judge(scene, followed.boxes))
 
 
-def row(setting: Setting, solver: str, outcomes: list[Outcome]) -> list[str]:
+def row(setting: TrackerSetting, solver: str, outcomes: list[SolverOutcome]) -> list[str]:
     """Return a row of the table."""
     labels = [it.labels for it in outcomes]
     windows = sum(len(it.followed.reports) for it in outcomes)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from benchmarks.paper_experiments.scene import HEIGHT, WIDTH, Scene, Truth
+from benchmarks.paper_experiments.scene import HEIGHT, WIDTH, ExperimentScene, ObjectTruth
 from tracking import Template
 from tracking.boxes import Floats
 from tracking.detectors import Image
@@ -72,7 +72,7 @@ def toys(frames: int, rng: np.random.Generator) -> Toys:
     return Toys(looks, behind, _ways(frames, rng))
 
 
-def play_toys(frames: int, seed: int, peaks: int = 80) -> Scene:
+def play_toys(frames: int, seed: int, peaks: int = 80) -> ExperimentScene:
     """Draw the toys and find them; the same seed gives the same."""
     rng = np.random.default_rng(seed)
     made = toys(frames, rng)
@@ -88,8 +88,8 @@ def play_toys(frames: int, seed: int, peaks: int = 80) -> Scene:
         Template(k + 1, one.histogram, box)
         for k, (one, box) in enumerate(zip(detectors, boxes[:, 0], strict=True))
     )
-    return Scene(
-        Truth(boxes, np.array([visible for _, visible in shown]).T), seen, templates, tuple(range(TOYS))
+    return ExperimentScene(
+        ObjectTruth(boxes, np.array([visible for _, visible in shown]).T), seen, templates, tuple(range(TOYS))
     )
 
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from benchmarks.paper_experiments.drawn_toys import play_toys
-from benchmarks.paper_experiments.noisy_detections import Cast, play
-from benchmarks.paper_experiments.scene import Scene
-from benchmarks.paper_experiments.walking_people import Walking
+from benchmarks.paper_experiments.noisy_detections import SceneParameters, play
+from benchmarks.paper_experiments.scene import ExperimentScene
+from benchmarks.paper_experiments.walking_people import WalkParameters
 from tracking import PAPER_COSTS, CostSettings, WindowSettings
 
 _FOR_EVER = 1_000_000
@@ -32,7 +32,7 @@ LAYOUT = 0.0005
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class TrackerSetting:
     """How a scene is followed."""
 
     name: str
@@ -58,28 +58,30 @@ class Experiment:
     name: str
     title: str
     figure: str
-    play: Callable[[int], Scene]
-    settings: tuple[Setting, ...]
+    play: Callable[[int], ExperimentScene]
+    settings: tuple[TrackerSetting, ...]
     paper: str
     scenes: int = 5
 
 
-def _settings(paper: CostSettings, default: CostSettings, *more: Setting) -> tuple[Setting, ...]:
+def _settings(
+    paper: CostSettings, default: CostSettings, *more: TrackerSetting
+) -> tuple[TrackerSetting, ...]:
     return (
-        Setting("paper", paper, PAPER_WINDOW),
+        TrackerSetting("paper", paper, PAPER_WINDOW),
         *more,
-        Setting("default", default, WindowSettings()),
+        TrackerSetting("default", default, WindowSettings()),
     )
 
 
-def _layout(costs: CostSettings) -> Setting:
-    return Setting("paper, layout", replace(costs, layout=LAYOUT), PAPER_WINDOW, ("columns",))
+def _layout(costs: CostSettings) -> TrackerSetting:
+    return TrackerSetting("paper, layout", replace(costs, layout=LAYOUT), PAPER_WINDOW, ("columns",))
 
 
-def _whole(frames: int, costs: CostSettings = PAPER_COSTS) -> Setting:
+def _whole(frames: int, costs: CostSettings = PAPER_COSTS) -> TrackerSetting:
     """Solve the whole sequence at once, as the paper does here."""
     window = replace(PAPER_WINDOW, window=frames, stride=frames, birth_window=frames)
-    return Setting("paper, one window", costs, window)
+    return TrackerSetting("paper, one window", costs, window)
 
 
 # Sub-images differ less than histograms do, and by their mean difference: c_a and c_b are set between an
@@ -94,19 +96,19 @@ _THREE_COSTS = replace(PAPER_COSTS, occlusion=0.35)
 _EXAMPLE_FRAMES, _TOYS_FRAMES, _TWO_FRAMES, _THREE_FRAMES, _FOUR_FRAMES = 340, 307, 1351, 2431, 500
 """As long as the paper's recordings."""
 
-_EXAMPLE = Cast((0, 1), _EXAMPLE_FRAMES, Walking(4.0, 0.15, side=90.0))
-_TWO = Cast((0, 1), _TWO_FRAMES, Walking(8.0, 0.25, side=70.0))
-_THREE = Cast(
+_EXAMPLE = SceneParameters((0, 1), _EXAMPLE_FRAMES, WalkParameters(4.0, 0.15, side=90.0))
+_TWO = SceneParameters((0, 1), _TWO_FRAMES, WalkParameters(8.0, 0.25, side=70.0))
+_THREE = SceneParameters(
     (0, 1, 2),
     _THREE_FRAMES,
-    Walking(3.0, 0.15, stay=(250, 600), away=(40, 160)),
+    WalkParameters(3.0, 0.15, stay=(250, 600), away=(40, 160)),
     missed=0.1,
     off=0.04,
     wrong_sizes=1.5,
     clutter=2.5,
     known=False,
 )
-_FOUR = Cast((0, 1, 0, 1), _FOUR_FRAMES, Walking(7.0, 0.25), clutter=3.0)
+_FOUR = SceneParameters((0, 1, 0, 1), _FOUR_FRAMES, WalkParameters(7.0, 0.25), clutter=3.0)
 
 EXPERIMENTS = (
     Experiment(

@@ -24,7 +24,7 @@ _NOBODY = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Wardrobe:
+class Clothing:
     """What everybody and everything looks like.
 
     Attributes:
@@ -36,7 +36,7 @@ class Wardrobe:
     tiles: Floats
 
 
-def wardrobe(kits: tuple[int, ...], rng: np.random.Generator) -> Wardrobe:
+def wardrobe(kits: tuple[int, ...], rng: np.random.Generator) -> Clothing:
     """Dress people: those of the same kit number nearly alike, the others not."""
     clothes = {kit: _clothes(place, len(set(kits)), rng) for place, kit in enumerate(dict.fromkeys(kits))}
     own = [clothes[kit] + rng.normal(0.0, 1.5, (2, 1)) for kit in kits]
@@ -44,7 +44,7 @@ def wardrobe(kits: tuple[int, ...], rng: np.random.Generator) -> Wardrobe:
     tiles = np.array(
         [[_bell(rng.uniform(24, 44, 3), rng) for _ in range(_TILES)] for _ in range(_TILES)],
     )
-    return Wardrobe(halves, tiles)
+    return Clothing(halves, tiles)
 
 
 def _clothes(place: int, kits: int, rng: np.random.Generator) -> Floats:
@@ -90,7 +90,7 @@ def visible(people: Floats) -> Floats:
     return shares
 
 
-def histogram(box: Floats, people: Floats, clothes: Wardrobe, rng: np.random.Generator) -> Floats:
+def histogram(box: Floats, people: Floats, clothes: Clothing, rng: np.random.Generator) -> Floats:
     """Return the grey histogram of a box, `(BINS,)`, summing to 1: of all that is in it, with noise."""
     shown = owners(box, people)
     y = np.linspace(box[1], box[3], _DOWN + 2)[1:-1]

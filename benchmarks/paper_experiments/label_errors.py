@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from benchmarks.paper_experiments.scene import Scene, Truth
+from benchmarks.paper_experiments.scene import ExperimentScene, ObjectTruth
 from tracking.boxes import Floats, iou
 
 _ON = 0.3
@@ -22,7 +22,7 @@ Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Labels:
+class LabelErrors:
     """What is wrong with the labels of n objects in T frames, each `(n, T)`.
 
     Attributes:
@@ -43,7 +43,7 @@ def per_frame(labels: Bools) -> float:
     return float(labels.sum() / labels.shape[1])
 
 
-def judge(scene: Scene, boxes: Floats) -> Labels:
+def judge(scene: ExperimentScene, boxes: Floats) -> LabelErrors:
     """Judge the labels' boxes, `(n, T, 4)`, NaN where a label is nowhere."""
     truth = scene.truth
     whose = _whose(truth, boxes)
@@ -55,10 +55,10 @@ def judge(scene: Scene, boxes: Floats) -> Labels:
     in_view = truth.visible >= _IN_VIEW
     wrong = shown & (whose != own)
     kits = np.array([*scene.kits, -1])
-    return Labels(wrong, wrong & (kits[whose] != kits[own]), ~shown & in_view & findable)
+    return LabelErrors(wrong, wrong & (kits[whose] != kits[own]), ~shown & in_view & findable)
 
 
-def _whose(truth: Truth, boxes: Floats) -> NDArray[np.int64]:
+def _whose(truth: ObjectTruth, boxes: Floats) -> NDArray[np.int64]:
     """Return the object that each label's box is on, `(n, T)`; -1: on none. Of equals, the label's own."""
     overlaps = np.nan_to_num(iou(boxes[:, None], truth.boxes[None]))
     own = np.arange(len(boxes))
@@ -67,7 +67,7 @@ def _whose(truth: Truth, boxes: Floats) -> NDArray[np.int64]:
     return np.asarray(np.where(overlaps.max(axis=1) >= _ON, best, -1))
 
 
-def _found(scene: Scene, k: int, t: int) -> bool:
+def _found(scene: ExperimentScene, k: int, t: int) -> bool:
     """Return whether the detector found an object."""
     if np.isnan(scene.truth.boxes[k, t, 0]):
         return False
@@ -75,7 +75,7 @@ def _found(scene: Scene, k: int, t: int) -> bool:
     return bool((iou(scene.truth.boxes[k, t], seen.boxes) >= _FOUND).any())
 
 
-def named(truth: Truth, tracks: dict[int, Floats]) -> Floats:
+def named(truth: ObjectTruth, tracks: dict[int, Floats]) -> Floats:
     """Return each object the track that follows it longest, `(n, T, 4)`: for objects that had to be found.
 
     One track for each object and one object for each track; an object left without has no label.

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.paper_experiments.grey_histograms import BINS, Wardrobe, histogram, visible, wardrobe
-from benchmarks.paper_experiments.scene import HEIGHT, WIDTH, Scene, Truth
-from benchmarks.paper_experiments.walking_people import Walking, inside, people_at, walks
+from benchmarks.paper_experiments.grey_histograms import BINS, Clothing, histogram, visible, wardrobe
+from benchmarks.paper_experiments.scene import HEIGHT, WIDTH, ExperimentScene, ObjectTruth
+from benchmarks.paper_experiments.walking_people import WalkParameters, inside, people_at, walks
 from tracking import Detections, Template
 from tracking.boxes import Floats
 
@@ -22,7 +22,7 @@ _LEAST_VISIBLE = 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class Cast:
+class SceneParameters:
     """Who is in a scene and how badly they are detected.
 
     Attributes:
@@ -39,7 +39,7 @@ class Cast:
 
     kits: tuple[int, ...]
     frames: int
-    walking: Walking
+    walking: WalkParameters
     height: float = 110.0
     missed: float = 0.04
     off: float = 0.03
@@ -48,7 +48,7 @@ class Cast:
     known: bool = True
 
 
-def play(cast: Cast, seed: int) -> Scene:
+def play(cast: SceneParameters, seed: int) -> ExperimentScene:
     """Play a scene; the same seed gives the same."""
     rng = np.random.default_rng(seed)
     clothes = wardrobe(cast.kits, rng)
@@ -62,11 +62,11 @@ def play(cast: Cast, seed: int) -> Scene:
             Template(k + 1, histogram(boxes[k, 0], boxes[:, 0], clothes, rng), boxes[k, 0])
             for k in range(len(cast.kits))
         )
-    return Scene(Truth(boxes, shares), (seen,), templates, cast.kits)
+    return ExperimentScene(ObjectTruth(boxes, shares), (seen,), templates, cast.kits)
 
 
 def detect(
-    cast: Cast, people: Floats, shares: Floats, clothes: Wardrobe, rng: np.random.Generator
+    cast: SceneParameters, people: Floats, shares: Floats, clothes: Clothing, rng: np.random.Generator
 ) -> Detections:
     """Return what is found in one frame, in no order that tells who is who.
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.paper_experiments.label_errors import Labels
-from benchmarks.paper_experiments.scene import Truth
+from benchmarks.paper_experiments.label_errors import LabelErrors
+from benchmarks.paper_experiments.scene import ObjectTruth
 from tracking.boxes import Floats
 
 _COLOURS = ("#1b6ca8", "#2e9e4f", "#c77700", "#8d3fae")
@@ -17,7 +17,9 @@ _AXES = ("x", "y")
 """Of the boxes' top left corner."""
 
 
-def plot(truth: Truth, followed: Mapping[str, tuple[Floats, Labels]], title: str, path: Path) -> None:
+def plot(
+    truth: ObjectTruth, followed: Mapping[str, tuple[Floats, LabelErrors]], title: str, path: Path
+) -> None:
     """Draw a column for each solver: truth as pale lines, labels as dots, wrong ones as crosses."""
     figure = Figure(figsize=(5.0 * len(followed), 6.5))
     axes = figure.subplots(len(_AXES), len(followed), sharex=True, sharey="row", squeeze=False)

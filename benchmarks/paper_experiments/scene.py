@@ -12,7 +12,7 @@ WIDTH, HEIGHT = 352, 288
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Truth:
+class ObjectTruth:
     """Where n objects are in T frames.
 
     Attributes:
@@ -35,7 +35,7 @@ class Truth:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class ExperimentScene:
     """One synthetic recording.
 
     Attributes:
@@ -45,7 +45,7 @@ class Scene:
         kits: what each object wears, by number; those of one number look alike.
     """
 
-    truth: Truth
+    truth: ObjectTruth
     seen: tuple[tuple[Detections, ...], ...]
     templates: tuple[Template, ...]
     kits: tuple[int, ...]

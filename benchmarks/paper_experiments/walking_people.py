@@ -17,7 +17,7 @@ _NEAR_GOAL = 12.0
 
 
 @dataclass(frozen=True, slots=True)
-class Walking:
+class WalkParameters:
     """How people move.
 
     Attributes:
@@ -38,7 +38,7 @@ class Walking:
 class Walker:
     """Somebody on the way from one goal to the next."""
 
-    def __init__(self, walking: Walking, start: Floats, rng: np.random.Generator) -> None:
+    def __init__(self, walking: WalkParameters, start: Floats, rng: np.random.Generator) -> None:
         self._walking, self._rng = walking, rng
         self._place, self._velocity = start, np.zeros(2)
         self._goal = self._new_goal()
@@ -83,7 +83,7 @@ class Walker:
         return -1 if span is None else int(self._rng.integers(*span))
 
 
-def walks(people: int, frames: int, walking: Walking, rng: np.random.Generator) -> Floats:
+def walks(people: int, frames: int, walking: WalkParameters, rng: np.random.Generator) -> Floats:
     """Return the feet of each person in each frame, `(people, frames, 2)` pixels; NaN while away.
 
     In the first frame everybody is there, side by side.

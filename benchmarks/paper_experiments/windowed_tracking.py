@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.paper_experiments.label_errors import named
-from benchmarks.paper_experiments.scene import Scene
+from benchmarks.paper_experiments.scene import ExperimentScene
 from tracking import CostSettings, Detections, OnlineTracker, SolveReport, Template, WindowSettings
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.network import Network, build_network, build_network_per_object
@@ -16,7 +16,7 @@ from tracking.solvers.base import OCCLUDED, Solver
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Followed:
+class TrackedLabels:
     """Where the labels were put.
 
     Attributes:
@@ -28,14 +28,18 @@ class Followed:
     reports: tuple[SolveReport, ...]
 
 
-def follow(scene: Scene, costs: CostSettings, window: WindowSettings, solver: Solver) -> Followed:
+def follow(
+    scene: ExperimentScene, costs: CostSettings, window: WindowSettings, solver: Solver
+) -> TrackedLabels:
     """Follow everybody through a scene; who is not known at the start is found as in II.E."""
     if scene.templates:
         return _follow_known(scene, costs, window, solver)
     return _follow_found(scene, costs, window, solver)
 
 
-def _follow_known(scene: Scene, costs: CostSettings, window: WindowSettings, solver: Solver) -> Followed:
+def _follow_known(
+    scene: ExperimentScene, costs: CostSettings, window: WindowSettings, solver: Solver
+) -> TrackedLabels:
     """Solve window after window; a window's templates are the first ones, where they last were."""
     frames = scene.truth.frames
     boxes = np.full((len(scene.templates), frames, BOX_SIDES), np.nan)
@@ -57,11 +61,11 @@ def _follow_known(scene: Scene, costs: CostSettings, window: WindowSettings, sol
             replace(item, box=None if np.isnan(box).any() else box)
             for item, box in zip(templates, last, strict=True)
         ]
-    return Followed(boxes, tuple(reports))
+    return TrackedLabels(boxes, tuple(reports))
 
 
 def _network(
-    scene: Scene, templates: Sequence[Template], first: int, stop: int, costs: CostSettings
+    scene: ExperimentScene, templates: Sequence[Template], first: int, stop: int, costs: CostSettings
 ) -> Network:
     parts: list[Sequence[Detections]] = [frames[first:stop] for frames in scene.seen]
     if len(parts) == 1:
@@ -69,7 +73,9 @@ def _network(
     return build_network_per_object(templates, parts, costs)
 
 
-def _follow_found(scene: Scene, costs: CostSettings, window: WindowSettings, solver: Solver) -> Followed:
+def _follow_found(
+    scene: ExperimentScene, costs: CostSettings, window: WindowSettings, solver: Solver
+) -> TrackedLabels:
     """Let the online tracker find and follow everybody."""
     tracker = OnlineTracker(window, costs, solver)
     tracks: dict[int, Floats] = {}
@@ -84,4 +90,4 @@ def _follow_found(scene: Scene, costs: CostSettings, window: WindowSettings, sol
         for track in result.tracks:
             boxes = tracks.setdefault(track.id, np.full((frames, BOX_SIDES), np.nan))
             boxes[final] = track.boxes[: result.final_to + 1 - result.first]
-    return Followed(named(scene.truth, tracks), tuple(reports))
+    return TrackedLabels(named(scene.truth, tracks), tuple(reports))

@@ -22,13 +22,13 @@ from pathlib import Path
 import yaml
 
 from benchmarks.common.environment import CannotRunError, finish, one_thread_environment, parser
-from benchmarks.common.recorded_views import Views, find_views
+from benchmarks.common.recorded_views import RecordedViews, find_views
 from benchmarks.common.report import Report
-from benchmarks.render.stage_times import STAGES, StageTimes, time_stages
+from benchmarks.render.stage_times import STAGES, RenderStageTimes, time_stages
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class RenderRun:
     """One run of the command."""
 
     frames: int
@@ -41,7 +41,7 @@ class Run:
     """All processes together, their start included."""
 
 
-def time_command(views: Views, config: Path, folder: Path) -> Run:
+def time_command(views: RecordedViews, config: Path, folder: Path) -> RenderRun:
     """Run `myview render` on the views into a new folder."""
     command = [sys.executable, "-m", "server.cli.main", "render", *map(str, views.videos)]
     command += ["--config", str(config), "--out", str(folder)]
@@ -53,10 +53,10 @@ def time_command(views: Views, config: Path, folder: Path) -> Run:
     # The command waits for its workers, so that theirs is in what it used.
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
-    return Run(views.frames, len(views.videos), views.site["fps"], wall, cpu)
+    return RenderRun(views.frames, len(views.videos), views.site["fps"], wall, cpu)
 
 
-def describe(report: Report, name: str, run: Run) -> None:
+def describe(report: Report, name: str, run: RenderRun) -> None:
     """Print the table of the whole command."""
     frames, wall, cpu = run.frames, run.wall_s, run.cpu_s
     report.table(
@@ -77,7 +77,7 @@ def describe(report: Report, name: str, run: Run) -> None:
     )
 
 
-def describe_stages(report: Report, times: StageTimes, whole_ms: float) -> None:
+def describe_stages(report: Report, times: RenderStageTimes, whole_ms: float) -> None:
     """Print the table of the stages; ``whole_ms`` is the command's processor time per frame."""
     total = sum(times.ms.values())
     rows = [
@@ -95,7 +95,7 @@ def describe_stages(report: Report, times: StageTimes, whole_ms: float) -> None:
     report.table("Processor time per frame by stage", ["stage", "ms", "share", "what"], rows)
 
 
-def plot(times: StageTimes, path: Path, title: str) -> None:
+def plot(times: RenderStageTimes, path: Path, title: str) -> None:
     """Draw the stages as bars."""
     from matplotlib.figure import Figure  # noqa: PLC0415 — loading it would count as a stage's time
 

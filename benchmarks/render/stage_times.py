@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.common.recorded_views import Views
+from benchmarks.common.recorded_views import RecordedViews
 from benchmarks.common.stopwatch import Stopwatch
 from server.camera.peers.cross_view_scorer import CrossViewScorer
 from server.camera.pipeline import CameraPipeline
@@ -33,13 +33,13 @@ STAGES = {
 
 
 @dataclass(frozen=True, slots=True)
-class StageTimes:
+class RenderStageTimes:
     """Processor milliseconds per frame (one camera's picture) of each stage."""
 
     ms: dict[str, float]
 
 
-def time_stages(views: Views, config_path: Path, folder: Path) -> StageTimes:
+def time_stages(views: RecordedViews, config_path: Path, folder: Path) -> RenderStageTimes:
     """Render the views in this process into a new folder and give each stage's time per frame."""
     config = config_for_videos(
         views.videos, base=read_content(config_path), folder=config_path.parent, ground=views.ground
@@ -63,7 +63,7 @@ def time_stages(views: Views, config_path: Path, folder: Path) -> StageTimes:
         (Renderer, "take", "write"),
     ):
         frames = _render(config, folder)
-    return StageTimes({stage: 1e3 * watch.seconds[stage] / frames for stage in STAGES})
+    return RenderStageTimes({stage: 1e3 * watch.seconds[stage] / frames for stage in STAGES})
 
 
 def _render(config: Config, folder: Path) -> int:

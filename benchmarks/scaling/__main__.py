@@ -19,8 +19,8 @@ import numpy as np
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from benchmarks.scaling.simulated_hall import Hall
-from benchmarks.scaling.simulated_site import Load, carry
+from benchmarks.scaling.simulated_hall import SimulatedHall
+from benchmarks.scaling.simulated_site import SiteLoad, carry
 from benchmarks.scaling.timed_service import REST, STAGES
 
 _FPS = 25.0
@@ -42,7 +42,7 @@ def exponent(cameras: Sequence[int], values: Sequence[float]) -> float:
     return float(np.polyfit(np.log(cameras), np.log(values), 1)[0])
 
 
-def describe(report: Report, loads: Sequence[Load]) -> None:
+def describe(report: Report, loads: Sequence[SiteLoad]) -> None:
     """Print the tables."""
     report.table(
         f"{_services(loads)}; processor time and memory",
@@ -95,12 +95,12 @@ def describe(report: Report, loads: Sequence[Load]) -> None:
     report.say("messages and bytes are for 25 pulses a second; late: windows decided without their camera")
 
 
-def _services(loads: Sequence[Load]) -> str:
+def _services(loads: Sequence[SiteLoad]) -> str:
     count = loads[0].services
     return "One best-view process" if count == 1 else f"Each of {count} best-view processes of the site"
 
 
-def plot(loads: Sequence[Load], path: Path) -> None:
+def plot(loads: Sequence[SiteLoad], path: Path) -> None:
     """Draw what a frame costs over the number of cameras, by stage."""
     from matplotlib.figure import Figure  # noqa: PLC0415 — only after what is measured
 
@@ -128,7 +128,7 @@ def measure(options: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory(prefix="myview-scaling-") as temporary:
         for cameras in sizes:
             fps = options.fps or max(1.0, round(_FPS * min(1.0, (_EASY / cameras) ** _GROWTH)))
-            hall = Hall(cameras, options.people)
+            hall = SimulatedHall(cameras, options.people)
             settle, epochs = (_QUICK_SETTLE, _QUICK_EPOCHS) if quick else (_SETTLE, _EPOCHS)
             loads.append(carry(hall, fps, Path(temporary) / f"{cameras}", settle, epochs, options.share))
             report.say(f"{cameras} cameras: {loads[-1].milliseconds:.1f} ms a frame")

@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from benchmarks.scaling.simulated_hall import HEIGHT, STRIDE, WIDTH, WINDOW, Hall, Tracker
+from benchmarks.scaling.simulated_hall import HEIGHT, STRIDE, WIDTH, WINDOW, SimulatedHall, SimulatedTracker
 from camsync import PulseClient
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.loader import load_config
@@ -31,10 +31,10 @@ _THUMB = bytes(1500)
 """As long as such a picture is; nobody looks at it."""
 
 
-async def serve(config: Config, hall: Hall, cameras: range) -> None:
+async def serve(config: Config, hall: SimulatedHall, cameras: range) -> None:
     """Publish until told to end."""
     boot = time.time_ns() // 1_000_000
-    trackers = {camera: Tracker(hall, camera, boot) for camera in cameras}
+    trackers = {camera: SimulatedTracker(hall, camera, boot) for camera in cameras}
     keys, bus = ZenohKeys(config.site.name), Bus.client(config.zenoh)
     encoder = Encoder(config.site, config.encode)
     grey = np.full((HEIGHT, WIDTH, 3), 128, dtype=np.uint8)
@@ -64,7 +64,13 @@ async def serve(config: Config, hall: Hall, cameras: range) -> None:
 
 
 def _frames(
-    bus: Bus, keys: ZenohKeys, hall: Hall, cameras: range, pulse: int, gop: list[AccessUnit], boot: int
+    bus: Bus,
+    keys: ZenohKeys,
+    hall: SimulatedHall,
+    cameras: range,
+    pulse: int,
+    gop: list[AccessUnit],
+    boot: int,
 ) -> None:
     unit = gop[pulse % len(gop)]
     now = time.time()
@@ -89,7 +95,7 @@ def main() -> None:
     terminate_with_parent()
     path, per_camera, first, count = sys.argv[1], *map(int, sys.argv[2:])
     config = load_config(Path(path))
-    hall = Hall(len(config.cameras), per_camera)
+    hall = SimulatedHall(len(config.cameras), per_camera)
     asyncio.run(serve(config, hall, range(first, first + count)))
 
 

@@ -29,7 +29,7 @@ _SPOTS = 20_000
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class CameraView:
     """What one camera sees of the people in one window.
 
     Attributes:
@@ -42,7 +42,7 @@ class View:
 
 
 @dataclass(frozen=True)
-class Hall:
+class SimulatedHall:
     """`cameras` cameras, with so many people that each sees `per_camera` on average."""
 
     cameras: int
@@ -109,13 +109,13 @@ class Hall:
         way = begin[:, None] + pace[:, None] * np.arange(first, last + 1)[:, None]
         return np.asarray(self._size - np.abs(way % (2 * self._size) - self._size))
 
-    def view(self, camera: int, places: Floats, seed: int) -> View:
+    def view(self, camera: int, places: Floats, seed: int) -> CameraView:
         """Project everybody into a camera; errors of the boxes come from the seed."""
         boxes = self._boxes(self._views[camera], places)
         people = np.flatnonzero(~np.isnan(boxes[..., 0]).all(axis=1))
         boxes = boxes[people]
         tall = (boxes[..., 3] - boxes[..., 1])[..., None]
-        return View(people, boxes + np.random.default_rng(seed).normal(0, _NOISE, boxes.shape) * tall)
+        return CameraView(people, boxes + np.random.default_rng(seed).normal(0, _NOISE, boxes.shape) * tall)
 
     @staticmethod
     def _boxes(view: Floats, places: Floats) -> Floats:
@@ -129,10 +129,10 @@ class Hall:
         return np.stack([u - 0.2 * tall, v - tall, u + 0.2 * tall, v + 0.0 * u], axis=-1)
 
 
-class Tracker:
+class SimulatedTracker:
     """Simulates one camera's tracker: whoever comes back into view gets a new track number."""
 
-    def __init__(self, hall: Hall, camera: int, boot: int) -> None:
+    def __init__(self, hall: SimulatedHall, camera: int, boot: int) -> None:
         self._hall, self._camera, self._boot = hall, camera, boot
         self._track: dict[int, int] = {}
         self._seen: dict[int, int] = {}

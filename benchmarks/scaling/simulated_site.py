@@ -15,8 +15,8 @@ from typing import IO
 import yaml
 
 from benchmarks.common.environment import ROOT, one_thread_environment
-from benchmarks.scaling.simulated_hall import HEIGHT, STRIDE, WIDTH, Hall
-from benchmarks.scaling.timed_service import LISTS, REST, STAGES, Times
+from benchmarks.scaling.simulated_hall import HEIGHT, STRIDE, WIDTH, SimulatedHall
+from benchmarks.scaling.timed_service import LISTS, REST, STAGES, ServiceTimes
 from server.cli.generated_config import free_port
 
 _PATIENCE_S = 120.0
@@ -25,7 +25,7 @@ _LOG = "site.log"
 
 
 @dataclass(frozen=True, slots=True)
-class Load:
+class SiteLoad:
     """What carrying a site costs the best-view process.
 
     Attributes:
@@ -69,7 +69,9 @@ class _Service:
     url: str
 
 
-def carry(hall: Hall, fps: float, folder: Path, settle: int, epochs: int, services: int = 1) -> Load:
+def carry(
+    hall: SimulatedHall, fps: float, folder: Path, settle: int, epochs: int, services: int = 1
+) -> SiteLoad:
     """Run the site for `settle` epochs, and measure over the `epochs` after them.
 
     Raises:
@@ -89,13 +91,15 @@ def carry(hall: Hall, fps: float, folder: Path, settle: int, epochs: int, servic
     return replace(loads[0], services=services, stages=stages)
 
 
-def _load(hall: Hall, fps: float, start: Times, stop: Times, memory: float, late: int) -> Load:
+def _load(
+    hall: SimulatedHall, fps: float, start: ServiceTimes, stop: ServiceTimes, memory: float, late: int
+) -> SiteLoad:
     frames = STRIDE * (stop.epochs - start.epochs)
     stages = {name: 1e3 * (stop.seconds[name] - start.seconds[name]) / frames for name in STAGES}
     stages[REST] = 1e3 * (stop.process - start.process) / frames - sum(stages.values())
     # The lists are told by the clock, whatever the rate of the pulses.
     stages[LISTS] *= frames / (25.0 * (stop.at - start.at))
-    return Load(
+    return SiteLoad(
         cameras=hall.cameras,
         people=hall.people,
         per_camera=hall.per_camera,
@@ -111,7 +115,7 @@ def _load(hall: Hall, fps: float, start: Times, stop: Times, memory: float, late
 
 
 @contextlib.contextmanager
-def _running(hall: Hall, fps: float, folder: Path, services: int) -> Iterator[list[_Service]]:
+def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> Iterator[list[_Service]]:
     sync, bus, *https = (free_port() for _ in range(2 + services))
     config = folder / "site.yaml"
     address = f"tcp/127.0.0.1:{bus}"
@@ -166,11 +170,11 @@ def _start(log: IO[bytes], *words: str, **own: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-m", *words], cwd=ROOT, env=environment, stdout=log, stderr=log)
 
 
-def _after(times: Path, epochs: int, folder: Path) -> Times:
+def _after(times: Path, epochs: int, folder: Path) -> ServiceTimes:
     """Wait until the service has decided so many epochs."""
     give_up = time.monotonic() + _PATIENCE_S
     while time.monotonic() < give_up:
-        found = Times.read(times)
+        found = ServiceTimes.read(times)
         if found is not None and found.epochs >= epochs:
             return found
         time.sleep(_POLL_S)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.live_cameras.stage_times import ThreadWatch
+from benchmarks.live_cameras.stage_times import ThreadStopwatch
 from bestview import IdentityRegistry
 from server.cli.main import main as command_line
 from server.http.api.events import Events
@@ -51,7 +51,7 @@ REST = "rest"
 
 
 @dataclass(frozen=True, slots=True)
-class Times:
+class ServiceTimes:
     """What the service has done and used since it started.
 
     Attributes:
@@ -71,14 +71,14 @@ class Times:
     at: float
 
     @classmethod
-    def read(cls, path: Path) -> Times | None:
+    def read(cls, path: Path) -> ServiceTimes | None:
         """Read what was written last; None: nothing yet."""
         return cls(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None
 
 
 def watch(path: Path) -> None:
     """Time this process from now on, and write into the file after every epoch."""
-    watched = ThreadWatch(STAGES)
+    watched = ThreadStopwatch(STAGES)
     count = {"epochs": 0, "messages": 0, "size": 0}
 
     def told() -> None:

@@ -70,7 +70,7 @@ Prepare = Callable[[], Awaitable[None]]
 
 
 @dataclass(frozen=True, slots=True)
-class Sitting:
+class ScreenshotSession:
     """A page whose pictures are taken, and where they go."""
 
     page: Page
@@ -153,17 +153,19 @@ async def take_watching(out: Path, fps: float) -> None:
 
 
 @contextlib.asynccontextmanager
-async def _sitting(browser: Browser, url: str, out: Path, script: str = "") -> AsyncIterator[Sitting]:
+async def _sitting(
+    browser: Browser, url: str, out: Path, script: str = ""
+) -> AsyncIterator[ScreenshotSession]:
     # The page's policy forbids eval, which it is asked with here.
     page = await browser.new_page(bypass_csp=True)
     if script:
         await page.add_init_script(script)
     await open_when_there(page, url)
-    yield Sitting(page, out)
+    yield ScreenshotSession(page, out)
     await page.close()
 
 
-async def _watched(sitting: Sitting) -> None:
+async def _watched(sitting: ScreenshotSession) -> None:
     choose, page = sitting.choose, sitting.page
     await sitting.shoot("watching", partial(choose, _SEEN_BY_MANY))
     await page.keyboard.press("w")
@@ -179,7 +181,7 @@ async def _watched(sitting: Sitting) -> None:
     await page.evaluate("document.querySelectorAll('.plus[aria-pressed=true]').forEach((it) => it.click())")
 
 
-async def _gone(sitting: Sitting) -> None:
+async def _gone(sitting: ScreenshotSession) -> None:
     """A moment of the past, somebody who has left, and a camera whose process does nothing any more."""
     page = sitting.page
 

@@ -34,9 +34,9 @@ from benchmarks.common.process_load import running_pids
 from benchmarks.common.report import Report
 from benchmarks.latency.running_site import LOG, running_site
 from benchmarks.live_cameras.frame_counters import read_counts
-from benchmarks.soak.accelerated_site import Tempo, film
+from benchmarks.soak.accelerated_site import TimeScale, film
 from benchmarks.soak.measurements import PROCESSES, LatencyMedians, SoakMeasurements
-from benchmarks.soak.samples import Sample, descriptors_of, resident_of, threads_of
+from benchmarks.soak.samples import ProcessSample, descriptors_of, resident_of, threads_of
 from benchmarks.soak.soak_report import describe, plot
 from benchmarks.soak.task_counts import hooked_environment, read_held
 from benchmarks.soak.visitors import Visitors
@@ -52,11 +52,11 @@ _KEPT = 0.125
 """Of the whole time: how long the recording is kept, so that it is full before the second quarter."""
 
 
-class BrokenError(Exception):
+class SiteBrokenError(Exception):
     """The site did not last; the text says why."""
 
 
-async def soak(hours: float, tempo: Tempo, folder: Path, out: Path) -> SoakMeasurements:
+async def soak(hours: float, tempo: TimeScale, folder: Path, out: Path) -> SoakMeasurements:
     """Run the site for so many hours of its time."""
     filmed = await asyncio.to_thread(film, folder / "films", tempo)
     notes, recorded = folder / "notes", folder / "recorded"
@@ -71,7 +71,7 @@ async def soak(hours: float, tempo: Tempo, folder: Path, out: Path) -> SoakMeasu
         try:
             with (out / "soak.csv").open("w", encoding="ascii", newline="", buffering=1) as table:
                 await _sample(soaked, hours, folder, csv.writer(table).writerow, watching)
-        except BrokenError as problem:
+        except SiteBrokenError as problem:
             soaked.broken = str(problem)
         finally:
             soaked.seconds = time.monotonic() - began
@@ -96,19 +96,19 @@ async def _sample(
     pids = {name: running_pids(name) for name in PROCESSES}
     missing = [name for name, found in pids.items() if len(found) != 1]
     if missing:
-        raise BrokenError(f"not running: {', '.join(missing)}")
+        raise SiteBrokenError(f"not running: {', '.join(missing)}")
     write(["hours", "process", "resident_mb", "descriptors", "threads", "tasks", "blocks"])
     while visitors.camera.pulse < tempo.pulse(hours):
         await asyncio.wait({watching}, timeout=every)
         if watching.done():
-            raise BrokenError(f"the visitors ended: {watching.exception()!r}")
+            raise SiteBrokenError(f"the visitors ended: {watching.exception()!r}")
         if time.monotonic() > give_up:
-            raise BrokenError(f"it came no further than hour {tempo.hours(visitors.camera.pulse):.2f}")
+            raise SiteBrokenError(f"it came no further than hour {tempo.hours(visitors.camera.pulse):.2f}")
         now, held = tempo.hours(visitors.camera.pulse), read_held(folder / "notes")
         for name, (pid,) in pids.items():
             noted = held.get(pid)
             try:
-                sample = Sample(
+                sample = ProcessSample(
                     now,
                     resident_of(pid),
                     descriptors_of(pid),
@@ -117,7 +117,7 @@ async def _sample(
                     noted.blocks if noted else 0,
                 )
             except OSError:
-                raise BrokenError(f"{name} died in hour {now:.2f}") from None
+                raise SiteBrokenError(f"{name} died in hour {now:.2f}") from None
             soaked.samples[name].append(sample)
             numbers = (sample.descriptors, sample.threads, sample.tasks, sample.blocks)
             write([f"{now:.3f}", name, f"{sample.resident:.1f}", *numbers])
@@ -146,7 +146,7 @@ def run(options: argparse.Namespace) -> bool:
     """Run, print and save; say whether everything stayed flat."""
     options.out.mkdir(parents=True, exist_ok=True)
     report = Report()
-    tempo = Tempo(options.speed)
+    tempo = TimeScale(options.speed)
     with tempfile.TemporaryDirectory(prefix="myview-soak-") as temporary:
         soaked = asyncio.run(soak(options.hours, tempo, Path(temporary), options.out))
     well = describe(report, soaked)

@@ -27,7 +27,7 @@ _TIME_BASE = Fraction(1, 90_000)
 
 
 @dataclass(frozen=True, slots=True)
-class Tempo:
+class TimeScale:
     """How much faster than its own time the site runs."""
 
     speed: float
@@ -51,11 +51,11 @@ class Tempo:
 
 
 @dataclass(frozen=True, slots=True)
-class Filmed:
-    """Recordings that are played again and again (see :class:`benchmarks.latency.running_site.Played`)."""
+class LoopedRecordings:
+    """Recordings that are played in a loop (see :class:`benchmarks.latency.running_site.PlayedViews`)."""
 
     folder: Path
-    tempo: Tempo
+    tempo: TimeScale
 
     @property
     def cameras(self) -> list[dict[str, Any]]:
@@ -100,7 +100,7 @@ class Filmed:
         }
 
 
-def film(folder: Path, tempo: Tempo) -> Filmed:
+def film(folder: Path, tempo: TimeScale) -> LoopedRecordings:
     """Film the groups, one after the other, into one file for each camera."""
     folder.mkdir(parents=True)
     parts = []
@@ -111,7 +111,7 @@ def film(folder: Path, tempo: Tempo) -> Filmed:
     for camera in CAMERAS:
         _join([it / f"{camera}.mp4" for it in parts], folder / f"{camera}.mp4", tempo.fps)
     (folder / "ground.json").write_bytes((parts[0] / "ground.json").read_bytes())
-    return Filmed(folder, tempo)
+    return LoopedRecordings(folder, tempo)
 
 
 def _join(parts: list[Path], path: Path, fps: float) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from benchmarks.live_cameras.frame_counters import Counts
-from benchmarks.soak.accelerated_site import CAMERAS, Tempo
-from benchmarks.soak.samples import Sample
+from benchmarks.live_cameras.frame_counters import FrameCounts
+from benchmarks.soak.accelerated_site import CAMERAS, TimeScale
+from benchmarks.soak.samples import ProcessSample
 from benchmarks.soak.visitors import Visitors
 
 PROCESSES = ("bestview", "sync", "up", *(f"camera {it}" for it in CAMERAS))
@@ -25,12 +25,12 @@ class LatencyMedians:
 class SoakMeasurements:
     """What a soak test sampled: processes, delays, disk use, and the counters at its end."""
 
-    tempo: Tempo
+    tempo: TimeScale
     visitors: Visitors
-    samples: dict[str, list[Sample]] = field(default_factory=lambda: {it: [] for it in PROCESSES})
+    samples: dict[str, list[ProcessSample]] = field(default_factory=lambda: {it: [] for it in PROCESSES})
     delays: list[LatencyMedians] = field(default_factory=list)
     recorded: list[float] = field(default_factory=list)
     """Megabytes on the disk."""
-    counts: Counts = field(default_factory=lambda: Counts({}, 0))
+    counts: FrameCounts = field(default_factory=lambda: FrameCounts({}, 0))
     seconds: float = 0.0
     broken: str = ""

@@ -14,7 +14,7 @@ _MEGABYTE = 1e6
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class ProcessSample:
     """A process at one moment.
 
     Attributes:
@@ -35,7 +35,7 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class GrowthRule:
     """How much a quantity may grow from the second quarter to the fourth.
 
     Attributes:
@@ -50,7 +50,7 @@ class Rule:
     besides: float
     quantile: float = 0.5
 
-    def judge(self, hours: Sequence[float], values: Sequence[float]) -> Verdict:
+    def judge(self, hours: Sequence[float], values: Sequence[float]) -> GrowthVerdict:
         """Compare the two quarters of the time; the first one is warming up.
 
         Of a quarter without a sample nothing is known: NaN, which is not flat.
@@ -59,17 +59,17 @@ class Rule:
         quarters = np.minimum(3, (4 * np.asarray(hours) / whole).astype(int))
         numbers: NDArray[np.float64] = np.asarray(values, dtype=np.float64)
         second, fourth = (self._of(numbers[quarters == it]) for it in (1, 3))
-        return Verdict(self, second, fourth)
+        return GrowthVerdict(self, second, fourth)
 
     def _of(self, samples: NDArray[np.float64]) -> float:
         return float(np.quantile(samples, self.quantile)) if len(samples) else np.nan
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class GrowthVerdict:
     """One quantity, judged."""
 
-    rule: Rule
+    rule: GrowthRule
     second: float
     fourth: float
 
@@ -79,12 +79,12 @@ class Verdict:
         return self.fourth <= self.second * (1.0 + self.rule.share) + self.rule.besides
 
 
-RESIDENT = Rule("memory, MB", 0.05, 0.0)
-DESCRIPTORS = Rule("descriptors", 0.0, 2.0)
-THREADS = Rule("threads", 0.0, 1.0)
+RESIDENT = GrowthRule("memory, MB", 0.05, 0.0)
+DESCRIPTORS = GrowthRule("descriptors", 0.0, 2.0)
+THREADS = GrowthRule("threads", 0.0, 1.0)
 """The bus has threads that come and go."""
-TASKS = Rule("tasks", 0.0, 2.0)
-DELAY = Rule("delay, ms", 0.10, 50.0, 0.1)
+TASKS = GrowthRule("tasks", 0.0, 2.0)
+DELAY = GrowthRule("delay, ms", 0.10, 50.0, 0.1)
 """Machines have other work, now more, now less: the delay is judged by the tenth of the time that is best."""
 
 
@@ -116,7 +116,7 @@ def threads_of(pid: int) -> int:
     return len(os.listdir(f"/proc/{pid}/task"))  # noqa: PTH208 — likewise
 
 
-def judge(samples: Sequence[Sample]) -> list[Verdict]:
+def judge(samples: Sequence[ProcessSample]) -> list[GrowthVerdict]:
     """Judge a process."""
     hours = [it.hours for it in samples]
     return [

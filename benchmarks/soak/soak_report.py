@@ -10,15 +10,15 @@ from matplotlib.figure import Figure
 
 from benchmarks.common.report import Report
 from benchmarks.soak.measurements import SoakMeasurements
-from benchmarks.soak.samples import DELAY, RESIDENT, Rule, Sample, Verdict, judge
+from benchmarks.soak.samples import DELAY, RESIDENT, GrowthRule, GrowthVerdict, ProcessSample, judge
 
-_DISK = Rule("recorded, MB", 0.05, 1.0)
+_DISK = GrowthRule("recorded, MB", 0.05, 1.0)
 _LEAST = 8
 """Samples of which quarters can be told: two in each."""
 _NAMED = 5
 """Numbers of a table's row."""
 
-_CURVES: tuple[tuple[str, Callable[[Sample], float]], ...] = (
+_CURVES: tuple[tuple[str, Callable[[ProcessSample], float]], ...] = (
     ("resident memory, MB", lambda it: it.resident),
     ("descriptors", lambda it: it.descriptors),
     ("threads", lambda it: it.threads),
@@ -27,7 +27,7 @@ _CURVES: tuple[tuple[str, Callable[[Sample], float]], ...] = (
 )
 
 
-def verdicts(soaked: SoakMeasurements) -> list[tuple[str, Verdict]]:
+def verdicts(soaked: SoakMeasurements) -> list[tuple[str, GrowthVerdict]]:
     """Judge everything that was sampled."""
     found = [(name, it) for name, samples in soaked.samples.items() for it in judge(samples)]
     hours = [it.hours for it in soaked.delays]

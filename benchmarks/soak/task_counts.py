@@ -24,7 +24,7 @@ _EVERY_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class ObjectCounts:
     """What a process holds.
 
     Attributes:
@@ -42,10 +42,11 @@ def hooked_environment(folder: Path) -> dict[str, str]:
     return {"PYTHONPATH": os.pathsep.join(filter(None, path)), FOLDER_VARIABLE: str(folder)}
 
 
-def read_held(folder: Path) -> Mapping[int, Held]:
+def read_held(folder: Path) -> Mapping[int, ObjectCounts]:
     """Read what the processes have noted last, by their numbers."""
     return {
-        int(file.stem): Held(**json.loads(file.read_text(encoding="ascii"))) for file in folder.glob("*.json")
+        int(file.stem): ObjectCounts(**json.loads(file.read_text(encoding="ascii")))
+        for file in folder.glob("*.json")
     }
 
 

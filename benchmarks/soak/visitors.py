@@ -33,14 +33,14 @@ _FAMILIAR = (200, 204, 404, 416, 503)
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class FragmentSpan:
     """A picture of a stream, shown from one pulse to another."""
 
     pulse: int
     until: int
 
 
-def shown_by(moof: bytes, fps: float) -> Shown | None:
+def shown_by(moof: bytes, fps: float) -> FragmentSpan | None:
     """Return what a fragment shows, by the box before its pictures; None: it is sound, or another box."""
     time, run = moof.find(_TFDT), moof.find(_TRUN)
     if not moof.startswith(b"moof") or min(time, run) < 0:
@@ -51,11 +51,11 @@ def shown_by(moof: bytes, fps: float) -> Shown | None:
     lasts = sum(
         int.from_bytes(moof[at : at + 4], "big") for at in range(first, first + _ENTRY * count, _ENTRY)
     )
-    return Shown(round(start * fps / _TIMESCALE), round((start + lasts) * fps / _TIMESCALE))
+    return FragmentSpan(round(start * fps / _TIMESCALE), round((start + lasts) * fps / _TIMESCALE))
 
 
 @dataclass(slots=True)
-class Seen:
+class StreamDelays:
     """What was seen of a stream since it was last asked."""
 
     delays: list[float] = field(default_factory=list)
@@ -67,7 +67,7 @@ class Seen:
     until: int = 0
     """The pulse up to which there is something to show."""
 
-    def take(self, shown: Shown, delay: float) -> None:
+    def take(self, shown: FragmentSpan, delay: float) -> None:
         """Take in a picture that came so many milliseconds after its pulse was due."""
         if self.until:
             self.holes += max(0, shown.pulse - self.until)
@@ -81,7 +81,7 @@ class Visitors:
     def __init__(self, url: str, fps: float, seed: int, coming: int = _VISITORS) -> None:
         self._url, self._fps, self._coming = url, fps, coming
         self._random = random.Random(seed)
-        self.camera, self.person = Seen(), Seen()
+        self.camera, self.person = StreamDelays(), StreamDelays()
         self.visits: Counter[str] = Counter()
         self.faults: Counter[str] = Counter()
         self.events = 0
@@ -131,7 +131,7 @@ class Visitors:
                 if time.monotonic() > until:
                     return
 
-    async def _stream(self, path: str) -> AsyncIterator[tuple[Shown, float]]:
+    async def _stream(self, path: str) -> AsyncIterator[tuple[FragmentSpan, float]]:
         """Yield what is shown, and how many milliseconds after its pulse was due it came."""
         async with self._session.get(path) as answer:
             answer.raise_for_status()

@@ -14,8 +14,17 @@ import numpy as np
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from benchmarks.solvers.random_windows import Size
-from benchmarks.solvers.solver_times import CASES, EXACT_CASES, GATE, Case, against_arcs, live, timed, warm_up
+from benchmarks.solvers.random_windows import WindowSize
+from benchmarks.solvers.solver_times import (
+    CASES,
+    EXACT_CASES,
+    GATE,
+    WindowCase,
+    against_arcs,
+    live,
+    timed,
+    warm_up,
+)
 from benchmarks.solvers.time_growth import (
     SOLVERS,
     SWEEPS,
@@ -26,15 +35,15 @@ from benchmarks.solvers.time_growth import (
     table1,
 )
 
-LIVE = (Size(8, 16, 15), Size(10, 40, 15), Size(20, 40, 15))
+LIVE = (WindowSize(8, 16, 15), WindowSize(10, 40, 15), WindowSize(20, 40, 15))
 
 
-def named(case: Case) -> list[str]:
+def named(case: WindowCase) -> list[str]:
     """Return the cells that say which case it is."""
     return [case.name, f"{case.size.objects}", f"{case.size.places}", f"{case.layout:g}"]
 
 
-def ratios(case: Case, seeds: int) -> list[str]:
+def ratios(case: WindowCase, seeds: int) -> list[str]:
     """Return a row: full and gated programs of all arcs against `columns`."""
     cells = named(case)
     for gate in (None, GATE):
@@ -43,7 +52,7 @@ def ratios(case: Case, seeds: int) -> list[str]:
     return cells
 
 
-def exact(case: Case, seeds: int) -> list[str]:
+def exact(case: WindowCase, seeds: int) -> list[str]:
     """Return a row: what the integer optimum takes, and how far the rounded answer is from it."""
     found = [
         (timed("exact", network), timed("columns", network).solution.report)
@@ -62,7 +71,7 @@ def exact(case: Case, seeds: int) -> list[str]:
     return [*named(case), *shares]
 
 
-def live_row(size: Size, steps: int, *, told: bool) -> list[str]:
+def live_row(size: WindowSize, steps: int, *, told: bool) -> list[str]:
     """Return a row: windows at stride 1, the building of the network from boxes and histograms included."""
     found = live(size, steps, told=told)
     middle, late = np.percentile(1e3 * found.seconds, [50, 95])

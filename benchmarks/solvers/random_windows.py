@@ -17,7 +17,7 @@ SEEN = 0.9
 
 
 @dataclass(frozen=True, slots=True)
-class Size:
+class WindowSize:
     """A window: `objects`, `places` in each frame, `frames`."""
 
     objects: int
@@ -25,7 +25,7 @@ class Size:
     frames: int = 20
 
 
-def random_window(size: Size, settings: CostSettings, seed: int) -> Network:
+def random_window(size: WindowSize, settings: CostSettings, seed: int) -> Network:
     """Random boxes and histograms in every frame (paper IV.A.5): nobody walks, conflicts bind."""
     rng = np.random.default_rng(seed)
 
@@ -42,7 +42,7 @@ def random_window(size: Size, settings: CostSettings, seed: int) -> Network:
 class Walkers:
     """People who walk among false positives that look like one of them or like nobody."""
 
-    def __init__(self, size: Size, seed: int) -> None:
+    def __init__(self, size: WindowSize, seed: int) -> None:
         self._size = size
         self._rng = np.random.default_rng(seed)
         self.looks = self._rng.dirichlet(np.full(BINS, 0.5), size.objects)
@@ -83,14 +83,16 @@ class Walkers:
         )
 
 
-def walking_window(size: Size, settings: CostSettings, seed: int) -> Network:
+def walking_window(size: WindowSize, settings: CostSettings, seed: int) -> Network:
     """Return one window of people who walk."""
     people = Walkers(size, seed)
     templates = people.templates()
     return build_network(templates, [people.step() for _ in range(size.frames)], settings)
 
 
-def moving_windows(size: Size, steps: int, seed: int) -> Iterator[tuple[list[Template], list[Detections]]]:
+def moving_windows(
+    size: WindowSize, steps: int, seed: int
+) -> Iterator[tuple[list[Template], list[Detections]]]:
     """Yield the windows that a tracker with a stride of one frame solves one after the other."""
     people = Walkers(size, seed)
     past = [people.templates()]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.solvers.random_windows import Size, moving_windows, random_window, walking_window
+from benchmarks.solvers.random_windows import WindowSize, moving_windows, random_window, walking_window
 from tracking.model.network import CostSettings, Network, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import Solution, create_solver
@@ -19,16 +19,16 @@ GATE = 60.0
 REPEATS = 3
 """Solves whose median is a quick solver's time."""
 
-Window = Callable[[Size, CostSettings, int], Network]
+Window = Callable[[WindowSize, CostSettings, int], Network]
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class WindowCase:
     """A kind of window: `name`, how it is made, and the layout term's weight μ."""
 
     name: str
     window: Window
-    size: Size
+    size: WindowSize
     layout: float = 0.0
 
     def network(self, seed: int, gate: float | None = None) -> Network:
@@ -37,36 +37,36 @@ class Case:
 
 
 CASES = (
-    Case("random", random_window, Size(3, 50)),
-    Case("walking", walking_window, Size(3, 50)),
-    Case("random", random_window, Size(10, 40)),
-    Case("random", random_window, Size(20, 40)),
-    Case("walking", walking_window, Size(20, 40)),
-    Case("walking", walking_window, Size(3, 50), layout=0.001),
-    Case("random", random_window, Size(3, 50), layout=0.001),
+    WindowCase("random", random_window, WindowSize(3, 50)),
+    WindowCase("walking", walking_window, WindowSize(3, 50)),
+    WindowCase("random", random_window, WindowSize(10, 40)),
+    WindowCase("random", random_window, WindowSize(20, 40)),
+    WindowCase("walking", walking_window, WindowSize(20, 40)),
+    WindowCase("walking", walking_window, WindowSize(3, 50), layout=0.001),
+    WindowCase("random", random_window, WindowSize(3, 50), layout=0.001),
 )
 
 EXACT_CASES = (
-    Case("random", random_window, Size(10, 40)),
-    Case("walking", walking_window, Size(3, 20), layout=0.0003),
-    Case("walking", walking_window, Size(3, 50), layout=0.001),
+    WindowCase("random", random_window, WindowSize(10, 40)),
+    WindowCase("walking", walking_window, WindowSize(3, 20), layout=0.0003),
+    WindowCase("walking", walking_window, WindowSize(3, 50), layout=0.001),
 )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Timed:
+class TimedSolution:
     """A solution, and the processor time it took."""
 
     seconds: float
     solution: Solution
 
 
-def timed(solver: str, network: Network) -> Timed:
+def timed(solver: str, network: Network) -> TimedSolution:
     """Solve once."""
     found = create_solver(solver)
     start = time.process_time()
     solution = found.solve(network)
-    return Timed(time.process_time() - start, solution)
+    return TimedSolution(time.process_time() - start, solution)
 
 
 def seconds(solver: str, network: Network, repeats: int = 1) -> float:
@@ -76,11 +76,11 @@ def seconds(solver: str, network: Network, repeats: int = 1) -> float:
 
 def warm_up() -> None:
     """Load what solvers load when they are first used."""
-    seconds("columns", random_window(Size(2, 5, 3), PAPER_COSTS, 0))
+    seconds("columns", random_window(WindowSize(2, 5, 3), PAPER_COSTS, 0))
 
 
 @dataclass(frozen=True, slots=True)
-class Ratio:
+class TimeRatio:
     """Medians over windows, seconds, and the median ratio."""
 
     arcs: float
@@ -88,23 +88,23 @@ class Ratio:
     ratio: float
 
 
-def against_arcs(case: Case, seeds: int, gate: float | None) -> Ratio:
+def against_arcs(case: WindowCase, seeds: int, gate: float | None) -> TimeRatio:
     """Time the program of all arcs and `columns` on the same windows."""
     networks = [case.network(seed, gate) for seed in range(seeds)]
     arcs = np.array([seconds("arcs", network) for network in networks])
     columns = np.array([seconds("columns", network, REPEATS) for network in networks])
-    return Ratio(float(np.median(arcs)), float(np.median(columns)), float(np.median(arcs / columns)))
+    return TimeRatio(float(np.median(arcs)), float(np.median(columns)), float(np.median(arcs / columns)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Live:
+class LiveTimes:
     """Windows one after the other: `seconds` of each, the network's building included, and `rounds`."""
 
     seconds: np.ndarray
     rounds: np.ndarray
 
 
-def live(size: Size, steps: int, *, told: bool) -> Live:
+def live(size: WindowSize, steps: int, *, told: bool) -> LiveTimes:
     """Solve windows at a stride of one frame; `told`: each with the hint of the one before."""
     solver, settings = create_solver("columns"), replace(PAPER_COSTS, gate=GATE)
     times, rounds = [], []
@@ -116,4 +116,4 @@ def live(size: Size, steps: int, *, told: bool) -> Live:
             hint = solution.warm_start.shift(1, range(size.objects))
         times.append(time.process_time() - start)
         rounds.append(solution.report.rounds)
-    return Live(np.array(times), np.array(rounds))
+    return LiveTimes(np.array(times), np.array(rounds))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.solvers.random_windows import Size, random_window
+from benchmarks.solvers.random_windows import WindowSize, random_window
 from benchmarks.solvers.solver_times import REPEATS, seconds
 from tracking.model.settings import PAPER_COSTS
 
@@ -16,62 +16,62 @@ TABLE1_SOLVERS = ("extended-dp", "arcs", "exact", "columns", "greedy-dp", "separ
 
 
 @dataclass(frozen=True, slots=True)
-class Sweep:
+class SizeSweep:
     """Sizes along one axis of Fig. 21."""
 
     label: str
-    sizes: tuple[Size, ...]
+    sizes: tuple[WindowSize, ...]
     values: tuple[int, ...]
 
 
 _PLACES, _OBJECTS, _FRAMES = (5, 10, 20, 40, 60), (1, 2, 4, 6, 8), (5, 10, 20, 40)
 
 SWEEPS = (
-    Sweep("observations a frame (3 objects)", tuple(Size(3, k) for k in _PLACES), _PLACES),
-    Sweep("objects (20 observations a frame)", tuple(Size(n, 20) for n in _OBJECTS), _OBJECTS),
-    Sweep("frames (3 objects, 20 observations)", tuple(Size(3, 20, m) for m in _FRAMES), _FRAMES),
+    SizeSweep("observations a frame (3 objects)", tuple(WindowSize(3, k) for k in _PLACES), _PLACES),
+    SizeSweep("objects (20 observations a frame)", tuple(WindowSize(n, 20) for n in _OBJECTS), _OBJECTS),
+    SizeSweep("frames (3 objects, 20 observations)", tuple(WindowSize(3, 20, m) for m in _FRAMES), _FRAMES),
 )
 
 
 @dataclass(frozen=True, slots=True)
-class Growth:
+class TimeGrowth:
     """The mean times of a solver along a sweep, and the exponent fitted to them."""
 
-    sweep: Sweep
+    sweep: SizeSweep
     solver: str
     times: tuple[float, ...]
     exponent: float
 
 
-def paper_growth(size: Size) -> float:
+def paper_growth(size: WindowSize) -> float:
     """Return n² k m (2 log k + 2 log n + log m), the average complexity that II.D states."""
     n, k, m = size.objects, size.places, size.frames
     return float(n**2 * k * m * (2 * np.log(k) + 2 * np.log(n) + np.log(m)))
 
 
-def exponent(sizes: tuple[Size, ...], times: tuple[float, ...]) -> float:
+def exponent(sizes: tuple[WindowSize, ...], times: tuple[float, ...]) -> float:
     """Fit the e of time ~ (the paper's growth)^e; up to 1 is no worse than the paper's."""
     return float(np.polyfit(np.log([paper_growth(size) for size in sizes]), np.log(times), 1)[0])
 
 
-def grown(sweep: Sweep, solver: str, seeds: int) -> Growth:
+def grown(sweep: SizeSweep, solver: str, seeds: int) -> TimeGrowth:
     """Time a solver along a sweep: the mean over random windows, as in the paper."""
     repeats = REPEATS if solver != "arcs" else 1
     times = tuple(
         float(np.mean([seconds(solver, random_window(size, PAPER_COSTS, k), repeats) for k in range(seeds)]))
         for size in sweep.sizes
     )
-    return Growth(sweep, solver, times, exponent(sweep.sizes, times))
+    return TimeGrowth(sweep, solver, times, exponent(sweep.sizes, times))
 
 
-def exponent_of_all(growths: list[Growth], solver: str) -> float:
+def exponent_of_all(growths: list[TimeGrowth], solver: str) -> float:
     """Fit one exponent to all sweeps of a solver."""
     own = [growth for growth in growths if growth.solver == solver]
     sizes = tuple(size for growth in own for size in growth.sweep.sizes)
     return exponent(sizes, tuple(time for growth in own for time in growth.times))
 
 
-def plot_growth(growths: list[Growth], path: Path) -> None:
+def plot_growth(growths: list[TimeGrowth], path: Path) -> None:
     """Draw Fig. 21: time over observations, objects and frames."""
     from matplotlib.figure import Figure  # noqa: PLC0415 — loading it would count as a solver's time
 
@@ -89,7 +89,7 @@ def plot_growth(growths: list[Growth], path: Path) -> None:
 
 def table1() -> dict[str, float]:
     """Time all solvers at the size of Table I: three objects, 50 observations, 20 frames."""
-    network = random_window(Size(3, 50), PAPER_COSTS, 0)
+    network = random_window(WindowSize(3, 50), PAPER_COSTS, 0)
     return {
         solver: seconds(solver, network, 1 if solver in {"extended-dp", "arcs"} else REPEATS)
         for solver in TABLE1_SOLVERS

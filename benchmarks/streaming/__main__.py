@@ -27,9 +27,9 @@ from benchmarks.streaming.frame_correctness import judge
 from benchmarks.streaming.hls_latency import hls_delays
 from benchmarks.streaming.simulated_cameras import ENCODE, SITE, draw_room
 from benchmarks.streaming.splice_cost import encode_again, splice
-from benchmarks.streaming.stalled_viewers import Beside, beside_stalled, describe_stalled
+from benchmarks.streaming.stalled_viewers import StallComparison, beside_stalled, describe_stalled
 from benchmarks.streaming.stream_site import running, viewers
-from benchmarks.streaming.tables import Found, describe, plot
+from benchmarks.streaming.tables import StreamMeasurements, describe, plot
 from benchmarks.streaming.viewing_cost import first_pictures, step_up, watch_objects
 from server.camera.encoding.encoder import AccessUnit
 
@@ -48,10 +48,10 @@ _FREE = 200
 Films = Sequence[Sequence[AccessUnit]]
 
 
-def carry_out(options: argparse.Namespace, films: Films, folder: Path) -> Found:
+def carry_out(options: argparse.Namespace, films: Films, folder: Path) -> StreamMeasurements:
     """Measure the parts that are asked for."""
     parts, quick = options.part or PARTS, options.quick
-    found = Found()
+    found = StreamMeasurements()
     if "splice" in parts:
         found.encoded = encode_again(films[0], 5 if quick else 40)
         found.spliced = [asyncio.run(splice(films, it, 20 if quick else 200)) for it in (1, 10, _OBJECTS)]
@@ -67,7 +67,7 @@ def carry_out(options: argparse.Namespace, films: Films, folder: Path) -> Found:
     return found
 
 
-def stall(options: argparse.Namespace, films: Films, folder: Path) -> Beside:
+def stall(options: argparse.Namespace, films: Films, folder: Path) -> StallComparison:
     """Let a tenth of all viewers stall."""
     _open_files()
     rounds = 2 if options.quick else options.rounds
@@ -78,7 +78,7 @@ def stall(options: argparse.Namespace, films: Films, folder: Path) -> Beside:
 
 
 def _watch(
-    options: argparse.Namespace, parts: Sequence[str], films: Films, folder: Path, found: Found
+    options: argparse.Namespace, parts: Sequence[str], films: Films, folder: Path, found: StreamMeasurements
 ) -> None:
     """Measure what needs a site that is running."""
     quick, seconds = options.quick, options.seconds

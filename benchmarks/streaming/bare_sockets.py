@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.streaming.simulated_cameras import ENCODE, SITE
 from benchmarks.streaming.stream_site import viewers
-from benchmarks.streaming.viewer_crowd import Heard
+from benchmarks.streaming.viewer_crowd import CrowdReading
 from benchmarks.streaming.viewing_cost import send_delays
 from server.camera.encoding.encoder import AccessUnit
 from server.media.containers.fmp4 import FragmentSample, fragment
@@ -23,7 +23,7 @@ _BACKLOG = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Bare:
+class BareSocketCost:
     """What a loop over the sockets of so many viewers takes."""
 
     viewers: int
@@ -35,7 +35,7 @@ class Bare:
     """Milliseconds from the start of the loop to when a GOP's end was read: p50, p95, p99."""
 
 
-def bare_sends(film: Sequence[AccessUnit], count: int, seconds: float) -> Bare:
+def bare_sends(film: Sequence[AccessUnit], count: int, seconds: float) -> BareSocketCost:
     """Send a film's GOPs to so many viewers, as often as they come."""
     with (
         ExitStack() as open_ones,
@@ -50,7 +50,7 @@ def bare_sends(film: Sequence[AccessUnit], count: int, seconds: float) -> Bare:
         rounds = list(_rounds(film, sockets, hearing))
         heard = hearing.result()
     low, middle, high = np.percentile(send_delays(heard, {it.first: it.began for it in rounds}), [50, 95, 99])
-    return Bare(
+    return BareSocketCost(
         count,
         1e6 * statistics.median(it.busy for it in rounds) / count,
         1e3 * statistics.median(it.given for it in rounds),
@@ -67,7 +67,7 @@ class _Round:
 
 
 def _rounds(
-    film: Sequence[AccessUnit], sockets: Sequence[socket.socket], hearing: Future[Heard]
+    film: Sequence[AccessUnit], sockets: Sequence[socket.socket], hearing: Future[CrowdReading]
 ) -> Iterator[_Round]:
     """Send GOP after GOP for as long as somebody listens."""
     first = 0

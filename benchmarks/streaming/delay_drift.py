@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, Hall, Tracker
+from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, SimulatedHall, SimulatedTracker
 from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE
 from server.camera.encoding.encoder import AccessUnit
 from server.config.sections import CameraSettings
@@ -30,7 +30,7 @@ _PTS_AT = 9
 
 
 @dataclass(frozen=True, slots=True)
-class Drift:
+class DelayDrift:
     """What changed from the beginning to the end."""
 
     pulses: int
@@ -46,13 +46,15 @@ class Drift:
     """Processor milliseconds a pulse, in each tenth."""
 
 
-class Source:
+class PacedCameras:
     """Cameras that send at whatever pace they are asked."""
 
-    def __init__(self, service: BestViewPipeline, films: Sequence[Sequence[AccessUnit]], hall: Hall) -> None:
+    def __init__(
+        self, service: BestViewPipeline, films: Sequence[Sequence[AccessUnit]], hall: SimulatedHall
+    ) -> None:
         self._service, self._films, self._hall = service, films, hall
         self._keys = ZenohKeys(service.config.site.name)
-        self._trackers = [Tracker(hall, camera, _BOOT) for camera in range(CAMERAS)]
+        self._trackers = [SimulatedTracker(hall, camera, _BOOT) for camera in range(CAMERAS)]
         for name in hall.ids:
             service.ingest.alive(self._keys.camera(name, "alive"), is_present=True)
 
@@ -76,15 +78,15 @@ class Source:
         return Message(self._keys.camera(camera, what), payload, attachment)
 
 
-async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> Drift:
+async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> DelayDrift:
     """Let so many pulses pass through the service, without a bus, and watch a camera as it is decided."""
-    hall = Hall(CAMERAS, _PER_CAMERA)
+    hall = SimulatedHall(CAMERAS, _PER_CAMERA)
     cameras = [
         CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
         for name, ground in zip(hall.ids, hall.grounds, strict=True)
     ]
     service = BestViewPipeline(Config(site=SITE, encode=ENCODE, cameras=cameras))
-    source, decided = Source(service, films, hall), list[GopChoices]()
+    source, decided = PacedCameras(service, films, hall), list[GopChoices]()
     service.on_decision.append(decided.append)
     viewer = service.splicer.decided_cameras[hall.ids[0]].subscribe().chunks()
     delays: list[int] = []
@@ -101,7 +103,7 @@ async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> Drift:
             costs.append(1e3 * (now - began) / part)
             began = now
     service.close()
-    return Drift(pulses, len(delays), min(delays), max(delays), off, tuple(costs))
+    return DelayDrift(pulses, len(delays), min(delays), max(delays), off, tuple(costs))
 
 
 def times(piece: Chunk) -> tuple[int, int]:

@@ -61,7 +61,7 @@ def ffmpeg_switching(films: Sequence[Sequence[AccessUnit]], frames: int, folder:
 
 
 @dataclass(frozen=True, slots=True)
-class Served:
+class HlsServingCost:
     """What serving HLS costs, to players that stay connected."""
 
     requests: int
@@ -77,14 +77,14 @@ class Served:
         return 1e6 / self.microseconds
 
 
-def hls_here(site: StreamSite, number: int, seconds: float) -> Served:
+def hls_here(site: StreamSite, number: int, seconds: float) -> HlsServingCost:
     """Fetch an object's playlist and its newest segment from the best-view process, again and again."""
     before = site.used
     pairs, size = _fetch(site.http, f"/objects/{number}/hls/", seconds)
-    return Served(pairs, 1e6 * (site.used - before) / pairs, size / 1e3)
+    return HlsServingCost(pairs, 1e6 * (site.used - before) / pairs, size / 1e3)
 
 
-def hls_of_nginx(site: StreamSite, number: int, seconds: float, folder: Path) -> Served | None:
+def hls_of_nginx(site: StreamSite, number: int, seconds: float, folder: Path) -> HlsServingCost | None:
     """Fetch the same from nginx, which has been given the files. None: there is no nginx."""
     program = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
     if program is None:
@@ -100,7 +100,7 @@ def hls_of_nginx(site: StreamSite, number: int, seconds: float, folder: Path) ->
     with _nginx(program, folder, port) as worker:
         before = _used(worker)
         pairs, size = _fetch(port, "/", seconds)
-        return Served(pairs, 1e6 * (_used(worker) - before) / pairs, size / 1e3)
+        return HlsServingCost(pairs, 1e6 * (_used(worker) - before) / pairs, size / 1e3)
 
 
 @contextlib.contextmanager

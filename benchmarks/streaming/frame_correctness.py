@@ -11,7 +11,7 @@ from itertools import pairwise
 import av
 import numpy as np
 
-from benchmarks.streaming.splice_cost import Cut
+from benchmarks.streaming.splice_cost import SplicerFixture
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import CameraSettings, EncodeSettings, SiteSettings
 from server.config.site_config import Config
@@ -26,7 +26,7 @@ _BLOCK = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Right:
+class FrameCorrectness:
     """How many frames were what they should be."""
 
     frames: int
@@ -70,7 +70,9 @@ def schedule(gops: int, cuts: int, seed: int) -> list[int]:
     return chosen
 
 
-async def judge(frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings = _ENCODE) -> Right:
+async def judge(
+    frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings = _ENCODE
+) -> FrameCorrectness:
     """Splice so many frames, decode what a viewer is sent, and compare with each camera's own decode."""
     made = films(frames, seed, encode)
     chosen = schedule(frames // encode.gop, cuts, seed)
@@ -84,7 +86,7 @@ async def judge(frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings
     expected = [
         own[camera][gop * encode.gop + n] for gop, camera in enumerate(chosen) for n in range(encode.gop)
     ]
-    return Right(
+    return FrameCorrectness(
         frames=len(expected),
         cuts=sum(a != b for a, b in pairwise(chosen)),
         contained=_equal(contained, "mp4" if has_ts else "matroska", expected),
@@ -95,11 +97,11 @@ async def judge(frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings
 
 async def _watch(
     made: Sequence[Sequence[AccessUnit]], chosen: Sequence[int], encode: EncodeSettings
-) -> tuple[list[Chunk], Cut]:
+) -> tuple[list[Chunk], SplicerFixture]:
     """Return what one viewer of one object is sent, from the first GOP to the last."""
     names = [f"c{number}" for number in range(_CAMERAS)]
     cameras = [CameraSettings(id=name, source="rtsp://nowhere/") for name in names]
-    cut = Cut(made, Config(site=_SITE, encode=encode, cameras=cameras))
+    cut = SplicerFixture(made, Config(site=_SITE, encode=encode, cameras=cameras))
     pieces: list[Chunk] = []
     viewer = None
     for gop, camera in enumerate(chosen):

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 import aiohttp
 import numpy as np
 
-from benchmarks.scaling.simulated_hall import Hall
-from benchmarks.streaming.delay_drift import Source
+from benchmarks.scaling.simulated_hall import SimulatedHall
+from benchmarks.streaming.delay_drift import PacedCameras
 from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE
 from server.camera.encoding.encoder import AccessUnit
 from server.config.sections import CameraSettings, HttpSettings
@@ -30,7 +30,7 @@ _LINE = re.compile(rf"^(?:{_PART}|{_SEGMENT})$", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
-class Late:
+class HlsLatency:
     """Seconds from when a frame was decided to when a player has it, and to when it shows it; medians."""
 
     fetched: float
@@ -66,20 +66,24 @@ class _Player:
             self.shown.append(self.begun + pulse / SITE.fps - decided)
 
     @property
-    def late(self) -> Late:
+    def late(self) -> HlsLatency:
         """What it saw."""
-        return Late(float(np.median(self.fetched)), float(np.median(self.shown)), self.stalls)
+        return HlsLatency(float(np.median(self.fetched)), float(np.median(self.shown)), self.stalls)
 
 
-async def hls_delays(films: Sequence[Sequence[AccessUnit]], seconds: float) -> tuple[Late, Late]:
+async def hls_delays(films: Sequence[Sequence[AccessUnit]], seconds: float) -> tuple[HlsLatency, HlsLatency]:
     """Serve a camera as late as a best view, in real time; give what is seen without parts, and with them."""
-    hall = Hall(CAMERAS, _PER_CAMERA)
+    hall = SimulatedHall(CAMERAS, _PER_CAMERA)
     cameras = [
         CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
         for name, ground in zip(hall.ids, hall.grounds, strict=True)
     ]
     service = BestViewPipeline(Config(site=SITE, encode=ENCODE, cameras=cameras))
-    source, decided, clock = Source(service, films, hall), dict[int, float](), asyncio.get_running_loop().time
+    source, decided, clock = (
+        PacedCameras(service, films, hall),
+        dict[int, float](),
+        asyncio.get_running_loop().time,
+    )
 
     def note(choices: GopChoices) -> None:
         decided[choices.first] = clock()

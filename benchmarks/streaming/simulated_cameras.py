@@ -15,7 +15,7 @@ from pathlib import Path
 
 import msgspec
 
-from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, Hall, Tracker
+from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, SimulatedHall, SimulatedTracker
 from camsync import PulseClient
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.loader import load_config
@@ -54,10 +54,10 @@ def load(path: Path) -> list[list[AccessUnit]]:
     return msgspec.msgpack.decode(path.read_bytes(), type=list[list[AccessUnit]])
 
 
-async def serve(config: Config, films: list[list[AccessUnit]], hall: Hall) -> None:
+async def serve(config: Config, films: list[list[AccessUnit]], hall: SimulatedHall) -> None:
     """Publish until told to end."""
     boot = time.time_ns() // 1_000_000
-    trackers = [Tracker(hall, camera, boot) for camera in range(hall.cameras)]
+    trackers = [SimulatedTracker(hall, camera, boot) for camera in range(hall.cameras)]
     keys, bus = ZenohKeys(config.site.name), Bus.client(config.zenoh)
     there = asyncio.Event()
     bus.watch_alive(keys.bestview("alive"), lambda _, alive: there.set() if alive else None)
@@ -89,7 +89,7 @@ def main() -> None:
     """Read the command line and run."""
     terminate_with_parent()
     config = load_config(Path(sys.argv[1]))
-    asyncio.run(serve(config, load(Path(sys.argv[2])), Hall(CAMERAS, int(sys.argv[3]))))
+    asyncio.run(serve(config, load(Path(sys.argv[2])), SimulatedHall(CAMERAS, int(sys.argv[3]))))
 
 
 if __name__ == "__main__":

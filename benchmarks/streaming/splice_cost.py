@@ -28,7 +28,7 @@ _NO_REASON = cast("SelectionReasons", None)
 _US = 1e6
 
 
-class Cut:
+class SplicerFixture:
     """A splicer over shelves that are filled from films, and decisions that are made up."""
 
     def __init__(self, films: Sequence[Sequence[AccessUnit]], config: Config) -> None:
@@ -62,7 +62,7 @@ def cif_config() -> Config:
 
 
 @dataclass(frozen=True, slots=True)
-class Splice:
+class SpliceCost:
     """Processor microseconds; the median of the GOPs."""
 
     objects: int
@@ -77,9 +77,9 @@ class Splice:
         return CAMERAS * self.shelved / self.objects
 
 
-async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int) -> Splice:
+async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int) -> SpliceCost:
     """Splice with a viewer for every object, who takes the bytes as they come."""
-    cut, rng = Cut(films, cif_config()), np.random.default_rng(0)
+    cut, rng = SplicerFixture(films, cif_config()), np.random.default_rng(0)
     shelved, decided = [], []
     viewers: list[AsyncIterator[Chunk]] = []
     for gop in range(gops + 1):
@@ -98,11 +98,11 @@ async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int)
             viewers = [it.subscribe().chunks() for it in cut.splicer.persons.values()]
             for viewer in viewers:
                 await anext(viewer)
-    return Splice(objects, statistics.median(shelved), statistics.median(decided))
+    return SpliceCost(objects, statistics.median(shelved), statistics.median(decided))
 
 
 @dataclass(frozen=True, slots=True)
-class Encoded:
+class TranscodeCost:
     """Processor microseconds a frame; the median of the GOPs."""
 
     decoded: float
@@ -115,7 +115,7 @@ class Encoded:
         return self.decoded + self.encoded
 
 
-def encode_again(film: Sequence[AccessUnit], gops: int) -> Encoded:
+def encode_again(film: Sequence[AccessUnit], gops: int) -> TranscodeCost:
     """Decode a film and encode it with the site's encoder."""
     decoder, encoder = av.CodecContext.create("h264", "r"), Encoder(SITE, ENCODE)
     assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — tells mypy what h264 is
@@ -134,4 +134,4 @@ def encode_again(film: Sequence[AccessUnit], gops: int) -> Encoded:
         if gop:
             decoded.append(_US * (between - began) / ENCODE.gop)
             encoded.append(_US * (end - between) / ENCODE.gop)
-    return Encoded(statistics.median(decoded), statistics.median(encoded))
+    return TranscodeCost(statistics.median(decoded), statistics.median(encoded))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from benchmarks.common.report import Report
 from benchmarks.streaming.simulated_cameras import ENCODE, SITE
-from benchmarks.streaming.stream_site import StreamSite, Viewers
+from benchmarks.streaming.stream_site import StreamSite, ViewerProcess
 from benchmarks.streaming.viewing_cost import send_delays
 from server.media.rendering_messages import TIMESCALE
 
@@ -28,7 +28,7 @@ _BUFFER = 4096
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class ReadingRound:
     """One turn: the others' delays, and how much of what was sent has come to them.
 
     Attributes:
@@ -45,7 +45,7 @@ class Turn:
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class StallComparison:
     """The others alone, and beside those who stall; round by round.
 
     Attributes:
@@ -55,8 +55,8 @@ class Beside:
 
     good: int
     stalled: int
-    alone: list[Turn]
-    beside: list[Turn]
+    alone: list[ReadingRound]
+    beside: list[ReadingRound]
 
     @property
     def ratio(self) -> float:
@@ -66,8 +66,8 @@ class Beside:
 
 
 def beside_stalled(
-    site: StreamSite, crowd: Viewers, numbers: Sequence[int], viewers: int, seconds: float, rounds: int
-) -> Beside:
+    site: StreamSite, crowd: ViewerProcess, numbers: Sequence[int], viewers: int, seconds: float, rounds: int
+) -> StallComparison:
     """Let most read and, every other turn, a tenth besides never; the order of the turns changes, too."""
     stalled = round(STALLED_SHARE * viewers)
     good = viewers - stalled
@@ -84,10 +84,10 @@ def beside_stalled(
         if number % 2:
             alone.append(_turn(site, crowd, good, seconds))
     crowd.watch([])
-    return Beside(good, stalled, alone, beside)
+    return StallComparison(good, stalled, alone, beside)
 
 
-def _turn(site: StreamSite, crowd: Viewers, good: int, seconds: float) -> Turn:
+def _turn(site: StreamSite, crowd: ViewerProcess, good: int, seconds: float) -> ReadingRound:
     """Read for so long; longer where the machine is so busy that hardly a GOP comes.
 
     Raises:
@@ -106,7 +106,7 @@ def _turn(site: StreamSite, crowd: Viewers, good: int, seconds: float) -> Turn:
         whole = counts[ends][1:-1]  # those at both ends had come, or have yet to come, to some
         if len(whole) >= _LEAST_GOPS:
             p50, p99 = np.percentile(np.concatenate(delays), [50, 99]).tolist()
-            return Turn(p50, p99, float(whole.mean()) / good, (site.used - before) / passed)
+            return ReadingRound(p50, p99, float(whole.mean()) / good, (site.used - before) / passed)
     raise RuntimeError(f"{len(whole)} GOPs came in {passed:.0f} s: the machine is too busy to measure this")
 
 
@@ -124,7 +124,7 @@ def stalling(port: int, paths: Sequence[str]) -> Iterator[list[socket.socket]]:
         yield found
 
 
-def describe_stalled(report: Report, found: Beside) -> None:
+def describe_stalled(report: Report, found: StallComparison) -> None:
     """Print the rounds, and their medians."""
     rows = [
         [str(number), *(_cell(it, alone, beside) for it in _COLUMNS)]
@@ -144,6 +144,6 @@ _COLUMNS = {"p50": 1, "p99": 1, "arrived": 3, "cores": 2}
 """With so many digits."""
 
 
-def _cell(name: str, alone: Turn, beside: Turn) -> str:
+def _cell(name: str, alone: ReadingRound, beside: ReadingRound) -> str:
     digits = _COLUMNS[name]
     return f"{getattr(alone, name):.{digits}f} / {getattr(beside, name):.{digits}f}"

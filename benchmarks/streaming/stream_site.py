@@ -18,10 +18,10 @@ import msgspec
 import yaml
 
 from benchmarks.common.environment import ROOT, one_thread_environment
-from benchmarks.scaling.simulated_hall import Hall
+from benchmarks.scaling.simulated_hall import SimulatedHall
 from benchmarks.streaming import timed_service as stream_service
 from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE, save
-from benchmarks.streaming.viewer_crowd import Heard
+from benchmarks.streaming.viewer_crowd import CrowdReading
 from server.camera.encoding.encoder import AccessUnit
 from server.cli.generated_config import free_port
 
@@ -34,26 +34,26 @@ _MANY = 100_000
 _TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 
 
-class Viewers:
+class ViewerProcess:
     """A process of viewers (:mod:`benchmarks.streaming.viewer_crowd`)."""
 
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
         self.process = process
 
-    def watch(self, paths: Sequence[str], seconds: float = 0.0) -> Heard:
+    def watch(self, paths: Sequence[str], seconds: float = 0.0) -> CrowdReading:
         """Let these be watched instead, and read for a while."""
         return self._ask({"watch": list(paths), "for": seconds})
 
-    def read(self, seconds: float) -> Heard:
+    def read(self, seconds: float) -> CrowdReading:
         """Read for a while."""
         return self._ask({"for": seconds})
 
-    def _ask(self, command: object) -> Heard:
+    def _ask(self, command: object) -> CrowdReading:
         assert self.process.stdin is not None  # noqa: S101 — it was started with pipes
         assert self.process.stdout is not None  # noqa: S101 — likewise
         self.process.stdin.write(msgspec.json.encode(command) + b"\n")
         self.process.stdin.flush()
-        return msgspec.json.decode(self.process.stdout.readline(), type=Heard)
+        return msgspec.json.decode(self.process.stdout.readline(), type=CrowdReading)
 
 
 class StreamSite:
@@ -70,7 +70,7 @@ class StreamSite:
         return (int(words[11]) + int(words[12])) * _TICK_S
 
     @property
-    def sent(self) -> dict[int, stream_service.Given]:
+    def sent(self) -> dict[int, stream_service.SendTimes]:
         """When each GOP was given to the streams."""
         return stream_service.read(self.folder / "sent")
 
@@ -99,7 +99,7 @@ def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[Str
     folder.mkdir(parents=True)
     save([list(film) for film in films], folder / "films")
     sync, bus, http = (free_port() for _ in range(3))
-    hall = Hall(CAMERAS, PER_CAMERA)
+    hall = SimulatedHall(CAMERAS, PER_CAMERA)
     config, address = folder / "site.yaml", f"tcp/127.0.0.1:{bus}"
     content = {
         "site": {"name": SITE.name, "fps": SITE.fps, "width": SITE.width, "height": SITE.height},
@@ -127,13 +127,13 @@ def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[Str
 
 
 @contextlib.contextmanager
-def viewers(port: int) -> Iterator[Viewers]:
+def viewers(port: int) -> Iterator[ViewerProcess]:
     """Run a process of viewers of a server on this machine."""
     pipe = subprocess.PIPE
     words = [sys.executable, "-m", "benchmarks.streaming.viewer_crowd", f"{port}"]
     process = subprocess.Popen(words, cwd=ROOT, env=one_thread_environment(), stdin=pipe, stdout=pipe)
     try:
-        yield Viewers(process)
+        yield ViewerProcess(process)
     finally:
         end([process])
         for end_of_pipe in (process.stdin, process.stdout):

@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from benchmarks.common.report import Report
-from benchmarks.streaming.bare_sockets import Bare
-from benchmarks.streaming.delay_drift import Drift
-from benchmarks.streaming.ffmpeg_and_nginx import Served
-from benchmarks.streaming.frame_correctness import Right
-from benchmarks.streaming.hls_latency import Late
+from benchmarks.streaming.bare_sockets import BareSocketCost
+from benchmarks.streaming.delay_drift import DelayDrift
+from benchmarks.streaming.ffmpeg_and_nginx import HlsServingCost
+from benchmarks.streaming.frame_correctness import FrameCorrectness
+from benchmarks.streaming.hls_latency import HlsLatency
 from benchmarks.streaming.simulated_cameras import SITE
-from benchmarks.streaming.splice_cost import Encoded, Splice
-from benchmarks.streaming.viewing_cost import Step, Watched
+from benchmarks.streaming.splice_cost import SpliceCost, TranscodeCost
+from benchmarks.streaming.viewing_cost import ViewerStep, WatchingCost
 
 _SOON_MS = 40.0
 """A frame: later than that and more than one picture may be missing."""
@@ -27,29 +27,29 @@ _WHOLE = 0.9
 
 
 @dataclass
-class Found:
+class StreamMeasurements:
     """What has been measured so far."""
 
-    encoded: Encoded | None = None
-    spliced: list[Splice] = field(default_factory=list)
+    encoded: TranscodeCost | None = None
+    spliced: list[SpliceCost] = field(default_factory=list)
     ffmpeg: float | None = None
     """Microseconds a frame."""
-    watched: Watched | None = None
-    steps: list[Step] = field(default_factory=list)
-    bare: Bare | None = None
+    watched: WatchingCost | None = None
+    steps: list[ViewerStep] = field(default_factory=list)
+    bare: BareSocketCost | None = None
     too_many: list[int] = field(default_factory=list)
     """Viewers that a process here may not have."""
-    here: Served | None = None
-    nginx: Served | None = None
+    here: HlsServingCost | None = None
+    nginx: HlsServingCost | None = None
     first: NDArray[np.float64] | None = None
     """(requests,) milliseconds."""
-    right: Right | None = None
-    drift: Drift | None = None
-    hls: tuple[Late, Late] | None = None
+    right: FrameCorrectness | None = None
+    drift: DelayDrift | None = None
+    hls: tuple[HlsLatency, HlsLatency] | None = None
     """Without parts, and with them."""
 
 
-def describe(report: Report, found: Found) -> None:
+def describe(report: Report, found: StreamMeasurements) -> None:
     """Print the tables."""
     if found.spliced and found.encoded:
         _splices(report, found, found.encoded)
@@ -60,7 +60,7 @@ def describe(report: Report, found: Found) -> None:
         report.table("The stream", ["what", "measured", "to reach", "how"], rows)
 
 
-def _splices(report: Report, found: Found, encoded: Encoded) -> None:
+def _splices(report: Report, found: StreamMeasurements, encoded: TranscodeCost) -> None:
     rows = [
         [
             f"spliced, objects: {it.objects}",
@@ -81,7 +81,7 @@ def _splices(report: Report, found: Found, encoded: Encoded) -> None:
     report.table("An object's frame, processor time; decoding and encoding it against", columns, rows)
 
 
-def _steps(report: Report, found: Found) -> None:
+def _steps(report: Report, found: StreamMeasurements) -> None:
     rows = [
         [
             f"{it.viewers}",
@@ -110,7 +110,7 @@ def _steps(report: Report, found: Found) -> None:
         report.say("HLS of nginx: left out: needs nginx; on Debian: apt install nginx-light")
 
 
-def _bare(it: Bare) -> str:
+def _bare(it: BareSocketCost) -> str:
     late = ", ".join(f"{value:.0f}" for value in it.delays)
     return (
         f"A bare loop of sends to {it.viewers} sockets, beside it: {it.each:.1f} µs of the processor each, "
@@ -118,14 +118,14 @@ def _bare(it: Bare) -> str:
     )
 
 
-def _served(served: Served) -> str:
+def _served(served: HlsServingCost) -> str:
     return (
         f"{served.microseconds:.0f} µs for a playlist and a segment of {served.kilobytes:.0f} kB, "
         f"which is {served.per_core:.0f} viewers of a segment a second per core"
     )
 
 
-def summary(found: Found) -> list[list[str]]:
+def summary(found: StreamMeasurements) -> list[list[str]]:
     """Return the rows of the table of all that was measured."""
     rows = []
     if found.spliced and found.encoded:
@@ -159,7 +159,7 @@ def summary(found: Found) -> list[list[str]]:
     return rows
 
 
-def _hls_rows(segments: Late, parts: Late) -> list[list[str]]:
+def _hls_rows(segments: HlsLatency, parts: HlsLatency) -> list[list[str]]:
     return [
         [
             f"HLS, {what}: decided to shown, p50",
@@ -171,7 +171,7 @@ def _hls_rows(segments: Late, parts: Late) -> list[list[str]]:
     ]
 
 
-def _watched_rows(watched: Watched) -> list[list[str]]:
+def _watched_rows(watched: WatchingCost) -> list[list[str]]:
     how = f"cores: {watched.all:.3f}, {watched.one:.3f}, nobody {watched.nobody:.3f}; {watched.rounds} rounds"
     rows = [[f"watching {watched.objects} objects against 1", f"{watched.ratio:.2f}x", "1.10x", how]]
     how = f"worked out: {watched.nobody + watched.encoded:.2f} cores with an encoder for each"
@@ -179,13 +179,13 @@ def _watched_rows(watched: Watched) -> list[list[str]]:
     return rows
 
 
-def per_core(steps: Sequence[Step]) -> tuple[float, float]:
+def per_core(steps: Sequence[ViewerStep]) -> tuple[float, float]:
     """Fit a line to the cores: give what the service uses without viewers, and how many fill a core."""
     slope, alone = np.polyfit([it.viewers for it in steps], [it.cores for it in steps], 1)
     return float(alone), float((1.0 - alone) / slope)
 
 
-def _viewer_rows(found: Found) -> list[list[str]]:
+def _viewer_rows(found: StreamMeasurements) -> list[list[str]]:
     soon = max((it.viewers for it in found.steps if it.delays[2] < _SOON_MS), default=0)
     rows = [["viewers with p99 below 40 ms", f"{soon}", "4000", "of the counts tried; all get a GOP at once"]]
     whole = [it for it in found.steps if it.arrived > _WHOLE]
@@ -198,7 +198,7 @@ def _viewer_rows(found: Found) -> list[list[str]]:
     return rows
 
 
-def _drift_rows(it: Drift) -> list[list[str]]:
+def _drift_rows(it: DelayDrift) -> list[list[str]]:
     minutes = it.pulses / SITE.fps / 60
     return [
         [
@@ -216,7 +216,7 @@ def _drift_rows(it: Drift) -> list[list[str]]:
     ]
 
 
-def plot(found: Found, path: Path) -> None:
+def plot(found: StreamMeasurements, path: Path) -> None:
     """Draw what viewers cost, and how late they are served."""
     figure = Figure(figsize=(9, 4), layout="constrained")
     left, right = figure.subplots(1, 2)

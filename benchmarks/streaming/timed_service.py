@@ -33,17 +33,17 @@ def note(path: Path) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class SendTimes:
     """When a GOP was given out, and when every viewer's socket had accepted it or was found full."""
 
     began: float
     ended: float
 
 
-def read(path: Path) -> dict[int, Given]:
+def read(path: Path) -> dict[int, SendTimes]:
     """Return when each GOP was sent, by its first pulse."""
     lines = (line.split() for line in path.read_text(encoding="ascii").split("\n")[:-1])
-    return {int(first): Given(float(began), float(ended)) for first, began, ended in lines}
+    return {int(first): SendTimes(float(began), float(ended)) for first, began, ended in lines}
 
 
 if __name__ == "__main__":

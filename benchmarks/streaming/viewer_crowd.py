@@ -28,7 +28,7 @@ _TIME_AT = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class CrowdReading:
     """What all viewers were sent in a while."""
 
     megabytes: float
@@ -43,7 +43,7 @@ class Heard:
     """When it came, seconds by a clock that never steps and all processes share."""
 
 
-class Crowd:
+class ViewerCrowd:
     """Viewers of streams of one server."""
 
     def __init__(self, port: int) -> None:
@@ -73,7 +73,7 @@ class Crowd:
             viewer.close()
         self._viewers, self._gone = [], 0
 
-    def read(self, seconds: float) -> Heard:
+    def read(self, seconds: float) -> CrowdReading:
         """Read whatever comes."""
         ticks, at = array.array("q"), array.array("d")
         buffer, total = self._buffer, 0
@@ -88,7 +88,7 @@ class Crowd:
                 if 0 <= found < size - 16:
                     ticks.append(int.from_bytes(buffer[found + _TIME_AT : found + _TIME_AT + 8], "big"))
                     at.append(time.monotonic())
-        return Heard(
+        return CrowdReading(
             total / 1e6,
             time.monotonic() - began,
             time.process_time() - busy,
@@ -110,7 +110,7 @@ class Crowd:
         return size
 
 
-class Command(msgspec.Struct, forbid_unknown_fields=True):
+class CrowdCommand(msgspec.Struct, forbid_unknown_fields=True):
     """One of the two."""
 
     watch: list[str] | None = None
@@ -119,9 +119,9 @@ class Command(msgspec.Struct, forbid_unknown_fields=True):
 
 def main() -> None:
     """Do as told until the input ends."""
-    crowd = Crowd(int(sys.argv[1]))
+    crowd = ViewerCrowd(int(sys.argv[1]))
     for line in sys.stdin.buffer:
-        command = msgspec.json.decode(line, type=Command)
+        command = msgspec.json.decode(line, type=CrowdCommand)
         if command.watch is not None:
             crowd.watch(command.watch)
         sys.stdout.buffer.write(msgspec.json.encode(crowd.read(command.seconds)) + b"\n")

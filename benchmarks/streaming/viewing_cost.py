@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from benchmarks.streaming.simulated_cameras import ENCODE, SITE
 from benchmarks.streaming.splice_cost import encode_again
-from benchmarks.streaming.stream_site import StreamSite, Viewers
-from benchmarks.streaming.timed_service import Given
-from benchmarks.streaming.viewer_crowd import Heard
+from benchmarks.streaming.stream_site import StreamSite, ViewerProcess
+from benchmarks.streaming.timed_service import SendTimes
+from benchmarks.streaming.viewer_crowd import CrowdReading
 from server.camera.encoding.encoder import AccessUnit
 from server.media.rendering_messages import TIMESCALE
 
@@ -30,7 +30,7 @@ _RECEIVED = 65_536
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
+class WatchingCost:
     """Cores that the best-view process uses, by how many objects are watched; medians of the rounds."""
 
     objects: int
@@ -54,12 +54,12 @@ class Watched:
 
 def watch_objects(
     site: StreamSite,
-    viewers: Viewers,
+    viewers: ViewerProcess,
     numbers: Sequence[int],
     film: Sequence[AccessUnit],
     seconds: float,
     rounds: int,
-) -> Watched:
+) -> WatchingCost:
     """Let nobody, one and all of the objects be watched by turns, one viewer each; encode between them.
 
     A busy machine makes all of them dearer: hence by turns.
@@ -73,11 +73,11 @@ def watch_objects(
             found.append(_used(site, viewers, seconds)[0])
     nobody, one, everybody = (statistics.median(found) for found in cores.values())
     encoded = len(numbers) * statistics.median(again)
-    return Watched(len(numbers), nobody, one, everybody, encoded, rounds)
+    return WatchingCost(len(numbers), nobody, one, everybody, encoded, rounds)
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class ViewerStep:
     """So many viewers at once."""
 
     viewers: int
@@ -98,8 +98,8 @@ class Step:
 
 
 def step_up(
-    site: StreamSite, viewers: Viewers, numbers: Sequence[int], counts: Sequence[int], seconds: float
-) -> list[Step]:
+    site: StreamSite, viewers: ViewerProcess, numbers: Sequence[int], counts: Sequence[int], seconds: float
+) -> list[ViewerStep]:
     """Let ever more watch, spread over the objects."""
     steps = []
     for count in counts:
@@ -109,7 +109,7 @@ def step_up(
         delays = send_delays(heard, {first: it.began for first, it in sent.items()})
         low, middle, high = np.percentile(delays, [50, 95, 99]).tolist()
         steps.append(
-            Step(
+            ViewerStep(
                 viewers=count,
                 cores=cores,
                 crowd=heard.busy / heard.seconds,
@@ -123,13 +123,13 @@ def step_up(
     return steps
 
 
-def _given(heard: Heard, sent: dict[int, Given]) -> list[float]:
+def _given(heard: CrowdReading, sent: dict[int, SendTimes]) -> list[float]:
     """Return the milliseconds that giving out took, of the GOPs that have come."""
     gops = {round(tick * SITE.fps / TIMESCALE) // ENCODE.gop * ENCODE.gop for tick in heard.ticks}
     return [1e3 * (it.ended - it.began) for first, it in sent.items() if first in gops]
 
 
-def send_delays(heard: Heard, sent: dict[int, float]) -> NDArray[np.float64]:
+def send_delays(heard: CrowdReading, sent: dict[int, float]) -> NDArray[np.float64]:
     """Return the milliseconds from when each GOP was sent to when its end was read."""
     gop = ENCODE.gop
     last = (round(tick * SITE.fps / TIMESCALE) for tick in heard.ticks)
@@ -174,7 +174,7 @@ def end_of_first_fragment(data: bytes) -> int:
     return 0
 
 
-def _used(site: StreamSite, viewers: Viewers, seconds: float) -> tuple[float, Heard]:
+def _used(site: StreamSite, viewers: ViewerProcess, seconds: float) -> tuple[float, CrowdReading]:
     before = site.used
     heard = viewers.read(seconds)
     return (site.used - before) / heard.seconds, heard

@@ -24,12 +24,12 @@ from pathlib import Path
 import cv2
 import matplotlib as mpl
 
-from benchmarks.baselines import View
+from benchmarks.baselines import SearchedView
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from benchmarks.survey_table.measured_row import REAL_TIME, Measured, Row, measured, summed
+from benchmarks.survey_table.measured_row import REAL_TIME, TrackerRow, ViewMeasurement, measured, summed
 from benchmarks.survey_table.plots import plot
-from benchmarks.survey_table.survey_ratings import WORDS, Words
+from benchmarks.survey_table.survey_ratings import WORDS, SurveyRatings
 from server.cli.track.command import config_for_video, detect_frames
 from synthetic import Scene, write_recording
 from tracking.motchallenge import read_rows
@@ -44,7 +44,7 @@ _QUICK = 150
 """Frames, the last ones of each view: there somebody is."""
 
 
-def recorded(data: Path) -> Iterator[View]:
+def recorded(data: Path) -> Iterator[SearchedView]:
     """Yield the recordings that there are."""
     for scene, name, rate in _RECORDED:
         video, truth = data / scene / f"{name}.mp4", data / scene / "gt" / f"{name}.txt"
@@ -52,7 +52,7 @@ def recorded(data: Path) -> Iterator[View]:
             yield _searched(f"{scene} {name}", video, truth, rate)
 
 
-def drawn(seconds: float) -> Iterator[View]:
+def drawn(seconds: float) -> Iterator[SearchedView]:
     """Draw the scenes, as `myview scene` does, and search them."""
     for name, people, seed in _DRAWN:
         scene = Scene(name, cameras=1, objects=people, seed=seed)
@@ -62,20 +62,20 @@ def drawn(seconds: float) -> Iterator[View]:
             yield _searched(f"{name}, {people} people", out / "c0.mp4", out / "gt" / "c0.txt", scene.fps)
 
 
-def _searched(name: str, video: Path, truth: Path, fps: float) -> View:
-    return View(name, list(detect_frames(config_for_video(video, None, None))), read_rows(truth), fps)
+def _searched(name: str, video: Path, truth: Path, fps: float) -> SearchedView:
+    return SearchedView(name, list(detect_frames(config_for_video(video, None, None))), read_rows(truth), fps)
 
 
-def _shortened(view: View, frames: int) -> View:
+def _shortened(view: SearchedView, frames: int) -> SearchedView:
     """Return the last frames of a view."""
     last = view.frames[-frames:]
-    return View(view.name, last, [row for row in view.truth if row.frame > last[0].number], view.fps)
+    return SearchedView(view.name, last, [row for row in view.truth if row.frame > last[0].number], view.fps)
 
 
 def measure(options: argparse.Namespace) -> None:
     """Measure, print and save."""
     report = Report()
-    table: dict[str, list[Measured]] = {name: [] for name in tracker_names()}
+    table: dict[str, list[ViewMeasurement]] = {name: [] for name in tracker_names()}
     # One after the other: the pictures of all of them at once are gigabytes.
     for whole in chain(recorded(options.data), drawn(_DRAWN_S)):
         view = _shortened(whole, options.frames) if options.frames else whole
@@ -90,7 +90,7 @@ def measure(options: argparse.Namespace) -> None:
     report.table(
         "Table 1, over all views: measured, and the survey's word",
         ["", "occlusion", "", "identities", "", "targets", "", "real time", ""],
-        [[name, *_with_words(row, WORDS.get(name, Words()))] for name, row in rows.items()],
+        [[name, *_with_words(row, WORDS.get(name, SurveyRatings()))] for name, row in rows.items()],
     )
     report.say(
         "occlusion: survived with the number; identities: mean IDF1, switches; targets: people whose boxes "
@@ -100,7 +100,7 @@ def measure(options: argparse.Namespace) -> None:
     report.save(options.out / "survey_table.txt")
 
 
-def _cells(it: Measured) -> list[str]:
+def _cells(it: ViewMeasurement) -> list[str]:
     return [
         f"{it.kept} of {it.hidden}",
         str(it.scores.switches),
@@ -112,7 +112,7 @@ def _cells(it: Measured) -> list[str]:
     ]
 
 
-def _with_words(row: Row, words: Words) -> list[str]:
+def _with_words(row: TrackerRow, words: SurveyRatings) -> list[str]:
     return [
         f"{100 * row.share_kept:.0f} %: {row.kept} of {row.hidden}",
         words.occlusion,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import fmean
 
-from benchmarks.baselines import View, follow
+from benchmarks.baselines import SearchedView, follow
 from tracking.evaluation import Scores, evaluate, find_occlusions, identities_kept
 
 REAL_TIME = 25.0
@@ -14,7 +14,7 @@ REAL_TIME = 25.0
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class ViewMeasurement:
     """One tracker on one view.
 
     Attributes:
@@ -35,7 +35,7 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class TrackerRow:
     """One tracker over all views: sums of counts, means of shares, and the slowest view's frames a second."""
 
     kept: int
@@ -52,7 +52,7 @@ class Row:
         return self.kept / max(self.hidden, 1)
 
 
-def measured(view: View, tracker: str) -> Measured:
+def measured(view: SearchedView, tracker: str) -> ViewMeasurement:
     """Let one tracker follow one view."""
     rows, milliseconds = follow(tracker, view)
     around = round(view.fps)
@@ -60,12 +60,12 @@ def measured(view: View, tracker: str) -> Measured:
     scores = evaluate(view.truth, rows)
     there = sum(row.confidence != 0.0 for row in view.truth) / len(view.frames)
     kept = sum(identities_kept(found, view.truth, rows, around))
-    return Measured(kept, len(found), scores, scores.recall * there, there, milliseconds)
+    return ViewMeasurement(kept, len(found), scores, scores.recall * there, there, milliseconds)
 
 
-def summed(found: Sequence[Measured]) -> Row:
+def summed(found: Sequence[ViewMeasurement]) -> TrackerRow:
     """Put one tracker's views together."""
-    return Row(
+    return TrackerRow(
         kept=sum(it.kept for it in found),
         hidden=sum(it.hidden for it in found),
         idf1=fmean(it.scores.idf1 for it in found),

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.survey_table.measured_row import REAL_TIME, Measured, Row, summed
+from benchmarks.survey_table.measured_row import REAL_TIME, TrackerRow, ViewMeasurement, summed
 
 _WIDTH = 0.8
 
 
-def plot(table: Mapping[str, Sequence[Measured]], path: Path) -> None:
+def plot(table: Mapping[str, Sequence[ViewMeasurement]], path: Path) -> None:
     """Draw occlusions survived, identities, targets and speed of each tracker, over all views."""
-    rows: dict[str, Row] = {name: summed(found) for name, found in table.items()}
+    rows: dict[str, TrackerRow] = {name: summed(found) for name, found in table.items()}
     panels = (
         ("occlusions survived, %", [100 * row.share_kept for row in rows.values()]),
         ("IDF1, %", [100 * row.idf1 for row in rows.values()]),

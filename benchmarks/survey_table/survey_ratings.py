@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Words:
+class SurveyRatings:
     """One tracker's row; empty where the survey has none."""
 
     occlusion: str = ""
@@ -16,10 +16,10 @@ class Words:
 
 
 WORDS = {
-    "klt": Words("No", "Yes", "No", "Yes"),
-    "mean-shift": Words("No", "No", "No", "Yes"),
-    "kalman": Words("Some", "No", "No", "Yes"),
-    "particle": Words("Some", "Yes", "No", "Yes"),
-    "mcmc": Words("Some", "Yes", "No", "Yes"),
-    "track-graph": Words("Some", "Yes", "Yes", "No"),
+    "klt": SurveyRatings("No", "Yes", "No", "Yes"),
+    "mean-shift": SurveyRatings("No", "No", "No", "Yes"),
+    "kalman": SurveyRatings("Some", "No", "No", "Yes"),
+    "particle": SurveyRatings("Some", "Yes", "No", "Yes"),
+    "mcmc": SurveyRatings("Some", "Yes", "No", "Yes"),
+    "track-graph": SurveyRatings("Some", "Yes", "Yes", "No"),
 }

@@ -26,7 +26,7 @@ import numpy as np
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
 from benchmarks.temporal_consistency.blob_merges import events, merged, mistaken
-from benchmarks.temporal_consistency.overhead_room import SIZE, Clip, Played, played
+from benchmarks.temporal_consistency.overhead_room import SIZE, BlobSequence, OverheadClip, played
 from benchmarks.temporal_consistency.plots import THEIR_EDGES, THEIRS, plot
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.baselines.temporal_consistency.edge_search import cheapest_path_by_edges
@@ -51,7 +51,7 @@ _LEAST_MINUTES = 8.0
 
 
 @dataclass(slots=True)
-class Tally:
+class MergeCounts:
     """What was counted of all clips with so many people.
 
     Attributes:
@@ -71,13 +71,15 @@ class Tally:
     milliseconds: dict[str, list[float]] = field(default_factory=lambda: {way: [] for way in WAYS})
 
 
-def clips(minutes: float) -> list[Clip]:
+def clips(minutes: float) -> list[OverheadClip]:
     """Return sixteen sequences, so that many clothes meet: four of two people, six of three, six of four."""
     people = (2,) * 4 + (3,) * 6 + (4,) * 6
-    return [Clip(count, minutes / len(people), seed) for seed, count in enumerate(people)]
+    return [OverheadClip(count, minutes / len(people), seed) for seed, count in enumerate(people)]
 
 
-def follow(seen: Played, settings: TemporalSettings, tally: Tally | None = None) -> list[dict[int, int]]:
+def follow(
+    seen: BlobSequence, settings: TemporalSettings, tally: MergeCounts | None = None
+) -> list[dict[int, int]]:
     """Return the blobs by number that a window decides on, stage by stage; count its edges into `tally`."""
     window = TemporalWindow(settings, SIZE, seen.metre, STAGE_S)
     first = dict(enumerate(seen.blobs[0].tolist(), start=1))
@@ -97,7 +99,7 @@ def follow(seen: Played, settings: TemporalSettings, tally: Tally | None = None)
     return [first, *(it.blob_by_id for it in told)]
 
 
-def _time(graph: WindowGraph, settings: TemporalSettings, tally: Tally) -> None:
+def _time(graph: WindowGraph, settings: TemporalSettings, tally: MergeCounts) -> None:
     """Solve a window in all ways, from the costs of its steps on."""
     whole = replace(graph, max_step_cost=np.inf)
     solve: tuple[Callable[[], object], ...] = (
@@ -114,7 +116,7 @@ def _time(graph: WindowGraph, settings: TemporalSettings, tally: Tally) -> None:
 def measure(options: argparse.Namespace) -> None:
     """Measure, print and save."""
     report, began = Report(), time.perf_counter()
-    whole, pale = ({people: Tally() for people in THEIRS} for _ in COLOURS)
+    whole, pale = ({people: MergeCounts() for people in THEIRS} for _ in COLOURS)
     searching = []
     for clip in clips(options.minutes):
         for seen, tallies in zip(played(clip, STAGE_S, COLOURS), (whole, pale), strict=True):
@@ -131,7 +133,7 @@ def measure(options: argparse.Namespace) -> None:
     report.save(options.out / "temporal_consistency.txt")
 
 
-def count(seen: Played, tally: Tally, *, edges_too: bool) -> None:
+def count(seen: BlobSequence, tally: MergeCounts, *, edges_too: bool) -> None:
     """Count the merges of a clip, who is mistaken after them by each window, and the longest one's edges."""
     found = merged(seen.blobs)
     tally.merges += events(found, seen.blobs)
@@ -142,7 +144,7 @@ def count(seen: Played, tally: Tally, *, edges_too: bool) -> None:
         tally.errors[stages] += sum(mistaken(found, seen.blobs, told))
 
 
-def print_errors(report: Report, tallies: dict[int, Tally], how: str) -> None:
+def print_errors(report: Report, tallies: dict[int, MergeCounts], how: str) -> None:
     """Print Fig. 5, theirs beside it."""
     rows = []
     for people, tally in tallies.items():
@@ -163,7 +165,7 @@ def print_errors(report: Report, tallies: dict[int, Tally], how: str) -> None:
     )
 
 
-def _shares(tallies: Sequence[Tally]) -> str:
+def _shares(tallies: Sequence[MergeCounts]) -> str:
     """Return the errors in hundredths of the people in merges."""
     chances = max(sum(it.chances for it in tallies), 1)
     return " ".join(f"{100 * sum(it.errors[stages] for it in tallies) / chances:.0f}" for stages in STAGES)
@@ -175,7 +177,7 @@ def _of(theirs: Sequence[tuple[int, ...]]) -> str:
     return " ".join(f"{100 * it / merges:.0f}" for it in errors)
 
 
-def print_edges(report: Report, tallies: dict[int, Tally]) -> None:
+def print_edges(report: Report, tallies: dict[int, MergeCounts]) -> None:
     """Print Fig. 6, theirs beside it, and what is saved."""
     rows = []
     for people, tally in tallies.items():

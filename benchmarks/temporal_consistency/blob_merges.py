@@ -19,7 +19,7 @@ NOBODY = -1
 
 
 @dataclass(frozen=True, slots=True)
-class Merged:
+class PersonMerge:
     """One person's time in a merge, between two times alone: stages, the last ones excluded."""
 
     person: int
@@ -28,12 +28,12 @@ class Merged:
     after: tuple[int, int]
 
 
-def merged(blobs: NDArray[np.int64]) -> list[Merged]:
+def merged(blobs: NDArray[np.int64]) -> list[PersonMerge]:
     """Find the merges that begin and end in a recording, one for each person in each, by `(T, P)` blobs."""
     return [it for person in range(blobs.shape[1]) for it in _of(person, _alone(blobs, person))]
 
 
-def events(found: Sequence[Merged], blobs: NDArray[np.int64]) -> int:
+def events(found: Sequence[PersonMerge], blobs: NDArray[np.int64]) -> int:
     """Count the merges: people who are in one blob at one time are in the same one."""
     group = list(range(len(found)))
     at: dict[tuple[int, int], int] = {}
@@ -46,7 +46,7 @@ def events(found: Sequence[Merged], blobs: NDArray[np.int64]) -> int:
 
 
 def mistaken(
-    found: Sequence[Merged], blobs: NDArray[np.int64], told: Sequence[Mapping[int, int]]
+    found: Sequence[PersonMerge], blobs: NDArray[np.int64], told: Sequence[Mapping[int, int]]
 ) -> list[bool]:
     """Return who of those merged is somebody else afterwards; `told` are the blobs by number of each stage.
 
@@ -80,11 +80,11 @@ def _alone(blobs: NDArray[np.int64], person: int) -> list[bool | None]:
     ]
 
 
-def _of(person: int, alone: Sequence[bool | None]) -> Iterator[Merged]:
+def _of(person: int, alone: Sequence[bool | None]) -> Iterator[PersonMerge]:
     """Cut a person's time into runs, and give those in merges that lie between two alone."""
     known = [(stage, state) for stage, state in enumerate(alone) if state is not None]
     runs = [(state, list(run)) for state, run in groupby(known, key=lambda it: it[1])]
     spans = [(state, (run[0][0], run[-1][0] + 1)) for state, run in runs]
     for (_, before), ((state, inside), (_, after)) in zip(spans, pairwise(spans[1:]), strict=False):
         if state is False:
-            yield Merged(person, before, inside, after)
+            yield PersonMerge(person, before, inside, after)

@@ -25,7 +25,7 @@ _EMPTY = 25
 
 
 @dataclass(frozen=True, slots=True)
-class Clip:
+class OverheadClip:
     """One sequence: so many people for so long."""
 
     people: int
@@ -34,7 +34,7 @@ class Clip:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Played:
+class BlobSequence:
     """A sequence as it was seen.
 
     Attributes:
@@ -44,32 +44,34 @@ class Played:
         seconds: what finding the blobs of all stages took.
     """
 
-    clip: Clip
+    clip: OverheadClip
     stages: tuple[Stage, ...]
     blobs: NDArray[np.int64]
     metre: float
     seconds: float
 
 
-def played(clip: Clip, stage_s: float, colours: Sequence[float] = (1.0,)) -> list[Played]:
+def played(clip: OverheadClip, stage_s: float, colours: Sequence[float] = (1.0,)) -> list[BlobSequence]:
     """Play a sequence, one picture a stage: what lies between is not looked at.
 
     Each picture is also seen with only a share of its colour, for each of `colours`.
     """
     scene = _scene(clip, clip.people, stage_s)
     empty = _scene(clip, 0, stage_s)
-    eyes = [_Eye(scene.homography(0), [empty.image(0, it) for it in range(_EMPTY)], it) for it in colours]
+    eyes = [
+        _BlobReader(scene.homography(0), [empty.image(0, it) for it in range(_EMPTY)], it) for it in colours
+    ]
     for frame in range(round(clip.minutes * 60.0 / stage_s)):
         image, truth = scene.image(0, frame), scene.truth(frame)[0]
         for eye in eyes:
             eye.look(frame, image, truth, clip.people)
     return [
-        Played(clip, tuple(eye.stages), np.stack(eye.rows), eye.finder.pixels_per_meter, eye.seconds)
+        BlobSequence(clip, tuple(eye.stages), np.stack(eye.rows), eye.finder.pixels_per_meter, eye.seconds)
         for eye in eyes
     ]
 
 
-class _Eye:
+class _BlobReader:
     """Finds the blobs of pictures with a share of their colour, and says who is in which."""
 
     def __init__(self, homography: Floats | None, empty: Sequence[Image], colour: float) -> None:
@@ -106,7 +108,7 @@ def faded(image: Image, colour: float) -> Image:
     return np.asarray(cv2.addWeighted(image, colour, grey, 1.0 - colour, 0.0), dtype=np.uint8)
 
 
-def _scene(clip: Clip, people: int, stage_s: float) -> Scene:
+def _scene(clip: OverheadClip, people: int, stage_s: float) -> Scene:
     width, height = SIZE
     return Scene("overhead", 1, people, clip.seed, width, height, 1.0 / stage_s)
 

@@ -16,7 +16,7 @@ THEIR_EDGES = {2: (1, 36, 7), 3: (1, 5398, 780), 4: (1, 50047, 4290)}
 _COLOURS = {2: "#4c72b0", 3: "#dd8452", 4: "#55a868"}
 
 
-class Counted(Protocol):
+class PlottedCounts(Protocol):
     """What is plotted of the clips with so many people."""
 
     chances: int
@@ -25,7 +25,7 @@ class Counted(Protocol):
     unpruned: list[int]
 
 
-def plot(tallies: Mapping[int, Counted], pale: Mapping[int, Counted], path: Path) -> None:
+def plot(tallies: Mapping[int, PlottedCounts], pale: Mapping[int, PlottedCounts], path: Path) -> None:
     """Draw both figures side by side; `pale` is of pictures with little colour."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.2))
     _errors(left, tallies, pale)
@@ -36,7 +36,7 @@ def plot(tallies: Mapping[int, Counted], pale: Mapping[int, Counted], path: Path
     plt.close(figure)
 
 
-def _errors(axes: Any, tallies: Mapping[int, Counted], pale: Mapping[int, Counted]) -> None:
+def _errors(axes: Any, tallies: Mapping[int, PlottedCounts], pale: Mapping[int, PlottedCounts]) -> None:
     """Draw the share of people mistaken after a merge over the stages of the window."""
     for people, tally in tallies.items():
         shares = [100 * errors / max(tally.chances, 1) for errors in tally.errors.values()]
@@ -53,7 +53,7 @@ def _errors(axes: Any, tallies: Mapping[int, Counted], pale: Mapping[int, Counte
     axes.grid(alpha=0.3)
 
 
-def _edges(axes: Any, tallies: Mapping[int, Counted]) -> None:
+def _edges(axes: Any, tallies: Mapping[int, PlottedCounts]) -> None:
     """Draw how many edges the stages have, pruned and not, as cumulative shares."""
     for people, tally in tallies.items():
         colour = _COLOURS[people]

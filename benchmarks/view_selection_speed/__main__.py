@@ -14,8 +14,8 @@ from pathlib import Path
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from benchmarks.view_selection_speed.selection_program import Size, frame_time
-from benchmarks.view_selection_speed.whole_decision import Crowd, decision_times
+from benchmarks.view_selection_speed.selection_program import ProgramSize, frame_time
+from benchmarks.view_selection_speed.whole_decision import SimulatedCrowd, decision_times
 
 _PEOPLE, _CAMERAS, _AHEAD = 1000, 16, 25
 _GOPS = (1, 5, 10, 25)
@@ -26,14 +26,14 @@ _SEEN_BY = (1, 2, 4)
 
 def program_row(gop: int, repeats: int) -> list[str]:
     """Return a row: the program at the size that is promised, without and with a least shot of a second."""
-    free = frame_time(Size(_PEOPLE, _CAMERAS, _AHEAD, gop, 0), repeats)
-    kept = frame_time(Size(_PEOPLE, _CAMERAS, _AHEAD, gop, -(-25 // gop)), repeats)
+    free = frame_time(ProgramSize(_PEOPLE, _CAMERAS, _AHEAD, gop, 0), repeats)
+    kept = frame_time(ProgramSize(_PEOPLE, _CAMERAS, _AHEAD, gop, -(-25 // gop)), repeats)
     return [f"{gop}", f"{1e3 * free:.3f}", f"{1e3 * kept:.3f}"]
 
 
 def decision_row(seen_by: int, gop: int, epochs: int, *, all_terms: bool) -> list[str]:
     """Return a row: what the stages of the whole decision cost."""
-    spent = decision_times(Crowd(_PEOPLE, _CAMERAS, seen_by), gop, epochs, all_terms=all_terms)
+    spent = decision_times(SimulatedCrowd(_PEOPLE, _CAMERAS, seen_by), gop, epochs, all_terms=all_terms)
     stages = (
         spent.reading,
         spent.quality,
@@ -70,8 +70,8 @@ def run(options: argparse.Namespace) -> None:
         ["GOP", "free", "shots of a second"],
         [program_row(gop, repeats) for gop in _GOPS],
     )
-    people = [frame_time(Size(it, _CAMERAS, _AHEAD, 10, 0), repeats) for it in _MORE_PEOPLE]
-    cameras = [frame_time(Size(_PEOPLE, it, _AHEAD, 10, 0), repeats) for it in _MORE_CAMERAS]
+    people = [frame_time(ProgramSize(it, _CAMERAS, _AHEAD, 10, 0), repeats) for it in _MORE_PEOPLE]
+    cameras = [frame_time(ProgramSize(_PEOPLE, it, _AHEAD, 10, 0), repeats) for it in _MORE_CAMERAS]
     report.table(
         "Growth, GOP 10; µs a frame",
         ["objects", "time", "cameras", "time"],

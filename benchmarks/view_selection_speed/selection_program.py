@@ -14,7 +14,7 @@ _SWITCH_COST = 7.5
 
 
 @dataclass(frozen=True, slots=True)
-class Size:
+class ProgramSize:
     """How much there is to choose."""
 
     objects: int
@@ -25,7 +25,7 @@ class Size:
     """GOPs."""
 
 
-def frame_time(size: Size, repeats: int) -> float:
+def frame_time(size: ProgramSize, repeats: int) -> float:
     """Return the seconds a frame: one choice serves all frames of a GOP; the median of some."""
     rng = np.random.default_rng(_SEED)
     # As the service has them: objects innermost.

@@ -39,7 +39,7 @@ _ALL = QualitySettings(
 
 
 @dataclass(frozen=True, slots=True)
-class Crowd:
+class SimulatedCrowd:
     """People who walk, each before as many of the cameras."""
 
     people: int
@@ -74,7 +74,7 @@ class Crowd:
 
 
 @dataclass(frozen=True, slots=True)
-class Spent:
+class StageSeconds:
     """Seconds of processor time a frame."""
 
     reading: float
@@ -98,7 +98,7 @@ class Spent:
         return self.reading + self.quality + self.costs + self.choice + self.rest
 
 
-class _Given:
+class _AppearanceRegistry:
     """A registry that reads people's numbers off their looks."""
 
     def update(
@@ -110,12 +110,12 @@ class _Given:
         return IdentityUpdate(numbers, created=(), returned=(), departed=(), merged=(), split=())
 
 
-def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> Spent:
+def decision_times(crowd: SimulatedCrowd, gop: int, epochs: int, *, all_terms: bool) -> StageSeconds:
     """Decide for a crowd, and give what the stages cost."""
     config = _config(crowd, gop, asdict(_ALL) if all_terms else {})
     ground = np.array([[1.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.002, 1.0]])
     decider = ViewDecider(config, dict.fromkeys(config.camera_ids, ground), lambda _camera, _pulse: True)
-    decider.people._registry = _Given()  # type: ignore[assignment]  # noqa: SLF001 — joining is measured elsewhere
+    decider.people._registry = _AppearanceRegistry()  # type: ignore[assignment]  # noqa: SLF001 — joining is measured elsewhere
     board, watch = DecisionState(25.0), Stopwatch()
     stages: tuple[Watched, ...] = (
         (WindowReader, "read", "reading"),
@@ -137,10 +137,10 @@ def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> S
             for decision in decider.step(epoch):
                 board.put(decision)
     frames = epochs * config.track.window.stride
-    return Spent(**{stage: spent / frames for stage, spent in watch.seconds.items()})
+    return StageSeconds(**{stage: spent / frames for stage, spent in watch.seconds.items()})
 
 
-def _config(crowd: Crowd, gop: int, quality: dict[str, float]) -> Config:
+def _config(crowd: SimulatedCrowd, gop: int, quality: dict[str, float]) -> Config:
     cameras = [{"id": f"c{number}", "source": "scene:room"} for number in range(crowd.cameras)]
     return build_config(
         {

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from benchmarks import ablation
-from benchmarks.ablation import DEFAULT, TERMS, Term, cell
+from benchmarks.ablation import DEFAULT, TERMS, Ablation, cell
 from benchmarks.common.environment import SKIPPED
 from benchmarks.common.public_detections import Recording, find_recordings, track
 from benchmarks.other_trackers import __main__ as peers
 from benchmarks.other_trackers import virtual_environment as peer_environment
-from benchmarks.other_trackers.virtual_environment import PeersAwayError
+from benchmarks.other_trackers.virtual_environment import OtherTrackersUnavailableError
 from server.cli.track.command import track_one
 from server.system.errors import UserError
 from tracking.evaluation import Scores
@@ -57,7 +57,7 @@ def test_what_is_measured_is_what_the_command_writes(recording: Recording, tmp_p
 
 
 @pytest.mark.parametrize("term", TERMS, ids=lambda term: term.name)
-def test_a_term_is_switched_off_by_settings_that_there_are(term: Term, recording: Recording) -> None:
+def test_a_term_is_switched_off_by_settings_that_there_are(term: Ablation, recording: Recording) -> None:
     track(recording, term.off)
 
 
@@ -109,7 +109,7 @@ def test_half_an_environment_is_made_anew(tmp_path: Path, monkeypatch: pytest.Mo
     left_over = tmp_path / "environment" / "bin"
     left_over.mkdir(parents=True)
     monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
-    with pytest.raises(PeersAwayError):
+    with pytest.raises(OtherTrackersUnavailableError):
         peer_environment.peer_environment(tmp_path / "environment")
     assert not left_over.exists()
 

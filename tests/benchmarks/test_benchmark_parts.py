@@ -15,8 +15,8 @@ from benchmarks.common.environment import SKIPPED, CannotRunError
 from benchmarks.common.process_load import OTHER, busy_now
 from benchmarks.common.recorded_views import find_views
 from benchmarks.common.stopwatch import Stopwatch
-from benchmarks.latency.bus_subscriber import Marks
-from benchmarks.latency.shown_frames import Shown
+from benchmarks.latency.bus_subscriber import BusTimestamps
+from benchmarks.latency.shown_frames import ShownFrames
 from benchmarks.latency.stage_delays import STAGES, split
 from benchmarks.render import __main__ as render
 from benchmarks.screenshots.__main__ import small_png
@@ -56,9 +56,9 @@ def choices(first: int, camera: str) -> GopChoices:
     return GopChoices(first=first, frames=GOP, choices={7: camera}, boxes={}, cuts=[])
 
 
-def live_marks() -> Marks:
+def live_marks() -> BusTimestamps:
     """Two GOPs of two cameras: solved 30 ms (c1: 50 ms) after the last frame, decided 10 ms later."""
-    marks = Marks()
+    marks = BusTimestamps()
     for pulse in range(40):
         for camera in ("c0", "c1"):
             marks.video(camera, head(pulse), due(pulse) + 0.02)
@@ -70,8 +70,8 @@ def live_marks() -> Marks:
     return marks
 
 
-def seen(at: dict[int, float]) -> Shown:
-    return Shown(object=7, at=at, lookahead=LOOKAHEAD, fps=FPS, cores={})
+def seen(at: dict[int, float]) -> ShownFrames:
+    return ShownFrames(object=7, at=at, lookahead=LOOKAHEAD, fps=FPS, cores={})
 
 
 def test_every_frame_of_a_gop_waits_equally_long_for_the_look_ahead() -> None:

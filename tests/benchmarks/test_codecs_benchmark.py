@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from benchmarks.codecs import WAYS, Cost, measure, middle, record
+from benchmarks.codecs import WAYS, StreamCost, measure, middle, record
 from server.config.sections import SiteSettings
 
 SITE = SiteSettings(width=160, height=96)
@@ -24,6 +24,6 @@ def test_what_passes_through_is_the_same_and_costs_no_encoding(tmp_path: Path) -
 
 
 def test_the_median_of_the_rounds_is_taken_of_each_time() -> None:
-    rounds = [Cost(1, 6, 2, 9, 40), Cost(3, 4, 1, 9, 40), Cost(2, 5, 3, 9, 40)]
-    assert middle(rounds) == Cost(2, 5, 2, 9, 40)
+    rounds = [StreamCost(1, 6, 2, 9, 40), StreamCost(3, 4, 1, 9, 40), StreamCost(2, 5, 3, 9, 40)]
+    assert middle(rounds) == StreamCost(2, 5, 2, 9, 40)
     assert middle(rounds).whole == 9

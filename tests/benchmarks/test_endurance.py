@@ -11,7 +11,7 @@ import pytest
 from benchmarks.common.report import Report
 from benchmarks.endurance.__main__ import describe, run_tracker, spans
 from benchmarks.endurance.endless_crowd import crowd
-from benchmarks.endurance.memory_samples import Samples, resident_megabytes
+from benchmarks.endurance.memory_samples import MemorySamples, resident_megabytes
 from tracking import CostSettings, OnlineTracker, WindowSettings, create_solver
 
 WARM_UP, FRAMES = 400, 900
@@ -48,7 +48,7 @@ def test_the_crowd_goes_on_and_changes() -> None:
 
 
 def test_growth_is_that_of_a_straight_line() -> None:
-    samples = Samples([1000, 2000, 3000], [50.0, 50.5, 51.0], [1.0, 3.0, 5.0], [700, 700, 700])
+    samples = MemorySamples([1000, 2000, 3000], [50.0, 50.5, 51.0], [1.0, 3.0, 5.0], [700, 700, 700])
     assert samples.growth() == pytest.approx(5.0)
     assert samples.block_growth() == pytest.approx(0.0, abs=1e-6)
     assert samples.milliseconds_per_frame() == pytest.approx(2.0)

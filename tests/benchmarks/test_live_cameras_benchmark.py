@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.common.recorded_views import ROOM, Views
+from benchmarks.common.recorded_views import ROOM, RecordedViews
 from benchmarks.live_cameras.frame_counters import counts_in
-from benchmarks.live_cameras.looped_views import CROWD, FPS, Live, usual_views
+from benchmarks.live_cameras.looped_views import CROWD, FPS, LoopedViews, usual_views
 from benchmarks.live_cameras.stage_times import (
     REST,
     STAGES,
-    StageTimes,
-    ThreadWatch,
+    CameraStageTimes,
+    ThreadStopwatch,
     hooked_environment,
     read_stages,
 )
@@ -65,7 +65,7 @@ CLOCK = HandClock()
 
 def test_a_stage_inside_a_stage_counts_only_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("benchmarks.live_cameras.stage_times.time", CLOCK)
-    watch = ThreadWatch()
+    watch = ThreadStopwatch()
     calls: list[int] = []
     outer, inner = type("O", (Outer,), {}), type("I", (Inner,), {})
     watch.wrap(outer, "work", "track", lambda: calls.append(1))
@@ -80,7 +80,7 @@ def test_what_no_stage_explains_is_the_rest(tmp_path: Path) -> None:
     seconds = dict.fromkeys(STAGES, 0.0)
     (tmp_path / "c0.json").write_text(json.dumps({"frames": 10, "seconds": seconds, "process": 1.0}))
     start = read_stages(tmp_path)["c0"]
-    later = StageTimes(20, {**seconds, "detect": 0.05}, 1.08)
+    later = CameraStageTimes(20, {**seconds, "detect": 0.05}, 1.08)
     used = later.milliseconds_since(start)
     assert used["detect"] == pytest.approx(5.0)
     assert used[REST] == pytest.approx(3.0)
@@ -94,10 +94,10 @@ def test_only_camera_processes_are_hooked(tmp_path: Path) -> None:
 
 def test_four_cameras_of_two_scenes_never_end(tmp_path: Path) -> None:
     views = tuple(
-        Views(name, tuple(tmp_path / name / f"c{n}.mp4" for n in range(count)), None)
+        RecordedViews(name, tuple(tmp_path / name / f"c{n}.mp4" for n in range(count)), None)
         for name, count in (("terrace", 2), ("campus4", 3))
     )
-    live = Live(CROWD, views)
+    live = LoopedViews(CROWD, views)
     assert [camera["id"] for camera in live.cameras] == ["c0", "c1", "c2", "c3"]
     assert all(camera["at_end"] == "loop" for camera in live.cameras)
     assert live.ground is None

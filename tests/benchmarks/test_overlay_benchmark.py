@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import asyncio
 
-from benchmarks.overlay import Stage, Wish, measure
+from benchmarks.overlay import RoomStream, ViewerLoad, measure
 from server.config.sections import EncodeSettings, SiteSettings
 
 
 def test_boxes_cost_more_than_no_boxes_and_no_more_for_another_viewer() -> None:
-    stage = Stage(SiteSettings(width=320, height=180), EncodeSettings())
+    stage = RoomStream(SiteSettings(width=320, height=180), EncodeSettings())
     nothing, one, more = (
-        asyncio.run(measure(stage, wish, 4)) for wish in (Wish("nothing"), Wish("one", 1), Wish("more", 10))
+        asyncio.run(measure(stage, wish, 4))
+        for wish in (ViewerLoad("nothing"), ViewerLoad("one", 1), ViewerLoad("more", 10))
     )
     assert 0 < nothing.drawing < one.drawing
     assert more.drawing < 4 * one.drawing, "not ten times as much"

@@ -12,10 +12,10 @@ import pytest
 from benchmarks.overload.__main__ import load, step_of
 from benchmarks.overload.growing_site import running
 from benchmarks.overload.overload_report import plot
-from benchmarks.overload.responsiveness import Asked, lag_below, row
-from benchmarks.overload.samples import Loaded, Sample, Step
+from benchmarks.overload.responsiveness import Responsiveness, lag_below, row
+from benchmarks.overload.samples import LoadStep, OverloadResult, SiteSample
 
-CALM = Sample(
+CALM = SiteSample(
     at=0.0, levels=(0, 0), pulses=1000, shed=100, missed=10, late=7, delays=(), holes=0
 )  # two cameras, of an earlier time
 
@@ -39,26 +39,28 @@ def test_a_step_counts_only_its_own_time() -> None:
 
 def test_the_machine_carries_as_many_as_are_searched_whole() -> None:
     step = step_of(1, [CALM], [CALM, replace(CALM, pulses=2000)])
-    found = Loaded(
+    found = OverloadResult(
         steps=[step, replace(step, cameras=2, searched=0.995), replace(step, cameras=3, searched=0.6)]
     )
     assert found.carried == 2
-    assert Loaded(steps=[Step(1, (3.0, 3), 0.2, 0.0, 0.0, (1.0, 1.0), 0)]).carried == 0
+    assert OverloadResult(steps=[LoadStep(1, (3.0, 3), 0.2, 0.0, 0.0, (1.0, 1.0), 0)]).carried == 0
 
 
 def test_what_was_found_is_drawn(tmp_path: Path) -> None:
     samples = [replace(CALM, at=float(it), delays=(400.0,)) for it in range(5)]
-    plot(Loaded(samples=samples, started=[(0.0, 1), (3.0, 2)]), tmp_path / "load.png")
+    plot(OverloadResult(samples=samples, started=[(0.0, 1), (3.0, 2)]), tmp_path / "load.png")
     assert (tmp_path / "load.png").stat().st_size > 1000
 
 
 def test_who_was_not_answered_counts_with_the_time_that_they_waited() -> None:
-    asked = Asked(60.0, waits=[(0.0, None), (1.0, 2.0), (10.0, 0.5), (20.0, None), (5.0, 1.5), (2.0, 9.0)])
+    asked = Responsiveness(
+        60.0, waits=[(0.0, None), (1.0, 2.0), (10.0, 0.5), (20.0, None), (5.0, 1.5), (2.0, 9.0)]
+    )
     assert asked.first == 3.0
     assert [asked.wait(it) for it in (0, 50, 100)] == [0.5, 1.5, 40.0], (
         "those that came before are not counted"
     )
-    assert Asked(60.0, waits=[(0.0, None)]).first == np.inf
+    assert Responsiveness(60.0, waits=[(0.0, None)]).first == np.inf
 
 
 def test_a_lag_is_told_by_the_bound_that_it_does_not_pass() -> None:
@@ -68,10 +70,10 @@ def test_a_lag_is_told_by_the_bound_that_it_does_not_pass() -> None:
 
 def test_frames_are_counted_at_the_end_and_what_is_not_known_is_told_so() -> None:
     frames = [(1.0, 0.0), (40.0, 100.0), (50.0, 600.0), (60.0, 1100.0)]
-    asked = Asked(60.0, frames=frames, lags=[(0.1, 1.0)])
+    asked = Responsiveness(60.0, frames=frames, lags=[(0.1, 1.0)])
     assert asked.rate == 50.0
     assert row(40, 10, asked)[:3] == ["40", "10", "inf"]
-    assert np.isnan(Asked(60.0, frames=frames[:1]).rate)
+    assert np.isnan(Responsiveness(60.0, frames=frames[:1]).rate)
 
 
 @pytest.mark.slow

@@ -11,29 +11,29 @@ import pytest
 from benchmarks.common.report import Report
 from benchmarks.paper_experiments.__main__ import run
 from benchmarks.paper_experiments.drawn_toys import TOYS, play_toys
-from benchmarks.paper_experiments.experiment_list import PAPER_WINDOW, Experiment, Setting
+from benchmarks.paper_experiments.experiment_list import PAPER_WINDOW, Experiment, TrackerSetting
 from benchmarks.paper_experiments.label_errors import judge, named, per_frame
-from benchmarks.paper_experiments.noisy_detections import Cast, play
-from benchmarks.paper_experiments.scene import Scene, Truth
-from benchmarks.paper_experiments.walking_people import Walking
+from benchmarks.paper_experiments.noisy_detections import SceneParameters, play
+from benchmarks.paper_experiments.scene import ExperimentScene, ObjectTruth
+from benchmarks.paper_experiments.walking_people import WalkParameters
 from benchmarks.paper_experiments.windowed_tracking import follow
 from tracking import PAPER_COSTS, CostSettings, Detections, Template, WindowSettings, create_solver
 from tracking.boxes import iou
 
 FRAMES = 40
-CAST = Cast((0, 1), FRAMES, Walking(3.0, 0.15))
+CAST = SceneParameters((0, 1), FRAMES, WalkParameters(3.0, 0.15))
 
 
 def box(left: float) -> list[float]:
     return [left, 0.0, left + 40.0, 100.0]
 
 
-def two_apart(kits: tuple[int, ...] = (0, 1)) -> Scene:
+def two_apart(kits: tuple[int, ...] = (0, 1)) -> ExperimentScene:
     """Two people who stand apart for four frames, both found in each."""
     boxes = np.array([[box(0.0)] * 4, [box(200.0)] * 4])
     frame = Detections(boxes[:, 0], np.ones(2), np.eye(2))
     templates = tuple(Template(k + 1, np.eye(2)[k], boxes[k, 0]) for k in range(2))
-    return Scene(Truth(boxes, np.ones((2, 4))), ((frame,) * 4,), templates, kits)
+    return ExperimentScene(ObjectTruth(boxes, np.ones((2, 4))), ((frame,) * 4,), templates, kits)
 
 
 def test_a_scene_is_the_same_for_the_same_seed() -> None:
@@ -44,7 +44,7 @@ def test_a_scene_is_the_same_for_the_same_seed() -> None:
 
 
 def test_who_leaves_is_away_and_comes_back() -> None:
-    cast = replace(CAST, frames=400, walking=Walking(6.0, 0.2, stay=(20, 40), away=(10, 20)))
+    cast = replace(CAST, frames=400, walking=WalkParameters(6.0, 0.2, stay=(20, 40), away=(10, 20)))
     away = np.isnan(play(cast, 1).truth.boxes[0, :, 0])
     leaves, returns = (
         np.flatnonzero(np.diff(away.astype(int)) == 1),
@@ -109,7 +109,7 @@ def test_people_who_are_not_known_are_found() -> None:
 
 
 def test_separate_paths_share_boxes_where_the_program_does_not() -> None:
-    scene = play(Cast((0, 0), FRAMES, Walking(6.0, 0.25, side=140.0)), 3)
+    scene = play(SceneParameters((0, 0), FRAMES, WalkParameters(6.0, 0.25, side=140.0)), 3)
     together = follow(scene, PAPER_COSTS, PAPER_WINDOW, create_solver("columns"))
     apart = follow(scene, PAPER_COSTS, PAPER_WINDOW, create_solver("separate-dp"))
     assert sum(report.conflicts for report in together.reports) == 0
@@ -126,7 +126,7 @@ def test_toys_in_full_view_are_among_their_own_peaks() -> None:
 
 
 def test_an_experiment_prints_its_table_and_saves_its_plot(tmp_path: Path) -> None:
-    settings = (Setting("paper", PAPER_COSTS, PAPER_WINDOW),)
+    settings = (TrackerSetting("paper", PAPER_COSTS, PAPER_WINDOW),)
     experiment = Experiment(
         "tiny", "two people", "Fig. 0", lambda seed: play(CAST, seed), settings, "nothing"
     )

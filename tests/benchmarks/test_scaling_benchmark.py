@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks.scaling.__main__ import exponent
-from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, Hall, Tracker
+from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, SimulatedHall, SimulatedTracker
 from benchmarks.scaling.simulated_site import carry
-from benchmarks.scaling.timed_service import REST, STAGES, Times
+from benchmarks.scaling.timed_service import REST, STAGES, ServiceTimes
 from bestview import foot_points, to_ground
 from server.messaging.messages import CameraTracks
 from server.service.ingest.validation import is_plausible
@@ -19,7 +19,7 @@ from server.service.ingest.validation import is_plausible
 
 @pytest.mark.parametrize("cameras", [4, 25])
 def test_every_camera_sees_about_as_many_as_asked_for_wherever_they_walk(cameras: int) -> None:
-    hall = Hall(cameras, 20)
+    hall = SimulatedHall(cameras, 20)
     for first in (0, 5000):
         places = hall.places(first, first)
         seen = [hall.view(camera, places, 0).people.size for camera in range(cameras)]
@@ -28,7 +28,7 @@ def test_every_camera_sees_about_as_many_as_asked_for_wherever_they_walk(cameras
 
 
 def test_boxes_stand_where_people_are() -> None:
-    hall = Hall(9, 10)
+    hall = SimulatedHall(9, 10)
     places = hall.places(100, 114)
     for camera in range(9):
         view = hall.view(camera, places, 3)
@@ -39,7 +39,7 @@ def test_boxes_stand_where_people_are() -> None:
 
 
 def test_nobody_walks_out_of_the_hall_or_jumps() -> None:
-    hall = Hall(4, 10)
+    hall = SimulatedHall(4, 10)
     places = hall.places(0, 3000)
     assert places.min() >= 0
     assert places.max() <= 20.0
@@ -47,8 +47,8 @@ def test_nobody_walks_out_of_the_hall_or_jumps() -> None:
 
 
 def test_a_tracker_says_what_the_service_takes_and_renames_who_comes_back() -> None:
-    hall = Hall(4, 10)
-    tracker = Tracker(hall, 1, boot=7)
+    hall = SimulatedHall(4, 10)
+    tracker = SimulatedTracker(hall, 1, boot=7)
     ids: dict[tuple[float, ...], set[int]] = {}
     for epoch in range(2, 200):
         last = (epoch + 1) * STRIDE - 1
@@ -68,12 +68,12 @@ def test_growth_is_the_exponent_of_a_power_law() -> None:
 
 
 def test_a_process_that_has_said_nothing_yet_has_no_times(tmp_path: Path) -> None:
-    assert Times.read(tmp_path / "times.json") is None
+    assert ServiceTimes.read(tmp_path / "times.json") is None
 
 
 @pytest.mark.slow
 def test_a_small_site_is_carried_in_time(tmp_path: Path) -> None:
-    load = carry(Hall(3, 5), 25.0, tmp_path / "site", settle=6, epochs=6)
+    load = carry(SimulatedHall(3, 5), 25.0, tmp_path / "site", settle=6, epochs=6)
     assert set(load.stages) == {*STAGES, REST}
     assert load.stages["who is who"] > 0
     assert load.stages["splice"] > 0

@@ -11,19 +11,19 @@ import pytest
 from aiohttp import web
 from aiohttp.test_utils import TestServer
 
-from benchmarks.soak.accelerated_site import CAMERAS, HEIGHT, WIDTH, Filmed, Tempo
+from benchmarks.soak.accelerated_site import CAMERAS, HEIGHT, WIDTH, LoopedRecordings, TimeScale
 from benchmarks.soak.samples import (
     DELAY,
     DESCRIPTORS,
     RESIDENT,
-    Sample,
+    ProcessSample,
     descriptors_of,
     judge,
     resident_of,
     threads_of,
 )
 from benchmarks.soak.task_counts import FOLDER_VARIABLE, hooked_environment, note_tasks, read_held
-from benchmarks.soak.visitors import Seen, Visitors, shown_by
+from benchmarks.soak.visitors import StreamDelays, Visitors, shown_by
 from fakes.timeouts import PATIENCE
 from server.config.loader import build_config
 from server.media.containers import fmp4
@@ -54,7 +54,8 @@ def test_what_was_not_seen_is_not_flat(hours: list[float]) -> None:
 
 def test_every_quantity_of_a_process_is_judged_by_itself() -> None:
     samples = [
-        Sample(it, 100.0, 10, 5 + (it > 16.0) * 2, 7, 1000) for it in map(float, np.linspace(0.1, 24.0, 40))
+        ProcessSample(it, 100.0, 10, 5 + (it > 16.0) * 2, 7, 1000)
+        for it in map(float, np.linspace(0.1, 24.0, 40))
     ]
     assert [it.rule.name for it in judge(samples) if not it.flat] == ["threads"]
 
@@ -92,8 +93,8 @@ async def _until(folder: Path) -> None:
 
 
 def test_what_is_kept_is_counted_in_the_time_of_the_site(tmp_path: Path) -> None:
-    tempo = Tempo(20.0)
-    filmed = Filmed(tmp_path, tempo)
+    tempo = TimeScale(20.0)
+    filmed = LoopedRecordings(tmp_path, tempo)
     for camera in CAMERAS:
         (tmp_path / f"{camera}.mp4").touch()
     content = {
@@ -109,7 +110,7 @@ def test_what_is_kept_is_counted_in_the_time_of_the_site(tmp_path: Path) -> None
 
 
 def test_a_stream_has_a_hole_where_there_is_nothing_to_show_and_not_where_a_picture_lasts() -> None:
-    seen = Seen()
+    seen = StreamDelays()
     pictures = [
         fmp4.fragment([fmp4.FragmentSample(b"a", key=True)], 10, 25.0),
         fmp4.fragment([fmp4.FragmentSample(b"b", key=False), fmp4.FragmentSample(b"c", key=False)], 11, 25.0),

@@ -16,17 +16,17 @@ from benchmarks.common.report import Report
 from benchmarks.streaming.bare_sockets import bare_sends
 from benchmarks.streaming.delay_drift import drift, times
 from benchmarks.streaming.ffmpeg_and_nginx import ffmpeg_switching
-from benchmarks.streaming.frame_correctness import Right
+from benchmarks.streaming.frame_correctness import FrameCorrectness
 from benchmarks.streaming.hls_latency import hls_delays
 from benchmarks.streaming.simulated_cameras import draw_room, load, save
 from benchmarks.streaming.splice_cost import encode_again, splice
-from benchmarks.streaming.stalled_viewers import Beside, Turn, beside_stalled, stalling
+from benchmarks.streaming.stalled_viewers import ReadingRound, StallComparison, beside_stalled, stalling
 from benchmarks.streaming.stream_site import running, viewers
-from benchmarks.streaming.tables import Found, describe, per_core, plot
-from benchmarks.streaming.timed_service import Given, read
-from benchmarks.streaming.viewer_crowd import Crowd, Heard
+from benchmarks.streaming.tables import StreamMeasurements, describe, per_core, plot
+from benchmarks.streaming.timed_service import SendTimes, read
+from benchmarks.streaming.viewer_crowd import CrowdReading, ViewerCrowd
 from benchmarks.streaming.viewing_cost import (
-    Step,
+    ViewerStep,
     end_of_first_fragment,
     first_pictures,
     send_delays,
@@ -96,13 +96,13 @@ def test_the_first_fragment_ends_where_its_pictures_do() -> None:
 
 
 def test_a_send_delay_ends_with_the_last_frame_of_a_gop() -> None:
-    heard = Heard(1.0, 1.0, 0.1, 0, [ticks(19, 25), ticks(14, 25), ticks(39, 25)], [5.25, 5.1, 6.0])
+    heard = CrowdReading(1.0, 1.0, 0.1, 0, [ticks(19, 25), ticks(14, 25), ticks(39, 25)], [5.25, 5.1, 6.0])
     assert send_delays(heard, {10: 5.0, 20: 5.4}).tolist() == [250.0]
 
 
 def test_when_gops_were_given_out_is_read_up_to_the_line_that_is_being_written(tmp_path: Path) -> None:
     (tmp_path / "sent").write_text("10 5.0 5.25\n20 5.4 5.5\n30 5.8", encoding="ascii")
-    assert read(tmp_path / "sent") == {10: Given(5.0, 5.25), 20: Given(5.4, 5.5)}
+    assert read(tmp_path / "sent") == {10: SendTimes(5.0, 5.25), 20: SendTimes(5.4, 5.5)}
 
 
 def test_a_bare_loop_sends_whole_gops_to_all(films: Films) -> None:
@@ -134,7 +134,7 @@ def shouting(data: bytes) -> Iterator[int]:
 def test_a_crowd_hears_all_that_is_sent_and_notices_who_hangs_up() -> None:
     data = fragment([FragmentSample(b"abc" * 100, key=True)], 9, 25)
     with shouting(data) as port:
-        crowd, began = Crowd(port), time.monotonic()
+        crowd, began = ViewerCrowd(port), time.monotonic()
         crowd.watch(["/"] * 3)
         heard = [crowd.read(0.1)]
         while heard[-1].gone < 3:
@@ -145,8 +145,8 @@ def test_a_crowd_hears_all_that_is_sent_and_notices_who_hangs_up() -> None:
     assert all(began < at < time.monotonic() for it in heard for at in it.at)
 
 
-def step(count: int, cores: float, late: float) -> Step:
-    return Step(count, cores, 0.1, 500.0, 1.0, (1.0, 2.0, late), 3.0, 1.0)
+def step(count: int, cores: float, late: float) -> ViewerStep:
+    return ViewerStep(count, cores, 0.1, 500.0, 1.0, (1.0, 2.0, late), 3.0, 1.0)
 
 
 def test_viewers_of_a_core_are_on_a_line_beside_what_the_service_uses_anyway() -> None:
@@ -158,7 +158,9 @@ def test_viewers_of_a_core_are_on_a_line_beside_what_the_service_uses_anyway() -
 def test_the_table_says_how_many_frames_were_wrong_and_who_was_served_in_time(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    found = Found(steps=[step(500, 0.2, 39.0), step(1000, 0.3, 41.0)], right=Right(100, 5, 100, 98, 0))
+    found = StreamMeasurements(
+        steps=[step(500, 0.2, 39.0), step(1000, 0.3, 41.0)], right=FrameCorrectness(100, 5, 100, 98, 0)
+    )
     describe(Report(), found)
     said = capsys.readouterr().out
     assert "98 of 100" in said
@@ -183,9 +185,9 @@ def test_a_real_site_is_watched(films: Films, tmp_path: Path) -> None:
 
 
 def test_stalled_viewers_are_judged_by_the_medians_of_the_rounds() -> None:
-    alone = [Turn(10.0, p99, 1.0, 0.3) for p99 in (50.0, 400.0, 52.0)]
-    beside = [Turn(10.0, p99, 1.0, 0.3) for p99 in (54.0, 56.0, 900.0)]
-    assert Beside(900, 100, alone, beside).ratio == pytest.approx(56.0 / 52.0)
+    alone = [ReadingRound(10.0, p99, 1.0, 0.3) for p99 in (50.0, 400.0, 52.0)]
+    beside = [ReadingRound(10.0, p99, 1.0, 0.3) for p99 in (54.0, 56.0, 900.0)]
+    assert StallComparison(900, 100, alone, beside).ratio == pytest.approx(56.0 / 52.0)
 
 
 def test_who_stalls_asks_and_never_reads() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.temporal_consistency.__main__ import follow, main
 from benchmarks.temporal_consistency.blob_merges import NOBODY, events, merged, mistaken
-from benchmarks.temporal_consistency.overhead_room import Clip, played
+from benchmarks.temporal_consistency.overhead_room import OverheadClip, played
 from tracking.baselines.temporal_consistency import TemporalSettings
 
 # Two people meet at the third stage and part at the fifth; the third person is by themselves.
@@ -74,7 +74,7 @@ def test_a_number_that_is_left_behind_is_a_mistake_of_whose_it_was() -> None:
 
 @pytest.mark.parametrize("stages", [1, 5])
 def test_two_people_are_followed_through_the_room_from_above(stages: int) -> None:
-    seen, pale = played(Clip(2, 0.5, 1), 0.5, (1.0, 0.25))
+    seen, pale = played(OverheadClip(2, 0.5, 1), 0.5, (1.0, 0.25))
     shares = [
         np.mean([blob.colors.max() for stage in kind.stages for blob in stage.blobs]) for kind in (seen, pale)
     ]

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.common.report import Report
 from benchmarks.faults.containers import FAULTS
-from benchmarks.faults.outcomes.fault_run import Outcome
+from benchmarks.faults.outcomes.fault_run import FaultOutcome
 from benchmarks.faults.outcomes.measurement import measure
 from benchmarks.faults.site.compose_site import missing
 
@@ -25,7 +25,7 @@ BY_NAME = {fault.name: fault for fault in FAULTS}
 
 
 @pytest.fixture(scope="module")
-def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Outcome]:
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, FaultOutcome]:
     """Inject all of them into one site, one after the other; after each it must have recovered."""
     lacking = missing()
     if lacking is not None:
@@ -36,28 +36,30 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Outcome]:
 
 
 @pytest.mark.parametrize("name", BY_NAME)
-def test_the_site_recovers(outcomes: dict[str, Outcome], name: str) -> None:
+def test_the_site_recovers(outcomes: dict[str, FaultOutcome], name: str) -> None:
     assert not outcomes[name].failed
 
 
 @pytest.mark.parametrize("name", [name for name, fault in BY_NAME.items() if not fault.breaks])
-def test_a_stream_survives_everything_but_its_own_server(outcomes: dict[str, Outcome], name: str) -> None:
+def test_a_stream_survives_everything_but_its_own_server(
+    outcomes: dict[str, FaultOutcome], name: str
+) -> None:
     assert outcomes[name].reconnections == 0
 
 
 @pytest.mark.parametrize("name", [name for name, fault in BY_NAME.items() if fault.breaks])
-def test_a_stream_is_back_when_its_server_is(outcomes: dict[str, Outcome], name: str) -> None:
+def test_a_stream_is_back_when_its_server_is(outcomes: dict[str, FaultOutcome], name: str) -> None:
     assert outcomes[name].back is not None
 
 
 @pytest.mark.parametrize("name", BY_NAME)
-def test_no_picture_and_no_box_is_a_wrong_one(outcomes: dict[str, Outcome], name: str) -> None:
+def test_no_picture_and_no_box_is_a_wrong_one(outcomes: dict[str, FaultOutcome], name: str) -> None:
     outcome = outcomes[name]
     assert sum(it.frames for it in outcome.received), "there is something to be wrong"
     assert [note for it in outcome.received for note in it.notes] == []
 
 
 @pytest.mark.parametrize("name", [name for name in BY_NAME if name.startswith("restart")])
-def test_who_is_told_to_end_ends_by_itself(outcomes: dict[str, Outcome], name: str) -> None:
+def test_who_is_told_to_end_ends_by_itself(outcomes: dict[str, FaultOutcome], name: str) -> None:
     (ended,) = outcomes[name].ended
     assert ended.code == 0

@@ -11,9 +11,9 @@ from random import Random
 import pytest
 
 from benchmarks.fuzz.__main__ import PARTS, side_by_side, targets_of
-from benchmarks.fuzz.engine.runner import Attempt, Crash, Plan, Runner, numbered
-from benchmarks.fuzz.engine.target import Scripts, Target, UnclearError, refused
-from benchmarks.fuzz.http.unauthenticated import SECRETS, Strangers
+from benchmarks.fuzz.engine.runner import Crash, FuzzPlan, InputFeeder, TargetRunner, numbered
+from benchmarks.fuzz.engine.target import ScriptTarget, Target, UnclearError, refused
+from benchmarks.fuzz.http.unauthenticated import SECRETS, UnauthenticatedRequests
 from server.http.access import authorization
 from server.http.access.permissions import Permission
 from server.service.calibration import floor_plan
@@ -32,7 +32,7 @@ def _no_settings_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("target", ALL, ids=[it.name for it in ALL])
 def test_no_input_makes_it_crash(target: type[Target], tmp_path: Path) -> None:
-    tally = Runner(target, target.name, Plan(INPUTS, SECONDS, seed=7, out=tmp_path)).run()
+    tally = TargetRunner(target, target.name, FuzzPlan(INPUTS, SECONDS, seed=7, out=tmp_path)).run()
     found = "\n\n".join(it.read_text() for it in sorted(tmp_path.glob("*.txt")))
     counts = tally.counts
     assert counts.crashes == 0, found
@@ -80,8 +80,8 @@ class Broken(Target):
 
 
 def test_whatever_a_reader_does_wrong_is_counted_and_saved(tmp_path: Path) -> None:
-    plan = Plan(INPUTS_OF_ALL_KINDS, seed=SEED, out=tmp_path, hang_s=0.7)
-    counts = Runner(Broken, Broken.name, plan).run().counts
+    plan = FuzzPlan(INPUTS_OF_ALL_KINDS, seed=SEED, out=tmp_path, hang_s=0.7)
+    counts = TargetRunner(Broken, Broken.name, plan).run().counts
     saved = {path.read_bytes() for path in tmp_path.glob("*.bin")}
     given = [numbered(Broken(), SEED, index) for index in range(INPUTS_OF_ALL_KINDS)]
     assert counts.inputs == counts.messages == INPUTS_OF_ALL_KINDS
@@ -111,16 +111,16 @@ class Sound(Raising):
 
 
 def test_targets_side_by_side_count_as_they_do_one_by_one() -> None:
-    plan = Plan(INPUTS_OF_ALL_KINDS, seed=SEED)
+    plan = FuzzPlan(INPUTS_OF_ALL_KINDS, seed=SEED)
     tallies = dict(side_by_side((Raising, Sound, Sound), plan, jobs=2))
-    alone = Runner(Raising, Raising.name, plan).run().counts
+    alone = TargetRunner(Raising, Raising.name, plan).run().counts
     assert sorted(tallies) == [0, 1, 2]
     assert tallies[0].counts == alone
     assert alone.crashes > 0
     assert tallies[1].counts.accepted == tallies[2].counts.accepted == INPUTS_OF_ALL_KINDS
 
 
-class Talking(Scripts):
+class Talking(ScriptTarget):
     """Is told words one by one, and dies of one of them."""
 
     name = "talking-reader"
@@ -143,22 +143,22 @@ def test_messages_are_counted_that_were_handed_over_though_a_process_dies() -> N
     handed = [it.index(b"over") + 1 if b"over" in it else len(it) for it in inputs]
     died = [it == [b"right"] * 5 for it in inputs]
     assert any(died)
-    counts = Runner(Talking, Talking.name, Plan(INPUTS, seed=SEED)).run().counts
+    counts = TargetRunner(Talking, Talking.name, FuzzPlan(INPUTS, seed=SEED)).run().counts
     assert counts.messages == sum(1 if dead else count for count, dead in zip(handed, died, strict=True))
     assert counts.crashes == sum(died)
 
 
 def test_so_many_messages_end_it_and_it_goes_on_from_there() -> None:
-    whole = Runner(Talking, Talking.name, Plan(messages=300, seed=SEED)).run().counts
+    whole = TargetRunner(Talking, Talking.name, FuzzPlan(messages=300, seed=SEED)).run().counts
     assert 300 <= whole.messages < 305
-    begun = Runner(Talking, Talking.name, Plan(20, seed=SEED)).run().counts
-    rest = Runner(Talking, Talking.name, Plan(whole.inputs - 20, seed=SEED, first=20)).run().counts
+    begun = TargetRunner(Talking, Talking.name, FuzzPlan(20, seed=SEED)).run().counts
+    rest = TargetRunner(Talking, Talking.name, FuzzPlan(whole.inputs - 20, seed=SEED, first=20)).run().counts
     assert begun.messages + rest.messages == whole.messages
     assert begun.accepted + rest.accepted == whole.accepted
 
 
 def test_a_saved_input_says_again_what_it_did() -> None:
-    attempt = Attempt(Broken())
+    attempt = InputFeeder(Broken())
     with attempt.watching():
         assert attempt.feed(b"right") is True
         assert attempt.feed(b"wrong") is False
@@ -168,8 +168,8 @@ def test_a_saved_input_says_again_what_it_did() -> None:
 
 
 @pytest.fixture(scope="module")
-def strangers() -> Iterator[Strangers]:
-    target = Strangers()
+def strangers() -> Iterator[UnauthenticatedRequests]:
+    target = UnauthenticatedRequests()
     yield target
     target.close()
 
@@ -185,7 +185,7 @@ def strangers() -> Iterator[Strangers]:
     ],
 )
 def test_a_site_that_lets_anybody_in_is_found_out(
-    asked: str, who: str, strangers: Strangers, monkeypatch: pytest.MonkeyPatch
+    asked: str, who: str, strangers: UnauthenticatedRequests, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     token = f"Authorization: Bearer {SECRETS[who]}\r\n" if who else ""
     request = f"\0GET {asked} HTTP/1.1\r\nHost: x\r\n{token}Connection: close\r\n\r\n".encode()

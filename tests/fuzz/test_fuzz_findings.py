@@ -12,7 +12,7 @@ from typing import Any
 import av
 import pytest
 
-from benchmarks.fuzz.engine.fed_site import KEYS, STRIDE, Fed, pictures, site, video
+from benchmarks.fuzz.engine.fed_site import KEYS, STRIDE, FedService, pictures, site, video
 from bestview import validate_homography
 from client.media_stream import MediaStreamError
 from client.remux import remux
@@ -170,7 +170,7 @@ def test_a_number_of_many_digits_is_not_repeated_whole(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("damaged", [b"", b"\x00\x00\x01", b"\x00\x00\x01\x41", b"\x00\x00\x01\x09\xf0"])
 async def test_an_access_unit_without_a_picture_is_counted_and_dropped(damaged: bytes) -> None:
-    service, units = Fed(site()), pictures(0, STRIDE)
+    service, units = FedService(site()), pictures(0, STRIDE)
     service.handle(video("c0", units[0]))
     right = video("c0", units[1])
     service.handle(Message(right.key, damaged, right.attachment))
@@ -277,7 +277,7 @@ def test_words_nested_without_end_are_counted_and_dropped() -> None:
     exchange = PeerDetectionExchange(site(), "c0", None, 50)
     payload = b'{"x":' * 100_000
     exchange._read(Message(KEYS.camera("c1", "detections"), payload, b""))
-    service = Fed(site())
+    service = FedService(site())
     service.handle(Message(KEYS.camera("c0", "status"), payload, b""))
     assert exchange.bad_messages == service.ingest.states["c0"].bad_messages == 1
 
@@ -296,7 +296,7 @@ BAD_REQUESTS: list[bytes] = [
 async def test_what_is_no_request_leaves_no_traceback_in_the_log(
     request_bytes: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:
-    service = Fed(site())
+    service = FedService(site())
     settings: Any = service.config.http.model_copy(update={"port": 0})
     with caplog.at_level(logging.DEBUG):
         async with serving(make_app(BestViewService(service)), settings) as port:

@@ -19,7 +19,7 @@ from hypothesis.errors import Unsatisfiable
 from schemathesis import GenerationMode
 from schemathesis.checks import content_type_conformance, response_schema_conformance, status_code_conformance
 
-from benchmarks.fuzz.http.served_site import Served
+from benchmarks.fuzz.http.served_site import ServedSite
 from fakes.timeouts import PATIENCE
 
 CASES = 4
@@ -42,7 +42,7 @@ class Site:
 @pytest.fixture(scope="module")
 def described() -> Iterator[Site]:
     """Serve a site in a thread of its own: schemathesis waits for answers."""
-    served = Served(loop=asyncio.new_event_loop())
+    served = ServedSite(loop=asyncio.new_event_loop())
     loop = served.loop
     thread = threading.Thread(target=loop.run_forever)
     thread.start()

@@ -20,7 +20,7 @@ Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class ColourSettings:
+class MeetingSettings:
     """When people meet, and what it takes to say that paths swapped them.
 
     Attributes:
@@ -37,7 +37,7 @@ class ColourSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Walker:
+class PathAppearance:
     """One path and what it looks like.
 
     Attributes:
@@ -57,24 +57,24 @@ class Walker:
         """The frame after its last."""
         return self.first + len(self.places)
 
-    def look(self, begin: int, end: int) -> _Look:
+    def look(self, begin: int, end: int) -> _AppearanceSums:
         """Return what it looks like over some frames."""
         span = slice(max(begin - self.first, 0), max(end - self.first, 0))
         pixels = self.pixels[span].astype(np.float64)
-        return _Look((self.looks[span] * pixels[..., None]).sum(axis=0), pixels.sum(axis=0))
+        return _AppearanceSums((self.looks[span] * pixels[..., None]).sum(axis=0), pixels.sum(axis=0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Look:
+class _AppearanceSums:
     """Sums over frames: (C, B) histograms by pixels, (C,) pixels."""
 
     rows: Floats
     pixels: Floats
 
-    def and_also(self, other: _Look) -> _Look:
-        return _Look(self.rows + other.rows, self.pixels + other.pixels)
+    def and_also(self, other: _AppearanceSums) -> _AppearanceSums:
+        return _AppearanceSums(self.rows + other.rows, self.pixels + other.pixels)
 
-    def apart(self, other: _Look, least: float) -> float:
+    def apart(self, other: _AppearanceSums, least: float) -> float:
         """Return the mean Bhattacharyya distance over the cameras that know both; NaN: none does."""
         known = (self.pixels >= least) & (other.pixels >= least)
         if not known.any():
@@ -94,7 +94,7 @@ class _Meeting:
     members: frozenset[int]
 
 
-def numbers_of(walkers: Sequence[Walker], person: float, settings: ColourSettings) -> list[Ints]:
+def numbers_of(walkers: Sequence[PathAppearance], person: float, settings: MeetingSettings) -> list[Ints]:
     """Return every path's number (F,) in each of its frames.
 
     Args:
@@ -103,7 +103,7 @@ def numbers_of(walkers: Sequence[Walker], person: float, settings: ColourSetting
         settings: what tells people apart.
     """
     numbers = [np.full(len(it.places), place + 1, dtype=np.int64) for place, it in enumerate(walkers)]
-    known = [_Look(np.zeros(it.looks.shape[1:]), np.zeros(it.pixels.shape[1:])) for it in walkers]
+    known = [_AppearanceSums(np.zeros(it.looks.shape[1:]), np.zeros(it.pixels.shape[1:])) for it in walkers]
     since = [it.first for it in walkers]
     meetings = _meetings(walkers, settings.near * person)
     for place, meeting in enumerate(meetings):
@@ -133,7 +133,7 @@ def numbers_of(walkers: Sequence[Walker], person: float, settings: ColourSetting
     return numbers
 
 
-def _meetings(walkers: Sequence[Walker], near: float) -> list[_Meeting]:
+def _meetings(walkers: Sequence[PathAppearance], near: float) -> list[_Meeting]:
     """Return the meetings in order: frames in which paths are near each other, overlapping ones as one."""
     found: list[_Meeting] = []
     for one, first in enumerate(walkers):

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.bestview.occupancy.foreground_masks import Masks
+from benchmarks.bestview.occupancy.foreground_masks import ForegroundMasks
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEndedError
 from server.config.site_config import Config
@@ -21,7 +21,7 @@ _BINS = AppearanceSettings().color_bins
 
 
 def looks_of(
-    config: Config, camera: str, masks: Masks, firsts: Sequence[int], boxes: Sequence[Floats]
+    config: Config, camera: str, masks: ForegroundMasks, firsts: Sequence[int], boxes: Sequence[Floats]
 ) -> tuple[list[NDArray[np.float32]], list[NDArray[np.float32]]]:
     """Look at a recording again; give each path's looks (F, B), and of how many pixels they are (F,).
 

@@ -22,7 +22,7 @@ _ASKED = 40
 
 
 @dataclass(frozen=True, slots=True)
-class FloorSettings:
+class GridSettings:
     """The grid on the ground. Lengths are in person heights.
 
     Attributes:
@@ -41,7 +41,7 @@ class FloorSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class CameraView:
     """A camera.
 
     Attributes:
@@ -102,7 +102,7 @@ class View:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Floor:
+class FloorGrid:
     """The grid.
 
     Attributes:
@@ -120,7 +120,7 @@ class Floor:
     person: float
 
 
-def lay_out(views: Sequence[View], settings: FloorSettings) -> Floor:
+def lay_out(views: Sequence[CameraView], settings: GridSettings) -> FloorGrid:
     """Put a grid over all the ground on which some camera shows people."""
     person = float(np.median([view.person() for view in views]))
     shown = np.concatenate([view.ground() for view in views])
@@ -138,11 +138,11 @@ def lay_out(views: Sequence[View], settings: FloorSettings) -> Floor:
     inner = cv2.erode(np.pad(inside, 1).astype(np.uint8), np.ones((2 * reach + 1,) * 2, dtype=np.uint8))
     places = mesh[inside]
     rectangles = tuple(view.cells(view.boxes(places, settings.aspect)) for view in views)
-    return Floor(places, np.stack(moves, axis=1), inner[rows, columns] == 0, rectangles, person)
+    return FloorGrid(places, np.stack(moves, axis=1), inner[rows, columns] == 0, rectangles, person)
 
 
 def _mesh(
-    views: Sequence[View], shown: Floats, step: float, settings: FloorSettings
+    views: Sequence[CameraView], shown: Floats, step: float, settings: GridSettings
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Return the places (R, C, 2) of a grid around what is shown, and which of them are."""
     (left, top), (right, bottom) = shown.min(axis=0), shown.max(axis=0)

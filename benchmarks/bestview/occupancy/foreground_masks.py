@@ -24,7 +24,7 @@ CELL = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Masks:
+class ForegroundMasks:
     """What one camera's detector sees, frame by frame, in cells.
 
     Attributes:
@@ -46,7 +46,7 @@ class CannotMapError(Exception):
     """There is no occupancy map; the text says why."""
 
 
-def masks_of(config: Config, camera: str) -> Masks:
+def masks_of(config: Config, camera: str) -> ForegroundMasks:
     """Search a recording as a camera's process does, and keep the foreground.
 
     Raises:
@@ -56,7 +56,7 @@ def masks_of(config: Config, camera: str) -> Masks:
     detector = pipeline._detector  # noqa: SLF001 — the very masks that its boxes come from
     if not isinstance(detector, BackgroundDetector):
         raise CannotMapError(f"camera {camera} is not searched by its background")
-    heard = _Heard(detector)
+    heard = _MaskRecorder(detector)
     detector._fit = heard  # type: ignore[method-assign]  # noqa: SLF001
     foreground: list[Mask | None] = []
     shadow: list[Mask | None] = []
@@ -73,10 +73,10 @@ def masks_of(config: Config, camera: str) -> Masks:
     if line is None or grid is None:
         raise CannotMapError(f"how tall people are in camera {camera} is never known")
     weight = np.asarray(_cells(grid.visible) > 127, dtype=np.float64)
-    return Masks(pipeline.source.size, foreground, shadow, weight, line.in_cells(grid.scale, 0.0))
+    return ForegroundMasks(pipeline.source.size, foreground, shadow, weight, line.in_cells(grid.scale, 0.0))
 
 
-class _Heard:
+class _MaskRecorder:
     """Stands before a detector's search for people, and keeps what that is given."""
 
     def __init__(self, detector: BackgroundDetector) -> None:

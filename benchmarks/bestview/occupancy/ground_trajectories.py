@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.bestview.occupancy.floor_grid import Floor, Ints, View
-from benchmarks.bestview.occupancy.shortest_paths import Path
+from benchmarks.bestview.occupancy.floor_grid import CameraView, FloorGrid, Ints
+from benchmarks.bestview.occupancy.shortest_paths import GridPath
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow
 
@@ -17,7 +17,7 @@ _LEAST = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class WalkSettings:
+class TrajectorySettings:
     """How places become boxes.
 
     Attributes:
@@ -33,14 +33,14 @@ class WalkSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Walk:
+class GroundTrajectory:
     """Where one person is: (F, 2) ground units, from the frame `first` on."""
 
     first: int
     places: Floats
 
 
-def walk_of(floor: Floor, q: Floats, path: Path, reach: int) -> Walk:
+def walk_of(floor: FloorGrid, q: Floats, path: GridPath, reach: int) -> GroundTrajectory:
     """Return a walk: places averaged over `reach` frames around, weighted by likelihood."""
     frames = path.first + np.arange(len(path.places))
     around = floor.moves[path.places]
@@ -49,7 +49,7 @@ def walk_of(floor: Floor, q: Floats, path: Path, reach: int) -> Walk:
     weight = np.where(there, q[frames[:, None], near], 0.0)
     weight += _LEAST * (near == path.places[:, None])
     places = (weight[..., None] * floor.places[near]).sum(axis=1) / weight.sum(axis=1)[:, None]
-    return Walk(path.first, smoothed(np.asarray(places), reach))
+    return GroundTrajectory(path.first, smoothed(np.asarray(places), reach))
 
 
 def smoothed(places: Floats, reach: int) -> Floats:
@@ -61,7 +61,7 @@ def smoothed(places: Floats, reach: int) -> Floats:
 
 
 def rows_of_walks(
-    view: View, walks: Sequence[Walk], numbers: Sequence[Ints], settings: WalkSettings
+    view: CameraView, walks: Sequence[GroundTrajectory], numbers: Sequence[Ints], settings: TrajectorySettings
 ) -> list[MotRow]:
     """Return all boxes of a camera by person and frame, cut at the borders of the picture."""
     width, height = view.size

@@ -43,7 +43,7 @@ class OccupancySettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sight:
+class ForegroundObservation:
     """What one camera sees in one frame.
 
     Attributes:
@@ -69,7 +69,7 @@ class OccupancyMap:
         self._settings = settings
         self._rectangles = rectangles
 
-    def occupied(self, sights: Sequence[Sight]) -> Floats:
+    def occupied(self, sights: Sequence[ForegroundObservation]) -> Floats:
         """Return the probabilities (L,), the fixed point of the paper's mean field (its equation 15).
 
         With A_c the picture of all rectangles where somebody is, expected under q, and B_c the foreground,
@@ -96,7 +96,9 @@ class OccupancyMap:
 class _Camera:
     """One camera's foreground beside its rectangles."""
 
-    def __init__(self, rectangles: NDArray[np.int64], sight: Sight, least_area: float) -> None:
+    def __init__(
+        self, rectangles: NDArray[np.int64], sight: ForegroundObservation, least_area: float
+    ) -> None:
         self._shape = sight.weight.shape
         left, top, right, bottom = rectangles.T
         wide = self._shape[1] + 1

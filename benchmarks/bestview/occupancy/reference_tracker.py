@@ -13,15 +13,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from benchmarks.bestview.camera_tracks import Rows
-from benchmarks.bestview.occupancy.appearance_association import ColourSettings, Walker, numbers_of
+from benchmarks.bestview.occupancy.appearance_association import MeetingSettings, PathAppearance, numbers_of
 from benchmarks.bestview.occupancy.color_histograms import looks_of
-from benchmarks.bestview.occupancy.floor_grid import Floor, FloorSettings, Ints, View, lay_out
-from benchmarks.bestview.occupancy.foreground_masks import Masks, masks_of
-from benchmarks.bestview.occupancy.ground_trajectories import Walk, WalkSettings, rows_of_walks, walk_of
+from benchmarks.bestview.occupancy.floor_grid import CameraView, FloorGrid, GridSettings, Ints, lay_out
+from benchmarks.bestview.occupancy.foreground_masks import ForegroundMasks, masks_of
+from benchmarks.bestview.occupancy.ground_trajectories import (
+    GroundTrajectory,
+    TrajectorySettings,
+    rows_of_walks,
+    walk_of,
+)
 from benchmarks.bestview.occupancy.homography_alignment import levelled
-from benchmarks.bestview.occupancy.occupancy_map import OccupancyMap, OccupancySettings, Sight
+from benchmarks.bestview.occupancy.occupancy_map import ForegroundObservation, OccupancyMap, OccupancySettings
 from benchmarks.bestview.occupancy.shortest_paths import Lattice, shortest_paths
-from benchmarks.bestview.scenes import Case
+from benchmarks.bestview.scenes import BenchmarkScene
 from server.config.site_config import Config
 from server.service.view_selection.decider import camera_homographies
 from tracking.boxes import Floats
@@ -47,17 +52,19 @@ class PathSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class ReferenceSettings:
     """All of it."""
 
-    floor: FloorSettings = field(default_factory=FloorSettings)
+    floor: GridSettings = field(default_factory=GridSettings)
     map: OccupancySettings = field(default_factory=OccupancySettings)
     paths: PathSettings = field(default_factory=PathSettings)
-    colours: ColourSettings = field(default_factory=ColourSettings)
-    walks: WalkSettings = field(default_factory=WalkSettings)
+    colours: MeetingSettings = field(default_factory=MeetingSettings)
+    walks: TrajectorySettings = field(default_factory=TrajectorySettings)
 
 
-def occupancy_rows(case: Case, boxes: Rows, settings: Settings | None = None) -> dict[str, list[MotRow]]:
+def occupancy_rows(
+    case: BenchmarkScene, boxes: Rows, settings: ReferenceSettings | None = None
+) -> dict[str, list[MotRow]]:
     """Return everybody's boxes in every camera by their number.
 
     Args:
@@ -68,7 +75,7 @@ def occupancy_rows(case: Case, boxes: Rows, settings: Settings | None = None) ->
     Raises:
         CannotMapError: there is no foreground to explain.
     """
-    settings, config = settings or Settings(), case.config()
+    settings, config = settings or ReferenceSettings(), case.config()
     masks = {camera: masks_of(config, camera) for camera in case.gt}
     ground = {camera: it for camera, it in camera_homographies(config).items() if it is not None}
     views = views_of(masks, ground, boxes)
@@ -82,15 +89,17 @@ def occupancy_rows(case: Case, boxes: Rows, settings: Settings | None = None) ->
     return {camera: rows_of_walks(view, walks, numbers, settings.walks) for camera, view in views.items()}
 
 
-def views_of(masks: Mapping[str, Masks], ground: Mapping[str, Floats], boxes: Rows) -> dict[str, View]:
+def views_of(
+    masks: Mapping[str, ForegroundMasks], ground: Mapping[str, Floats], boxes: Rows
+) -> dict[str, CameraView]:
     """Return the cameras, their homographies shifted until their feet agree."""
-    views = {camera: View(ground[camera], it.size, it.line, it.weight) for camera, it in masks.items()}
+    views = {camera: CameraView(ground[camera], it.size, it.line, it.weight) for camera, it in masks.items()}
     person = float(np.median([view.person() for view in views.values()]))
     level = levelled(boxes, ground, {camera: it.size[1] for camera, it in views.items()}, person)
     return {camera: replace(view, homography=level[camera]) for camera, view in views.items()}
 
 
-def occupancy(floor: Floor, masks: Sequence[Masks], settings: OccupancySettings) -> Floats:
+def occupancy(floor: FloorGrid, masks: Sequence[ForegroundMasks], settings: OccupancySettings) -> Floats:
     """Return the probabilities (T, L) that somebody stands at each place in each frame."""
     mapping = OccupancyMap(floor.rectangles, settings)
     frames = max(len(it.foreground) for it in masks)
@@ -100,7 +109,7 @@ def occupancy(floor: Floor, masks: Sequence[Masks], settings: OccupancySettings)
     return q
 
 
-def lattice_of(floor: Floor, q: Floats, settings: PathSettings) -> Lattice:
+def lattice_of(floor: FloorGrid, q: Floats, settings: PathSettings) -> Lattice:
     """Return the paper's network: being at a place costs `-log(q / (1 - q))`."""
     sure = np.clip(q, settings.doubt, 1.0 - settings.doubt)
     gates = np.where(floor.gates, settings.gate_cost, settings.inside_cost)
@@ -109,11 +118,11 @@ def lattice_of(floor: Floor, q: Floats, settings: PathSettings) -> Lattice:
 
 def walkers_of(
     config: Config,
-    masks: Mapping[str, Masks],
-    views: Mapping[str, View],
-    walks: Sequence[Walk],
+    masks: Mapping[str, ForegroundMasks],
+    views: Mapping[str, CameraView],
+    walks: Sequence[GroundTrajectory],
     aspect: float,
-) -> list[Walker]:
+) -> list[PathAppearance]:
     """Return what everybody looks like in all cameras, along their walks."""
     firsts = [walk.first for walk in walks]
     seen = []
@@ -121,7 +130,7 @@ def walkers_of(
         boxes = [view.boxes(walk.places, aspect) for walk in walks]
         seen.append(looks_of(config, camera, masks[camera], firsts, boxes))
     return [
-        Walker(
+        PathAppearance(
             walk.first,
             walk.places,
             np.stack([looks[place] for looks, _ in seen], axis=1),
@@ -131,13 +140,13 @@ def walkers_of(
     ]
 
 
-def _sight(masks: Masks, frame: int) -> Sight:
+def _sight(masks: ForegroundMasks, frame: int) -> ForegroundObservation:
     """Return a frame's foreground; shadows tell nothing, and neither does a frame that is not there."""
     one = masks.foreground[frame] if frame < len(masks.foreground) else None
     other = masks.shadow[frame] if frame < len(masks.shadow) else None
     if one is None or other is None:
-        return Sight(np.zeros_like(masks.weight), np.zeros_like(masks.weight))
-    return Sight(one / 255.0, masks.weight * (1.0 - other / 255.0))
+        return ForegroundObservation(np.zeros_like(masks.weight), np.zeros_like(masks.weight))
+    return ForegroundObservation(one / 255.0, masks.weight * (1.0 - other / 255.0))
 
 
 def _whole(costs: Floats) -> Ints:

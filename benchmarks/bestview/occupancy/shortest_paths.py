@@ -39,14 +39,14 @@ class Lattice:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Path:
+class GridPath:
     """Where one person is: the frame `first` and the `places` (F,) from there on."""
 
     first: int
     places: Ints
 
 
-def shortest_paths(lattice: Lattice) -> list[Path]:
+def shortest_paths(lattice: Lattice) -> list[GridPath]:
     """Return the paths of least total cost, by their first frame and place."""
     flow = _Flow(lattice)
     while flow.augment():
@@ -85,7 +85,7 @@ class _Flow:
         self._take(frame, place)
         return True
 
-    def paths(self) -> list[Path]:
+    def paths(self) -> list[GridPath]:
         """Return the paths that are in use."""
         found = []
         for first, place in zip(*np.nonzero(self._used & (self._before == _END)), strict=True):
@@ -94,7 +94,7 @@ class _Flow:
                 places.append(here)
                 here = int(self._after[frame, here])
                 frame += 1
-            found.append(Path(int(first), np.array(places, dtype=np.int64)))
+            found.append(GridPath(int(first), np.array(places, dtype=np.int64)))
         return found
 
     def _measure(self) -> None:

@@ -12,8 +12,8 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 from benchmarks.common.environment import CannotRunError
-from benchmarks.faults.site.fault_site import Fault, Inject, Stand, with_up
-from benchmarks.faults.video.stamped_views import Views
+from benchmarks.faults.site.fault_site import Fault, FaultSite, Inject, with_up
+from benchmarks.faults.video.stamped_views import StampedViews
 from client import site
 
 _HOUR_S = 3600
@@ -63,7 +63,7 @@ time_t time(time_t *now) {
 """
 
 
-class Clock:
+class ClockOffset:
     """Seconds by which the site's clock is ahead."""
 
     def __init__(self, path: Path) -> None:
@@ -78,7 +78,7 @@ class Clock:
 
 
 @contextlib.asynccontextmanager
-async def with_clock(views: Views, folder: Path) -> AsyncIterator[Stand]:
+async def with_clock(views: StampedViews, folder: Path) -> AsyncIterator[FaultSite]:
     """Run a site with a clock that can be stepped.
 
     Raises:
@@ -94,7 +94,7 @@ async def with_clock(views: Views, folder: Path) -> AsyncIterator[Stand]:
     )
     if await compiling.wait():
         raise CannotRunError("gcc could not compile what steps the clock")
-    clock = await asyncio.to_thread(Clock, shared)
+    clock = await asyncio.to_thread(ClockOffset, shared)
     environment = {"LD_PRELOAD": str(shim), "FAULTS_CLOCK": str(shared)}
     async with with_up(views, folder, environment=environment) as stand:
         stand.control = clock
@@ -104,7 +104,7 @@ async def with_clock(views: Views, folder: Path) -> AsyncIterator[Stand]:
 def stepped(seconds: int) -> Inject:
     """Step the clock of all processes."""
 
-    async def inject(stand: Stand) -> None:
+    async def inject(stand: FaultSite) -> None:
         before = (await site(stand.url)).now - time.time()
         stand.control.step(seconds)
         after = (await site(stand.url)).now - time.time()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import yaml
 
-from benchmarks.faults.site.fault_site import Fault, Stand, with_up
+from benchmarks.faults.site.fault_site import Fault, FaultSite, with_up
 from benchmarks.latency.running_site import CONFIG, LOG
 
 _MISTAKE = {"view": {"switch_cost_s": "banana"}}
@@ -18,7 +18,7 @@ _WITHIN_S = 5.0
 _POLL_S = 0.05
 
 
-async def mistaken(stand: Stand) -> None:
+async def mistaken(stand: FaultSite) -> None:
     """Write a mistake into the file, have it read again, and wait until the error is told; then mend it.
 
     Raises:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from benchmarks.common.environment import CannotRunError, one_thread_environment
 from benchmarks.faults.injection.separate_processes import configured
-from benchmarks.faults.site.fault_site import Fault, Stand, listening, told_to_end
-from benchmarks.faults.video.stamped_views import Views
+from benchmarks.faults.site.fault_site import Fault, FaultSite, listening, told_to_end
+from benchmarks.faults.video.stamped_views import StampedViews
 
 _MB = 48
 _FULL_S = 6.0
@@ -23,7 +23,7 @@ _DECIDED = "decided"
 
 
 @contextlib.asynccontextmanager
-async def on_small_disk(views: Views, folder: Path) -> AsyncIterator[Stand]:
+async def on_small_disk(views: StampedViews, folder: Path) -> AsyncIterator[FaultSite]:
     """Run `myview up`, which records onto a small disk, and writes what it decides there, too.
 
     Raises:
@@ -45,7 +45,7 @@ async def on_small_disk(views: Views, folder: Path) -> AsyncIterator[Stand]:
         )
     disk: int | None = None
     try:
-        stand = Stand(url, folder, process.pid)
+        stand = FaultSite(url, folder, process.pid)
         async with listening(stand):
             disk = os.open(f"/proc/{process.pid}/root{kept}", os.O_RDONLY | os.O_DIRECTORY)
             stand.recorded = Path(f"/proc/self/fd/{disk}")  # it is there as long as this is open
@@ -57,7 +57,7 @@ async def on_small_disk(views: Views, folder: Path) -> AsyncIterator[Stand]:
             await process.wait()
 
 
-async def full(stand: Stand) -> None:
+async def full(stand: FaultSite) -> None:
     """Fill the disk, and make room again after a while."""
     filler = stand.recorded / "filler"
     await asyncio.to_thread(_fill, filler)

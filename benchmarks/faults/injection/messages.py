@@ -19,9 +19,9 @@ import aiohttp
 
 from benchmarks.common.environment import one_thread_environment
 from benchmarks.faults.injection.separate_processes import apart
-from benchmarks.faults.site.fault_site import Fault, Inject, Stand
+from benchmarks.faults.site.fault_site import Fault, FaultSite, Inject
 from benchmarks.faults.site.lossy_bus import FOUND, POINTING
-from benchmarks.faults.video.stamped_views import CAMERAS, Views
+from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews
 from client import Gop
 from server.cli.generated_config import free_port
 from server.http.access.csrf import CSRF_HEADER
@@ -33,7 +33,7 @@ _KINDS = ("tracks", "status", FOUND, POINTING)
 _POLL_S = 0.05
 
 
-class _Middle:
+class _LossyBusProcess:
     """The process in the middle."""
 
     def __init__(self, connect: str, listen: Mapping[str, str]) -> None:
@@ -63,11 +63,11 @@ class _Middle:
 
 
 @contextlib.asynccontextmanager
-async def with_middle(views: Views, folder: Path) -> AsyncIterator[Stand]:
+async def with_middle(views: StampedViews, folder: Path) -> AsyncIterator[FaultSite]:
     """Run a site whose cameras reach each other and the best view by a process in the middle only."""
     near = {camera: f"tcp/127.0.0.1:{free_port()}" for camera in CAMERAS}
     far = f"tcp/127.0.0.1:{free_port()}"
-    middle = _Middle(far, near)
+    middle = _LossyBusProcess(far, near)
     await middle.start()
     settings: Mapping[str, Mapping[str, Any]] = {
         "zenoh": {"connect": far, "listen": far},
@@ -87,7 +87,7 @@ async def with_middle(views: Views, folder: Path) -> AsyncIterator[Stand]:
         await middle.kill()
 
 
-async def _operate(stand: Stand) -> None:
+async def _operate(stand: FaultSite) -> None:
     """Point at whom viewers watch, once a GOP, where they really are: until cancelled."""
     pointed = 0
     async with aiohttp.ClientSession(stand.url, headers={CSRF_HEADER: "1"}) as session:
@@ -118,7 +118,7 @@ def _pointing(gop: Gop, number: int) -> dict[str, Any] | None:
 def passed(how: str) -> Inject:
     """Let messages pass in some way for a while."""
 
-    async def inject(stand: Stand) -> None:
+    async def inject(stand: FaultSite) -> None:
         before = await stand.control.say(how)
         await asyncio.sleep(_FAULTY_S)
         after = await stand.control.say("plain")
@@ -129,7 +129,7 @@ def passed(how: str) -> Inject:
     return inject
 
 
-async def router_gone(stand: Stand) -> None:
+async def router_gone(stand: FaultSite) -> None:
     """Kill the router, and start it again after a while."""
     await stand.control.kill()
     await asyncio.sleep(_GONE_S)

@@ -8,7 +8,7 @@ import time
 
 from benchmarks.common.browser import chromium, chromium_path
 from benchmarks.common.demo_site import open_when_there
-from benchmarks.faults.site.fault_site import Fault, Stand, with_up
+from benchmarks.faults.site.fault_site import Fault, FaultSite, with_up
 
 _PLAYING_MS = 90_000
 _POLL_S = 0.05
@@ -19,7 +19,7 @@ _END = """() => {
 }"""
 
 
-async def killed(stand: Stand) -> None:
+async def killed(stand: FaultSite) -> None:
     """Kill the best view while a browser shows the page; note when more video than before has come.
 
     Raises:

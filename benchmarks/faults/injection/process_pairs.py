@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from itertools import combinations
 
-from benchmarks.faults.site.fault_site import Stand
+from benchmarks.faults.site.fault_site import FaultSite
 
 BESTVIEW, SYNC, DRAWING = "bestview", "sync", "drawing"
 SHOWN = "shown"
@@ -28,7 +28,7 @@ def title(processes: Collection[str]) -> str:
     return "+".join("camera" if process in (SHOWN, OTHER) else process for process in processes)
 
 
-def names(stand: Stand, processes: Collection[str]) -> list[str]:
+def names(stand: FaultSite, processes: Collection[str]) -> list[str]:
     """Return the names of the processes in a site as it is now."""
     cameras = stand.shown()
     chosen = {SHOWN: cameras[0], OTHER: cameras[1]}

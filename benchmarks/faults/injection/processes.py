@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator
 import aiohttp
 
 from benchmarks.faults.injection.process_pairs import BESTVIEW, DRAWING, SHOWN, names, title, turns
-from benchmarks.faults.site.fault_site import LEASE_S, Fault, Inject, Stand, with_up
+from benchmarks.faults.site.fault_site import LEASE_S, Fault, FaultSite, Inject, with_up
 
 _FROZEN_S = 4.0
 _SOME_BYTES, _MORE_BYTES = 10_000, 100_000
@@ -20,7 +20,7 @@ _AGAIN_S = 0.2
 def killed(*processes: str) -> Inject:
     """Kill processes at once."""
 
-    async def inject(stand: Stand) -> None:
+    async def inject(stand: FaultSite) -> None:
         stand.send(signal.SIGKILL, *names(stand, processes))
 
     return inject
@@ -29,7 +29,7 @@ def killed(*processes: str) -> Inject:
 def frozen(*processes: str, seconds: float = _FROZEN_S) -> Inject:
     """Stop processes for a while."""
 
-    async def inject(stand: Stand) -> None:
+    async def inject(stand: FaultSite) -> None:
         chosen = names(stand, processes)
         stand.send(signal.SIGSTOP, *chosen)
         try:
@@ -46,7 +46,7 @@ def while_drawing(inject: Inject, *, breaks: bool) -> Inject:
     Their stream goes on; where it breaks with its server, it is opened again, and pictures come.
     """
 
-    async def injected(stand: Stand) -> None:
+    async def injected(stand: FaultSite) -> None:
         path = f"/objects/{stand.viewers[0].number}/best.mjpeg"
         async with aiohttp.ClientSession(stand.url, raise_for_status=True) as session:
             async with _pictures(session, path) as content:

@@ -13,14 +13,14 @@ import yaml
 
 from benchmarks.common.environment import one_thread_environment
 from benchmarks.faults.injection.process_pairs import BESTVIEW, DRAWING, names, title, turns
-from benchmarks.faults.site.fault_site import SETTINGS, Fault, Inject, Stand, listening, told_to_end
-from benchmarks.faults.video.stamped_views import CAMERAS, Views
+from benchmarks.faults.site.fault_site import SETTINGS, Fault, FaultSite, Inject, listening, told_to_end
+from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews
 from server.cli.generated_config import free_port
 
 NAMES = ("bestview", "sync", *CAMERAS)
 
 
-class Apart:
+class SeparateProcesses:
     """Processes that are started one by one; ``own`` is what the environment of each says besides."""
 
     def __init__(
@@ -41,7 +41,7 @@ class Apart:
 
 
 def configured(
-    views: Views, folder: Path, settings: Mapping[str, Mapping[str, Any]] | None = None
+    views: StampedViews, folder: Path, settings: Mapping[str, Mapping[str, Any]] | None = None
 ) -> tuple[Path, str]:
     """Write the configuration of a site on free ports; give it, and the site's address.
 
@@ -66,16 +66,16 @@ def configured(
 
 @contextlib.asynccontextmanager
 async def apart(
-    views: Views,
+    views: StampedViews,
     folder: Path,
     settings: Mapping[str, Mapping[str, Any]] | None = None,
     own: Mapping[str, Mapping[str, str]] | None = None,
-) -> AsyncIterator[Stand]:
+) -> AsyncIterator[FaultSite]:
     """Run a site's processes one by one, each with an environment of its own; in the end tell them to end."""
     config, url = configured(views, folder, settings)
     with (folder / "site.log").open("w", encoding="utf-8") as log:
-        control = Apart(config, log, own)
-        stand = Stand(url, folder, 0, control=control, recorded=folder / "kept")
+        control = SeparateProcesses(config, log, own)
+        stand = FaultSite(url, folder, 0, control=control, recorded=folder / "kept")
         try:
             for name in NAMES:
                 await control.start(name)
@@ -90,11 +90,11 @@ async def apart(
 def restarted(*processes: str) -> Inject:
     """Stop processes, and restart each as soon as it has exited."""
 
-    async def restart(stand: Stand, name: str) -> None:
+    async def restart(stand: FaultSite, name: str) -> None:
         stand.ended.append(await told_to_end(name, stand.control.processes[name]))
         await stand.control.start(name)
 
-    async def inject(stand: Stand) -> None:
+    async def inject(stand: FaultSite) -> None:
         await asyncio.gather(*(restart(stand, name) for name in names(stand, processes)))
 
     return inject

@@ -12,9 +12,9 @@ from pathlib import Path
 import aiohttp
 
 from benchmarks.common.environment import one_thread_environment
-from benchmarks.faults.injection.separate_processes import NAMES, Apart, configured
-from benchmarks.faults.site.fault_site import Ended, Fault, Stand, told_to_end, with_up
-from benchmarks.faults.video.stamped_views import Views
+from benchmarks.faults.injection.separate_processes import NAMES, SeparateProcesses, configured
+from benchmarks.faults.site.fault_site import Fault, FaultSite, ProcessExit, told_to_end, with_up
+from benchmarks.faults.video.stamped_views import StampedViews
 from benchmarks.faults.viewing.viewers import Viewer
 
 _MOMENTS_S = (0.0, 1.0, 3.0)
@@ -24,7 +24,7 @@ _WATCHED_S = 4.0
 _MOMENT_S = 2.0
 
 
-async def right_after_start(views: Views, folder: Path) -> list[Ended]:
+async def right_after_start(views: StampedViews, folder: Path) -> list[ProcessExit]:
     """Start a site, and each process for itself, and tell them to end soon after."""
     config, _ = await asyncio.to_thread(configured, views, folder)
     ended = []
@@ -40,7 +40,7 @@ async def right_after_start(views: Views, folder: Path) -> list[Ended]:
             await asyncio.sleep(moment)
             ended.append(await told_to_end(f"up after {moment:g} s", site))
         for moment in _MOMENTS_S:
-            single = Apart(config, log)
+            single = SeparateProcesses(config, log)
             for name in NAMES:
                 await single.start(name)
             await asyncio.gather(*(_begun(it) for it in single.processes.values()))
@@ -62,7 +62,7 @@ async def _begun(process: asyncio.subprocess.Process) -> None:
         await asyncio.sleep(_POLL_S)
 
 
-async def while_watched(views: Views, folder: Path) -> list[Ended]:
+async def while_watched(views: StampedViews, folder: Path) -> list[ProcessExit]:
     """Shut a site down while a client of every kind is connected.
 
     Raises:
@@ -84,10 +84,10 @@ async def while_watched(views: Views, folder: Path) -> list[Ended]:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
     left = await _left(before)
-    return [*stand.ended, *(Ended(f"{name} is left behind", 0.0, None) for name in left)]
+    return [*stand.ended, *(ProcessExit(f"{name} is left behind", 0.0, None) for name in left)]
 
 
-def _below(stand: Stand) -> list[tuple[str, int]]:
+def _below(stand: FaultSite) -> list[tuple[str, int]]:
     return [(name, pid) for name in (*NAMES, "drawing") for pid in stand.pids(name)]
 
 

@@ -8,10 +8,10 @@ from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.faults.site.fault_site import LEASE_S, Fault, Inject, Stand, with_up
-from benchmarks.faults.video.network_camera import Film, NetworkCamera
+from benchmarks.faults.site.fault_site import LEASE_S, Fault, FaultSite, Inject, with_up
+from benchmarks.faults.video.network_camera import EncodedFilm, NetworkCamera
 from benchmarks.faults.video.stamp_detector import write_reader
-from benchmarks.faults.video.stamped_views import CAMERAS, Views, make_smaller, make_unattractive
+from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews, make_smaller, make_unattractive
 from client import site
 from server.cli.generated_config import free_port
 
@@ -22,7 +22,7 @@ _PULSES = 6000
 
 
 @contextlib.asynccontextmanager
-async def with_live(views: Views, folder: Path) -> AsyncIterator[Stand]:
+async def with_live(views: StampedViews, folder: Path) -> AsyncIterator[FaultSite]:
     """Run a site whose last camera is one of the network.
 
     Which picture it has at a pulse is not known beforehand: people are found in it by what it says it is.
@@ -33,8 +33,8 @@ async def with_live(views: Views, folder: Path) -> AsyncIterator[Stand]:
     own = await asyncio.to_thread(make_unattractive, views, folder, LIVE, _PULSES)
     reader = await asyncio.to_thread(write_reader, own, LIVE, folder / "reader.onnx")
     source = Path(own.cameras[-1]["source"])
-    whole = await asyncio.to_thread(Film.of, source)
-    smaller = await asyncio.to_thread(lambda: Film.of(make_smaller(source, folder / "smaller.mp4")))
+    whole = await asyncio.to_thread(EncodedFilm.of, source)
+    smaller = await asyncio.to_thread(lambda: EncodedFilm.of(make_smaller(source, folder / "smaller.mp4")))
     camera = NetworkCamera(whole, free_port())
     await camera.open()
     live = {**own.cameras[-1], "source": camera.url}
@@ -48,54 +48,54 @@ async def with_live(views: Views, folder: Path) -> AsyncIterator[Stand]:
             if told.pulse0 is not None:
                 camera.began = told.pulse0
                 await stand.settle()
-            stand.control, stand.live, stand.views = _Control(camera, whole, smaller), (LIVE,), played
+            stand.control, stand.live, stand.views = _CameraControl(camera, whole, smaller), (LIVE,), played
             yield stand
     finally:
         await camera.close()
 
 
-class _Control:
+class _CameraControl:
     """What is broken in this site."""
 
-    def __init__(self, camera: NetworkCamera, whole: Film, smaller: Film) -> None:
+    def __init__(self, camera: NetworkCamera, whole: EncodedFilm, smaller: EncodedFilm) -> None:
         self.camera, self.whole, self.smaller = camera, whole, smaller
 
 
-async def garbage(stand: Stand) -> None:
+async def garbage(stand: FaultSite) -> None:
     """Send bytes that are no video for a while."""
     stand.control.camera.garbage = True
     await asyncio.sleep(_BROKEN_S)
     stand.control.camera.garbage = False
 
 
-async def frozen(stand: Stand) -> None:
+async def frozen(stand: FaultSite) -> None:
     """Send nothing for a while; the connection stands."""
     stand.control.camera.frozen = True
     await asyncio.sleep(_BROKEN_S)
     stand.control.camera.frozen = False
 
 
-async def frozen_for_good(stand: Stand) -> None:
+async def frozen_for_good(stand: FaultSite) -> None:
     """Send nothing any more."""
     stand.control.camera.frozen = True
     await asyncio.sleep(_BROKEN_S)
 
 
-async def resized(stand: Stand) -> None:
+async def resized(stand: FaultSite) -> None:
     """Send pictures of another size for a while."""
     stand.control.camera.film = stand.control.smaller
     await asyncio.sleep(_BROKEN_S)
     stand.control.camera.film = stand.control.whole
 
 
-async def jumped(stand: Stand) -> None:
+async def jumped(stand: FaultSite) -> None:
     """Let time stamps jump ahead by an hour, and back again."""
     stand.control.camera.shift_s += 3600
     await asyncio.sleep(_BROKEN_S)
     stand.control.camera.shift_s -= 3600
 
 
-async def away(stand: Stand) -> None:
+async def away(stand: FaultSite) -> None:
     """Be away; come back with time stamps that are an hour later.
 
     It is tried again ever more seldom, but from 15.5 s on every 10 s, so that the site does at the end of an
@@ -110,7 +110,7 @@ async def away(stand: Stand) -> None:
 def while_shown(inject: Inject) -> Inject:
     """Have somebody watch what is about to break."""
 
-    async def injected(stand: Stand) -> None:
+    async def injected(stand: FaultSite) -> None:
         if LIVE not in [stand.told.shown(viewer.number) for viewer in stand.viewers]:
             raise RuntimeError(f"nobody is shown camera {LIVE}")
         await inject(stand)

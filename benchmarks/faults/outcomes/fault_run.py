@@ -7,9 +7,9 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from benchmarks.faults.site.fault_site import Ended, Fault, Stand
-from benchmarks.faults.video.stamped_views import Views
-from benchmarks.faults.viewing.picture_check import RHYTHM_S, Received, judge
+from benchmarks.faults.site.fault_site import Fault, FaultSite, ProcessExit
+from benchmarks.faults.video.stamped_views import StampedViews
+from benchmarks.faults.viewing.picture_check import RHYTHM_S, PictureVerdict, judge
 from benchmarks.faults.viewing.viewers import Viewer
 
 _VIEWERS = 2
@@ -22,7 +22,7 @@ _POLL_S = 0.05
 
 
 @dataclass(slots=True)
-class Outcome:
+class FaultOutcome:
     """What came of a fault.
 
     ``ordinary`` and ``without`` are the longest seconds without a fresh picture, less the rhythm of GOPs,
@@ -39,7 +39,7 @@ class Outcome:
     page: float | None = None
     """The same of the page, where there is one."""
     reconnections: int = 0
-    received: list[Received] = field(default_factory=list)
+    received: list[PictureVerdict] = field(default_factory=list)
     gops: tuple[int, int] = (0, 0)
     """The GOPs decided meanwhile, by their place in what was told."""
     lost: int | None = None
@@ -47,14 +47,14 @@ class Outcome:
     broken_files: int | None = None
     unlike: list[str] = field(default_factory=list)
     """What was recorded of a network camera as another picture than viewers were shown, in words."""
-    ended: list[Ended] = field(default_factory=list)
+    ended: list[ProcessExit] = field(default_factory=list)
     failed: str = ""
     """What kept it from being measured."""
 
 
-async def run(fault: Fault, stand: Stand, views: Views) -> Outcome:
+async def run(fault: Fault, stand: FaultSite, views: StampedViews) -> FaultOutcome:
     """Let viewers watch, inject the fault, and judge what they received."""
-    outcome = Outcome(fault)
+    outcome = FaultOutcome(fault)
     ended_before = len(stand.ended)
     try:
         await stand.settle()
@@ -88,7 +88,7 @@ async def run(fault: Fault, stand: Stand, views: Views) -> Outcome:
     return outcome
 
 
-async def _injected(fault: Fault, stand: Stand, outcome: Outcome) -> None:
+async def _injected(fault: Fault, stand: FaultSite, outcome: FaultOutcome) -> None:
     try:
         async with asyncio.timeout(fault.seconds + _LONGEST_S):
             await fault.inject(stand)
@@ -96,7 +96,7 @@ async def _injected(fault: Fault, stand: Stand, outcome: Outcome) -> None:
         outcome.failed = f"{type(error).__name__}: {error}"
 
 
-async def _all_watch(stand: Stand) -> None:
+async def _all_watch(stand: FaultSite) -> None:
     """Wait, not for ever, until something has come for all viewers, and one is shown what may break."""
     give_up = time.monotonic() + _JOIN_S
     while time.monotonic() < give_up:
@@ -106,7 +106,7 @@ async def _all_watch(stand: Stand) -> None:
         await asyncio.sleep(_POLL_S)
 
 
-async def _all_back(stand: Stand) -> None:
+async def _all_back(stand: FaultSite) -> None:
     """Wait, not for ever, until the server is back and all viewers have some of it: machines may be busy."""
     give_up = time.monotonic() + _BACK_S
     while time.monotonic() < give_up:
@@ -115,14 +115,14 @@ async def _all_back(stand: Stand) -> None:
         await asyncio.sleep(_POLL_S)
 
 
-def _received(stand: Stand, views: Views) -> list[Received]:
+def _received(stand: FaultSite, views: StampedViews) -> list[PictureVerdict]:
     told, live = stand.told, stand.live
     return [
         judge(viewer.pictures(), told, viewer.number, stand.views or views, live) for viewer in stand.viewers
     ]
 
 
-def _sum_up(outcome: Outcome, received: Sequence[Received], stand: Stand) -> None:
+def _sum_up(outcome: FaultOutcome, received: Sequence[PictureVerdict], stand: FaultSite) -> None:
     outcome.received = list(received)
     begun, until = outcome.began, outcome.until
     spans = [it.without(begun - _BEFORE_S, begun) for it in received]

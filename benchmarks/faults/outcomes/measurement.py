@@ -10,9 +10,9 @@ from pathlib import Path
 from benchmarks.common.environment import CannotRunError
 from benchmarks.common.report import Report
 from benchmarks.faults.outcomes import recording_check
-from benchmarks.faults.outcomes.fault_run import Outcome, run
+from benchmarks.faults.outcomes.fault_run import FaultOutcome, run
 from benchmarks.faults.site.fault_site import Fault
-from benchmarks.faults.video.stamped_views import Views, make
+from benchmarks.faults.video.stamped_views import StampedViews, make
 from client import ClientError
 
 _LINES = 20
@@ -20,22 +20,24 @@ _PULSES = 15_000
 """Detections for so many: ten minutes."""
 
 
-async def measure(faults: list[Fault], folder: Path, report: Report) -> list[Outcome]:
+async def measure(faults: list[Fault], folder: Path, report: Report) -> list[FaultOutcome]:
     """Inject these faults one after the other."""
     views = await asyncio.to_thread(make, folder, _PULSES)
-    outcomes: list[Outcome] = []
+    outcomes: list[FaultOutcome] = []
     groups = itertools.groupby(faults, key=lambda fault: fault.alone or fault.setup)
     for number, (_, some) in enumerate(groups):
         outcomes += await _group(list(some), views, folder / f"site-{number}", report)
     return outcomes
 
 
-async def _group(faults: list[Fault], views: Views, folder: Path, report: Report) -> list[Outcome]:
+async def _group(
+    faults: list[Fault], views: StampedViews, folder: Path, report: Report
+) -> list[FaultOutcome]:
     await asyncio.to_thread(folder.mkdir)
-    outcomes: list[Outcome] = []
+    outcomes: list[FaultOutcome] = []
     try:
         if faults[0].alone is not None:
-            return [Outcome(faults[0], ended=await faults[0].alone(views, folder))]
+            return [FaultOutcome(faults[0], ended=await faults[0].alone(views, folder))]
         async with faults[0].setup(views, folder) as stand:
             for fault in faults:
                 outcomes.append(await run(fault, stand, views))
@@ -49,7 +51,9 @@ async def _group(faults: list[Fault], views: Views, folder: Path, report: Report
     except (ClientError, RuntimeError) as error:
         report.say(f"{faults[0].name} and what follows it: {error}")
         report.say(await asyncio.to_thread(_log_of, folder))
-        outcomes += [Outcome(it, failed="there was no site to try it on") for it in faults[len(outcomes) :]]
+        outcomes += [
+            FaultOutcome(it, failed="there was no site to try it on") for it in faults[len(outcomes) :]
+        ]
     return outcomes
 
 

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.faults.outcomes.fault_run import Outcome
+from benchmarks.faults.outcomes.fault_run import FaultOutcome
 from benchmarks.faults.video.stamped_views import CAMERAS
 
 _COLOURS = ("tab:blue", "tab:orange", "tab:green")
 _ROW_INCHES = 0.35
 
 
-def draw(outcomes: Sequence[Outcome], path: Path) -> None:
+def draw(outcomes: Sequence[FaultOutcome], path: Path) -> None:
     """Draw a line per fault and viewer; time counts from when the fault began."""
     lines = [(it, received) for it in outcomes for received in it.received]
     if not lines:

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from statistics import median_low
 
 from benchmarks.common.report import Report
-from benchmarks.faults.outcomes.fault_run import Outcome
+from benchmarks.faults.outcomes.fault_run import FaultOutcome
 
 _BACK_S = 2.0
 """Promised: from the server's return to the next picture."""
 _NOTES = 3
 
 
-def describe(report: Report, outcomes: Sequence[Outcome]) -> None:
+def describe(report: Report, outcomes: Sequence[FaultOutcome]) -> None:
     """Print what was measured."""
     columns = [
         "fault",
@@ -40,7 +40,7 @@ def describe(report: Report, outcomes: Sequence[Outcome]) -> None:
     report.say(f"{len(outcomes) - len(broken)} of {len(outcomes)} keep all promises" + _list(broken))
 
 
-def kept(outcome: Outcome) -> bool:
+def kept(outcome: FaultOutcome) -> bool:
     """Whether every promise was kept."""
     fault = outcome.fault
     if fault.breaks and (outcome.back is None or max(outcome.back, outcome.page or 0.0) > _BACK_S):
@@ -56,13 +56,13 @@ def kept(outcome: Outcome) -> bool:
     )
 
 
-def _wrong(outcome: Outcome) -> bool:
+def _wrong(outcome: FaultOutcome) -> bool:
     """Whether any picture or box was wrong, or may have been: nothing said of which camera it should be."""
     unnamed = not outcome.fault.breaks and any(it.unnamed for it in outcome.received)
     return unnamed or bool(outcome.unlike) or any(it.wrong or it.wrong_boxes for it in outcome.received)
 
 
-def _row(it: Outcome) -> list[str]:
+def _row(it: FaultOutcome) -> list[str]:
     frames, boxes = sum(r.frames for r in it.received), sum(r.boxes for r in it.received)
     wrong, wrong_boxes = sum(r.wrong for r in it.received), sum(r.wrong_boxes for r in it.received)
     means = sum(r.blurred for r in it.received)
@@ -81,7 +81,7 @@ def _row(it: Outcome) -> list[str]:
     ]
 
 
-def _fresh(it: Outcome) -> str:
+def _fresh(it: FaultOutcome) -> str:
     if not it.received:
         return ""
     if not it.fault.breaks:
@@ -90,7 +90,7 @@ def _fresh(it: Outcome) -> str:
     return f"{'never' if it.back is None else f'{it.back:.2f}'}{page} ({it.without:.2f})"
 
 
-def _promised(it: Outcome) -> str:
+def _promised(it: FaultOutcome) -> str:
     if it.fault.breaks:
         return f"{_BACK_S:g}"
     return "" if it.fault.within is None or not it.received else f"{it.fault.within:g}"

@@ -9,17 +9,17 @@ from pathlib import Path
 import av
 import numpy as np
 
-from benchmarks.faults.outcomes.fault_run import Outcome
+from benchmarks.faults.outcomes.fault_run import FaultOutcome
 from benchmarks.faults.video.stamped_views import FPS, FRAMES, read_stamp
-from benchmarks.faults.viewing.live_pictures import Course, differ
-from benchmarks.faults.viewing.viewers import Told
+from benchmarks.faults.viewing.live_pictures import LiveFrameOrder, differ
+from benchmarks.faults.viewing.viewers import EventLog
 
 _GOES_ON = 5
 """So many of the last GOPs of a fault must be there, whatever it was."""
 
 
 @dataclass(frozen=True, slots=True)
-class File:
+class RecordedFile:
     """One file of a camera.
 
     Attributes:
@@ -34,15 +34,15 @@ class File:
     plays: bool
 
 
-def read(folder: Path, live: Collection[str] = ()) -> list[File]:
+def read(folder: Path, live: Collection[str] = ()) -> list[RecordedFile]:
     """Decode everything that was recorded, in all runs."""
     return [_read(path, live) for path in sorted(folder.glob("*/cameras/*/*.mp4"))]
 
 
-def _read(path: Path, live: Collection[str]) -> File:
+def _read(path: Path, live: Collection[str]) -> RecordedFile:
     camera, plays = path.parent.name, True
     frames: dict[int, int] = {}
-    course = Course() if camera in live else None
+    course = LiveFrameOrder() if camera in live else None
     try:
         with av.open(str(path)) as container:
             for picture in container.decode(video=0):
@@ -57,10 +57,10 @@ def _read(path: Path, live: Collection[str]) -> File:
                     plays &= not course.wrong(pulse, stamp.frame)
     except (av.error.FFmpegError, OSError):
         plays = False
-    return File(camera, int(path.stem), frames, plays)
+    return RecordedFile(camera, int(path.stem), frames, plays)
 
 
-def note(outcomes: Sequence[Outcome], told: Told, files: Sequence[File]) -> None:
+def note(outcomes: Sequence[FaultOutcome], told: EventLog, files: Sequence[RecordedFile]) -> None:
     """Note with each fault what is not on the disk of what was shown meanwhile, and what does not play.
 
     Of a network camera also what is there as another picture than the one that was shown.

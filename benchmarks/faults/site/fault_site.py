@@ -16,8 +16,8 @@ from typing import Any
 import aiohttp
 
 from benchmarks.common.process_load import running_pids
-from benchmarks.faults.video.stamped_views import CAMERAS, Views
-from benchmarks.faults.viewing.viewers import Told, Viewer
+from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews
+from benchmarks.faults.viewing.viewers import EventLog, Viewer
 from benchmarks.latency import running_site as delay_site
 
 LEASE_S = 1.0
@@ -33,7 +33,7 @@ SETTINGS: Mapping[str, Mapping[str, Any]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class ProcessExit:
     """A process that was told to end."""
 
     name: str
@@ -48,16 +48,16 @@ class Ended:
 
 
 @dataclass(slots=True)
-class Stand:
+class FaultSite:
     """A site that runs, and what is heard of it."""
 
     url: str
     folder: Path
     main: int
     """The process that all others are children of; 0: they were started one by one."""
-    told: Told = field(default_factory=Told)
+    told: EventLog = field(default_factory=EventLog)
     viewers: list[Viewer] = field(default_factory=list)
-    ended: list[Ended] = field(default_factory=list)
+    ended: list[ProcessExit] = field(default_factory=list)
     returned: list[float] = field(default_factory=list)
     """When the server answered again after it had not."""
     live: tuple[str, ...] = ()
@@ -67,7 +67,7 @@ class Stand:
     recorded: Path = Path()
     page_at: float | None = None
     """When the page had new pictures again."""
-    views: Views | None = None
+    views: StampedViews | None = None
     """What it plays, where that is not what all sites play."""
 
     def pids(self, name: str) -> list[int]:
@@ -144,7 +144,7 @@ class Stand:
 
 
 @contextlib.asynccontextmanager
-async def listening(stand: Stand) -> AsyncIterator[Stand]:
+async def listening(stand: FaultSite) -> AsyncIterator[FaultSite]:
     """Follow the events of a site, and wait until it is well."""
     tasks = [asyncio.create_task(stand.told.listen(stand.url)), asyncio.create_task(stand.watch_server())]
     try:
@@ -158,11 +158,11 @@ async def listening(stand: Stand) -> AsyncIterator[Stand]:
 
 @contextlib.asynccontextmanager
 async def with_up(
-    views: Views,
+    views: StampedViews,
     folder: Path,
     settings: Mapping[str, Mapping[str, Any]] | None = None,
     environment: Mapping[str, str] | None = None,
-) -> AsyncIterator[Stand]:
+) -> AsyncIterator[FaultSite]:
     """Run `myview up`, which starts again what dies; in the end tell it to end."""
     recorded = folder / "kept"
     content = {name: dict(values) for name, values in SETTINGS.items()}
@@ -170,13 +170,13 @@ async def with_up(
     for name, values in (settings or {}).items():
         content[name] = {**content.get(name, {}), **values}
     async with delay_site.running_site(views, folder, environment, content) as site:
-        stand = Stand(site.url, folder, site.process.pid, recorded=recorded)
+        stand = FaultSite(site.url, folder, site.process.pid, recorded=recorded)
         async with listening(stand):
             yield stand
             stand.ended.append(await told_to_end("up", site.process))
 
 
-async def told_to_end(name: str, process: asyncio.subprocess.Process) -> Ended:
+async def told_to_end(name: str, process: asyncio.subprocess.Process) -> ProcessExit:
     """Send a process SIGTERM; return when and how it exits."""
     begun = time.monotonic()
     process.terminate()
@@ -185,16 +185,16 @@ async def told_to_end(name: str, process: asyncio.subprocess.Process) -> Ended:
     except TimeoutError:
         process.kill()
         await process.wait()
-        return Ended(name, time.monotonic() - begun, None)
-    return Ended(name, time.monotonic() - begun, code)
+        return ProcessExit(name, time.monotonic() - begun, None)
+    return ProcessExit(name, time.monotonic() - begun, code)
 
 
-Inject = Callable[[Stand], Awaitable[None]]
-Alone = Callable[[Views, Path], Awaitable[list[Ended]]]
-Setup = Callable[[Views, Path], contextlib.AbstractAsyncContextManager[Stand]]
+Inject = Callable[[FaultSite], Awaitable[None]]
+Alone = Callable[[StampedViews, Path], Awaitable[list[ProcessExit]]]
+Setup = Callable[[StampedViews, Path], contextlib.AbstractAsyncContextManager[FaultSite]]
 
 
-async def _nothing(stand: Stand) -> None:
+async def _nothing(stand: FaultSite) -> None:
     """Leave it as it is."""
     del stand
 

@@ -42,17 +42,17 @@ def kind_of(key: str) -> str:
     return key.split("/")[_KIND]
 
 
-class Sends(Protocol):
+class MessageSink(Protocol):
     """What a message can be passed on to, such as a bus."""
 
     def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
         """Send a message."""
 
 
-class Way:
+class LossyLink:
     """Passes messages on, more or less."""
 
-    def __init__(self, to: Sends) -> None:
+    def __init__(self, to: MessageSink) -> None:
         self._to, self.how = to, "plain"
         self._random = random.Random(1)
         self._held: dict[str, list[tuple[int, Message]]] = {}
@@ -81,10 +81,10 @@ class Way:
         self._to.publish(message.key, message.payload, message.attachment)
 
 
-class Crossing:
+class MessageRouter:
     """Sends each message to whom it is for: other cameras, one camera, or the best view."""
 
-    def __init__(self, cameras: Mapping[str, Sends], bestview: Sends) -> None:
+    def __init__(self, cameras: Mapping[str, MessageSink], bestview: MessageSink) -> None:
         self._cameras, self._bestview = cameras, bestview
 
     def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
@@ -92,13 +92,13 @@ class Crossing:
         for receiver in self._receivers(camera_of_key(key), kind_of(key)):
             receiver.publish(key, payload, attachment)
 
-    def _receivers(self, camera: str, kind: str) -> list[Sends]:
+    def _receivers(self, camera: str, kind: str) -> list[MessageSink]:
         if kind == FOUND:
             return [bus for other, bus in self._cameras.items() if other != camera]
         return [self._cameras[camera] if kind == POINTING else self._bestview]
 
 
-class _Presence:
+class _BestViewLiveliness:
     """Holds liveliness tokens at the best view's router, one session each."""
 
     def __init__(self, settings: ZenohSettings) -> None:
@@ -114,7 +114,7 @@ class _Presence:
             self._there.pop(key).close()
 
 
-class _Known:
+class _RouterLiveliness:
     """Holds liveliness tokens at some routers, for the life of this process."""
 
     def __init__(self, *routers: Bus) -> None:
@@ -132,16 +132,16 @@ async def _run() -> None:
     there = ZenohSettings(connect=sys.argv[1])
     listens = dict(word.split("=", 1) for word in sys.argv[2:])
     near = {camera: Bus.router(ZenohSettings(listen=address)) for camera, address in listens.items()}
-    far, keys, presence = Bus.client(there), ZenohKeys(SITE), _Presence(there)
-    way = Way(Crossing(near, far))
+    far, keys, presence = Bus.client(there), ZenohKeys(SITE), _BestViewLiveliness(there)
+    way = LossyLink(MessageRouter(near, far))
     for camera, router in near.items():
         for what in _FROM_CAMERAS:
             router.subscribe(keys.camera(camera, what), way.take)
         others = [bus for other, bus in near.items() if other != camera]
-        router.watch_alive(keys.camera(camera, "peer_listener"), _Known(*others).note)
+        router.watch_alive(keys.camera(camera, "peer_listener"), _RouterLiveliness(*others).note)
         router.watch_alive(keys.camera(camera, "alive"), presence.note)
     far.subscribe(keys.camera("*", POINTING), way.take)
-    far.watch_alive(keys.bestview("alive"), _Known(*near.values()).note)
+    far.watch_alive(keys.bestview("alive"), _RouterLiveliness(*near.values()).note)
     reader = asyncio.StreamReader()
     await asyncio.get_running_loop().connect_read_pipe(
         lambda: asyncio.StreamReaderProtocol(reader), sys.stdin.buffer

@@ -24,14 +24,14 @@ _ANSWER = b"HTTP/1.0 200 OK\r\nContent-Type: video/mp2t\r\n\r\n"
 
 
 @dataclass(frozen=True, slots=True)
-class Film:
+class EncodedFilm:
     """What it sends: encoded pictures, over and over again."""
 
     path: Path
     pictures: tuple[bytes, ...]
 
     @classmethod
-    def of(cls, path: Path) -> Film:
+    def of(cls, path: Path) -> EncodedFilm:
         """Read a film."""
         with av.open(str(path)) as container:
             found = [bytes(packet) for packet in container.demux(video=0) if packet.size]
@@ -41,7 +41,7 @@ class Film:
 class _Muxer:
     """Packs pictures of one film into a transport stream."""
 
-    def __init__(self, film: Film) -> None:
+    def __init__(self, film: EncodedFilm) -> None:
         self._film, self._out = film, io.BytesIO()
         self._container = av.open(self._out, "w", format="mpegts")
         with av.open(str(film.path)) as template:
@@ -63,7 +63,7 @@ class _Muxer:
 class NetworkCamera:
     """Serves a film at its rate, to anybody who connects. What is set holds from the next frame on."""
 
-    def __init__(self, film: Film, port: int) -> None:
+    def __init__(self, film: EncodedFilm, port: int) -> None:
         self.film = film
         self.frozen = self.garbage = False
         self.shift_s = 0
@@ -122,7 +122,7 @@ class NetworkCamera:
                 await writer.drain()
             number += 1  # none is left out: the next ones are decoded by it
 
-    def _sent(self) -> tuple[Film, int, float]:
+    def _sent(self) -> tuple[EncodedFilm, int, float]:
         """Return what all that is sent at a stretch has in common."""
         return self.film, self.shift_s, self.began
 

@@ -14,7 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common.environment import CannotRunError
-from benchmarks.faults.video.stamped_views import BITS, BLOCK, EDGE, FRAMES, HEIGHT, NUMBER_BITS, WIDTH, Views
+from benchmarks.faults.video.stamped_views import (
+    BITS,
+    BLOCK,
+    EDGE,
+    FRAMES,
+    HEIGHT,
+    NUMBER_BITS,
+    WIDTH,
+    StampedViews,
+)
 
 _ROW = 6
 """Left, top, right, bottom, score, class: what networks with an end of their own write."""
@@ -23,7 +32,7 @@ _HALF = 0.5
 _OPSET, _IR = 17, 8
 
 
-def write_reader(views: Views, camera: str, path: Path) -> Path:
+def write_reader(views: StampedViews, camera: str, path: Path) -> Path:
     """Write the network for a camera's film.
 
     Raises:
@@ -89,7 +98,7 @@ def _numbers(table: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
     }
 
 
-def _table(views: Views, camera: str) -> NDArray[np.float32]:
+def _table(views: StampedViews, camera: str) -> NDArray[np.float32]:
     """Return the people in each frame of a film, `(frames, most people, 6)`; zeros: no person."""
     frames: list[list[tuple[float, ...]]] = [[] for _ in range(FRAMES)]
     for (of, *sides), frame in views.found.items():

@@ -44,7 +44,7 @@ _TIME_BASE = Fraction(1, 90_000)
 
 
 @dataclass(frozen=True, slots=True)
-class Stamp:
+class FrameStamp:
     """What a picture says of itself."""
 
     camera: str
@@ -53,8 +53,8 @@ class Stamp:
 
 
 @dataclass(frozen=True, slots=True)
-class Views:
-    """What is played: `benchmarks.latency.running_site.Played`."""
+class StampedViews:
+    """What is played: `benchmarks.latency.running_site.PlayedViews`."""
 
     cameras: list[dict[str, Any]]
     site: dict[str, Any]
@@ -79,7 +79,7 @@ def stamped(image: NDArray[np.uint8], camera: int, frame: int) -> NDArray[np.uin
     return marked
 
 
-def read_stamp(grey: NDArray[np.uint8]) -> Stamp | None:
+def read_stamp(grey: NDArray[np.uint8]) -> FrameStamp | None:
     """Read the strip of a picture ``(H, W)``; None where it cannot be read."""
     rows = grey[-BLOCK + EDGE : grey.shape[0] - EDGE, : 2 * BITS * BLOCK].astype(np.float64)
     blocks = rows.reshape(len(rows), 2 * BITS, BLOCK)[:, :, EDGE:-EDGE].mean(axis=(0, 2)) > _MIDDLE
@@ -88,10 +88,10 @@ def read_stamp(grey: NDArray[np.uint8]) -> Stamp | None:
         return None
     value = sum(1 << place for place in np.flatnonzero(bits).tolist())
     camera, frame = divmod(value, 1 << NUMBER_BITS)
-    return Stamp(f"c{camera}", frame)
+    return FrameStamp(f"c{camera}", frame)
 
 
-def make(folder: Path, pulses: int) -> Views:
+def make(folder: Path, pulses: int) -> StampedViews:
     """Write films, detections for so many pulses, and the homographies into a folder."""
     scene = Scene("room", len(CAMERAS), _PEOPLE, _SEED, WIDTH, HEIGHT, FPS)
     places = _places()
@@ -111,10 +111,10 @@ def make(folder: Path, pulses: int) -> Views:
     ground = {name: floor.tolist() for name, floor in floors.items() if floor is not None}
     (folder / "ground.json").write_text(json.dumps({"unit": "m", "homography": ground}), encoding="ascii")
     site = {"name": "faults", "fps": FPS, "width": WIDTH, "height": HEIGHT}
-    return Views(cameras, site, folder / "ground.json", found)
+    return StampedViews(cameras, site, folder / "ground.json", found)
 
 
-def make_unattractive(views: Views, folder: Path, best: str, pulses: int) -> Views:
+def make_unattractive(views: StampedViews, folder: Path, best: str, pulses: int) -> StampedViews:
     """Let people be smaller in all cameras but one, so that this one is shown: by other detections."""
     cameras, found = [], dict(views.found)
     for camera in views.cameras:

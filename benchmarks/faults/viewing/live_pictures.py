@@ -24,7 +24,7 @@ def behind(pulse: int, frame: int) -> int:
     return (pulse - frame + FRAMES // 2) % FRAMES - FRAMES // 2
 
 
-class Course:
+class LiveFrameOrder:
     """Follows the pictures of one network camera, by rising pulses."""
 
     def __init__(self) -> None:

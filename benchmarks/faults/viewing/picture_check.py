@@ -6,14 +6,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from benchmarks.faults.video.stamped_views import FPS, FRAMES, Stamp, Views
-from benchmarks.faults.viewing.live_pictures import Course
-from benchmarks.faults.viewing.viewers import Picture, Told
+from benchmarks.faults.video.stamped_views import FPS, FRAMES, FrameStamp, StampedViews
+from benchmarks.faults.viewing.live_pictures import LiveFrameOrder
+from benchmarks.faults.viewing.viewers import EventLog, ReceivedPicture
 from client import Box, Gop
 
 
 @dataclass(frozen=True, slots=True)
-class Received:
+class PictureVerdict:
     """One viewer's pictures in the time of a fault.
 
     Attributes:
@@ -37,7 +37,7 @@ class Received:
     fresh: tuple[tuple[float, str], ...]
     notes: tuple[str, ...]
     """What was wrong, in words."""
-    courses: Mapping[str, Course]
+    courses: Mapping[str, LiveFrameOrder]
     """What was shown of each network camera."""
 
     def without(self, since: float, until: float) -> float:
@@ -52,14 +52,18 @@ class Received:
 
 
 def judge(
-    pictures: Sequence[Picture], told: Told, number: int, views: Views, live: Iterable[str] = ()
-) -> Received:
+    pictures: Sequence[ReceivedPicture],
+    told: EventLog,
+    number: int,
+    views: StampedViews,
+    live: Iterable[str] = (),
+) -> PictureVerdict:
     """Judge every picture; of the cameras of ``live`` it is known within bounds only which comes when."""
     said = dict(_said(told, number))
-    courses = {camera: Course() for camera in live}
+    courses = {camera: LiveFrameOrder() for camera in live}
     fresh, notes = [], []
     wrong = unnamed = repeated = boxes = wrong_boxes = blurred = 0
-    before: Picture | None = None
+    before: ReceivedPicture | None = None
     for picture in pictures:
         stamp, last, before = picture.stamp, before, picture
         named = picture.pulse in said
@@ -85,10 +89,10 @@ def judge(
                 wrong_boxes += 1
                 notes.append(f"pulse {picture.pulse} of {camera}: a box of frame {frame} on {stamp}")
     counts = len(pictures), wrong, unnamed, repeated, boxes, wrong_boxes, blurred
-    return Received(*counts, tuple(fresh), tuple(notes), courses)
+    return PictureVerdict(*counts, tuple(fresh), tuple(notes), courses)
 
 
-def _of_another_moment(pulse: int, stamp: Stamp, courses: Mapping[str, Course]) -> str:
+def _of_another_moment(pulse: int, stamp: FrameStamp, courses: Mapping[str, LiveFrameOrder]) -> str:
     """Return in what way a picture is not the one of its pulse; empty: it is."""
     course = courses.get(stamp.camera)
     if course is not None:
@@ -96,7 +100,7 @@ def _of_another_moment(pulse: int, stamp: Stamp, courses: Mapping[str, Course]) 
     return "" if stamp.frame == pulse % FRAMES else ", another frame"
 
 
-def _said(told: Told, number: int) -> Iterator[tuple[int, tuple[str | None, tuple[Box, ...]]]]:
+def _said(told: EventLog, number: int) -> Iterator[tuple[int, tuple[str | None, tuple[Box, ...]]]]:
     """Yield for every pulse the camera to be shown and the boxes in its picture.
 
     Where none is chosen, since nobody sees the person, a stream stays with the last one.

@@ -12,7 +12,7 @@ from typing import cast
 import av
 import numpy as np
 
-from benchmarks.faults.video.stamped_views import FPS, Stamp, read_stamp
+from benchmarks.faults.video.stamped_views import FPS, FrameStamp, read_stamp
 from client import Cameras, ClientError, Event, Gop, HttpSettings, events
 from client.fmp4 import BoxReader, decode_time
 from client.http import server_url
@@ -26,18 +26,18 @@ _SETTINGS = HttpSettings()
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class ReceivedPicture:
     """One picture as a viewer got it."""
 
     pulse: int
     at: float
     """When it came, seconds of the monotonic clock."""
-    stamp: Stamp | None
+    stamp: FrameStamp | None
     """What it says of itself; None where it cannot be read."""
 
 
 @dataclass(slots=True)
-class Tape:
+class StreamRecorder:
     """Takes what the player would write into a file, and notes when."""
 
     data: bytearray = field(default_factory=bytearray)
@@ -50,7 +50,7 @@ class Tape:
         self.came.append((time.monotonic(), len(self.data)))
         return len(data)
 
-    def pictures(self) -> list[Picture]:
+    def pictures(self) -> list[ReceivedPicture]:
         """Decode everything."""
         moments: dict[int, float] = {}
         at = 0
@@ -66,7 +66,7 @@ class Tape:
             for frame in container.decode(video=0):
                 pulse = round(float(frame.time or 0.0) * FPS)
                 stamp = read_stamp(np.asarray(frame.to_ndarray(format="gray"), dtype=np.uint8))
-                shown.append(Picture(pulse, moments.get(pulse, 0.0), stamp))
+                shown.append(ReceivedPicture(pulse, moments.get(pulse, 0.0), stamp))
         return shown
 
 
@@ -75,7 +75,7 @@ class Viewer:
 
     def __init__(self, url: str, number: int) -> None:
         self.number = number
-        self.tapes: list[Tape] = []
+        self.tapes: list[StreamRecorder] = []
         self.given_up = 0
         """How often the player took the server for gone for good; it is then started again."""
         self._sessions: list[Session] = []
@@ -89,7 +89,7 @@ class Viewer:
     async def run(self) -> None:
         """Watch until cancelled."""
         while True:
-            self.tapes.append(Tape())
+            self.tapes.append(StreamRecorder())
             record = Recording(cast("io.BufferedWriter", self.tapes[-1]), None)
             self._sessions.append(Session(record, ViewHistory(self.number), None, None, None))
             with contextlib.suppress(ClientError):
@@ -102,13 +102,13 @@ class Viewer:
         """When something came last; 0 before."""
         return max((tape.came[-1][0] for tape in self.tapes if tape.came), default=0.0)
 
-    def pictures(self) -> list[Picture]:
+    def pictures(self) -> list[ReceivedPicture]:
         """Decode what came, in the order in which it came."""
         return [picture for tape in self.tapes for picture in tape.pictures()]
 
 
 @dataclass(slots=True)
-class Told:
+class EventLog:
     """What the server's events said, and when."""
 
     gops: list[tuple[float, Gop]] = field(default_factory=list)

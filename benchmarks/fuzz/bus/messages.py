@@ -9,7 +9,7 @@ import msgspec
 from prometheus_client import generate_latest
 
 from benchmarks.fuzz.bus.damaged_messages import wrong
-from benchmarks.fuzz.bus.retained_state import Memories
+from benchmarks.fuzz.bus.retained_state import RetainedStates
 from benchmarks.fuzz.engine.fed_site import (
     CAMERAS,
     FPS,
@@ -17,7 +17,7 @@ from benchmarks.fuzz.engine.fed_site import (
     KEYS,
     STRIDE,
     WIDTH,
-    Fed,
+    FedService,
     pictures,
     site,
     sound,
@@ -27,7 +27,7 @@ from benchmarks.fuzz.engine.fed_site import (
     video,
     word,
 )
-from benchmarks.fuzz.engine.target import Scripts, Target
+from benchmarks.fuzz.engine.target import ScriptTarget, Target
 from server.camera.operator_corrections import CorrectionInbox as PointedAt
 from server.camera.peers.detection_buffer import PeerDetectionBuffer
 from server.camera.peers.detection_exchange import PeerDetectionExchange
@@ -57,7 +57,7 @@ _script = msgspec.msgpack.Decoder(Script)
 _packed = msgspec.msgpack.encode
 
 
-class Messages(Target):
+class IngestMessages(Target):
     """One message to an ingest that has just begun."""
 
     name = "bus-messages"
@@ -101,7 +101,7 @@ class Messages(Target):
         return not any(it.bad_messages for it in ingest.states.values())
 
 
-class Words(Scripts):
+class PeerMessages(ScriptTarget):
     """What cameras tell each other of a frame."""
 
     name = "bus-detections"
@@ -136,7 +136,7 @@ class Words(Scripts):
         return self._exchange.bad_messages == bad
 
 
-class Places(Scripts):
+class OperatorPlaces(ScriptTarget):
     """Where an operator points, as a camera hears it."""
 
     name = "bus-operator-points"
@@ -163,7 +163,7 @@ class Places(Scripts):
         return not heard.bad_messages
 
 
-class Sessions(Scripts):
+class SiteSessions(ScriptTarget):
     """A site over some epochs: messages wrong, lost, doubled and out of order; then all is asked of it."""
 
     name = "bus-sessions"
@@ -206,7 +206,7 @@ class Sessions(Scripts):
         return self._loop.run_until_complete(self._session(_script.decode(data)))
 
     async def _session(self, script: Script) -> bool:
-        service = Fed(self._config)
+        service = FedService(self._config)
         service.stream_format.accept(self._pictures[0][0].data)
         viewers = [
             it.subscribe()
@@ -234,7 +234,7 @@ class Sessions(Scripts):
         self._loop.close()
 
 
-def ask(service: Fed) -> None:
+def ask(service: FedService) -> None:
     """Ask a service everything that its API tells."""
     facade = BestViewService(service)
     for content in (site_info(facade), objects_info(facade), cameras_info(facade)):
@@ -258,4 +258,4 @@ def _plain(key: str) -> str:
     return key.encode("utf-8", "replace").decode()
 
 
-TARGETS = (Messages, Words, Places, Memories, Sessions)
+TARGETS = (IngestMessages, PeerMessages, OperatorPlaces, RetainedStates, SiteSessions)

@@ -8,7 +8,7 @@ import msgspec
 
 from benchmarks.fuzz.bus.damaged_messages import wrong
 from benchmarks.fuzz.engine.fed_site import CAMERAS, FPS, HEIGHT, KEYS, STRIDE, WIDTH, site, word
-from benchmarks.fuzz.engine.target import Scripts
+from benchmarks.fuzz.engine.target import ScriptTarget
 from server.messaging.epochs import end_of_epoch
 from server.messaging.identity_snapshot import IdentitySnapshot, PersonSnapshot
 from server.messaging.inbox import Message
@@ -22,7 +22,7 @@ _EPOCHS = 2
 _script = msgspec.msgpack.Decoder(tuple[int, list[tuple[str, bytes]]])
 
 
-class Memories(Scripts):
+class RetainedStates(ScriptTarget):
     """What cameras say, again and again: memories that are right, wrong in something, or of somebody else."""
 
     name = "bus-retained-state"

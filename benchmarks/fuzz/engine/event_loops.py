@@ -18,7 +18,7 @@ _AWHILE_S = 1.0
 _AT_ONCE = struct.pack("ii", 1, 0)
 
 
-class _Impatient(selectors.DefaultSelector):
+class _TimeSkippingSelector(selectors.DefaultSelector):
     """A selector that skips the waiting: timeouts pass at once, without wall-clock time."""
 
     def __init__(self) -> None:
@@ -45,11 +45,11 @@ class _Impatient(selectors.DefaultSelector):
         return []
 
 
-class HurryingLoop(asyncio.SelectorEventLoop):
+class TimeSkippingLoop(asyncio.SelectorEventLoop):
     """``time()`` is the only clock that goes with it."""
 
     def __init__(self) -> None:
-        self._impatient = _Impatient()
+        self._impatient = _TimeSkippingSelector()
         super().__init__(self._impatient)
 
     def time(self) -> float:
@@ -84,7 +84,7 @@ class HurryingLoop(asyncio.SelectorEventLoop):
         self._impatient.processes -= 1
 
 
-class AtOnceLoop(asyncio.SelectorEventLoop):
+class InlineExecutorLoop(asyncio.SelectorEventLoop):
     """Does what is meant for a thread at once, and waits for it."""
 
     def run_in_executor(  # type: ignore[override]  # whatever it takes

@@ -180,7 +180,7 @@ def sound(epoch: int) -> Message:
     return Message(KEYS.sound, bytes(_SOUND_BYTES * 9), msgspec.json.encode(head))
 
 
-class Fed(BestViewPipeline):
+class FedService(BestViewPipeline):
     """The best-view service without a bus; ``handle`` is what the bus would call."""
 
     def __init__(self, config: Config) -> None:
@@ -215,7 +215,7 @@ class Fed(BestViewPipeline):
         return sum(it.bad_messages for it in self.ingest.states.values())
 
 
-def feed_epoch(service: Fed, rng: Random, epoch: int, epochs: int, word: Word = word) -> None:
+def feed_epoch(service: FedService, rng: Random, epoch: int, epochs: int, word: Word = word) -> None:
     """Hand a service one of some epochs, right in everything, and have it decide."""
     for seed, camera in enumerate(CAMERAS):
         for unit in pictures(seed, epochs * STRIDE)[epoch * STRIDE :][:STRIDE]:

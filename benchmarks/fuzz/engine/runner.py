@@ -19,7 +19,7 @@ from pathlib import Path
 from random import Random
 from types import FrameType
 
-from benchmarks.fuzz.engine.shared_counts import ROOM, Counts, Shared
+from benchmarks.fuzz.engine.shared_counts import ROOM, InputCounts, SharedCounts
 from benchmarks.fuzz.engine.target import Target
 
 HANG_S = 2.0
@@ -42,10 +42,10 @@ class GrowthError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Tally:
+class TargetResult:
     """What came of a target's inputs, in which time."""
 
-    counts: Counts
+    counts: InputCounts
     seconds: float
     kinds: int
     """Of crashes, by the place in the code."""
@@ -59,7 +59,7 @@ class Crash:
     text: str
 
 
-class _Tracebacks(logging.Handler):
+class _TracebackHandler(logging.Handler):
     """Keeps the last traceback that was logged."""
 
     def __init__(self) -> None:
@@ -71,12 +71,12 @@ class _Tracebacks(logging.Handler):
             self.last = record.getMessage() + "\n" + logging.Formatter().formatException(record.exc_info)
 
 
-class Attempt:
+class InputFeeder:
     """Feeds inputs one by one, and tells what is wrong: what is raised, logged, too slow or too large."""
 
     def __init__(self, target: Target, hang_s: float = HANG_S) -> None:
         self.target, self._hang_s = target, hang_s
-        self._log = _Tracebacks()
+        self._log = _TracebackHandler()
         self._most = _most_mb()
 
     @contextmanager
@@ -143,7 +143,7 @@ def _logged(text: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class FuzzPlan:
     """How many inputs and which; whichever bound is reached first is the end."""
 
     inputs: int | None = None
@@ -156,7 +156,7 @@ class Plan:
     first: int = 0
     """The number of the first input."""
 
-    def done(self, counts: Counts) -> bool:
+    def done(self, counts: InputCounts) -> bool:
         """Return whether these are as many as there were to be."""
         return any(
             most is not None and so_far >= most
@@ -169,17 +169,17 @@ def numbered(target: Target, seed: int, index: int) -> bytes:
     return target.make(Random(seed << 48 | index))
 
 
-class Runner:
+class TargetRunner:
     """Counts and saves what comes of a target's inputs."""
 
-    def __init__(self, make: Callable[[], Target], name: str, plan: Plan) -> None:
+    def __init__(self, make: Callable[[], Target], name: str, plan: FuzzPlan) -> None:
         self._make, self._name, self._plan = make, name, plan
         self._kinds: dict[str, int] = {}
 
-    def run(self) -> Tally:
+    def run(self) -> TargetResult:
         """Run it in processes of its own; one that dies or grows is followed by another."""
         began = time.monotonic()
-        shared, fork, counts = Shared(), multiprocessing.get_context("fork"), Counts()
+        shared, fork, counts = SharedCounts(), multiprocessing.get_context("fork"), InputCounts()
         until = None if self._plan.seconds is None else began + self._plan.seconds
         while not self._plan.done(counts) and (
             not counts.inputs or until is None or time.monotonic() < until
@@ -197,9 +197,9 @@ class Runner:
                     it + 1 for it in (counts.inputs, counts.messages, counts.crashes)
                 )
                 shared.keep(counts)
-        return Tally(counts, time.monotonic() - began, len(self._kinds))
+        return TargetResult(counts, time.monotonic() - began, len(self._kinds))
 
-    def _wait(self, child: multiprocessing.process.BaseProcess, shared: Shared) -> str | None:
+    def _wait(self, child: multiprocessing.process.BaseProcess, shared: SharedCounts) -> str | None:
         """Wait for a process; say how it died, None where it did not."""
         last, since = -1, time.monotonic()
         while child.is_alive():
@@ -218,12 +218,12 @@ class Runner:
         return None
 
     def _child(
-        self, shared: Shared, until: float | None, kinds: multiprocessing.queues.SimpleQueue[str]
+        self, shared: SharedCounts, until: float | None, kinds: multiprocessing.queues.SimpleQueue[str]
     ) -> None:
         counts = shared.counts
         resource.setrlimit(resource.RLIMIT_AS, (MOST_MB << 20, MOST_MB << 20))
         target = self._make()
-        attempt, begun, grown = Attempt(target, self._plan.hang_s), counts.inputs, False
+        attempt, begun, grown = InputFeeder(target, self._plan.hang_s), counts.inputs, False
         before = counts.messages - target.messages
         gc.freeze()
         with attempt.watching():

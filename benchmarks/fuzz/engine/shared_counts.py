@@ -12,7 +12,7 @@ _HEAD = struct.Struct("<6Q")
 
 
 @dataclass(slots=True)
-class Counts:
+class InputCounts:
     """What came of a target's inputs so far."""
 
     inputs: int = 0
@@ -23,22 +23,22 @@ class Counts:
     crashes: int = 0
 
 
-class Shared:
+class SharedCounts:
     """Memory that a process and its children have in common: counts, and the input that is being fed."""
 
     def __init__(self) -> None:
         self._memory = mmap.mmap(-1, _HEAD.size + ROOM)
 
-    def keep(self, counts: Counts, data: bytes = b"") -> None:
+    def keep(self, counts: InputCounts, data: bytes = b"") -> None:
         """Keep what has come of the inputs before this one."""
         self._memory[_HEAD.size : _HEAD.size + len(data)] = data
         told = (counts.inputs, counts.messages, counts.refused, counts.accepted, counts.crashes)
         _HEAD.pack_into(self._memory, 0, *told, len(data))
 
     @property
-    def counts(self) -> Counts:
+    def counts(self) -> InputCounts:
         """Return what was kept last."""
-        return Counts(*_HEAD.unpack_from(self._memory)[:-1])
+        return InputCounts(*_HEAD.unpack_from(self._memory)[:-1])
 
     @property
     def data(self) -> bytes:

@@ -53,7 +53,7 @@ class Target(ABC):
         """Let go of what was opened."""
 
 
-class Scripts(Target):
+class ScriptTarget(Target):
     """A reader whose inputs are several messages each: ``feed`` counts them as it hands them over."""
 
     def hand_over(self, data: bytes) -> bool:

@@ -65,7 +65,7 @@ def _points(rng: Random, cameras: dict[str, list[dict[str, Any]]]) -> bytes:
     return damaged(rng, data, WORDS) if rng.random() < 0.9 else data
 
 
-class _Files(Target):
+class _GroundFiles(Target):
     """Files in a folder of their own, and a site that goes by them."""
 
     def __init__(self) -> None:
@@ -92,7 +92,7 @@ class _Files(Target):
         self._folder.cleanup()
 
 
-class Points(_Files):
+class MarkedPoints(_GroundFiles):
     """Marked points are read and fitted."""
 
     name = "calibration-points"
@@ -116,7 +116,7 @@ class Points(_Files):
         return True
 
 
-class Plans(_Files):
+class CalibrationCommand(_GroundFiles):
     """The whole command: homographies that the configuration takes, a plan, lines that can be printed.
 
     Drawing the plan takes hundreds of times as long as all else: for most it is seen that it could be drawn.
@@ -157,7 +157,7 @@ def _laid_out(views: Sequence[FloorPlanCamera], unit: str, _: object) -> None:
         assert not is_math_text(floor_plan._plain(text)), text
 
 
-class Ground(_Files):
+class GroundFile(_GroundFiles):
     """The file of homographies, as a site's configuration reads it."""
 
     name = "calibration-ground"
@@ -180,4 +180,4 @@ class Ground(_Files):
         return True
 
 
-TARGETS = (Points, Ground, Plans)
+TARGETS = (MarkedPoints, GroundFile, CalibrationCommand)

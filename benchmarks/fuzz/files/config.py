@@ -53,7 +53,7 @@ _SELDOM = 256
 """Telling all settings takes longer than reading them: it is done for one in so many."""
 
 
-class _Undisturbed(Target):
+class _IsolatedConfig(Target):
     """A configuration that the machine's own environment, which is read with it, has no part in."""
 
     def __init__(self) -> None:
@@ -74,7 +74,7 @@ def _looked_at(config: Config, *, seldom: bool) -> None:
         BestViewPipeline(config)
 
 
-class Text(_Undisturbed):
+class ConfigFile(_IsolatedConfig):
     """A file."""
 
     name = "config-text"
@@ -103,7 +103,7 @@ class Text(_Undisturbed):
         self._folder.cleanup()
 
 
-class Tokens(Target):
+class TokenFile(Target):
     """The file that says who may come."""
 
     name = "config-tokens"
@@ -130,7 +130,7 @@ class Tokens(Target):
         self._folder.cleanup()
 
 
-class Values(_Undisturbed):
+class ConfigValues(_IsolatedConfig):
     """Sections of the reference, some keys of a few, one value changed; sometimes from the environment."""
 
     name = "config-values"
@@ -181,7 +181,7 @@ class Values(_Undisturbed):
         return True
 
 
-class Tried(Target):
+class TrialSettings(Target):
     """Settings that an operator tries out: what a service would choose by."""
 
     name = "config-preview"
@@ -228,4 +228,4 @@ def _plain(value: Any) -> Any:
     return json.loads(TypeAdapter(Any).dump_json(value))
 
 
-TARGETS = (Text, Tokens, Values, Tried)
+TARGETS = (ConfigFile, TokenFile, ConfigValues, TrialSettings)

@@ -39,7 +39,7 @@ def _rows(rng: Random, least_id: int) -> bytes:
     return format_rows(rows).encode()
 
 
-class _Files(Target):
+class _MotFiles(Target):
     """Files in a folder of their own."""
 
     least_id = -1
@@ -66,7 +66,7 @@ class _Files(Target):
         self._folder.cleanup()
 
 
-class Text(_Files):
+class MotRoundTrip(_MotFiles):
     """What is read is written and read again as the same."""
 
     name = "mot-text"
@@ -97,7 +97,7 @@ def _readable(text: str) -> list[str]:
     return [line for line in text.splitlines() if "0.00" not in line.split(",")[4:6]]
 
 
-class Detections(_Files):
+class DetectionFile(_MotFiles):
     """As the detections of a camera, frame by frame."""
 
     name = "mot-detections"
@@ -123,7 +123,7 @@ class Detections(_Files):
         return True
 
 
-class Walks(_Files):
+class TrackFile(_MotFiles):
     """As the tracks of a walk, from which cameras are calibrated."""
 
     name = "mot-trajectories"
@@ -142,4 +142,4 @@ class Walks(_Files):
         return True
 
 
-TARGETS = (Text, Detections, Walks)
+TARGETS = (MotRoundTrip, DetectionFile, TrackFile)

@@ -9,10 +9,10 @@ from random import Random
 
 import msgspec
 
-from benchmarks.fuzz.engine.event_loops import AtOnceLoop
-from benchmarks.fuzz.engine.fed_site import CAMERAS, Fed, feed_epoch, site
+from benchmarks.fuzz.engine.event_loops import InlineExecutorLoop
+from benchmarks.fuzz.engine.fed_site import CAMERAS, FedService, feed_epoch, site
 from benchmarks.fuzz.engine.mutations import as_json, damaged, otherwise
-from benchmarks.fuzz.engine.target import Scripts, folder
+from benchmarks.fuzz.engine.target import ScriptTarget, folder
 from benchmarks.fuzz.media.damaged_media import WORDS as MEDIA
 from server.service.recording.recorder import Recorder
 from server.service.recording.retention import RetentionLimits, RetentionPolicy
@@ -48,13 +48,13 @@ _Files = list[tuple[str, bytes]]
 _files = msgspec.msgpack.Decoder(_Files)
 
 
-class Runs(Scripts):
+class RecordedRuns(ScriptTarget):
     """A recorded run: what is told and played of it, and that it is taken away, and nothing else."""
 
     name = "recordings-sessions"
 
     def __init__(self) -> None:
-        self._loop = AtOnceLoop()
+        self._loop = InlineExecutorLoop()
         self._folder = folder()
         self._path = Path(self._folder.name)
         self._precious = self._path / "precious" / "000000000000.mp4"
@@ -73,8 +73,8 @@ class Runs(Scripts):
         self._kinds = {it.suffix: [name for name in self._right if name.endswith(it.suffix)] for it in files}
         self._restore()
 
-    async def _record(self) -> Fed:
-        service, rng = Fed(self._config), Random(1)
+    async def _record(self) -> FedService:
+        service, rng = FedService(self._config), Random(1)
         service.pulse0 = _PULSE0
         service.recorder.open()
         for epoch in range(_EPOCHS):
@@ -172,4 +172,4 @@ class Runs(Scripts):
         self._folder.cleanup()
 
 
-TARGETS = (Runs,)
+TARGETS = (RecordedRuns,)

@@ -6,7 +6,7 @@ from random import Random
 from typing import Any
 
 from benchmarks.fuzz.engine.mutations import as_json, damaged, otherwise
-from benchmarks.fuzz.http.served_site import Asked
+from benchmarks.fuzz.http.served_site import OpenSiteTarget
 from server.http.access.csrf import CSRF_HEADER
 
 _ASKED: tuple[tuple[str, str, Any], ...] = (
@@ -36,7 +36,7 @@ _ASKED: tuple[tuple[str, str, Any], ...] = (
 """To finish a walk starts a process: that is for other tests."""
 
 
-class Operator(Asked):
+class OperatorRequests(OpenSiteTarget):
     """One thing that is asked by somebody who may; what the one before did holds."""
 
     name = "http-operator"

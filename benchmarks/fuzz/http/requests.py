@@ -6,7 +6,7 @@ from random import Random
 
 from benchmarks.fuzz.engine.mutations import as_json, damaged, otherwise
 from benchmarks.fuzz.http.addresses import METHODS, WORDS, address, some_range
-from benchmarks.fuzz.http.served_site import Asked
+from benchmarks.fuzz.http.served_site import OpenSiteTarget
 from server.http.access.csrf import CSRF_HEADER
 
 _CHANGES_SHARE = 0.8
@@ -36,7 +36,7 @@ _HEADERS = (
 )
 
 
-class Requests(Asked):
+class AnonymousRequests(OpenSiteTarget):
     """One request on a connection of its own."""
 
     name = "http-requests"

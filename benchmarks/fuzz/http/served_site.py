@@ -15,8 +15,8 @@ from typing import Any
 
 from aiohttp import web
 
-from benchmarks.fuzz.engine.event_loops import HurryingLoop, leaves_no_trace
-from benchmarks.fuzz.engine.fed_site import Fed, Word, feed_epoch, site, word
+from benchmarks.fuzz.engine.event_loops import TimeSkippingLoop, leaves_no_trace
+from benchmarks.fuzz.engine.fed_site import FedService, Word, feed_epoch, site, word
 from benchmarks.fuzz.engine.target import Target
 from server.http.api.openapi import describe
 from server.http.app import make_app, serving
@@ -30,7 +30,7 @@ _MOST = 65_536
 _HEALTH = b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
 
 
-class Served:
+class ServedSite:
     """A site that has run for some epochs, and stands still. ``sections`` are its configuration's.
 
     ``before`` is given the application before it is served.
@@ -43,7 +43,7 @@ class Served:
         loop: AbstractEventLoop | None = None,
         before: Callable[[web.Application], None] = lambda _: None,
     ) -> None:
-        self.loop = loop or HurryingLoop()
+        self.loop = loop or TimeSkippingLoop()
         self._folder = TemporaryDirectory()
         self._stack = AsyncExitStack()
         self._before = before
@@ -51,7 +51,7 @@ class Served:
 
     async def _serve(self, sections: dict[str, Any], word: Word) -> None:
         config = site(record={"folder": str(Path(self._folder.name) / "kept")}, **sections)
-        self.service, rng = Fed(config), Random(1)
+        self.service, rng = FedService(config), Random(1)
         self.service.recorder.open()
         self._stack.callback(self.service.close)
         self.service.pulse0 = 1_700_000_000.0
@@ -114,11 +114,11 @@ def judged(data: bytes, answer: bytes) -> bool:
     return code.startswith((b"2", b"3"))
 
 
-class Asked(Target):
+class OpenSiteTarget(Target):
     """Requests to a site that is open to all: what the one before has chosen goes on."""
 
     def __init__(self) -> None:
-        self._served = Served()
+        self._served = ServedSite()
         self._fed = 0
 
     def feed(self, data: bytes) -> bool:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from benchmarks.fuzz.http.operator_requests import Operator
-from benchmarks.fuzz.http.requests import Requests
-from benchmarks.fuzz.http.unauthenticated import Strangers
+from benchmarks.fuzz.http.operator_requests import OperatorRequests
+from benchmarks.fuzz.http.requests import AnonymousRequests
+from benchmarks.fuzz.http.unauthenticated import UnauthenticatedRequests
 
-TARGETS = (Requests, Operator, Strangers)
+TARGETS = (AnonymousRequests, OperatorRequests, UnauthenticatedRequests)

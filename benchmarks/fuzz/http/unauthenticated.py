@@ -20,7 +20,7 @@ from benchmarks.fuzz.engine.fed_site import STRIDE, one_each, pictures
 from benchmarks.fuzz.engine.mutations import as_json, damaged
 from benchmarks.fuzz.engine.target import Target, folder
 from benchmarks.fuzz.http.addresses import WORDS, address, some_range
-from benchmarks.fuzz.http.served_site import EPOCHS, Served, judged
+from benchmarks.fuzz.http.served_site import EPOCHS, ServedSite, judged
 from server.config.tokens_file import token_digest
 from server.http.access.authorization import ACCESS
 from server.http.access.sessions import _Session
@@ -48,7 +48,7 @@ _MADE = (".mjpeg", "best.jpg", "live.jpg")
 
 
 @dataclass(frozen=True, slots=True)
-class _Answered:
+class _AnsweredRequest:
     """What an answer was one to."""
 
     status: int
@@ -62,7 +62,7 @@ class _Answered:
     """The view was to be of a camera."""
 
 
-class Strangers(Target):
+class UnauthenticatedRequests(Target):
     """One request, of somebody or nobody."""
 
     name = "http-unauthenticated"
@@ -75,8 +75,8 @@ class Strangers(Target):
             for who, rights in _RIGHTS.items()
         ]
         tokens.write_text(yaml.safe_dump({"tokens": listed}))
-        self._answered: list[_Answered] = []
-        self._served = Served(
+        self._answered: list[_AnsweredRequest] = []
+        self._served = ServedSite(
             {"access": {"tokens": str(tokens)}, "http": {"hls_segment_s": 0.2}}, one_each, before=self._watch
         )
         for number, name in _NAMES.items():
@@ -102,7 +102,7 @@ class Strangers(Target):
             request.app[SERVICE].people.current_number(int(names["object"])) if "object" in names else None
         )
         self._answered.append(
-            _Answered(
+            _AnsweredRequest(
                 status=response.status,
                 method=request.method,
                 path="" if resource is None else resource.canonical,
@@ -177,7 +177,7 @@ class Strangers(Target):
         self._folder.cleanup()
 
 
-def _may(who: set[str], one: _Answered) -> bool:
+def _may(who: set[str], one: _AnsweredRequest) -> bool:
     """Return whether somebody who knows these secrets may have been given this answer."""
     if one.path in _OPEN or one.method == "OPTIONS" or "night" in who:
         return True

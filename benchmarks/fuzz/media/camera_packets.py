@@ -33,7 +33,7 @@ def _take(source: PictureSource) -> None:
         source.close()
 
 
-class OwnPackets(Target):
+class PassthroughPackets(Target):
     """What a camera's own H.264 is packed in."""
 
     name = "media-packets"
@@ -62,7 +62,7 @@ class OwnPackets(Target):
         return True
 
 
-class Files(Target):
+class RecordingFile(Target):
     """A recording, opened as a camera's source: each frame in its place however damaged the file is."""
 
     name = "media-files"

@@ -16,7 +16,7 @@ from client.remux import remux
 from client.sse_parser import EventStreamError, SseParser
 
 
-class _Film(Target):
+class _ClientStream(Target):
     """A stream that a client reads in pieces, and makes a file of."""
 
     codec: ClassVar[Literal["h264", "vp8"]]
@@ -52,7 +52,7 @@ class _Film(Target):
         self._folder.cleanup()
 
 
-class ClientMp4(_Film):
+class ClientMp4(_ClientStream):
     """What `myview watch` is sent, and makes a file of."""
 
     name = "media-mp4"
@@ -60,7 +60,7 @@ class ClientMp4(_Film):
     container = "mp4"
 
 
-class ClientWebm(_Film):
+class ClientWebm(_ClientStream):
     """The same of WebM."""
 
     name = "media-webm"
@@ -68,7 +68,7 @@ class ClientWebm(_Film):
     container = "webm"
 
 
-class Events(Target):
+class ClientEvents(Target):
     """Server-sent events, as the client reads them."""
 
     name = "media-events"

@@ -13,7 +13,7 @@ import numpy as np
 from av.video.stream import VideoStream
 
 from benchmarks.fuzz.engine.fed_site import FPS, HEIGHT, STRIDE, WIDTH
-from benchmarks.fuzz.engine.target import Scripts, folder, refused
+from benchmarks.fuzz.engine.target import ScriptTarget, folder, refused
 from benchmarks.fuzz.media.damaged_media import wrong
 from server.camera.audio.live_source import LiveAudioSource
 from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
@@ -28,7 +28,7 @@ _FRAMES = 2 * STRIDE + 3
 _FORMS = {"mpegts": "libx264", "h264": "libx264", "mpjpeg": "mjpeg"}
 
 
-class _Once(LiveStream):
+class _SingleRead(LiveStream):
     """Reads until what the camera sends ends; what its thread raises is kept."""
 
     failure: BaseException | None = None
@@ -47,7 +47,7 @@ class _Once(LiveStream):
         return super()._decode(packet)
 
 
-class _OwnOnce(PassthroughStream, _Once):
+class _SinglePassthroughRead(PassthroughStream, _SingleRead):
     """The same where its access units are passed on."""
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
@@ -55,7 +55,7 @@ class _OwnOnce(PassthroughStream, _Once):
         return super()._decode(packet)
 
 
-class Live(Scripts):
+class LiveIngest(ScriptTarget):
     """A camera that sends whatever it likes. How it is reached is FFmpeg's: here it is in a file."""
 
     name = "media-live"
@@ -77,16 +77,16 @@ class Live(Scripts):
         sound = LiveAudioSource(SoundSettings(source="c0"), FPS)
         try:
             if data[:1] == b"P":
-                self._watch(_OwnOnce(str(self._path), {}, sound, self._wanted), range(_FRAMES))
+                self._watch(_SinglePassthroughRead(str(self._path), {}, sound, self._wanted), range(_FRAMES))
             else:
-                self._watch(_Once(str(self._path), {}, sound), range(1))
+                self._watch(_SingleRead(str(self._path), {}, sound), range(1))
         except (UserError, IncompatibleStreamError) as error:
             self.messages += 1
             return refused(error)
         sound.at(0)
         return True
 
-    def _watch(self, stream: _Once, pulses: Iterable[int]) -> None:
+    def _watch(self, stream: _SingleRead, pulses: Iterable[int]) -> None:
         stream._thread.join()
         self.messages += stream.units
         for pulse in pulses:

@@ -10,8 +10,8 @@ from typing import Literal
 import msgspec
 
 from benchmarks.fuzz.bus.messages import ask, drain
-from benchmarks.fuzz.engine.fed_site import CAMERAS, STRIDE, Fed, pictures, site, tracks, video, word
-from benchmarks.fuzz.engine.target import Scripts
+from benchmarks.fuzz.engine.fed_site import CAMERAS, STRIDE, FedService, pictures, site, tracks, video, word
+from benchmarks.fuzz.engine.target import ScriptTarget
 from benchmarks.fuzz.media.damaged_media import wrong
 from server.camera.encoding.encoder import AccessUnit
 from server.config.site_config import Config
@@ -31,7 +31,7 @@ _Units = list[tuple[int, int, bytes]]
 _script = msgspec.msgpack.Decoder(tuple[_Cuts, _Units])
 
 
-class _Splice(Scripts):
+class _Splice(ScriptTarget):
     """Two cameras' frames, and where the streams of people are cut from one to the other."""
 
     codec: Literal["h264", "vp8"] = "h264"
@@ -77,7 +77,7 @@ class _Splice(Scripts):
 
     async def _whole(self, units: _Units) -> bool:
         """Decide by what cameras say of people, and ask everything that the API tells."""
-        service, rng = Fed(self._config), Random(1)
+        service, rng = FedService(self._config), Random(1)
         published, self._decided = service._publish, []
 
         def publish(decision: GopDecision) -> None:
@@ -99,7 +99,7 @@ class _Splice(Scripts):
 
     async def _cut(self, cuts: _Cuts, units: _Units) -> bool:
         """Cut where the input says, as it may come to anybody's mind: to pictures that never came, too."""
-        service = Fed(self._config)
+        service = FedService(self._config)
         viewers = [broadcaster.subscribe() for broadcaster in _broadcasters(service)]
         before: dict[int, str | None] = dict.fromkeys(_PEOPLE)
         for gop, chosen in enumerate(cuts):
@@ -121,7 +121,7 @@ class _Splice(Scripts):
             drain(viewer)
         return not any(it.refused for it in service.ingest.states.values())
 
-    def _show(self, service: Fed, units: _Units, gop: int) -> None:
+    def _show(self, service: FedService, units: _Units, gop: int) -> None:
         for camera, pulse, data in units:
             if pulse // STRIDE == gop:
                 self.messages += 1
@@ -133,7 +133,7 @@ class _Splice(Scripts):
         self._loop.close()
 
 
-def _broadcasters(service: Fed) -> list[Broadcaster]:
+def _broadcasters(service: FedService) -> list[Broadcaster]:
     return [*service.splicer.cameras.values(), *service.splicer.decided_cameras.values()]
 
 
@@ -143,7 +143,7 @@ class Splice(_Splice):
     name = "media-splice"
 
 
-class SpliceOwn(_Splice):
+class SplicePassthrough(_Splice):
     """H.264 whose parameter sets are each camera's own."""
 
     name = "media-splice-own"

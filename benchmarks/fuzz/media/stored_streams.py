@@ -22,7 +22,7 @@ _FILMED_EVERY = 8
 """Half of the time goes into opening an encoder, which knows nothing of what pictures were decoded from."""
 
 
-class Drawing(Target):
+class RenderedStreams(Target):
     """Streams whose pictures are decoded and drawn on."""
 
     name = "media-drawing"
@@ -54,7 +54,7 @@ class Drawing(Target):
         return drawn.newest >= 0
 
 
-class Kept(Target):
+class StoredMedia(Target):
     """What was recorded, read again after somebody has damaged it."""
 
     name = "media-recorded"

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from benchmarks.fuzz.media.camera_packets import Files, OwnPackets
-from benchmarks.fuzz.media.client_streams import ClientMp4, ClientWebm, Events
-from benchmarks.fuzz.media.live_ingest import Live
-from benchmarks.fuzz.media.splicing import Splice, SpliceOwn, SpliceVp8
-from benchmarks.fuzz.media.stored_streams import Drawing, Kept
+from benchmarks.fuzz.media.camera_packets import PassthroughPackets, RecordingFile
+from benchmarks.fuzz.media.client_streams import ClientEvents, ClientMp4, ClientWebm
+from benchmarks.fuzz.media.live_ingest import LiveIngest
+from benchmarks.fuzz.media.splicing import Splice, SplicePassthrough, SpliceVp8
+from benchmarks.fuzz.media.stored_streams import RenderedStreams, StoredMedia
 
 TARGETS = (
     Splice,
-    SpliceOwn,
+    SplicePassthrough,
     SpliceVp8,
     ClientMp4,
     ClientWebm,
-    Events,
-    OwnPackets,
-    Kept,
-    Drawing,
-    Files,
-    Live,
+    ClientEvents,
+    PassthroughPackets,
+    StoredMedia,
+    RenderedStreams,
+    RecordingFile,
+    LiveIngest,
 )

@@ -6,7 +6,7 @@ import asyncio
 from typing import Any
 
 
-class Clock:
+class ManualClock:
     """Unix seconds."""
 
     def __init__(self) -> None:
@@ -17,7 +17,7 @@ class Clock:
         return self.now
 
 
-class Wire(asyncio.Transport):
+class FakeWriter(asyncio.Transport):
     """Keeps what is written instead of sending it."""
 
     def __init__(self) -> None:

@@ -63,7 +63,7 @@ def some_line(rng: Random, lines: tuple[bytes, ...]) -> bytes:
     return line if rng.random() < 0.3 else damaged(rng, line, WORDS)
 
 
-class Lines(Target):
+class ProtocolLines(Target):
     """One line, as both sides read it."""
 
     name = "pulse-lines"

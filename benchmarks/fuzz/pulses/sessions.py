@@ -7,8 +7,8 @@ from random import Random
 
 import msgspec
 
-from benchmarks.fuzz.engine.target import Scripts
-from benchmarks.fuzz.pulses.fake_connection import Clock, Wire
+from benchmarks.fuzz.engine.target import ScriptTarget
+from benchmarks.fuzz.pulses.fake_connection import FakeWriter, ManualClock
 from benchmarks.fuzz.pulses.protocol_lines import CLIENT_LINES, SERVER_LINES, some_line
 from camsync import ClientSettings, PulseClient, PulseServer
 from camsync.protocol import parse_client_line, parse_server_line
@@ -31,7 +31,7 @@ def _scripted(rng: Random, lines: tuple[bytes, ...], connections: int) -> bytes:
     return msgspec.msgpack.encode(script)
 
 
-class ServerSessions(Scripts):
+class ServerSessions(ScriptTarget):
     """Three connections to a server, which must go on to speak its own protocol to them all."""
 
     name = "pulse-server"
@@ -48,10 +48,10 @@ class ServerSessions(Scripts):
         return self._loop.run_until_complete(self._session(_script.decode(data)))
 
     async def _session(self, script: Script) -> bool:
-        clock = Clock()
+        clock = ManualClock()
         server = PulseServer(25.0, expect=("c0",), clock=clock)
         hub = server._registry
-        wires = [Wire() for _ in range(3)]
+        wires = [FakeWriter() for _ in range(3)]
         peers = [hub.new_connection() for _ in wires]
         for peer, wire in zip(peers, wires, strict=True):
             peer.connection_made(wire)
@@ -75,7 +75,7 @@ class ServerSessions(Scripts):
         return errors == 0 and not any(wire.closed for wire in wires)
 
     @staticmethod
-    def _spoken(wire: Wire) -> None:
+    def _spoken(wire: FakeWriter) -> None:
         for line in wire.lines:
             assert parse_server_line(line) is not None, line
 
@@ -84,7 +84,7 @@ class ServerSessions(Scripts):
         self._loop.close()
 
 
-class ClientSessions(Scripts):
+class ClientSessions(ScriptTarget):
     """A client that is told anything by its server: numbers rise, and it ends in words or goes on."""
 
     name = "pulse-client"
@@ -104,11 +104,11 @@ class ClientSessions(Scripts):
         return self._loop.run_until_complete(self._session(_script.decode(data)))
 
     async def _session(self, script: Script) -> bool:
-        clock = Clock()
+        clock = ManualClock()
         client = PulseClient("nowhere", 1, "c0", settings=ClientSettings(queue=10_000), clock=clock)
         link = ServerConnection(client._receive, clock, hello=client._hello, ping_interval=1.0, silence=5.0)
         client._server._connection = link
-        wire = Wire()
+        wire = FakeWriter()
         link.connection_made(wire)
         for _, said in script:
             if not wire.closed:

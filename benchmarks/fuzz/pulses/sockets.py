@@ -6,8 +6,8 @@ import asyncio
 import contextlib
 from random import Random
 
-from benchmarks.fuzz.engine.event_loops import HurryingLoop, leaves_no_trace
-from benchmarks.fuzz.engine.target import Scripts, refused
+from benchmarks.fuzz.engine.event_loops import TimeSkippingLoop, leaves_no_trace
+from benchmarks.fuzz.engine.target import ScriptTarget, refused
 from benchmarks.fuzz.pulses.protocol_lines import CLIENT_LINES, SERVER_LINES, some_line
 from camsync import PulseClient, PulseServer, SyncError, query_clients
 from camsync.messages import ClientList, ErrorMessage
@@ -20,13 +20,13 @@ _SELDOM = 8
 """Who says that nothing more will come leaves a port that is taken for a minute."""
 
 
-class Sockets(Scripts):
+class SocketBytes(ScriptTarget):
     """What somebody says to the server, or to a client."""
 
     name = "pulse-sockets"
 
     def __init__(self) -> None:
-        self._loop = HurryingLoop()
+        self._loop = TimeSkippingLoop()
         self._server = PulseServer(25.0, clock=self._loop.time)
         self._loop.run_until_complete(self._server.start())
         self._said = b""

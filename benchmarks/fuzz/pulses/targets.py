@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from benchmarks.fuzz.pulses.protocol_lines import Lines
+from benchmarks.fuzz.pulses.protocol_lines import ProtocolLines
 from benchmarks.fuzz.pulses.sessions import ClientSessions, ServerSessions
-from benchmarks.fuzz.pulses.sockets import Sockets
-from benchmarks.fuzz.pulses.unauthenticated import Strangers
+from benchmarks.fuzz.pulses.sockets import SocketBytes
+from benchmarks.fuzz.pulses.unauthenticated import UnauthenticatedClients
 
-TARGETS = (Lines, ServerSessions, ClientSessions, Strangers, Sockets)
+TARGETS = (ProtocolLines, ServerSessions, ClientSessions, UnauthenticatedClients, SocketBytes)

@@ -8,8 +8,8 @@ from random import Random
 import msgspec
 
 from benchmarks.fuzz.engine.mutations import damaged
-from benchmarks.fuzz.engine.target import Scripts
-from benchmarks.fuzz.pulses.fake_connection import Clock, Wire
+from benchmarks.fuzz.engine.target import ScriptTarget
+from benchmarks.fuzz.pulses.fake_connection import FakeWriter, ManualClock
 from benchmarks.fuzz.pulses.protocol_lines import CLIENT_LINES, WORDS, some_line
 from camsync import Credentials, PulseServer
 from camsync.messages import ClientsRequest, ErrorMessage, Hello, LoginMessage, LoginRequest, Ping
@@ -28,7 +28,7 @@ def _guessed_login(rng: Random) -> bytes:
     return encode(LoginMessage(user, rng.choice(wrong))) + rng.choice(CLIENT_LINES)
 
 
-class Strangers(Scripts):
+class UnauthenticatedClients(ScriptTarget):
     """Two strangers learn nothing, and the client that has logged in notices nothing."""
 
     name = "pulse-unauthenticated"
@@ -50,9 +50,9 @@ class Strangers(Scripts):
         return self._loop.run_until_complete(self._session(_said.decode(data)))
 
     async def _session(self, script: _Said) -> bool:
-        clock = Clock()
+        clock = ManualClock()
         server = PulseServer(25.0, expect=("c0", "c1"), clock=clock, users=_USERS)
-        wires = [Wire() for _ in range(3)]
+        wires = [FakeWriter() for _ in range(3)]
         peers = [server._registry.new_connection() for _ in wires]
         for peer, wire in zip(peers, wires, strict=True):
             peer.connection_made(wire)

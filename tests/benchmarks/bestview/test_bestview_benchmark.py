@@ -20,11 +20,11 @@ from benchmarks.bestview.association_baselines import (
     tracks_by_truth,
 )
 from benchmarks.bestview.camera_tracks import Rows
-from benchmarks.bestview.methods import Way, outcome, visible_rows
-from benchmarks.bestview.parameter_sweep import DEFAULT_SWITCH_COST_S, STRIDE, Setting, sweep
-from benchmarks.bestview.scenes import Case
+from benchmarks.bestview.methods import MethodResult, outcome, visible_rows
+from benchmarks.bestview.parameter_sweep import DEFAULT_SWITCH_COST_S, STRIDE, SweepSetting, sweep
+from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.bestview.service_decisions import Rendering, decide_given, largest
-from benchmarks.bestview.visibility_losses import Losses, losses
+from benchmarks.bestview.visibility_losses import VisibilityLosses, losses
 from server.cli.evaluate.choices_file import Choice
 from server.messaging.messages import CameraTracks, TrackMessage
 from tracking.motchallenge import MotRow
@@ -38,16 +38,16 @@ def rows(number: int, left: float, frames: Sequence[int], top: float = 0.0) -> l
     return [MotRow(frame, number, left, top, 10.0, 20.0) for frame in frames]
 
 
-def hall(gt: Rows, least_shown: float = 0.25) -> Case:
+def hall(gt: Rows, least_shown: float = 0.25) -> BenchmarkScene:
     content = {
         "site": {"name": "hall", "fps": 10.0, "width": 100, "height": 100},
         "cameras": [{"id": camera, "source": "scene:none"} for camera in gt],
     }
-    return Case("hall", "two views", content, gt, least_shown)
+    return BenchmarkScene("hall", "two views", content, gt, least_shown)
 
 
 @pytest.fixture
-def passing() -> Case:
+def passing() -> BenchmarkScene:
     """Somebody is near c0 for the first half and near c1 for the second; both always see them."""
     first, second = range(1, FRAMES // 2 + 1), range(FRAMES // 2 + 1, FRAMES + 1)
     return hall(
@@ -58,18 +58,18 @@ def passing() -> Case:
     )
 
 
-def test_on_true_boxes_myviews_choice_is_the_optimum_where_it_is_plain(passing: Case) -> None:
+def test_on_true_boxes_myviews_choice_is_the_optimum_where_it_is_plain(passing: BenchmarkScene) -> None:
     truth = passing.truth()
     for found in (
         decide_given(passing.config(), passing.gt, FRAMES),
         decide_given(passing.config(), visible_rows(passing, truth), FRAMES),
     ):
-        score = outcome(passing, truth, Way("true", found, given=True)).views
+        score = outcome(passing, truth, MethodResult("true", found, given=True)).views
         assert (score.agreement, score.regret, score.visible, score.chosen) == (1.0, 0.0, 1.0, 1.0)
         assert score.cuts_per_minute == score.optimum_cuts_per_minute == 10.0
 
 
-def test_the_largest_box_is_taken_frame_by_frame(passing: Case) -> None:
+def test_the_largest_box_is_taken_frame_by_frame(passing: BenchmarkScene) -> None:
     shown = largest(passing.gt, passing.sizes, FRAMES)
     assert shown[:2] == [Choice(1, 5, "c0"), Choice(2, 5, "c0")]
     assert {it.camera for it in shown[FRAMES // 2 :]} == {"c1"}
@@ -154,21 +154,21 @@ def test_a_cameras_own_tracks_are_what_was_final() -> None:
     assert [row.left for row in found["c0"]] == [1.0] * 5 + [2.0] * 5 + [3.0] * 7
 
 
-def test_what_keeps_somebody_from_being_seen_is_told_apart(passing: Case) -> None:
+def test_what_keeps_somebody_from_being_seen_is_told_apart(passing: BenchmarkScene) -> None:
     truth = passing.truth()
     found = {
         "c0": [replace(row, id=1 if row.frame <= 20 else 2) for row in passing.gt["c0"] if row.frame <= 30],
         "c1": [],
     }
     shown = [Choice(frame, 1, "c0") for frame in range(1, 11)]
-    told = losses(passing, truth, Way("ours", Rendering(found, shown)))
-    assert told == Losses(visible=10 / 60, choice=10 / 60, number=10 / 60, missed=30 / 60)
+    told = losses(passing, truth, MethodResult("ours", Rendering(found, shown)))
+    assert told == VisibilityLosses(visible=10 / 60, choice=10 / 60, number=10 / 60, missed=30 / 60)
 
 
-def test_settings_are_swept_and_knowing_all_costs_nothing_but_the_gop(passing: Case) -> None:
+def test_settings_are_swept_and_knowing_all_costs_nothing_but_the_gop(passing: BenchmarkScene) -> None:
     found = {it.setting: it for it in sweep(passing, passing.truth(), quick=True)}
-    assert found[Setting(None, 1, DEFAULT_SWITCH_COST_S)].score.regret == 0.0
-    assert found[Setting(25, 10, DEFAULT_SWITCH_COST_S)].delay_s == (25 + STRIDE - 2) / 10.0
+    assert found[SweepSetting(None, 1, DEFAULT_SWITCH_COST_S)].score.regret == 0.0
+    assert found[SweepSetting(25, 10, DEFAULT_SWITCH_COST_S)].delay_s == (25 + STRIDE - 2) / 10.0
     assert all(it.score.regret >= 0.0 for it in found.values())
 
 

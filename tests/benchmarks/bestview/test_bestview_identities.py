@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.bestview.identity_errors import Agreement, Met
+from benchmarks.bestview.identity_errors import MatchedBoxes, PairScores
 from benchmarks.bestview.tracklet_cuts import own_parts
 from server.config.loader import build_config
 from server.messaging.messages import Box, CameraTracks, TrackMessage
@@ -33,10 +33,10 @@ def test_one_number_in_one_camera_and_another_in_the_other_is_not_whole_but_pure
         "c0": rows(1, 0.0, range(1, 11)),
         "c1": [*rows(1, 30.0, range(1, 6)), *rows(2, 30.0, range(6, 11))],
     }
-    met = Met.of(tracks, GT, 0.5)
-    assert met.at_once() == Agreement(whole=0.5, pure=1.0)
+    met = MatchedBoxes.of(tracks, GT, 0.5)
+    assert met.at_once() == PairScores(whole=0.5, pure=1.0)
     # In c0 nobody changes; in c1 two boxes of five are followed by one of another number two frames later.
-    assert met.later(2) == Agreement(whole=(8 + 6) / 16, pure=1.0)
+    assert met.later(2) == PairScores(whole=(8 + 6) / 16, pure=1.0)
 
 
 def test_two_people_of_one_number_are_whole_but_not_pure() -> None:
@@ -44,19 +44,19 @@ def test_two_people_of_one_number_are_whole_but_not_pure() -> None:
         "c0": [*rows(1, 0.0, range(1, 6)), *rows(1, 50.0, range(6, 11))],
         "c1": rows(1, 30.0, range(1, 11)),
     }
-    met = Met.of(tracks, GT, 0.5)
-    assert met.at_once() == Agreement(whole=1.0, pure=0.5)
-    assert met.later(5) == Agreement(whole=1.0, pure=5 / 10)
+    met = MatchedBoxes.of(tracks, GT, 0.5)
+    assert met.at_once() == PairScores(whole=1.0, pure=0.5)
+    assert met.later(5) == PairScores(whole=1.0, pure=5 / 10)
 
 
 def test_boxes_at_nobody_and_people_without_boxes_say_nothing() -> None:
-    met = Met.of({"c0": rows(1, 200.0, range(1, 11)), "c1": []}, GT, 0.5)
+    met = MatchedBoxes.of({"c0": rows(1, 200.0, range(1, 11)), "c1": []}, GT, 0.5)
     for told in (met.at_once(), met.later(1)):
         assert np.isnan([told.whole, told.pure]).all()
 
 
 def test_of_two_boxes_at_one_person_one_counts() -> None:
-    met = Met.of({"c0": [*rows(1, 0.0, [1]), *rows(2, 1.0, [1])], "c1": []}, GT, 0.5)
+    met = MatchedBoxes.of({"c0": [*rows(1, 0.0, [1]), *rows(2, 1.0, [1])], "c1": []}, GT, 0.5)
     assert met.number.tolist() == [1]
 
 

@@ -13,16 +13,24 @@ import pytest
 
 from benchmarks.common.report import Report
 from benchmarks.faults.injection.processes import FAULTS
-from benchmarks.faults.outcomes.fault_run import Outcome, _injected
+from benchmarks.faults.outcomes.fault_run import FaultOutcome, _injected
 from benchmarks.faults.outcomes.measurement import _group
 from benchmarks.faults.outcomes.promise_table import kept
-from benchmarks.faults.outcomes.recording_check import File, note
-from benchmarks.faults.site.fault_site import Stand
+from benchmarks.faults.outcomes.recording_check import RecordedFile, note
+from benchmarks.faults.site.fault_site import FaultSite
 from benchmarks.faults.video.stamp_detector import write_reader
-from benchmarks.faults.video.stamped_views import FRAMES, HEIGHT, WIDTH, Stamp, Views, read_stamp, stamped
+from benchmarks.faults.video.stamped_views import (
+    FRAMES,
+    HEIGHT,
+    WIDTH,
+    FrameStamp,
+    StampedViews,
+    read_stamp,
+    stamped,
+)
 from benchmarks.faults.viewing.live_pictures import MOST_AHEAD, MOST_BEHIND
 from benchmarks.faults.viewing.picture_check import judge
-from benchmarks.faults.viewing.viewers import Picture, Told
+from benchmarks.faults.viewing.viewers import EventLog, ReceivedPicture
 from client import Box, Gop
 from tracking.detectors.neural.onnx import OnnxDetector, OnnxSettings
 
@@ -36,11 +44,11 @@ def box_of(frame: int) -> Box:
 
 
 FOUND = {("c0", *(1000 * side + frame for side in SIDES)): frame for frame in range(FRAMES)}
-VIEWS = Views([], {}, None, FOUND)
+VIEWS = StampedViews([], {}, None, FOUND)
 
 
-def told(gops: int) -> Told:
-    heard = Told()
+def told(gops: int) -> EventLog:
+    heard = EventLog()
     for number in range(gops):
         first = number * GOP
         boxes = {"c0": tuple((box_of(frame % FRAMES),) for frame in range(first, first + GOP))}
@@ -48,9 +56,9 @@ def told(gops: int) -> Told:
     return heard
 
 
-def watched(gops: int, behind: int = 0) -> list[Picture]:
+def watched(gops: int, behind: int = 0) -> list[ReceivedPicture]:
     return [
-        Picture(pulse, 100.0 + pulse // GOP * 0.4, Stamp("c0", (pulse - behind) % FRAMES))
+        ReceivedPicture(pulse, 100.0 + pulse // GOP * 0.4, FrameStamp("c0", (pulse - behind) % FRAMES))
         for pulse in range(gops * GOP)
     ]
 
@@ -63,7 +71,7 @@ def kept_of(pulses: Iterable[int]) -> dict[int, int]:
 def test_a_picture_says_whose_it_is_and_which(camera: int, frame: int) -> None:
     noise = np.random.default_rng(1).integers(0, 255, (144, 256, 3), dtype=np.uint8)
     grey = stamped(noise, camera, frame).mean(axis=2).astype(np.uint8)
-    assert read_stamp(grey) == Stamp(f"c{camera}", frame)
+    assert read_stamp(grey) == FrameStamp(f"c{camera}", frame)
     assert read_stamp(noise.mean(axis=2).astype(np.uint8)) is None
 
 
@@ -76,20 +84,20 @@ def test_what_is_right_is_right_over_the_end_of_the_film() -> None:
 
 def test_a_picture_of_another_camera_is_wrong() -> None:
     pictures = watched(3)
-    pictures[14] = replace(pictures[14], stamp=Stamp("c1", 14))
+    pictures[14] = replace(pictures[14], stamp=FrameStamp("c1", 14))
     assert judge(pictures, told(3), 1, VIEWS).wrong == 1
 
 
 def test_a_picture_of_another_moment_is_wrong_and_so_is_the_box_on_it() -> None:
     pictures = watched(3)
-    pictures[14] = replace(pictures[14], stamp=Stamp("c0", 12))
+    pictures[14] = replace(pictures[14], stamp=FrameStamp("c0", 12))
     received = judge(pictures, told(3), 1, VIEWS)
     assert (received.wrong, received.wrong_boxes) == (1, 1)
 
 
 def test_a_picture_that_is_shown_again_is_not_fresh_and_boxes_of_the_next_one_do_not_belong_on_it() -> None:
     pictures = watched(3)
-    pictures[14] = replace(pictures[14], stamp=Stamp("c0", 13))
+    pictures[14] = replace(pictures[14], stamp=FrameStamp("c0", 13))
     received = judge(pictures, told(3), 1, VIEWS)
     assert (received.wrong, received.repeated, received.wrong_boxes, len(received.fresh)) == (0, 1, 1, 29)
 
@@ -97,7 +105,7 @@ def test_a_picture_that_is_shown_again_is_not_fresh_and_boxes_of_the_next_one_do
 def test_a_picture_that_no_event_named_a_camera_of_may_be_of_the_wrong_one() -> None:
     received = judge(watched(3), told(2), 1, VIEWS)
     assert (received.wrong, received.unnamed) == (0, 10)
-    unproven = Outcome(FAULTS[0], received=[received])
+    unproven = FaultOutcome(FAULTS[0], received=[received])
     assert not kept(unproven)
     assert kept(replace(unproven, fault=replace(FAULTS[0], breaks=True), back=1.0)), "nobody is there to say"
 
@@ -107,7 +115,7 @@ def test_where_no_camera_is_chosen_the_last_one_stays() -> None:
     heard.take(Gop(first=GOP, frames=GOP, choices={}, boxes={}, cuts=()))
     pictures = watched(2)
     assert judge(pictures, heard, 1, VIEWS).wrong == 0
-    pictures[14] = replace(pictures[14], stamp=Stamp("c1", 14))
+    pictures[14] = replace(pictures[14], stamp=FrameStamp("c1", 14))
     assert judge(pictures, heard, 1, VIEWS).wrong == 1
 
 
@@ -116,7 +124,7 @@ def test_of_a_network_camera_the_bounds_are_known_and_that_it_never_goes_back() 
         assert judge(watched(3, behind), told(3), 1, VIEWS, ["c0"]).wrong == wrong
     assert judge(watched(3, 3), told(3), 1, VIEWS).wrong == 30, "a recording's are known exactly"
     pictures = watched(3, 3)
-    pictures[14] = replace(pictures[14], stamp=Stamp("c0", 14 - 3 - 5))
+    pictures[14] = replace(pictures[14], stamp=FrameStamp("c0", 14 - 3 - 5))
     assert judge(pictures, told(3), 1, VIEWS, ["c0"]).wrong == 1
 
 
@@ -126,9 +134,9 @@ def test_of_a_network_camera_a_box_is_right_on_the_picture_it_was_found_in() -> 
 
 
 def test_of_a_network_camera_what_is_recorded_is_what_was_shown() -> None:
-    outcome = Outcome(FAULTS[0], received=[judge(watched(3), told(3), 1, VIEWS, ["c0"])], gops=(0, 3))
+    outcome = FaultOutcome(FAULTS[0], received=[judge(watched(3), told(3), 1, VIEWS, ["c0"])], gops=(0, 3))
     for there, unlike in ((kept_of(range(30)), 0), ({**kept_of(range(30)), 14: 13}, 1)):
-        note([outcome], told(3), [File("c0", 0, there, plays=True)])
+        note([outcome], told(3), [RecordedFile("c0", 0, there, plays=True)])
         assert len(outcome.unlike) == unlike
         assert kept(outcome) == (unlike == 0)
 
@@ -152,10 +160,12 @@ def test_who_gets_nothing_waits() -> None:
 
 
 def test_a_gop_that_was_shown_and_is_not_on_the_disk_is_lost() -> None:
-    outcome = Outcome(FAULTS[0], gops=(0, 3))
+    outcome = FaultOutcome(FAULTS[0], gops=(0, 3))
     there = kept_of(range(25))
     note(
-        [outcome], told(3), [File("c0", 0, there, plays=True), File("c1", 0, kept_of(range(30)), plays=False)]
+        [outcome],
+        told(3),
+        [RecordedFile("c0", 0, there, plays=True), RecordedFile("c1", 0, kept_of(range(30)), plays=False)],
     )
     assert (outcome.lost, outcome.broken_files) == (1, 1)
     assert not kept(outcome)
@@ -165,14 +175,14 @@ def test_a_recording_that_does_not_go_on_after_the_disk_was_full_is_no_recording
     full = replace(FAULTS[0], unrecorded=True)
     before, after = kept_of(range(50)), kept_of(range(100, 200))
     for pulses, lost, goes_on in ((before, 15, False), (before | after, 5, True)):
-        outcome = Outcome(full, gops=(0, 20))
-        note([outcome], told(20), [File("c0", 0, pulses, plays=True)])
+        outcome = FaultOutcome(full, gops=(0, 20))
+        note([outcome], told(20), [RecordedFile("c0", 0, pulses, plays=True)])
         assert outcome.lost == lost
         assert kept(outcome) == goes_on
 
 
 def test_promises_are_kept_or_not() -> None:
-    good = Outcome(FAULTS[0], received=[judge(watched(3), told(3), 1, VIEWS)], without=0.9)
+    good = FaultOutcome(FAULTS[0], received=[judge(watched(3), told(3), 1, VIEWS)], without=0.9)
     assert kept(good)
     assert not kept(replace(good, without=1.1))
     assert not kept(replace(good, reconnections=1))
@@ -180,7 +190,7 @@ def test_promises_are_kept_or_not() -> None:
 
 
 async def test_faults_of_a_site_that_does_not_start_are_broken_promises(tmp_path: Path) -> None:
-    def not_started(views: Views, folder: Path) -> AbstractAsyncContextManager[Stand]:
+    def not_started(views: StampedViews, folder: Path) -> AbstractAsyncContextManager[FaultSite]:
         raise RuntimeError(f"{folder}, {len(views.cameras)} cameras: did not start")
 
     faults = [replace(it, setup=not_started) for it in FAULTS[:2]]
@@ -190,10 +200,10 @@ async def test_faults_of_a_site_that_does_not_start_are_broken_promises(tmp_path
 
 
 async def test_a_stream_that_ends_meanwhile_fails_its_fault_and_no_other() -> None:
-    async def broken_off(stand: Stand) -> None:
+    async def broken_off(stand: FaultSite) -> None:
         raise asyncio.IncompleteReadError(stand.url.encode(), 10)
 
-    outcome = Outcome(replace(FAULTS[0], inject=broken_off))
-    await _injected(outcome.fault, Stand("here", Path(), 0), outcome)
+    outcome = FaultOutcome(replace(FAULTS[0], inject=broken_off))
+    await _injected(outcome.fault, FaultSite("here", Path(), 0), outcome)
     assert outcome.failed.startswith("IncompleteReadError: 4 bytes read")
     assert not kept(outcome)

@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from benchmarks.faults.injection.messages import _pointing
-from benchmarks.faults.site.lossy_bus import Crossing, Way
+from benchmarks.faults.site.lossy_bus import LossyLink, MessageRouter
 from client import Box, Gop
 from server.messaging.inbox import Message
 
@@ -26,7 +26,7 @@ class Heard:
 @pytest.mark.parametrize("how", ["plain", "lost", "doubled", "disordered"])
 def test_messages_are_lost_doubled_or_disordered_and_pictures_are_not(how: str) -> None:
     heard = Heard()
-    way = Way(heard)
+    way = LossyLink(heard)
     way.how = how
     for number in range(1000):
         for what in (*["video"] * 5, "tracks"):
@@ -49,7 +49,7 @@ def test_messages_are_lost_doubled_or_disordered_and_pictures_are_not(how: str) 
 
 def test_messages_go_to_whom_they_are_for() -> None:
     cameras, bestview = {name: Heard() for name in ("c0", "c1", "c2")}, Heard()
-    crossing = Crossing(cameras, bestview)
+    crossing = MessageRouter(cameras, bestview)
     for number, what in enumerate(
         ("video", "tracks", "status", "thumbs/7", "detections", "position_corrections")
     ):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from benchmarks.faults.__main__ import FAULTS
 from benchmarks.faults.injection.process_pairs import BESTVIEW, DRAWING, OTHER, SHOWN, names, title, turns
-from benchmarks.faults.site.fault_site import Stand
+from benchmarks.faults.site.fault_site import FaultSite
 from benchmarks.faults.viewing.viewers import Viewer
 from client import Gop
 
@@ -25,7 +25,7 @@ def test_each_process_fails_and_any_two_of_them() -> None:
 
 
 def test_the_cameras_that_fail_are_those_that_are_watched() -> None:
-    stand = Stand("here", Path(), 0)
+    stand = FaultSite("here", Path(), 0)
     stand.told.take(Gop(first=0, frames=10, choices={1: "c2", 2: "c1", 3: "c2"}, boxes={}, cuts=()))
     assert names(stand, ("sync", SHOWN, OTHER)) == ["sync", "c0", "c1"]
     stand.viewers = [Viewer("http://localhost/", number) for number in (1, 2, 3)]

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from benchmarks.operator_assist.assisted_tracking import FISH, Watched, watch
+from benchmarks.operator_assist.assisted_tracking import FISH, TrackedClip, watch
 from benchmarks.operator_assist.clips import Clip
 from benchmarks.operator_assist.fish_school import school
 from benchmarks.operator_assist.flag_outcomes import Outcome, count
-from benchmarks.operator_assist.flag_selection import Desk
+from benchmarks.operator_assist.flag_selection import FlagSelector
 from benchmarks.operator_assist.identity_failures import Kind, failures, matches
 from benchmarks.operator_assist.outcome_table import texts
-from benchmarks.operator_assist.simulated_operator import Flag, Operator, Person
-from benchmarks.paper_experiments.scene import Truth
+from benchmarks.operator_assist.simulated_operator import OperatorFlag, OperatorProfile, SimulatedOperator
+from benchmarks.paper_experiments.scene import ObjectTruth
 from server.config.sections import FlagSettings
 from tracking import Detections
 from tracking.interactive import RiskEvent, RiskReason
@@ -25,16 +25,16 @@ FPS = 25.0
 ALL = FlagSettings(per_minute=600, risk=0.0)
 
 
-def _truth() -> Truth:
+def _truth() -> ObjectTruth:
     """Two fish on lines of their own, far from each other."""
     frames = np.arange(FRAMES)
     boxes = np.stack(
         [np.stack([frames, frames * 0 + y, frames + 60, frames * 0 + y + 20], 1) for y in (0, 300)]
     )
-    return Truth(boxes.astype(np.float64), np.ones((2, FRAMES)))
+    return ObjectTruth(boxes.astype(np.float64), np.ones((2, FRAMES)))
 
 
-def _tracks(truth: Truth, numbers: Sequence[Sequence[int]]) -> dict[int, dict[int, np.ndarray]]:
+def _tracks(truth: ObjectTruth, numbers: Sequence[Sequence[int]]) -> dict[int, dict[int, np.ndarray]]:
     """Tracks that are exactly at fish n in frame t, of the number `numbers[n][t]`; 0: no track."""
     return {t: {row[t]: truth.boxes[n, t] for n, row in enumerate(numbers) if row[t]} for t in range(FRAMES)}
 
@@ -61,7 +61,9 @@ def test_a_moment_under_another_number_is_no_failure_and_a_new_number_after_a_ga
 def test_the_operator_points_at_what_was_on_the_late_screen_once_they_have_reacted() -> None:
     truth = _truth()
     shown = _tracks(truth, [[1] * FRAMES, [2] * FRAMES])
-    operator = Operator(Person(reaction_s=0.4, error=0.0, delay_s=1.0), Desk(ALL, FPS), truth, FPS, seed=1)
+    operator = SimulatedOperator(
+        OperatorProfile(reaction_s=0.4, error=0.0, delay_s=1.0), FlagSelector(ALL, FPS), truth, FPS, seed=1
+    )
     operator.hear(60, [RiskEvent("id_switch", (2, 1), 55, 0.1, 5, 0.5)])
     said = {newest: operator.look(newest, shown) for newest in range(60, 100)}
     assert all(said[newest] is None for newest in range(60, 70))
@@ -75,7 +77,7 @@ def test_who_is_under_the_wrong_box_when_the_operator_looks_is_followed_wrongly(
     """The operator knows no more than the screen: there the two had changed places already."""
     truth = _truth()
     shown = _tracks(truth, [[2] * FRAMES, [1] * FRAMES])
-    operator = Operator(Person(delay_s=0.0), Desk(ALL, FPS), truth, FPS, seed=1)
+    operator = SimulatedOperator(OperatorProfile(delay_s=0.0), FlagSelector(ALL, FPS), truth, FPS, seed=1)
     operator.hear(60, [RiskEvent("id_switch", (2, 1), 55, 0.1, 5, 0.5)])
     for newest in range(60, 80):
         operator.look(newest, shown)
@@ -86,8 +88,8 @@ def test_a_second_flag_waits_until_the_first_is_over_and_is_let_be_if_all_is_ove
     truth = _truth()
     shown = _tracks(truth, [[1] * FRAMES, [2] * FRAMES])
     for due, seen_to in ((150, True), (61, False)):
-        person = Person(delay_s=0.0, back_s=0.0)
-        operator = Operator(person, Desk(ALL, FPS), truth, FPS, seed=1)
+        person = OperatorProfile(delay_s=0.0, back_s=0.0)
+        operator = SimulatedOperator(person, FlagSelector(ALL, FPS), truth, FPS, seed=1)
         operator.hear(60, [_trouble((1, 8), 60, 0.9), _trouble((2, 7), due, 0.5)])
         pointings = [operator.look(newest, shown) for newest in range(60, 200)]
         assert [flag.trouble.objects for flag in operator.flags] == [(1, 8), (2, 7)]
@@ -100,7 +102,9 @@ def test_a_second_flag_waits_until_the_first_is_over_and_is_let_be_if_all_is_ove
 def test_what_is_over_when_the_first_is_over_is_seen_again_from_a_moment_before() -> None:
     truth = _truth()
     shown = _tracks(truth, [[1] * FRAMES, [2] * FRAMES])
-    operator = Operator(Person(delay_s=0.0, back_s=8.0), Desk(ALL, FPS), truth, FPS, seed=1)
+    operator = SimulatedOperator(
+        OperatorProfile(delay_s=0.0, back_s=8.0), FlagSelector(ALL, FPS), truth, FPS, seed=1
+    )
     operator.hear(60, [_trouble((1, 8), 60, 0.9), _trouble((2, 7), 61, 0.5)])
     pointings = [operator.look(newest, shown) for newest in range(60, 200)]
     second = operator.flags[1]
@@ -114,7 +118,7 @@ def test_what_is_over_when_the_first_is_over_is_seen_again_from_a_moment_before(
 def test_who_was_lost_long_ago_is_seen_again_when_they_were_still_there() -> None:
     truth = _truth()
     shown = _tracks(truth, [[1] * 60 + [0] * 140, [2] * FRAMES])
-    operator = Operator(Person(delay_s=1.0), Desk(ALL, FPS), truth, FPS, seed=1)
+    operator = SimulatedOperator(OperatorProfile(delay_s=1.0), FlagSelector(ALL, FPS), truth, FPS, seed=1)
     operator.hear(120, [_trouble((1,), 60, 0.9)])
     first = next(it for newest in range(120, 200) if (it := operator.look(newest, shown)) is not None)
     assert (first.object, operator.flags[0].fish) == (1, 0)
@@ -122,7 +126,7 @@ def test_who_was_lost_long_ago_is_seen_again_when_they_were_still_there() -> Non
 
 
 def test_flags_go_to_the_riskiest_and_once_to_the_same_two() -> None:
-    desk = Desk(FlagSettings(per_minute=2), FPS)
+    desk = FlagSelector(FlagSettings(per_minute=2), FPS)
     desk.begin()
     first = desk.raised(10, [_trouble((1, 2), 10, 0.2), _trouble((3, 4), 10, 0.8), _trouble((5, 6), 10, 0.5)])
     assert [it.objects for it in first] == [(3, 4), (5, 6)]
@@ -137,11 +141,13 @@ RIGHT = [[1] * FRAMES, [2] * FRAMES]
 EXCHANGED = [[1] * 100 + [2] * 100, [2] * 100 + [1] * 100]
 
 
-def _watched(truth: Truth, numbers: Sequence[Sequence[int]], flags: Sequence[Flag] = ()) -> Watched:
+def _watched(
+    truth: ObjectTruth, numbers: Sequence[Sequence[int]], flags: Sequence[OperatorFlag] = ()
+) -> TrackedClip:
     """A clip of which is known what its tracks were, and what somebody was asked."""
     clip = Clip(0, FPS, (Detections.empty(4),) * FRAMES, truth)
     tracks = _tracks(truth, numbers)
-    return Watched(clip, failures(truth, tracks, FPS), [], list(flags), tracks)
+    return TrackedClip(clip, failures(truth, tracks, FPS), [], list(flags), tracks)
 
 
 @pytest.mark.parametrize(
@@ -158,18 +164,18 @@ def test_what_a_flag_was_good_for_is_told_by_the_fish_that_its_tracks_were_on(
     alone: list[list[int]], helped: list[list[int]], outcome: Outcome, followed: int | None
 ) -> None:
     truth = _truth()
-    flag = Flag(_trouble((1, 2), 105, 0.5), 1, raised=90, until=105, fish=followed)
-    cases = count([(_watched(truth, alone), _watched(truth, helped, [flag]))], Person())
+    flag = OperatorFlag(_trouble((1, 2), 105, 0.5), 1, raised=90, until=105, fish=followed)
+    cases = count([(_watched(truth, alone), _watched(truth, helped, [flag]))], OperatorProfile())
     assert {it for _, it in cases.flags} == {outcome}
 
 
 def test_a_flag_about_others_than_those_who_fail_was_not_needed() -> None:
     truth = _truth()
     still = np.tile([500.0, 600.0, 560.0, 620.0], (1, FRAMES, 1))
-    truth = Truth(np.concatenate([truth.boxes, still]), np.ones((3, FRAMES)))
+    truth = ObjectTruth(np.concatenate([truth.boxes, still]), np.ones((3, FRAMES)))
     numbers = [*EXCHANGED, [3] * FRAMES]
-    flag = Flag(_trouble((3, 9), 100, 0.5), 3, raised=100, until=100)
-    cases = count([(_watched(truth, numbers), _watched(truth, numbers, [flag]))], Person())
+    flag = OperatorFlag(_trouble((3, 9), 100, 0.5), 3, raised=100, until=100)
+    cases = count([(_watched(truth, numbers), _watched(truth, numbers, [flag]))], OperatorProfile())
     assert dict(cases.flags) == {("alone", "not needed"): 1}
 
 
@@ -183,12 +189,12 @@ def test_whether_others_were_in_the_way_is_told_by_where_they_were_and_not_by_th
     for number, frame in enumerate(others):
         rises = np.abs(np.arange(FRAMES) - frame)[:, None] * [0.0, 10.0, 0.0, 10.0]
         boxes = np.concatenate([boxes, (boxes[0] + (1 - 2 * number) * rises)[None]])
-    truth = Truth(boxes, np.ones((len(boxes), FRAMES)))
+    truth = ObjectTruth(boxes, np.ones((len(boxes), FRAMES)))
     numbers = [[n + 1] * FRAMES for n in range(len(boxes))]
     numbers[0] = [1] * 100 + [9] * 100
-    flag = Flag(RiskEvent(reason, (1,), 100, 0.1, 5, 0.5), 1, raised=99, until=100)
+    flag = OperatorFlag(RiskEvent(reason, (1,), 100, 0.1, 5, 0.5), 1, raised=99, until=100)
     watched = _watched(truth, numbers, [flag])
-    cases = count([(watched, watched)], Person())
+    cases = count([(watched, watched)], OperatorProfile())
     assert dict(cases.flags) == {(kind, "no help"): 1}
     assert dict(cases.kinds) == {kind: 1}, "of the failure and of its flag, the same"
 
@@ -196,16 +202,16 @@ def test_whether_others_were_in_the_way_is_told_by_where_they_were_and_not_by_th
 def test_who_meets_others_long_before_or_after_its_flag_was_alone() -> None:
     boxes = _truth().boxes
     rises = np.abs(np.arange(FRAMES) - 30)[:, None] * [0.0, 10.0, 0.0, 10.0]
-    truth = Truth(np.concatenate([boxes, (boxes[0] + rises)[None]]), np.ones((3, FRAMES)))
-    flag = Flag(_trouble((1, 3), 100, 0.5), 1, raised=99, until=100)
+    truth = ObjectTruth(np.concatenate([boxes, (boxes[0] + rises)[None]]), np.ones((3, FRAMES)))
+    flag = OperatorFlag(_trouble((1, 3), 100, 0.5), 1, raised=99, until=100)
     watched = _watched(truth, [*RIGHT, [3] * FRAMES], [flag])
-    assert dict(count([(watched, watched)], Person()).flags) == {("alone", "not needed"): 1}
+    assert dict(count([(watched, watched)], OperatorProfile()).flags) == {("alone", "not needed"): 1}
 
 
 def test_the_table_has_the_thesis_beside_it_for_as_many_minutes() -> None:
     truth = _truth()
-    flag = Flag(_trouble((1, 2), 100, 0.5), 1, raised=99, until=100)
-    cases = count([(_watched(truth, RIGHT), _watched(truth, EXCHANGED, [flag]))], Person())
+    flag = OperatorFlag(_trouble((1, 2), 100, 0.5), 1, raised=99, until=100)
+    cases = count([(_watched(truth, RIGHT), _watched(truth, EXCHANGED, [flag]))], OperatorProfile())
     rows = {it[0].strip(): it[1:] for it in texts(cases, thesis=True)}
     as_56_clips = str(56 * 20 * 25 // FRAMES)
     assert rows["flagged, tracked rightly"] == ["0", "0", "53"]
@@ -219,10 +225,10 @@ def test_a_school_is_played_again_from_its_seed_and_helped_it_fails_no_more_than
     clip = school(8, seconds=18.0)
     again = school(8, seconds=18.0)
     assert all((one.boxes == other.boxes).all() for one, other in zip(clip.seen, again.seen, strict=True))
-    alone, helped = watch(clip, FISH), watch(clip, FISH, Person())
+    alone, helped = watch(clip, FISH), watch(clip, FISH, OperatorProfile())
     assert alone.failures
     assert len(helped.failures) < len(alone.failures)
-    cases = count([(alone, helped)], Person())
+    cases = count([(alone, helped)], OperatorProfile())
     assert cases.unaided.total() == len(alone.failures)
     assert cases.left.total() == len(helped.failures)
     assert cases.flags.total() == len(helped.flags)

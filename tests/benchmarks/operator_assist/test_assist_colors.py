@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.operator_assist.background_colors import FamiliarColours
+from benchmarks.operator_assist.background_colors import ForegroundColors
 from tracking.detectors import Image
 from tracking.detectors.base import Mask
 
@@ -19,7 +19,7 @@ def _picture(weed: int, fish: int, colour: tuple[int, int, int] = FISH) -> Image
     return image
 
 
-def _taught(pale: bool) -> FamiliarColours:
+def _taught(pale: bool) -> ForegroundColors:
     """A weed that sways by its own width in front of half of the pictures, and a fish that swims by."""
     seen: list[tuple[Image, Mask]] = []
     for n in range(12):
@@ -28,7 +28,7 @@ def _taught(pale: bool) -> FamiliarColours:
         mask[10:22, 5 * n : 5 * n + 20] = 255
         mask[30:, 32:35] = 255 * (n % 2)
         seen.append((image, mask))
-    return FamiliarColours(seen)
+    return ForegroundColors(seen)
 
 
 def test_what_swims_has_familiar_colours_and_what_sways_has_not() -> None:
@@ -50,4 +50,4 @@ def test_a_colour_that_was_never_seen_says_nothing() -> None:
 
 
 def test_without_a_picture_every_colour_says_nothing() -> None:
-    assert np.allclose(FamiliarColours([]).shares(_picture(0, 0)), 0.5)
+    assert np.allclose(ForegroundColors([]).shares(_picture(0, 0)), 0.5)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.sparse import lil_matrix
 
-from benchmarks.bestview.occupancy.occupancy_map import OccupancyMap, OccupancySettings, Sight
-from benchmarks.bestview.occupancy.shortest_paths import NOWHERE, Lattice, Path, shortest_paths
+from benchmarks.bestview.occupancy.occupancy_map import ForegroundObservation, OccupancyMap, OccupancySettings
+from benchmarks.bestview.occupancy.shortest_paths import NOWHERE, GridPath, Lattice, shortest_paths
 
 bounded = settings(max_examples=40)
 
@@ -32,7 +32,7 @@ def lattices(draw: st.DrawFn, most_frames: int, most_places: int) -> Lattice:
     return Lattice(np.array(costs).reshape(frames, places), corridor(places), np.array(gates))
 
 
-def cost_of(lattice: Lattice, path: Path) -> int:
+def cost_of(lattice: Lattice, path: GridPath) -> int:
     """What one path costs; it has to keep to the moves."""
     frames = path.first + np.arange(len(path.places))
     assert all(other in lattice.moves[one] for one, other in pairwise(path.places.tolist()))
@@ -44,10 +44,10 @@ def cost_of(lattice: Lattice, path: Path) -> int:
     return cost
 
 
-def all_paths(lattice: Lattice) -> list[Path]:
+def all_paths(lattice: Lattice) -> list[GridPath]:
     frames, places = lattice.costs.shape
     return [
-        Path(first, np.array(walk))
+        GridPath(first, np.array(walk))
         for first in range(frames)
         for length in range(1, frames - first + 1)
         for walk in product(range(places), repeat=length)
@@ -142,7 +142,7 @@ def covered(rectangles: np.ndarray, people: tuple[int, ...]) -> np.ndarray:
 
 
 def marginals_by_trying(
-    rectangles: list[np.ndarray], sights: list[Sight], model: OccupancySettings
+    rectangles: list[np.ndarray], sights: list[ForegroundObservation], model: OccupancySettings
 ) -> np.ndarray:
     """The model's own probabilities: every set of people, weighed by its prior and by all pictures."""
     places = len(rectangles[0])
@@ -174,7 +174,9 @@ def test_one_person_and_two_apart_are_where_the_exact_posterior_has_them(people:
     rectangles = row_of_people(7, 3)
     model = OccupancySettings(sigma=0.05, least_area=1.0)
     sights = [
-        Sight(noisy(covered(it, tuple(people)), seed + 2000 * camera, 0.04), np.ones((HIGH, WIDE)))
+        ForegroundObservation(
+            noisy(covered(it, tuple(people)), seed + 2000 * camera, 0.04), np.ones((HIGH, WIDE))
+        )
         for camera, it in enumerate(rectangles)
     ]
     exact = marginals_by_trying(rectangles, sights, model)
@@ -187,7 +189,7 @@ def test_who_hides_behind_somebody_in_one_picture_is_found_by_the_other() -> Non
     """Two people stand in line before the first camera; the second sees them side by side."""
     first = np.array([[10, 1, 13, 8], [10, 2, 13, 9], [2, 2, 5, 9]])
     second = np.array([[4, 2, 7, 9], [14, 2, 17, 9], [19, 2, 22, 9]])
-    sights = [Sight(covered(it, (0, 1)), np.ones((HIGH, WIDE))) for it in (first, second)]
+    sights = [ForegroundObservation(covered(it, (0, 1)), np.ones((HIGH, WIDE))) for it in (first, second)]
     q = OccupancyMap([first, second], OccupancySettings()).occupied(sights)
     assert (q > 0.9).tolist() == [True, True, False]
 
@@ -198,16 +200,16 @@ def test_what_does_not_count_in_a_picture_changes_nothing() -> None:
     weight[:, 15:] = 0.0
     clear = covered(rectangles[0], (1,))
     dirty = np.where(weight > 0, clear, 1.0)
-    whole = Sight(covered(rectangles[1], (1,)), np.ones((HIGH, WIDE)))
+    whole = ForegroundObservation(covered(rectangles[1], (1,)), np.ones((HIGH, WIDE)))
     occupancy = OccupancyMap(rectangles, OccupancySettings())
-    one, other = (occupancy.occupied([Sight(it, weight), whole]) for it in (clear, dirty))
+    one, other = (occupancy.occupied([ForegroundObservation(it, weight), whole]) for it in (clear, dirty))
     np.testing.assert_array_equal(one, other)
 
 
 def test_nobody_is_found_in_nothing() -> None:
     rectangles = row_of_people(7, 3)
-    unseen = Sight(np.zeros((HIGH, WIDE)), np.zeros((HIGH, WIDE)))
-    empty = Sight(np.zeros((HIGH, WIDE)), np.ones((HIGH, WIDE)))
+    unseen = ForegroundObservation(np.zeros((HIGH, WIDE)), np.zeros((HIGH, WIDE)))
+    empty = ForegroundObservation(np.zeros((HIGH, WIDE)), np.ones((HIGH, WIDE)))
     occupancy = OccupancyMap(rectangles, OccupancySettings())
     assert (occupancy.occupied([empty, empty]) < 0.05).all()
     np.testing.assert_allclose(occupancy.occupied([unseen, unseen]), 0.01, atol=1e-3)

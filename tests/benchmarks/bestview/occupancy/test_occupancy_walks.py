@@ -5,11 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.bestview.occupancy.appearance_association import ColourSettings, Walker, numbers_of
-from benchmarks.bestview.occupancy.floor_grid import FloorSettings, View, lay_out
-from benchmarks.bestview.occupancy.ground_trajectories import WalkSettings, rows_of_walks, smoothed, walk_of
+from benchmarks.bestview.occupancy.appearance_association import (
+    MeetingSettings,
+    PathAppearance,
+    numbers_of,
+)
+from benchmarks.bestview.occupancy.floor_grid import CameraView, GridSettings, lay_out
+from benchmarks.bestview.occupancy.ground_trajectories import (
+    TrajectorySettings,
+    rows_of_walks,
+    smoothed,
+    walk_of,
+)
 from benchmarks.bestview.occupancy.homography_alignment import levelled
-from benchmarks.bestview.occupancy.shortest_paths import Path
+from benchmarks.bestview.occupancy.shortest_paths import GridPath
 from bestview import to_ground
 from tracking.detectors.background.height_model import HeightModel
 from tracking.motchallenge import MotRow
@@ -18,15 +27,15 @@ LINE = HeightModel(slope=0.5, offset=20.0, min_height=10.0)
 """In a picture of 200 by 100 pixels people are 20 rows tall at its upper edge and 70 at its lower one."""
 
 
-def plan_view(left: float) -> View:
+def plan_view(left: float) -> CameraView:
     """A camera whose picture is the floor itself, ten pixels to a unit of the ground."""
     homography = np.array([[0.1, 0.0, left], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]])
-    return View(homography, (200, 100), LINE, np.ones((50, 100)))
+    return CameraView(homography, (200, 100), LINE, np.ones((50, 100)))
 
 
 def test_the_grid_covers_what_is_seen_and_its_border_is_the_gate() -> None:
     view = plan_view(0.0)
-    floor = lay_out([view], FloorSettings(step=0.2, gate=0.2, least_seen=0.5))
+    floor = lay_out([view], GridSettings(step=0.2, gate=0.2, least_seen=0.5))
     assert (view.seen(view.boxes(floor.places, 0.34)) >= 0.5).all()
     neighbours = (floor.moves < len(floor.places)).sum(axis=1)
     assert floor.gates[neighbours < 9].all()
@@ -40,13 +49,13 @@ def test_the_grid_covers_what_is_seen_and_its_border_is_the_gate() -> None:
 
 def test_a_path_becomes_the_boxes_of_who_walks_it() -> None:
     view = plan_view(0.0)
-    floor = lay_out([view], FloorSettings(step=0.2))
+    floor = lay_out([view], GridSettings(step=0.2))
     middle = int(np.abs(floor.places - floor.places.mean(axis=0)).sum(axis=1).argmin())
     q = np.zeros((5, len(floor.places)))
     q[:, middle] = 0.9
-    walk = walk_of(floor, q, Path(1, np.full(3, middle)), 2)
+    walk = walk_of(floor, q, GridPath(1, np.full(3, middle)), 2)
     np.testing.assert_allclose(walk.places, np.tile(floor.places[middle], (3, 1)), atol=1e-6)
-    rows = rows_of_walks(view, [walk], [np.array([4, 4, 9])], WalkSettings(aspect=0.4))
+    rows = rows_of_walks(view, [walk], [np.array([4, 4, 9])], TrajectorySettings(aspect=0.4))
     assert [(row.frame, row.id) for row in rows] == [(2, 4), (3, 4), (4, 9)]
     x, y = floor.places[middle] * 10.0
     tall = 0.5 * y + 20.0
@@ -81,12 +90,12 @@ def test_homographies_that_disagree_are_shifted_until_feet_agree() -> None:
 FRAMES, MEET = 60, slice(25, 35)
 
 
-def walker(look: np.ndarray, away: float, first: int = 0) -> Walker:
+def walker(look: np.ndarray, away: float, first: int = 0) -> PathAppearance:
     """Somebody who is `away` from the middle, but for a meeting there."""
     places = np.tile([away, 0.0], (FRAMES, 1))
     places[MEET] = 0.0
     pixels = np.full((FRAMES, 2), 100.0, dtype=np.float32)
-    return Walker(first, places[first:], look[first:], pixels[first:])
+    return PathAppearance(first, places[first:], look[first:], pixels[first:])
 
 
 def looks(before: int, after: int) -> np.ndarray:
@@ -97,7 +106,7 @@ def looks(before: int, after: int) -> np.ndarray:
 
 def test_paths_that_swapped_two_people_give_their_numbers_back() -> None:
     swapped = [walker(looks(0, 1), -5.0), walker(looks(1, 0), 5.0)]
-    one, other = numbers_of(swapped, 1.0, ColourSettings())
+    one, other = numbers_of(swapped, 1.0, MeetingSettings())
     assert one.tolist() == [1] * 30 + [2] * 30
     assert other.tolist() == [2] * 30 + [1] * 30
 
@@ -111,6 +120,6 @@ def test_paths_that_swapped_two_people_give_their_numbers_back() -> None:
     ],
     ids=["told apart and right", "alike", "nothing known of one"],
 )
-def test_paths_keep_their_numbers_where_colours_say_nothing_else(walkers: list[Walker]) -> None:
-    numbers = numbers_of(walkers, 1.0, ColourSettings())
+def test_paths_keep_their_numbers_where_colours_say_nothing_else(walkers: list[PathAppearance]) -> None:
+    numbers = numbers_of(walkers, 1.0, MeetingSettings())
     assert [set(it.tolist()) for it in numbers] == [{1}, {2}]
