@@ -75,7 +75,7 @@ class Drawn(Hall):
     session: aiohttp.ClientSession
     port: int
     app: web.Application
-    told: dict[int, GopChoices]
+    decisions: dict[int, GopChoices]
     """Decisions by their first frame."""
     epochs: int = 0
 
@@ -107,15 +107,15 @@ class Drawn(Hall):
 async def drawn_room(**changes: object) -> AsyncIterator[Drawn]:
     service = FedService(small_config(site={"width": SIZE[0], "height": SIZE[1]}, **changes))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
-    told: dict[int, GopChoices] = {}
-    service.on_decision.append(lambda choices: told.update({choices.first: choices}))
+    decisions: dict[int, GopChoices] = {}
+    service.on_decision.append(lambda choices: decisions.update({choices.first: choices}))
     app = make_app(BestViewService(service))
     async with (
         asyncio.timeout(2 * PATIENCE),
         serving(app, HttpSettings(port=0)) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
     ):
-        hall = Drawn(service, session, port, app, told)
+        hall = Drawn(service, session, port, app, decisions)
         service.come(*CAMERAS)
         hall.go_on(4)
         yield hall

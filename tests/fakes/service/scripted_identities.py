@@ -36,7 +36,7 @@ def boxes(it: PersonTracker, camera: str, pulse: int) -> dict[int, Box]:
     return {number: (left, top, right, bottom) for number, left, top, right, bottom in rows}
 
 
-def said(numbers: dict[tuple[str, int], int], *corrections: Merge | Split) -> IdentityUpdate:
+def identity_update(numbers: dict[tuple[str, int], int], *corrections: Merge | Split) -> IdentityUpdate:
     keys = {TrackletKey(*key, 0): number for key, number in numbers.items()}
     merged = tuple(it for it in corrections if isinstance(it, Merge))
     split = tuple(it for it in corrections if isinstance(it, Split))

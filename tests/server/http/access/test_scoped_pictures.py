@@ -61,7 +61,7 @@ async def test_no_box_is_drawn_but_that_of_whom_a_token_may_see(tmp_path: Path) 
     path = write_tokens(tmp_path / "tokens.yaml", line_of("family"), line_of("desk"))
     async with aclosing(drawn_room(access={"tokens": str(path)})) as rooms:
         room = await anext(rooms)
-        told = room.told[max(room.told)]
+        told = room.decisions[max(room.decisions)]
         boxes = told.boxes[told.choices[1]][-1]
         plain = await still(room, "", "desk")
         theirs, all_of_it = [await still(room, "?overlay=1", who) for who in ("family", "desk")]

@@ -61,7 +61,7 @@ async def test_boxes_are_on_the_very_frame_that_they_belong_to(drawn: Drawn) -> 
     edges: list[list[float]] = []
     for pulse in pulses[:-GOP]:
         image = pictures[pulse][0]
-        told = drawn.told[pulse // GOP * GOP]
+        told = drawn.decisions[pulse // GOP * GOP]
         camera = told.choices[SOMEBODY]
         near = {place: difference(image, own[camera][place]) for place in (pulse - 1, pulse, pulse + 1)}
         assert min(near, key=lambda place: near[place]) == pulse
@@ -69,7 +69,9 @@ async def test_boxes_are_on_the_very_frame_that_they_belong_to(drawn: Drawn) -> 
         edges.append([])
         for place in (pulse - 2, pulse, pulse + 2):
             (box,) = [
-                it for it in drawn.told[place // GOP * GOP].boxes[camera][place % GOP] if it[0] == SOMEBODY
+                it
+                for it in drawn.decisions[place // GOP * GOP].boxes[camera][place % GOP]
+                if it[0] == SOMEBODY
             ]
             edges[-1].append(abs(box[1] - x) + abs(box[3] - x - width) + abs(box[4] - y - height))
     before, at, after = np.mean(edges, axis=0)
@@ -90,7 +92,7 @@ async def test_a_still_is_the_newest_frame_and_is_kept_nowhere(drawn: Drawn) -> 
     assert int(np.argmin(near)) == 19
     drawn.go_on()
     async with drawn.session.get(f"/objects/{SOMEBODY}/best.jpg?overlay=1") as answer:
-        last = max(drawn.told) + GOP - 1
+        last = max(drawn.decisions) + GOP - 1
         assert answer.headers["X-MyView-Pulse"] == str(last)
         assert green(picture_of(await answer.read())).sum() > 50
     async with drawn.session.get(f"/objects/{SOMEBODY}/best.jpg") as answer:
@@ -101,9 +103,9 @@ async def test_a_cameras_boxes_belong_to_decided_frames(drawn: Drawn) -> None:
     async with drawn.session.get("/cameras/c1/live.jpg?overlay=1") as answer:
         assert answer.status == 200
         pulse, image = int(answer.headers["X-MyView-Pulse"]), picture_of(await answer.read())
-    assert pulse == max(drawn.told) + GOP - 1
+    assert pulse == max(drawn.decisions) + GOP - 1
     plain = list(decoded(1, pulse + 1))[pulse]
-    boxes = drawn.told[max(drawn.told)].boxes["c1"][-1]
+    boxes = drawn.decisions[max(drawn.decisions)].boxes["c1"][-1]
     assert boxes
     changed = np.abs(image.astype(np.int16) - plain).max(axis=2) > 60
     for _, left, top, right, bottom in boxes:

@@ -42,9 +42,9 @@ def is_gray(picture: NDArray[np.uint8]) -> bool:
 def test_it_is_gray_and_the_pictures_around_it_are_unchanged(preset: str, blocks: tuple[int, int]) -> None:
     units = encoded((16 * blocks[0], 16 * blocks[1] + 2), preset, 3)
     samples = [join_sample(nal_units(it.data)) for it in units]
-    found, writer = parameter_sets(nal_units(units[0].data)), how(units[0])
-    assert found is not None
-    gray = [gray_picture(found, 0), writer.repeat(1, reference=True), gray_picture(found, 1)]
+    parameters, writer = parameter_sets(nal_units(units[0].data)), how(units[0])
+    assert parameters is not None
+    gray = [gray_picture(parameters, 0), writer.repeat(1, reference=True), gray_picture(parameters, 1)]
     shown, alone = decoded([*samples, *gray, *samples]), decoded(samples)
     assert len(shown) == 9
     assert all(map(is_gray, shown[3:6]))

@@ -54,12 +54,12 @@ def test_a_repetition_shows_the_picture_before_and_changes_none_after(
 ) -> None:
     units, again = encoded(width, height), repeat_frame(width, height)
     plain = decoded([unit.data for unit in units], "vp8")
-    told = [n for n, count in enumerate(repeats) for _ in range(1 + count)]
+    expected = [n for n, count in enumerate(repeats) for _ in range(1 + count)]
     frames = [
         data for unit, count in zip(units, repeats, strict=True) for data in [unit.data, *[again] * count]
     ]
     for decoder in ("vp8", "libvpx"):  # FFmpeg's own, and that of browsers
-        np.testing.assert_array_equal(decoded(frames, decoder), [plain[n] for n in told], decoder)
+        np.testing.assert_array_equal(decoded(frames, decoder), [plain[n] for n in expected], decoder)
 
 
 def test_a_repetition_is_small() -> None:
@@ -89,7 +89,7 @@ def test_a_camera_of_another_size_or_codec_is_refused() -> None:
         frame_buffer().put(0, 1, h264.data, key=True)
 
 
-def shelved(units: tuple[AccessUnit, ...], boot: int = 1) -> list[EncodedPicture]:
+def pictures_of(units: tuple[AccessUnit, ...], boot: int = 1) -> list[EncodedPicture]:
     on = frame_buffer()
     return [on.put(unit.pulse, boot, unit.data, key=unit.key) for unit in units]
 
@@ -131,12 +131,14 @@ def test_a_stream_has_a_picture_for_every_pulse_despite_losses(
     if not seen:
         assert not shown
         return
-    found = read(header(64, 48, FPS) + b"".join(picture.fragment for picture in shown))
+    pictures = read(header(64, 48, FPS) + b"".join(picture.fragment for picture in shown))
     pulses = [pulse for picture in shown for pulse in range(picture.pulse, picture.until)]
     assert pulses == list(range(first + FRAMES - len(seen), first + FRAMES))
-    assert [round(pulse, 3) for pulse, _ in found] == [picture.pulse for picture in shown]
+    assert [round(pulse, 3) for pulse, _ in pictures] == [picture.pulse for picture in shown]
     begun = dict(zip(pulses, seen, strict=True))
-    np.testing.assert_array_equal([picture for _, picture in found], [plain[begun[it.pulse]] for it in shown])
+    np.testing.assert_array_equal(
+        [picture for _, picture in pictures], [plain[begun[it.pulse]] for it in shown]
+    )
 
 
 def test_a_long_gap_is_filled_by_one_long_picture() -> None:
@@ -187,14 +189,14 @@ def test_demuxing_returns_the_muxed_frames_and_stops_at_damage(
 @needs_ffprobe
 def test_ffprobe_reports_no_errors(tmp_path: Path) -> None:
     units = encoded(64, 48)
-    data = header(64, 48, FPS, FRAMES) + b"".join(it.fragment for it in shelved(units))
+    data = header(64, 48, FPS, FRAMES) + b"".join(it.fragment for it in pictures_of(units))
     file = tmp_path / "film.webm"
     file.write_bytes(data)
     entries = "stream=codec_name,width,height,avg_frame_rate:format=format_name,duration"
     command = ["ffprobe", "-v", "warning", "-of", "default=nw=1", "-show_entries", entries, str(file)]
-    said = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert said.stderr == ""
-    assert set(said.stdout.split()) == {
+    result = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert result.stderr == ""
+    assert set(result.stdout.split()) == {
         "codec_name=vp8",
         "width=64",
         "height=48",

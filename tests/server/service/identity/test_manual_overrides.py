@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bestview import IdentityUpdate, Merge, Split
 from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, STRIDE, epoch_of, word
-from fakes.service.scripted_identities import Dictated, boxes, people, said
+from fakes.service.scripted_identities import Dictated, boxes, identity_update, people
 from server.service.identity.manual_overrides import ManualOverrides
 from server.service.identity.people import PersonTracker
 
@@ -27,7 +27,7 @@ def test_whoever_is_said_to_be_one_stays_one(steps: list[tuple[bool, int, int]])
         if by_hand:
             it.merge(kept, lost)
         else:
-            read = it.apply(said({}, Merge(first, second)))
+            read = it.apply(identity_update({}, Merge(first, second)))
             gone = {merge.lost for merge in read.merged}
             assert not gone & {it.current(number) for number in range(1, 7) if number not in gone}
             if it.current(first) != it.current(second):
@@ -53,7 +53,7 @@ def seen(it: PersonTracker, epoch: int) -> None:
     it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}), word("c1", epoch, {1: LARGE})))
 
 
-TWO = said({("c0", 1): 1, ("c1", 1): 2})
+TWO = identity_update({("c0", 1): 1, ("c1", 1): 2})
 
 
 def test_a_merge_by_hand_holds_while_the_evidence_goes_on_saying_two() -> None:
@@ -75,8 +75,8 @@ def test_a_merge_by_hand_holds_while_the_evidence_goes_on_saying_two() -> None:
 
 
 def test_who_is_said_to_be_somebody_is_whoever_that_turns_out_to_be() -> None:
-    three = said({("c0", 1): 1, ("c1", 1): 2, ("c1", 2): 3})
-    it = dictated(three, replace(three, merged=(Merge(3, 1),)), said({("c0", 2): 2}))
+    three = identity_update({("c0", 1): 1, ("c1", 1): 2, ("c1", 2): 3})
+    it = dictated(three, replace(three, merged=(Merge(3, 1),)), identity_update({("c0", 2): 2}))
     seen(it, 0)
     it.merge(1, 2)
     seen(it, 1)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from bestview import IdentitySettings, IdentityUpdate, Merge, Split, TrackKey, TrackletKey, TrackUpdate
 from fakes.service.scripted_cameras import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
-from fakes.service.scripted_identities import Dictated, boxes, people, said
+from fakes.service.scripted_identities import Dictated, boxes, identity_update, people
 from server.service.identity.local_numbers import LocalNumbers
 from server.service.identity.people import PersonTracker
 from server.service.ingest.window_history import WindowHistory
@@ -31,7 +31,7 @@ class Heard:
         del last_frame
         self._heard += tracks
         self.pictures.update(pictures)
-        return said({})
+        return identity_update({})
 
 
 def dictated(*updates: IdentityUpdate) -> PersonTracker:
@@ -124,12 +124,12 @@ def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
 def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
     def since(*numbers: tuple[int, int]) -> IdentityUpdate:
         return replace(
-            said({}), person_ids={TrackletKey("c0", 1, first): number for first, number in numbers}
+            identity_update({}), person_ids={TrackletKey("c0", 1, first): number for first, number in numbers}
         )
 
     later = 3 * STRIDE
     it = dictated(
-        said({}),
+        identity_update({}),
         since((STRIDE, 0)),
         since((STRIDE, 1)),
         since((STRIDE, 1), (later, 0)),
@@ -145,7 +145,9 @@ def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
 
 def test_frames_that_are_not_decided_yet_keep_their_people_when_the_registry_has_settled_them() -> None:
     def since(*parts: tuple[int, int]) -> IdentityUpdate:
-        return replace(said({}), person_ids={TrackletKey("c0", 1, first): number for first, number in parts})
+        return replace(
+            identity_update({}), person_ids={TrackletKey("c0", 1, first): number for first, number in parts}
+        )
 
     second, third = 2 * STRIDE, 4 * STRIDE
     it = dictated(
@@ -192,9 +194,9 @@ def test_of_merged_numbers_the_newest_are_remembered() -> None:
 
 def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> None:
     it = dictated(
-        said({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 3}),
-        said({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 2}, Merge(kept=2, lost=3)),
-        said({("c0", 1): 1, ("c0", 2): 1, ("c1", 1): 1}, Merge(kept=1, lost=2)),
+        identity_update({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 3}),
+        identity_update({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 2}, Merge(kept=2, lost=3)),
+        identity_update({("c0", 1): 1, ("c0", 2): 1, ("c1", 1): 1}, Merge(kept=1, lost=2)),
     )
     for epoch in range(3):
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: None}), word("c1", epoch, {1: LARGE})))
@@ -206,7 +208,11 @@ def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> Non
 
 def test_what_turned_out_is_taken_once_and_in_order() -> None:
     merge, split = Merge(kept=1, lost=2), Split(kept=1, split_off=4, camera="c0")
-    it = dictated(said({("c0", 1): 1}, merge), said({("c0", 1): 4}, split), said({("c0", 1): 4}))
+    it = dictated(
+        identity_update({("c0", 1): 1}, merge),
+        identity_update({("c0", 1): 4}, split),
+        identity_update({("c0", 1): 4}),
+    )
     for epoch in range(2):
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL})))
     assert it.take_corrections() == (merge, split)
@@ -215,7 +221,7 @@ def test_what_turned_out_is_taken_once_and_in_order() -> None:
 
 
 def test_who_has_left_a_person_for_one_not_confirmed_yet_has_no_number() -> None:
-    it = dictated(said({("c0", 1): 1}), said({("c0", 1): 0}))
+    it = dictated(identity_update({("c0", 1): 1}), identity_update({("c0", 1): 0}))
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
     it.update(epoch_of(1, word("c0", 1, {1: SMALL})))
     assert boxes(it, "c0", STRIDE) == {}
@@ -223,7 +229,7 @@ def test_who_has_left_a_person_for_one_not_confirmed_yet_has_no_number() -> None
 
 
 def test_two_tracks_of_one_person_in_one_picture_give_one_box() -> None:
-    it = dictated(said({("c0", 1): 1, ("c0", 2): 1}))
+    it = dictated(identity_update({("c0", 1): 1, ("c0", 2): 1}))
     it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE})))
     assert boxes(it, "c0", 0) == {1: SMALL}
 

@@ -80,7 +80,7 @@ def test_a_clock_that_jumped_during_recording_is_not_trusted_later_either(
     bounds = RetentionLimits(keep_s=3.5 * TRIAL_S, max_mb=1e6, segment_s=0.2)
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(2))
-    clocks.wall += YEAR_S  # and whoever keeps it says that it is right
+    clocks.wall += YEAR_S  # and it still counts as synchronized
     records(store, clocks, range(2, 4))
     clocks.now += TRIAL_S
     store.close()
@@ -111,12 +111,12 @@ def test_a_clock_that_is_ahead_at_the_start_deletes_nothing(
     clocks.jump(seconds)
     store = opened(tmp_path, clocks)
     assert segments_on_disk(tmp_path) == list(range(10))
-    (told,) = [it for it in caplog.messages if "does not count" in it]
-    assert "the clock is not synchronized (NTP)" in told
+    (logged,) = [it for it in caplog.messages if "does not count" in it]
+    assert "the clock is not synchronized (NTP)" in logged
     for gop in range(10, 18):
         records(store, clocks, range(gop, gop + 1))
         clocks.now += TRIAL_S / 1000
-    assert segments_on_disk(tmp_path) == list(range(18)), "as long as nobody vouches for it"
+    assert segments_on_disk(tmp_path) == list(range(18)), "as long as it is not synchronized"
     clocks.now += KEEP_S
     records(store, clocks, range(20, 21))
     assert not set(range(8)) & set(segments_on_disk(tmp_path)), "but it is not kept for ever"
@@ -160,10 +160,10 @@ def test_after_a_week_off_old_recordings_are_deleted_soon_if_the_clock_is_synchr
         records(store, clocks, range(gop, gop + 1))
         deleted.append(30 - len([it for it in segments_on_disk(tmp_path) if it < 30]))
     assert deleted == [10, 20, 30, 30], "in parts"
-    told = [it for it in caplog.messages if "deleted the oldest" in it]
+    logged = [it for it in caplog.messages if "deleted the oldest" in it]
     assert (
         "10 older than record.keep_s (86400 s); 20 more are too old and are deleted in the next passes"
-        in told[0]
+        in logged[0]
     )
     store.close()
 
@@ -277,9 +277,9 @@ def test_recordings_of_an_earlier_version_are_dated_once(tmp_path: Path, clocks:
     recorded(tmp_path, clocks)
     (tmp_path / "clock.json").unlink()
     (path,) = tmp_path.glob("*/session.json")
-    told = json.loads(path.read_bytes())
-    del told["age_clock_at_pulse0"], told["age_clock"]
-    path.write_text(json.dumps(told))
+    info = json.loads(path.read_bytes())
+    del info["age_clock_at_pulse0"], info["age_clock"]
+    path.write_text(json.dumps(info))
     for index in path.parent.glob("index/*"):
         os.utime(index, (clocks.wall, clocks.wall))
     clocks.now += KEEP_S / 2

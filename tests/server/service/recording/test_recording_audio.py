@@ -64,17 +64,17 @@ async def hall(recording: Path, tmp_path: Path) -> AsyncIterator[Hall]:
 
 
 def shows(hall: Hall, recording: Path, gops: range, choices: Mapping[int, str | None] | None = None) -> None:
-    """Decide some GOPs of the recording's pictures: person 1 is in either camera in turn, or as told."""
+    """Decide some GOPs of the recording: person 1 is in either camera in turn, or as in ``choices``."""
     service = hall.service
     for gop in gops:
         for camera in CAMERAS:
             for unit in flashing(recording)[gop * GOP : (gop + 1) * GOP]:
                 service.ingest.video(video(camera, unit))
         camera = CAMERAS[gop % 2] if choices is None else choices[gop]
-        told = GopChoices(
+        choices_of_gop = GopChoices(
             first=gop * GOP, frames=GOP, choices={} if camera is None else {1: camera}, boxes={}, cuts=[]
         )
-        service.recorder.put(told, PULSE0)
+        service.recorder.put(choices_of_gop, PULSE0)
         choice = ObjectChoice(1, camera, None, away=False)
         service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
@@ -99,7 +99,7 @@ async def download(hall: Hall, path: str) -> bytes:
 
 
 def unbroken(stream: bytes, kind: str | None = None) -> tuple[float, float]:
-    """Check that there is no hole in the sound; say from when to when it is heard."""
+    """Assert that the audio has no gap; return its first and last time."""
     times, _ = heard(stream, kind)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
     return float(times[0]), float(times[-1])

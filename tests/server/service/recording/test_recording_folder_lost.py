@@ -240,9 +240,9 @@ def test_old_recordings_that_cannot_be_deleted_do_not_stop_the_recording(
             it.chmod(0o700)
         assert store.session is not None
         assert [(it.first, it.end) for it in store.session.cameras[A].index.all] == [(100, 120)]
-        told = [it for it in caplog.messages if "cannot delete expired segments" in it]
-        assert len(told) == 1
-        assert "Permission denied" in told[0]
+        logged = [it for it in caplog.messages if "cannot delete expired segments" in it]
+        assert len(logged) == 1
+        assert "Permission denied" in logged[0]
         store.close()
 
 

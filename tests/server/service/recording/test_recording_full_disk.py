@@ -71,10 +71,10 @@ def files_in(session: RecordingSession) -> set[int]:
 
 def files_in_playlists(session: RecordingSession) -> set[int]:
     """Return the files that the playlists on the disk refer to."""
-    told: set[int] = set()
+    files: set[int] = set()
     for path in session.folder.rglob("*.m3u8"):
-        told |= {int(line[-16:-4]) for line in path.read_text().splitlines() if line[:1] not in ("#", "")}
-    return told
+        files |= {int(line[-16:-4]) for line in path.read_text().splitlines() if line[:1] not in ("#", "")}
+    return files
 
 
 def test_old_recordings_are_deleted_from_a_full_disk(tmp_path: Path, clock: ManualClocks) -> None:

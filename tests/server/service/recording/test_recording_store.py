@@ -208,7 +208,7 @@ def test_the_size_stays_bounded_and_a_restart_reads_the_same_indexes(
     for number, entries in found.items():
         expected = [gop for gop, choices in enumerate(shown) if number in choices]
         kept = [pulse // GOP for it in entries for pulse in range(it.first, it.end, GOP)]
-        assert kept == expected[len(expected) - len(kept) :], "the newest, without a hole of our own"
+        assert kept == expected[len(expected) - len(kept) :], "the newest, without a new gap"
         for it in entries:
             path = again.earlier[0].paths.camera_file(it.camera, it.file)
             assert [gop.first for gop in read_gops(path, it.offset, it.length, FPS)] == list(

@@ -97,9 +97,9 @@ def test_a_full_disk_is_logged_once_retried_and_counted(caplog: pytest.LogCaptur
     writer.close()
     assert (disk.taken, disk.abandoned) == ([15, -1], 3)
     assert (writer.written, writer.lost, writer.error_text) == (1, 3, "")
-    told, goes_on = (it.getMessage() for it in caplog.records)
-    assert told.startswith("recording: cannot write: No space left on device; nothing is recorded")
-    assert goes_on.startswith("recording: continues after ")
+    failed, continued = (it.getMessage() for it in caplog.records)
+    assert failed.startswith("recording: cannot write: No space left on device; nothing is recorded")
+    assert continued.startswith("recording: continues after ")
 
 
 def test_a_disk_that_is_full_repeatedly_is_not_logged_each_time(
@@ -187,7 +187,7 @@ def test_a_service_records_what_it_decides(tmp_path: Path) -> None:
     assert [pulse for pulse, _ in pictures(session.cameras[B].path)] == list(range(6 * GOP))
 
 
-def test_pictures_that_come_after_the_decision_are_recorded_too(tmp_path: Path) -> None:
+def test_pictures_that_arrive_after_the_decision_are_recorded_too(tmp_path: Path) -> None:
     service = fed(tmp_path / "kept")
     service.recorder.open()
     for epoch in range(7):
@@ -204,7 +204,7 @@ def test_pictures_that_come_after_the_decision_are_recorded_too(tmp_path: Path) 
         assert [pulse for pulse, _ in pictures(session.cameras[camera].path)] == list(range(decided))
 
 
-def test_a_folder_that_cannot_be_used_is_told_in_one_line(tmp_path: Path) -> None:
+def test_an_unusable_folder_is_a_one_line_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match=r"record\.folder: .*file: cannot write there"):
         fed(tmp_path / "file").recorder.open()
@@ -215,7 +215,7 @@ def test_a_folder_that_cannot_be_used_is_told_in_one_line(tmp_path: Path) -> Non
     first.close()
 
 
-def test_nothing_is_written_where_no_folder_is_named() -> None:
+def test_nothing_is_written_without_a_configured_folder() -> None:
     service = FedService(small_config())
     service.recorder.open()
     assert service.recorder.session is None

@@ -1,4 +1,4 @@
-"""The render worker: frames are result with their own boxes, and damage is confined to its GOP."""
+"""The render worker: frames are drawn with their own boxes, and damage is confined to its GOP."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One sound under every picture: unbroken under cuts and holes, in step to 40 ms, in every kind of stream."""
+"""The audio of every stream is gapless across cuts and losses, and within 40 ms of the pictures."""
 
 from __future__ import annotations
 
@@ -97,20 +97,22 @@ async def test_after_every_cut_a_beep_is_with_its_flash(
         assert len(packets(data)) == FRAMES * 48_000 // FPS // FRAME
 
 
-async def test_sound_has_no_hole_where_pictures_or_sound_are_missing(loud: Hall, recording: Path) -> None:
+async def test_audio_has_no_gap_where_pictures_or_audio_are_missing(loud: Hall, recording: Path) -> None:
     sends(loud.service, recording, silent=range(60, 80))
     lost = frozenset({13, *range(30, 45), 71})
     data, ts = await watched(loud, recording, ["/objects/1/best.mp4", "/objects/1/best.ts"], lost)
     for stream, kind in ((data, "mp4"), (ts, "mpegts")):
         times, samples = heard(stream, kind)
-        assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a hole"
+        assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a gap"
         quiet = (times > 61 * FRAME / 48_000) & (times < 80 * FRAME / 48_000)
         assert quiet.sum() > 18 * FRAME
         assert not samples[quiet].any()
     check_counters(taken_apart(ts))
 
 
-async def test_a_camera_has_the_sound_at_once_or_silence_a_little_later(loud: Hall, recording: Path) -> None:
+async def test_a_camera_stream_has_audio_at_once_or_silence_half_a_second_later(
+    loud: Hall, recording: Path
+) -> None:
     service = loud.service
     own = sends(service, recording, silent=range(60, 1000))
     service.come(*CAMERAS)
@@ -122,16 +124,16 @@ async def test_a_camera_has_the_sound_at_once_or_silence_a_little_later(loud: Ha
         await asyncio.sleep(0.002)
     service.splicer.close()
     data, ts = [await answer.read() for answer in answers]
-    got = packets(data)
-    assert got[:60] == own[:60]
-    assert {*got[60:]} == {service.config.sound.format.silence}  # type: ignore[union-attr]
-    assert 0 <= FRAMES * 1.92 / FRAME * 1000 - len(got) <= 0.5 * 48_000 / FRAME + 1, "half a second later"
+    frames = packets(data)
+    assert frames[:60] == own[:60]
+    assert {*frames[60:]} == {service.config.sound.format.silence}  # type: ignore[union-attr]
+    assert 0 <= FRAMES * 1.92 / FRAME * 1000 - len(frames) <= 0.5 * 48_000 / FRAME + 1, "half a second later"
     assert beeps(data) == beeps(ts, "mpegts") == pytest.approx(BEEPS[:1], abs=STEP)
     check_counters(taken_apart(ts))
 
 
 @pytest.mark.parametrize("parts", [0, 5])
-async def test_segments_and_their_parts_have_the_sound_of_their_pictures(
+async def test_segments_and_their_parts_have_the_audio_of_their_pictures(
     loud: Hall, recording: Path, parts: int
 ) -> None:
     sends(loud.service, recording)
@@ -151,7 +153,7 @@ async def test_segments_and_their_parts_have_the_sound_of_their_pictures(
     assert beeps(data) == pytest.approx([it for it in BEEPS if it > began], abs=STEP)
 
 
-async def test_everybody_shares_the_bytes_of_sound(loud: Hall, recording: Path) -> None:
+async def test_all_streams_share_the_bytes_of_the_audio(loud: Hall, recording: Path) -> None:
     service = loud.service
     sends(service, recording)
     for camera in CAMERAS:
@@ -159,13 +161,13 @@ async def test_everybody_shares_the_bytes_of_sound(loud: Hall, recording: Path) 
             service.ingest.video(video(camera, unit))
     both = (ObjectChoice(1, A, None, away=False), ObjectChoice(2, B, None, away=False))
     service.splicer.publish_decision(GopDecision(0, GOP, both, {}, {}, (), NO_REASON))
-    reels = [service.splicer.segmenter_of_person(number) for number in (1, 2)]
-    one, two = [reel._segments[0]._chunks[0] for reel in reels if reel is not None]
+    segmenters = [service.splicer.segmenter_of_person(number) for number in (1, 2)]
+    one, two = [segmenter._segments[0]._chunks[0] for segmenter in segmenters if segmenter is not None]
     assert one.audio is not None
     assert one.audio is two.audio
 
 
-async def test_a_site_without_sound_is_as_it_always_was(hall: Hall) -> None:
+async def test_a_site_without_audio_has_no_audio_track(hall: Hall) -> None:
     service = hall.service
     service.come(*CAMERAS)
     for epoch in range(3):
@@ -183,7 +185,7 @@ async def test_a_site_without_sound_is_as_it_always_was(hall: Hall) -> None:
     assert b"soun" not in await answer.read()
 
 
-async def test_the_site_says_what_sound_it_has_and_passes_over_what_is_none(loud: Hall) -> None:
+async def test_the_site_names_its_audio_codec_and_ignores_invalid_audio(loud: Hall) -> None:
     assert (await loud.get_json("/api/site"))["sound"] == "mp4a.40.2"
     (good,) = messages(
         RecordedAudioSource(
@@ -204,7 +206,7 @@ async def test_the_site_says_what_sound_it_has_and_passes_over_what_is_none(loud
     assert state.metrics.last_error.text.startswith("invalid message: audio: ")
 
 
-async def test_where_boxes_are_burnt_in_a_beep_is_with_its_flash(loud: Hall, recording: Path) -> None:
+async def test_in_videos_with_boxes_a_beep_is_with_its_flash(loud: Hall, recording: Path) -> None:
     service = loud.service
     own = sends(service, recording)
     service.come(*CAMERAS)
@@ -230,7 +232,7 @@ async def test_where_boxes_are_burnt_in_a_beep_is_with_its_flash(loud: Hall, rec
 
 
 @needs_ffprobe
-async def test_ffprobe_has_nothing_to_say(loud: Hall, recording: Path, tmp_path: Path) -> None:
+async def test_ffprobe_reports_no_errors(loud: Hall, recording: Path, tmp_path: Path) -> None:
     sends(loud.service, recording)
     ways = ["best.mp4", "best.ts"]
     for way, data in zip(
@@ -266,7 +268,7 @@ async def test_chromium_plays_both_to_the_end_where_either_is_missing(loud: Hall
     assert seen["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]
 
 
-async def test_a_recording_has_the_sound_from_its_first_picture_to_its_last(
+async def test_a_recording_has_audio_from_its_first_picture_to_its_last(
     loud: Hall, recording: Path, tmp_path: Path
 ) -> None:
     service, out = loud.service, tmp_path / "one.mp4"

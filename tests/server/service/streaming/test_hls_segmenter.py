@@ -1,4 +1,4 @@
-"""Segments: whole GOPs, numbered by their pulses, each decodable by itself, holes or not."""
+"""Segments: whole GOPs, numbered by their pulses, each decodable by itself, with and without gaps."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def check(
     """Compare with what is to be shown at every pulse; a picture of a tick or two is not seen."""
     assert pictures[0][0] == pytest.approx(first)
     for (_, until, _), (begin, _, _) in pairwise(pictures):
-        assert until == pytest.approx(begin), "no hole"
+        assert until == pytest.approx(begin), "no gap"
     for begin, until, picture in pictures:
         if until - begin > 0.01:
             for pulse in range(round(begin), round(until)):

@@ -20,7 +20,7 @@ A, B = CAMERAS
 
 
 class Site:
-    """Two cameras whose pictures are all there; a test says whom the first one sees, GOP by GOP."""
+    """Two cameras without losses; a test decides whether the first one sees the person, GOP by GOP."""
 
     def __init__(self) -> None:
         stream_format = StreamFormat()
@@ -32,7 +32,7 @@ class Site:
         self.gops = 0
 
     def decide(self, frames_seen: int, number: int = 1, merged: dict[int, int] | None = None) -> None:
-        """Decide a GOP: B is best, and A sees somebody in its first frames."""
+        """Decide a GOP: B is best, and A sees the person in its first frames."""
         seen: list[list[NumberedBox]] = [
             [(number, 1.0, 1.0, 9.0, 9.0)] if frame < frames_seen else [] for frame in range(GOP)
         ]

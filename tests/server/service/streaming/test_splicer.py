@@ -90,7 +90,7 @@ async def test_the_stream_of_a_merged_number_ends_with_its_last_viewer() -> None
     viewer = splicer.persons[2].subscribe()
     splicer.publish_decision(decision(1, choice(1, A), merged={2: 1, 3: 1}))
     splicer.forget({1}, {2: 1, 3: 1})
-    assert list(splicer.persons) == [1, 2], "nobody watched 3: who asks for it now is given 1"
+    assert list(splicer.persons) == [1, 2], "3 had no viewers: later ones receive 1"
     splicer.persons[2].unsubscribe(viewer)
     splicer.forget({1}, {2: 1, 3: 1})
     assert list(splicer.persons) == [1]
@@ -109,7 +109,7 @@ async def test_the_streams_of_forgotten_persons_end() -> None:
 async def test_a_cameras_own_stream_begins_with_a_keyframe_and_has_every_frame() -> None:
     splicer, frame_buffers = filled()
     early = splicer.cameras[A].subscribe()
-    frames = [shelved for pulse in range(2, 13) if (shelved := frame_buffers[A].get(pulse)) is not None]
+    frames = [frame for pulse in range(2, 13) if (frame := frame_buffers[A].get(pulse)) is not None]
     for frame in frames:
         splicer.publish_frame(A, frame)
     late = splicer.cameras[A].subscribe()

@@ -1,4 +1,4 @@
-"""A stream that begins in the past: from the disk, then from memory, then live, without a hole."""
+"""Time shift plays from the disk, then from memory, then live, without a gap."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ async def read_up_to(hall: Hall, path: str, pulse: int, then: int) -> list[tuple
                 return decoded(data)
 
 
-async def test_somebodys_past_goes_over_into_the_present_without_a_hole(recorded: Hall) -> None:
+async def test_a_persons_recording_continues_into_the_live_stream_without_a_gap(recorded: Hall) -> None:
     camera = {
         pulse: choices.choices[1]
         for choices in recorded.service.recorder.recent.choices(0)
@@ -119,7 +119,7 @@ async def test_somebodys_past_goes_over_into_the_present_without_a_hole(recorded
     assert used == {A, B}
 
 
-async def test_a_cameras_past_goes_over_into_the_present_without_a_hole(recorded: Hall) -> None:
+async def test_a_cameras_recording_continues_into_the_live_stream_without_a_gap(recorded: Hall) -> None:
     shown = await read_up_to(recorded, "/cameras/c0/live.mp4?from=p0", 7 * GOP, 7)
     assert [pulse for pulse, _ in shown] == list(range(8 * GOP))
     for pulse, picture in shown:
@@ -135,7 +135,7 @@ async def test_a_cameras_past_goes_over_into_the_present_without_a_hole(recorded
         ("from=2025-11-21T04:40:00.200Z&to=2025-11-21T05:40:00.8%2B01:00", range(5, 20)),
     ],
 )
-async def test_with_an_end_it_is_a_download_of_these_frames(
+async def test_a_range_with_an_end_is_a_download_of_its_frames(
     recorded: Hall, query: str, pulses: range
 ) -> None:
     recorded.service.pulse0 = 1_763_700_000.0
@@ -143,7 +143,7 @@ async def test_with_an_end_it_is_a_download_of_these_frames(
     assert [pulse for pulse, _ in shown] == list(pulses)
 
 
-async def test_an_end_that_is_yet_to_come_is_waited_for(recorded: Hall) -> None:
+async def test_a_download_waits_for_an_end_in_the_future(recorded: Hall) -> None:
     reading = asyncio.create_task(read(recorded, "/objects/1/best.mp4?from=p20&to=p33"))
     while not recorded.service.splicer.viewers:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
@@ -151,7 +151,7 @@ async def test_an_end_that_is_yet_to_come_is_waited_for(recorded: Hall) -> None:
     assert [pulse for pulse, _ in await reading] == list(range(20, 33))
 
 
-async def test_without_a_recording_the_memory_is_the_past(busy: Hall) -> None:
+async def test_without_a_recording_frames_in_memory_are_played(busy: Hall) -> None:
     for source in (PersonPlayback(busy.service.recorder, (1,)), CameraPlayback(busy.service.recorder, A)):
         (span,) = available_ranges(source)
         assert (first_available(source, 0), end_of_available(source)) == (span.first, span.end)
@@ -191,13 +191,13 @@ async def test_without_a_recording_the_memory_is_the_past(busy: Hall) -> None:
         ("/api/cameras/c0/past?to=yesterday", 400, f"to: 'yesterday' is not a time; {MOMENT}"),
     ],
 )
-async def test_what_cannot_be_played_is_told_in_one_line(
+async def test_impossible_requests_are_answered_with_a_one_line_error(
     recorded: Hall, path: str, status: int, error: str
 ) -> None:
     assert await recorded.get(path) == (status, {"error": error})
 
 
-async def test_it_is_said_what_there_is(recorded: Hall) -> None:
+async def test_spans_list_the_recorded_time(recorded: Hall) -> None:
     recorded.service.pulse0 = 1_763_700_000.0
     span = {
         "begins": "2025-11-21T04:40:00.000Z",
@@ -209,10 +209,10 @@ async def test_it_is_said_what_there_is(recorded: Hall) -> None:
     assert (await recorded.get_json("/api/cameras/c1/past"))["spans"][0]["frames"] == 35
 
 
-async def test_it_is_said_by_which_cameras(recorded: Hall) -> None:
+async def test_views_list_the_chosen_cameras(recorded: Hall) -> None:
     async with recorded.session.get("/api/past?from=p0") as answer:
-        told = [json.loads(line) async for line in answer.content]
-    chosen = {it["first"] + n: it["choices"]["1"] for it in told for n in range(it["frames"])}
+        decisions = [json.loads(line) async for line in answer.content]
+    chosen = {it["first"] + n: it["choices"]["1"] for it in decisions for n in range(it["frames"])}
     views = (await recorded.get_json("/api/objects/1/past"))["views"]
     assert {it["first"] + n: it["camera"] for it in views for n in range(it["frames"])} == chosen
     assert [it["camera"] for it in views] == [A, B]
@@ -222,7 +222,9 @@ async def test_it_is_said_by_which_cameras(recorded: Hall) -> None:
 
 
 @pytest.mark.parametrize(("query", "frames"), [("from=p7&to=p24", 17), ("from=p20", 10), ("to=p4", 4)])
-async def test_it_is_said_of_a_part_of_the_time(recorded: Hall, query: str, frames: int) -> None:
+async def test_spans_and_views_are_limited_to_the_requested_range(
+    recorded: Hall, query: str, frames: int
+) -> None:
     def cameras(views: list[dict[str, Any]]) -> dict[int, str]:
         return {it["first"] + n: it["camera"] for it in views for n in range(it["frames"])}
 
@@ -237,7 +239,7 @@ async def test_it_is_said_of_a_part_of_the_time(recorded: Hall, query: str, fram
     assert nothing == {"spans": [], "views": []}
 
 
-async def test_it_is_told_again_who_was_where(recorded: Hall) -> None:
+async def test_recorded_decisions_have_choices_and_boxes(recorded: Hall) -> None:
     async with recorded.session.get("/api/past?from=p7&to=p24") as answer:
         assert answer.content_type == "application/x-ndjson"
         lines = [json.loads(line) async for line in answer.content]
@@ -246,7 +248,7 @@ async def test_it_is_told_again_who_was_where(recorded: Hall) -> None:
     assert lines[0]["boxes"][A][0][0][0] == 1
 
 
-async def test_who_watches_the_past_is_a_viewer_like_others(
+async def test_a_viewer_of_time_shift_counts_like_others(
     recorded: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_stream, "_LEAD_S", 0.2)
@@ -261,7 +263,7 @@ async def test_who_watches_the_past_is_a_viewer_like_others(
         await asyncio.sleep(0.001)
 
 
-async def test_who_watches_the_past_takes_a_viewers_place_and_gives_it_back(recorded: Hall) -> None:
+async def test_a_viewer_of_time_shift_occupies_a_slot_and_frees_it(recorded: Hall) -> None:
     recorder = recorded.service.recorder
     async with recorded.session.get("/objects/1/best.mp4?from=p0") as answer:
         await answer.content.readany()
@@ -301,7 +303,7 @@ def site_of(store: RecordingFolder) -> tuple[StreamFormat, bytes]:
     st.integers(0, 20 * GOP),
     st.integers(1, 20 * GOP),
 )
-async def test_any_part_of_any_past_is_played_without_a_hole(
+async def test_any_range_of_any_recording_is_played_without_a_gap(
     tmp_path_factory: pytest.TempPathFactory, shown: list[str | None], start: int, frames: int
 ) -> None:
     folder = tmp_path_factory.mktemp("part")
@@ -336,7 +338,7 @@ async def test_any_part_of_any_past_is_played_without_a_hole(
     assert all(any(it.first <= gop * GOP < it.end for it in available_ranges(source)) for gop in wanted)
 
 
-async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -> None:
+async def test_segments_deleted_during_playback_are_left_out(tmp_path: Path) -> None:
     store = written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(12)])
     assert store.session is not None
     store.session.paths.camera_file(A, 25).unlink()
@@ -349,7 +351,7 @@ async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("end", [2 * GOP + 1, 10 * GOP])
-async def test_who_is_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, end: int) -> None:
+async def test_a_person_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, end: int) -> None:
     now = 10 * GOP + FPS
     store = written_folder(
         RecordingFolder(tmp_path, AMPLE),
@@ -365,23 +367,23 @@ async def test_who_is_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, e
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
 
 
-async def test_who_comes_back_after_the_end_does_not_make_the_past_longer(tmp_path: Path) -> None:
+async def test_a_person_who_returns_after_the_end_does_not_extend_the_download(tmp_path: Path) -> None:
     store = written_folder(
         RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A} if gop < 2 else {}) for gop in range(4)]
     )
     assert store.session is not None
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=4 * GOP)
     stream_format, header = site_of(store)
-    channel, back = Broadcaster(), gop_record(8, {1: A}).cameras[A]
+    broadcaster, back = Broadcaster(), gop_record(8, {1: A}).cameras[A]
     came = [Shown(back.first + at, not at, it, boot=1) for at, it in enumerate(back.fragments)]
-    channel.publish(MediaChunk(came, FPS, ContinuityCounters()))
-    stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: channel)
+    broadcaster.publish(MediaChunk(came, FPS, ContinuityCounters()))
+    stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: broadcaster)
     data = b"".join([it.data async for it in stream.send(PlaybackRange(0, 5 * GOP))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
     assert len(fragments(data)) == 2 * GOP, "and nothing that lasts up to then"
 
 
-async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
+async def test_a_few_seconds_are_sent_at_once_and_the_rest_in_real_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(40)])
@@ -403,7 +405,7 @@ async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
     store.close()
 
 
-async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path: Path) -> None:
+async def test_a_cameras_recording_includes_earlier_sessions(tmp_path: Path) -> None:
     written_folder(
         RecordingFolder(tmp_path / "kept", AMPLE), [gop_record(gop, {1: A}) for gop in range(4)]
     ).close()
@@ -433,7 +435,7 @@ async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path
     assert len(other.earlier) == 2
 
 
-async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tmp_path: Path) -> None:
+async def test_a_persons_recording_includes_earlier_sessions_with_the_same_numbers(tmp_path: Path) -> None:
     folder, since = tmp_path / "kept", PULSE0 - 9.0
     store = RecordingFolder(folder, AMPLE)
     written_folder(store, [gop_record(gop, {}) for gop in range(1)])
@@ -446,9 +448,9 @@ async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tm
         hall.service.pulse0 = PULSE0 + 0.01
         hall.service.recorder.open()
         hall.service.come(*CAMERAS)
-        said = IdentitySnapshot(pulse=19, boot=1, next_number=9, numbered_since=since, people=[])
+        snapshot = IdentitySnapshot(pulse=19, boot=1, next_number=9, numbered_since=since, people=[])
         key = ZenohKeys("hall").camera(A, "retained_identities")
-        hall.service.state_replication.snapshot_received(Message(key, msgspec.json.encode(said), b""))
+        hall.service.state_replication.snapshot_received(Message(key, msgspec.json.encode(snapshot), b""))
         for epoch in range(5, 8):
             hall.service.feed(epoch, IN_A)
         await until_written(hall, 1)
@@ -476,13 +478,13 @@ async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tm
         ("2025-11-21", 0),
     ],
 )
-def test_moments(text: str, pulse: int) -> None:
+def test_time_references_are_parsed(text: str, pulse: int) -> None:
     assert parse_time_reference(text, now=5000, fps=FPS, pulse0=1_763_700_000.0) == pulse
 
 
 @settings(max_examples=50, deadline=None)
 @given(st.text(max_size=30))
-def test_any_text_is_a_moment_or_told_in_one_line(text: str) -> None:
+def test_any_text_is_a_time_reference_or_a_one_line_error(text: str) -> None:
     try:
         pulse = parse_time_reference(text, now=5000, fps=FPS, pulse0=0.0)
     except TimeReferenceError as error:

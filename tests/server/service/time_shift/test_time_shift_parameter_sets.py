@@ -1,4 +1,4 @@
-"""The past of cameras with parameter sets of their own is what was live, holes included."""
+"""Recordings of cameras with parameter sets of their own play as the live stream did, gaps included."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ async def fetch(hall: Hall, *paths: str) -> bytes:
 
 
 @pytest.mark.parametrize("form", ["mp4", "ts", "hls"])
-async def test_the_past_is_what_was_live(hall: Hall, form: str) -> None:
+async def test_time_shift_plays_what_was_live(hall: Hall, form: str) -> None:
     reel = hall.service.splicer.segmenter_of_person(1)
     assert reel is not None
     reel._segments.clear()
@@ -62,7 +62,7 @@ async def test_the_past_is_what_was_live(hall: Hall, form: str) -> None:
         frames = list(container.decode(video=0))
     start = float(frames[0].time or 0) if form == "ts" else 0.0
     seen = {round((float(it.time or 0) - start) * FPS): it.to_ndarray(format="yuv420p") for it in frames}
-    assert MISSING, "there are holes in it, which are bridged"
+    assert MISSING, "there are gaps, which are filled"
     assert form == "hls" or list(seen) == list(range(FRAMES))
     for pulse, right in enumerate(expected()):
         np.testing.assert_array_equal(seen[max(it for it in seen if it <= pulse)], right, str(pulse))
