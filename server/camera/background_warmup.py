@@ -22,7 +22,7 @@ def warm_up_detector(
     """
     detector, settings = make_detector(config, camera, fit), config.detect
     if isinstance(detector, LetterboxedDetections) and isinstance(source, Recording):
-        detector.number_frames_by(source.counted)
+        detector.number_frames_by(source.counted_pulse)
     if isinstance(detector, BackgroundDetector):
         places = range(0, settings.prescan_frames, settings.prescan_every)
         detector.prepare((fit.image(image) for image in source.ahead(places)), settings.prescan_every)

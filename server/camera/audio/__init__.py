@@ -1,4 +1,4 @@
-"""A site's sound from what a camera or a file has: frames on the clock of the pulses."""
+"""The site's audio, from a camera or a file: encoded frames on the pulse clock."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["EncodedAudioFrame", "LiveAudioSource", "RecordedAudioSource", "conse
 
 
 def open_audio(config: Config, camera_id: str) -> RecordedAudioSource | LiveAudioSource | None:
-    """Open the site's sound, where this camera's process is to send it; None where it is not.
+    """Open the site's audio source if this camera's process sends it; None: it does not.
 
     Raises:
         UserError: it cannot be opened.

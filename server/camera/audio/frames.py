@@ -25,12 +25,12 @@ class AudioFramer(Protocol):
     """Turns the packets of a source into numbered audio frames."""
 
     def take(self, packet: Packet, at: Fraction) -> list[EncodedAudioFrame]:
-        """Return what becomes whole by a packet that sounds ``at`` seconds after pulse 0; numbers grow."""
+        """Return the frames that a packet completes, which sounds ``at`` seconds after pulse 0."""
         ...
 
 
 def consecutive_runs(frames: Sequence[EncodedAudioFrame]) -> Iterator[list[EncodedAudioFrame]]:
-    """Part frames into runs whose numbers follow each other."""
+    """Split frames into runs of consecutive numbers."""
     run: list[EncodedAudioFrame] = []
     for frame in frames:
         if run and frame.number != run[-1].number + 1:

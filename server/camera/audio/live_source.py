@@ -1,4 +1,4 @@
-"""The sound of a network camera, as it comes beside the camera's pictures."""
+"""Live audio of a network camera, beside its pictures."""
 
 from __future__ import annotations
 
@@ -17,51 +17,53 @@ from server.config.sections import SoundSettings
 log = logging.getLogger(__name__)
 
 _MEAN_S = 4.0
-"""How late pictures are shown is averaged over so long: each waits for its pulse, more or less."""
-_ANEW_S = 0.5
-"""A picture that comes this much sooner or later than those before tells of another time."""
-_WAITING_S = 2.0
-"""Sound that may wait to be fetched."""
-_FAR_S = 2.0
-"""Sound that is further away from what is shown is of another time: one of the two clocks has stepped."""
+"""Seconds over which the pictures' delay is averaged: each waits for its pulse, more or less."""
+_RESET_S = 0.5
+"""A change of delay by more than this, in seconds, restarts the average."""
+_BUFFER_S = 2.0
+"""Seconds of audio to buffer."""
+_MAX_OFFSET_S = 2.0
+"""Audio further than this from the shown picture, in seconds, is dropped: a clock has stepped."""
 
 
 class LiveAudioSource:
     """Audio of a network camera, aligned with its pictures by the camera's own clock.
 
-    A source tells it what comes, in a thread of its own; ``at`` is called in another. Pictures wait for up to
-    ``waiting_s`` until they are shown, and sound with them.
+    The source's thread passes pictures and packets; ``at`` is called in another thread. Pictures, and audio
+    with them, wait up to ``waiting_s`` seconds until they are shown.
     """
 
     def __init__(self, settings: SoundSettings, fps: float, waiting_s: float = 0.0) -> None:
-        form = settings.format
-        if form is None:
+        audio_format = settings.format
+        if audio_format is None:
             raise ValueError("a site without sound")
-        self._form, self._kbps, self._fps = form, settings.kbps, fps
-        self._far_s = _FAR_S + waiting_s
+        self._format, self._kbps, self._fps = audio_format, settings.kbps, fps
+        self._max_offset_s = _MAX_OFFSET_S + waiting_s
         self._lock = threading.Lock()
-        self._asked = 0.0
-        """When what is shown now is shown, seconds after pulse 0."""
+        self._shown_at = 0.0
+        """The newest pulse's time, seconds after pulse 0."""
         self._newest: Fraction | None = None
         """When the newest picture was taken, by the camera's clock."""
         self._shifts: deque[float] = deque(maxlen=max(1, round(_MEAN_S * fps)))
-        """Of the last pictures: how much later they are shown, counted from pulse 0."""
+        """Of the last pictures: pulse time minus camera time."""
         self._shift: Fraction | None = None
-        self._frames: deque[EncodedAudioFrame] = deque(maxlen=round(_WAITING_S * form.rate / form.samples))
-        self._way: AudioFramer | None = None
+        self._frames: deque[EncodedAudioFrame] = deque(
+            maxlen=round(_BUFFER_S * audio_format.rate / audio_format.samples)
+        )
+        self._framer: AudioFramer | None = None
         self._last = -1
-        self._silent = LogThrottle(quiet_s=0.0)
+        self._no_audio = LogThrottle(quiet_s=0.0)
 
     def opened(self, stream: AudioStream | None) -> None:
-        """Begin with a connection."""
-        self._way = None
+        """Start with a new connection's audio stream; None: it has none."""
+        self._framer = None
         if stream is None:
-            if (more := self._silent.record()) is not None:
-                log.warning("there is no sound in what the camera sends%s; the site is silent", more)
+            if (more := self._no_audio.record()) is not None:
+                log.warning("the camera sends no audio%s; the site is silent", more)
         else:
-            if self._silent.end():
-                log.info("there is sound again in what the camera sends")
-            self._way = select_framer(stream, self._form, self._kbps)
+            if self._no_audio.end():
+                log.info("the camera sends audio again")
+            self._framer = select_framer(stream, self._format, self._kbps)
 
     def picture(self, time: Fraction) -> None:
         """Note when the newest picture was taken, by the camera's clock."""
@@ -69,34 +71,34 @@ class LiveAudioSource:
             self._newest = time
 
     def packet(self, packet: Packet) -> None:
-        """Take some sound."""
+        """Take an audio packet."""
         with self._lock:
-            shift, asked = self._shift, self._asked
-        if shift is None or self._way is None or packet.pts is None or packet.time_base is None:
+            shift, shown_at = self._shift, self._shown_at
+        if shift is None or self._framer is None or packet.pts is None or packet.time_base is None:
             return
         at = packet.pts * packet.time_base + shift
-        if abs(at - asked) > self._far_s:
-            return  # once taken, it would keep out all that comes before it
-        for frame in self._way.take(packet, at):
+        if abs(at - shown_at) > self._max_offset_s:
+            return  # taking it would make all earlier audio late
+        for frame in self._framer.take(packet, at):
             if frame.number <= self._last:
-                continue  # of a time that is past: a connection was opened anew, or the mean has moved
+                continue  # already past: after a reconnect, or since the mean delay has moved
             self._last = frame.number
             with self._lock:
                 self._frames.append(frame)
 
     def at(self, pulse: int) -> list[EncodedAudioFrame]:
-        """Return what has come since the pulse before, now that the newest picture is shown at this one."""
+        """Return the frames since the previous pulse; the newest picture is shown at this one."""
         with self._lock:
-            self._asked = pulse / self._fps
+            self._shown_at = pulse / self._fps
             if self._newest is not None:
-                self._note(pulse / self._fps - float(self._newest))
+                self._add_shift(pulse / self._fps - float(self._newest))
                 self._newest = None
             frames = list(self._frames)
             self._frames.clear()
         return frames
 
-    def _note(self, shift: float) -> None:
-        if self._shift is not None and abs(shift - self._shift) > _ANEW_S:
+    def _add_shift(self, shift: float) -> None:
+        if self._shift is not None and abs(shift - self._shift) > _RESET_S:
             self._shifts.clear()
         self._shifts.append(shift)
         self._shift = Fraction(sum(self._shifts) / len(self._shifts))

@@ -1,4 +1,4 @@
-"""Sound that is as the site's is to be: passed on as it is, byte for byte."""
+"""Passthrough of audio that already has the site's format, byte for byte."""
 
 from __future__ import annotations
 
@@ -10,40 +10,40 @@ from server.camera.audio.frames import EncodedAudioFrame, Packet
 from server.media.audio.audio_format import OPUS_RATE, AudioFormat
 from server.media.audio.opus import packet_samples
 
-_OFF = Fraction(3, 4)
-"""Frames by which one may be away from its place before it is moved: times in files are rounded."""
+_MAX_DRIFT = Fraction(3, 4)
+"""Frames that one may be off its place before it is moved: times in files are rounded."""
 _EXTENSION = b"\x56\xe5"
-"""Begins what says that there is more to decode than low complexity (ISO/IEC 14496-3, 1.6.6.1)."""
+"""Marks an extension beyond AAC low complexity (ISO/IEC 14496-3, 1.6.6.1)."""
 _PRESENT = 0x80
 
 
-def is_compatible(stream: AudioStream, form: AudioFormat) -> bool:
-    """Return whether a decoder that was told the site's format decodes these packets."""
+def is_compatible(stream: AudioStream, audio_format: AudioFormat) -> bool:
+    """Return whether a decoder set up for the site's format decodes this stream."""
     context = stream.codec_context
-    if context.name in {"opus", "libopus"} and form.coding == "opus":
-        return (context.sample_rate, context.layout.nb_channels) == (OPUS_RATE, form.channels)
-    if context.name != "aac" or form.coding != "aac" or context.extradata is None:
+    if context.name in {"opus", "libopus"} and audio_format.coding == "opus":
+        return (context.sample_rate, context.layout.nb_channels) == (OPUS_RATE, audio_format.channels)
+    if context.name != "aac" or audio_format.coding != "aac" or context.extradata is None:
         return False
-    told, more = context.extradata[:2], context.extradata[2:]
-    richer = more.startswith(_EXTENSION) and len(more) > 2 and bool(more[2] & _PRESENT)  # noqa: PLR2004
-    return told == form.config and not richer
+    config, extension = context.extradata[:2], context.extradata[2:]
+    is_extended = extension.startswith(_EXTENSION) and len(extension) > 2 and bool(extension[2] & _PRESENT)  # noqa: PLR2004
+    return config == audio_format.config and not is_extended
 
 
 class AudioPassthrough:
     """Passes packets through; each gets the frame number nearest to its time."""
 
-    def __init__(self, form: AudioFormat) -> None:
-        self._form = form
+    def __init__(self, audio_format: AudioFormat) -> None:
+        self._format = audio_format
         self._next: int | None = None
 
     def take(self, packet: Packet, at: Fraction) -> list[EncodedAudioFrame]:
-        """Return the packet as a frame; nothing where its place is taken, or it is not as long as a frame."""
+        """Return the packet as a frame; nothing where its number is taken or its length is not a frame's."""
         data = bytes(packet)
-        if self._form.coding == "opus" and packet_samples(data) != self._form.samples:
+        if self._format.coding == "opus" and packet_samples(data) != self._format.samples:
             return []
-        place = at * self._form.rate / self._form.samples
+        place = at * self._format.rate / self._format.samples
         number = round(place)
-        if self._next is not None and abs(place - self._next) < _OFF:
+        if self._next is not None and abs(place - self._next) < _MAX_DRIFT:
             number = self._next
         if number < (self._next or 0):
             return []

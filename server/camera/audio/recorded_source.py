@@ -1,4 +1,4 @@
-"""The sound of a recording, replayed on the pulses."""
+"""Audio of a recording, replayed on the pulses."""
 
 from __future__ import annotations
 
@@ -23,101 +23,98 @@ from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
-_WARM_S = 1
-"""What is decoded of a recording before the moment at which it is first asked for."""
-_AHEAD_S = Fraction(1, 5)
-_FAR_S = 5
+_WARM_UP_S = 1
+"""Seconds to decode before the first requested moment."""
+_LEAD_S = Fraction(1, 5)
+_MAX_JUMP_S = 5
 
 
 class RecordedAudioSource:
     """Audio of a recording: at pulse ``offset + n``, what sounds ``n / fps`` seconds after its first picture.
 
-    What is of the site's format is passed on; all else is encoded.
+    Audio of the site's format is passed through, other audio encoded.
 
     Raises:
-        UserError: it cannot be opened, or there is no sound in it.
+        UserError: the file cannot be opened, or has no audio.
     """
 
     def __init__(
         self, path: str, settings: SoundSettings, fps: float, offset: int, at_end: Literal["stop", "loop"]
     ) -> None:
-        form = settings.format
-        if form is None:
+        audio_format = settings.format
+        if audio_format is None:
             raise ValueError("a site without sound")
         self._path = path
         self._fps = Fraction(fps).limit_denominator(100_000)
         self._begin = offset / self._fps
         container, stream = _open(path)
         try:
-            self._start = _first_picture(container)
-            self._way: AudioFramer = select_framer(stream, form, settings.kbps)
-            self._lasts = self._length(container, stream) if at_end == "loop" else None
+            self._start = _first_picture_time(container)
+            self._framer: AudioFramer = select_framer(stream, audio_format, settings.kbps)
+            self._duration = self._length(container, stream) if at_end == "loop" else None
         finally:
             container.close()
         self._packets: Iterator[tuple[Fraction, Packet]] | None = None
         self._waiting: tuple[Fraction, Packet] | None = None
-        self._told = False
-        """That it cannot be read to its end."""
+        self._has_warned = False
+        """Whether a read error was logged."""
 
     def at(self, pulse: int) -> list[EncodedAudioFrame]:
-        """Return what is to be sent at a pulse: it is recorded, so it can be sent a moment early.
-
-        The pictures of other cameras, shown at once, then find it there.
-        """
-        return self.until(pulse + max(1, round(_AHEAD_S * self._fps)))
+        """Return the frames to send at a pulse: a moment early, so that they arrive before its pictures."""
+        return self.until(pulse + max(1, round(_LEAD_S * self._fps)))
 
     def until(self, pulse: int) -> list[EncodedAudioFrame]:
-        """Return the frames that follow, up to what sounds when ``pulse`` is due; pulses must grow.
+        """Return the next frames, up to the time of ``pulse``; pulses must ascend.
 
-        The first call begins a second before that.
+        The first call begins a second earlier.
         """
         end = pulse / self._fps
         if self._packets is None:
-            self._packets = self._from(max(Fraction(0), end - _WARM_S))
+            self._packets = self._from(max(Fraction(0), end - _WARM_UP_S))
         frames: list[EncodedAudioFrame] = []
-        while (found := self._waiting or next(self._packets, None)) is not None:
-            self._waiting = found if found[0] >= end else None
+        while (timed := self._waiting or next(self._packets, None)) is not None:
+            self._waiting = timed if timed[0] >= end else None
             if self._waiting is not None:
                 break
-            frames += self._way.take(found[1], found[0])
+            frames += self._framer.take(timed[1], timed[0])
         return frames
 
     def _from(self, moment: Fraction) -> Iterator[tuple[Fraction, Packet]]:
-        """Yield the packets from a moment on with when they sound, seconds after pulse 0."""
-        begin, lasts = self._begin, self._lasts
-        if lasts is not None:
-            begin += max(0, (moment - begin) // lasts) * lasts
+        """Yield the packets from a moment on, each with its time in seconds after pulse 0."""
+        begin, duration = self._begin, self._duration
+        if duration is not None:
+            begin += max(0, (moment - begin) // duration) * duration
         while True:
-            heard = False
+            any_packet = False
             for time, packet in self._once():
-                if lasts is not None and time >= lasts:
+                if duration is not None and time >= duration:
                     break
-                heard = True
+                any_packet = True
                 if begin + time >= moment:
                     yield begin + time, packet
-            if lasts is None or not heard:  # what has none beside its pictures would be read for ever
+            if duration is None or not any_packet:  # a file without audio in its duration would loop for ever
                 return
-            begin += lasts
+            begin += duration
 
     def _once(self) -> Iterator[tuple[Fraction, Packet]]:
-        """Yield the packets of one pass with when they sound after the first picture."""
+        """Yield the packets of one pass, each with its time after the first picture."""
         container, stream = _open(self._path)
         try:
             for time, packet in _in_order(container.demux(stream)):
                 yield time - self._start, packet
         except av.error.FFmpegError as error:
-            if not self._told:  # it may be read over and over
+            if not self._has_warned:  # a loop would repeat it
                 log.warning(
-                    "%s: its sound cannot be read any further: %s", redact_address(self._path), error.strerror
+                    "%s: its audio cannot be read any further: %s", redact_address(self._path), error.strerror
                 )
-            self._told = True
+            self._has_warned = True
         finally:
             container.close()
 
     def _length(self, container: InputContainer, sound: AudioStream) -> Fraction:
-        """Return the seconds after which it begins again: its pictures', or without any its sound's."""
-        if (video := _pictures(container)) is not None:
-            return _lasts(container, video, self._fps)
+        """Return the duration of a loop in seconds: that of the video, or of the audio without any."""
+        if (video := _video_stream(container)) is not None:
+            return _video_duration(container, video, self._fps)
         ends = [
             (it.pts + (it.duration or 0)) * it.time_base
             for it in container.demux(sound)
@@ -126,16 +123,16 @@ class RecordedAudioSource:
         return Fraction(max(ends, default=Fraction(1)))
 
 
-def _first_picture(container: InputContainer) -> Fraction:
-    """Return when the first picture is shown, in seconds of the file."""
-    video = _pictures(container)
+def _first_picture_time(container: InputContainer) -> Fraction:
+    """Return the first picture's time, in seconds of the file."""
+    video = _video_stream(container)
     if video is None or video.start_time is None:
         return Fraction(0)
     return Fraction(video.start_time * (video.time_base or 0))
 
 
-def _lasts(container: InputContainer, video: VideoStream, fps: Fraction) -> Fraction:
-    """Return the seconds that the pictures last, which are whole pulses: what plays them rounds likewise."""
+def _video_duration(container: InputContainer, video: VideoStream, fps: Fraction) -> Fraction:
+    """Return the duration of the video in seconds, rounded to whole pulses as in playback."""
     unit = video.time_base or Fraction(0)
     times, count = list[int](), 0
     for packet in container.demux(video):
@@ -148,7 +145,7 @@ def _lasts(container: InputContainer, video: VideoStream, fps: Fraction) -> Frac
 
 
 def _in_order(packets: Iterable[Packet]) -> Iterator[tuple[Fraction, Packet]]:
-    """Yield packets with their times in seconds, without single ones far ahead of what follows: damage."""
+    """Yield packets with their times in seconds, without single damaged ones far ahead of the next."""
     reached: Fraction | None = None
     ahead: tuple[Fraction, Packet] | None = None
     for packet in packets:
@@ -159,15 +156,15 @@ def _in_order(packets: Iterable[Packet]) -> Iterator[tuple[Fraction, Packet]]:
             yield ahead
             reached = ahead[0]
         ahead = None
-        if reached is not None and time > reached + _FAR_S:
+        if reached is not None and time > reached + _MAX_JUMP_S:
             ahead = time, packet
         else:
             yield time, packet
             reached = time
 
 
-def _pictures(container: InputContainer) -> VideoStream | None:
-    """Return the stream of its pictures, if it has one: that of a record's cover is none."""
+def _video_stream(container: InputContainer) -> VideoStream | None:
+    """Return the video stream, if any; a cover picture does not count."""
     streams = container.streams.video
     return next((it for it in streams if not it.disposition & Disposition.attached_pic), None)
 

@@ -1,4 +1,4 @@
-"""Whether a source's sound is passed on or encoded."""
+"""The choice between audio passthrough and encoding."""
 
 from __future__ import annotations
 
@@ -13,23 +13,27 @@ from server.media.audio.audio_format import AudioFormat
 from server.media.audio.opus import packet_samples
 
 
-def select_framer(stream: AudioStream, form: AudioFormat, kbps: int) -> AudioFramer:
-    """Pass through audio of the site's format, encode all other."""
-    if not is_compatible(stream, form):
-        return AudioEncoder(form, kbps)
-    return AudioPassthrough(form) if form.coding == "aac" else _ByItsFirst(form, kbps)
+def select_framer(stream: AudioStream, audio_format: AudioFormat, kbps: int) -> AudioFramer:
+    """Return a passthrough for audio of the site's format, an encoder for other audio."""
+    if not is_compatible(stream, audio_format):
+        return AudioEncoder(audio_format, kbps)
+    return AudioPassthrough(audio_format) if audio_format.coding == "aac" else _OpusFramer(audio_format, kbps)
 
 
-class _ByItsFirst:
-    """Opus says only packet by packet how long its frames are: the first one decides for all."""
+class _OpusFramer:
+    """Chooses by the first packet: Opus streams do not declare the length of their frames."""
 
-    def __init__(self, form: AudioFormat, kbps: int) -> None:
-        self._form, self._kbps = form, kbps
-        self._way: AudioFramer | None = None
+    def __init__(self, audio_format: AudioFormat, kbps: int) -> None:
+        self._format, self._kbps = audio_format, kbps
+        self._framer: AudioFramer | None = None
 
     def take(self, packet: Packet, at: Fraction) -> list[EncodedAudioFrame]:
-        """Return what becomes whole by a packet."""
-        if self._way is None:
-            passes = packet_samples(bytes(packet)) == self._form.samples
-            self._way = AudioPassthrough(self._form) if passes else AudioEncoder(self._form, self._kbps)
-        return self._way.take(packet, at)
+        """Return the frames completed by a packet."""
+        if self._framer is None:
+            is_compatible_length = packet_samples(bytes(packet)) == self._format.samples
+            self._framer = (
+                AudioPassthrough(self._format)
+                if is_compatible_length
+                else AudioEncoder(self._format, self._kbps)
+            )
+        return self._framer.take(packet, at)

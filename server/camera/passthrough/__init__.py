@@ -1,4 +1,4 @@
-"""A camera's own H.264, passed on as it is: where it fits, nothing has to be encoded."""
+"""Passthrough of a camera's own H.264, where it fits the site's streams."""
 
 from __future__ import annotations
 

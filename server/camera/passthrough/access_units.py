@@ -1,4 +1,4 @@
-"""Access units as the site's streams have them, whatever container they came in (H.264, Annex B)."""
+"""Conversion of H.264 access units from a container's packing to Annex B."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class AccessUnitPacking:
     """How a container packs access units, by its ``extradata``."""
 
     length_bytes: int
-    """Of the length before each NAL unit; 0: there are start codes."""
+    """Bytes of the length before each NAL unit; 0: start codes instead."""
     sets: tuple[bytes, ...]
-    """Parameter sets that may stand there alone."""
+    """The parameter sets, which may be missing from the units."""
 
     def annex_b(self, packet: bytes) -> bytes:
-        """Return the same NAL units behind start codes, in a key picture with the parameter sets before them.
+        """Return the NAL units with start codes, a keyframe's with the parameter sets before them.
 
         Raises:
             ValueError: the lengths do not fit.

@@ -1,4 +1,4 @@
-"""Whether a camera's own H.264 may stand in the site's streams, beside what other cameras encode."""
+"""Check whether a camera's own H.264 can be passed through into the site's streams."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from server.config.site_config import Config
 from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets
 
 _SAME_RATE = 0.03
-"""Part by which a camera's rate may be off the site's: cameras say it in round numbers."""
+"""Relative deviation allowed of a camera's declared rate, which is often rounded."""
 
 
 class IncompatibleStreamError(Exception):
@@ -30,7 +30,7 @@ class RequiredFormat:
     fps: float
     gop: int
     parameters: ParameterSets | None
-    """Those of the cameras that encode; None: none does, and the cameras only have to agree."""
+    """Those of the encoding cameras; None: none encodes, and the cameras' own must agree."""
 
 
 def required_format(config: Config) -> RequiredFormat:
@@ -48,59 +48,61 @@ def required_format(config: Config) -> RequiredFormat:
 class CompatibilityCheck:
     """Checks a video and its access units, one after the other."""
 
-    def __init__(self, wanted: RequiredFormat) -> None:
-        self._wanted = wanted
-        self._parameters = wanted.parameters
+    def __init__(self, required: RequiredFormat) -> None:
+        self._required = required
+        self._parameters = required.parameters
         self._shown: int | None = None
 
-    def opened(self, opened: OpenedVideo) -> None:
-        """Look at what a video says of itself.
+    def check_video(self, opened: OpenedVideo) -> None:
+        """Check a video's declared codec, size and rate.
 
         Raises:
             IncompatibleStreamError: it does not fit.
         """
-        wanted, codec = self._wanted, opened.stream.codec_context.name
+        required, codec = self._required, opened.stream.codec_context.name
         if codec != "h264":
             raise IncompatibleStreamError(f"it is {codec}, not H.264")
-        if opened.size != wanted.size:
-            own, site = ("x".join(map(str, size)) for size in (opened.size, wanted.size))
+        if opened.size != required.size:
+            own, site = ("x".join(map(str, size)) for size in (opened.size, required.size))
             raise IncompatibleStreamError(
                 f"its pictures are {own}, the site's {site} (site.width, site.height)"
             )
         rate = opened.stream.average_rate
-        if rate and abs(float(rate) / wanted.fps - 1) > _SAME_RATE:
+        if rate and abs(float(rate) / required.fps - 1) > _SAME_RATE:
             raise IncompatibleStreamError(
-                f"it has {float(rate):g} pictures a second, the site {wanted.fps:g} (site.fps)"
+                f"it has {float(rate):g} pictures a second, the site {required.fps:g} (site.fps)"
             )
 
-    def lies(self, orientation: Orientation) -> None:
-        """Look at how its pictures are shown.
+    def check_orientation(self, orientation: Orientation) -> None:
+        """Check the orientation of its pictures.
 
         Raises:
-            IncompatibleStreamError: not as they are stored, and nothing in a site's streams says so.
+            IncompatibleStreamError: they must be turned or stretched, which the streams cannot express.
         """
         if orientation.words:
             raise IncompatibleStreamError(f"its pictures are shown {orientation.words}")
 
-    def at(self, frame: int, seconds: float) -> None:
-        """Look at when a frame of a recording is shown, after its first one.
+    def check_frame_time(self, frame: int, seconds: float) -> None:
+        """Check the time of a recording's frame, in seconds after its first one.
 
         Raises:
-            IncompatibleStreamError: at another pulse than the one that it would be passed on at.
+            IncompatibleStreamError: it belongs to another pulse than the one it would be sent at.
         """
-        if (place := frame_index(seconds, self._wanted.fps)) != frame:
+        if (place := frame_index(seconds, self._required.fps)) != frame:
             raise IncompatibleStreamError(
                 f"frame {frame} is shown at {seconds:.2f} s, which is frame {place} at the site's "
-                f"{self._wanted.fps:g} pictures a second (site.fps)"
+                f"{self._required.fps:g} pictures a second (site.fps)"
             )
 
-    def unit(self, frame: int, pulse: int, data: bytes, shown: int | None, decoded: int | None) -> None:
-        """Look at the next access unit; ``shown`` and ``decoded`` are its times, where it has any.
+    def check_access_unit(
+        self, frame: int, pulse: int, data: bytes, shown: int | None, decoded: int | None
+    ) -> None:
+        """Check the next access unit; ``shown`` and ``decoded`` are its time stamps, if any.
 
         Raises:
             IncompatibleStreamError: it does not fit.
         """
-        gop = self._wanted.gop
+        gop = self._required.gop
         later = shown is not None and self._shown is not None and shown <= self._shown
         if later or (shown is not None and decoded is not None and shown != decoded):
             raise IncompatibleStreamError(
@@ -119,5 +121,5 @@ class CompatibilityCheck:
         if self._parameters is None:
             self._parameters = found
         elif found != self._parameters:
-            whose = "this site encodes with" if self._wanted.parameters else "it began with"
+            whose = "this site encodes with" if self._required.parameters else "it began with"
             raise IncompatibleStreamError(f"frame {frame} has other parameter sets (SPS, PPS) than {whose}")

@@ -1,4 +1,4 @@
-"""In the place of an encoder, where nothing is encoded."""
+"""An encoder's stand-in that passes the source's access units through."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ class PassthroughUnit:
     data: bytes
     image: Image
     time: Fraction | None = None
-    """When it was taken, seconds by the camera's clock; None: it does not say."""
+    """When it was taken, seconds by the camera's clock; None: not known."""
 
 
 class PassthroughSource(PictureSource, Protocol):
     """A source that keeps the access units of its pictures."""
 
     taken: PassthroughUnit | None
-    """The one whose picture was taken last."""
+    """The unit of the picture taken last."""
 
 
 class PassthroughEncoder:

@@ -1,4 +1,4 @@
-"""Opening a camera whose own H.264 is to be passed on."""
+"""Opens a camera for passthrough of its own H.264."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class PassthroughOpening:
     """The result of opening a camera for passthrough."""
 
     source: PassthroughSource | None
-    """None: the camera's pictures are to be encoded."""
+    """None: the camera's pictures must be encoded."""
     why: str
-    """Why so; empty where nothing was asked for."""
+    """Why; empty: passthrough was not requested."""
 
 
 def open_passthrough(
@@ -31,8 +31,8 @@ def open_passthrough(
     """Open a camera for passthrough of its own H.264, where the configuration asks for that.
 
     Raises:
-        UserError: it cannot be opened, or must fit and does not; the text says which camera and why.
-        UnavailableError: the same, of a network camera that may yet come.
+        UserError: it cannot be opened, or does not fit though the configuration demands it.
+        UnavailableError: the same, of a network camera that may become available.
     """
     if camera.h264 == "encode":
         return PassthroughOpening(None, "")

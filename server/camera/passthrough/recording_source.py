@@ -1,4 +1,4 @@
-"""A recording whose own access units are passed on, frame by frame."""
+"""A recording whose access units are passed through, frame by frame."""
 
 from __future__ import annotations
 
@@ -31,24 +31,24 @@ class PassthroughRecording:
 
     Raises:
         UserError: there is no such file, or no video in it.
-        IncompatibleStreamError: the site's streams cannot hold all of it; it is read to the end to find out.
+        IncompatibleStreamError: some of it does not fit the site's streams; all of it is read to check.
     """
 
     recorded = True
 
     def __init__(
-        self, path: str, offset: int, at_end: Literal["stop", "loop"], wanted: RequiredFormat
+        self, path: str, offset: int, at_end: Literal["stop", "loop"], required: RequiredFormat
     ) -> None:
         if path_is_missing(path):
             raise UserError(f"{redact_address(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
-        self._fps = wanted.fps
-        self._length = _checked(path, offset, wanted)
-        if self._loop and self._length % wanted.gop:
+        self._fps = required.fps
+        self._length = _checked(path, offset, required)
+        if self._loop and self._length % required.gop:
             raise IncompatibleStreamError(
                 f"its {self._length} frames are not whole GOPs: it cannot begin again (at_end)"
             )
-        self.size = wanted.size
+        self.size = required.size
         self.taken: PassthroughUnit | None = None
         self._begin()
 
@@ -83,24 +83,24 @@ class PassthroughRecording:
 
     def _read(self) -> None:
         packet = next(self._packets, None)
-        if packet is None:  # shorter than when it was looked through
+        if packet is None:  # shorter than when it was checked
             raise SourceEndedError(self._path)
         data = self._packing.annex_b(bytes(packet))
         image = decode_unit(packet)
         if image is None and self.taken is not None:
-            image = self.taken.image  # damaged, which a viewer sees too
+            image = self.taken.image  # damaged, for a viewer, too
         self.taken = None if image is None else PassthroughUnit(is_keyframe(data), data, image)
         self._next += 1
 
 
 def decode_unit(packet: av.Packet[VideoStream]) -> Image | None:
-    """Return the picture of an access unit; None where it cannot be decoded (yet), or is to be turned."""
+    """Return the picture of an access unit; None where it cannot be decoded (yet), or must be turned."""
     pictures = decode_pictures(packet)
     return to_bgr(pictures[-1]) if pictures and not parse_orientation(pictures[-1]).turned else None
 
 
 def decode_pictures(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
-    """Decode an access unit; nothing comes of one that is damaged, or waits for others."""
+    """Decode an access unit; empty where it is damaged, or depends on missing ones."""
     try:
         return [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
     except av.error.FFmpegError:
@@ -108,7 +108,7 @@ def decode_pictures(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
 
 
 def decode_without_delay(opened: OpenedVideo) -> None:
-    """Let the decoder give each picture with its own access unit, whatever may come later."""
+    """Make the decoder return each picture with its own access unit."""
     opened.stream.codec_context.flags |= av.codec.context.Flags.low_delay
 
 
@@ -126,20 +126,20 @@ def _orientation(path: str) -> Orientation:
     return recording.orientation
 
 
-def _checked(path: str, offset: int, wanted: RequiredFormat) -> int:
-    """Look at all of it; give the number of its frames."""
-    opened, fitting, frame = open_video(path), CompatibilityCheck(wanted), -1
+def _checked(path: str, offset: int, required: RequiredFormat) -> int:
+    """Check the whole file; return the number of its frames."""
+    opened, check, frame = open_video(path), CompatibilityCheck(required), -1
     unit, first = float(opened.stream.time_base or 1), None
     try:
-        fitting.opened(opened)
-        fitting.lies(_orientation(path))
+        check.check_video(opened)
+        check.check_orientation(_orientation(path))
         packing = parse_packing(opened.stream.codec_context.extradata)
         for frame, packet in enumerate(access_unit_packets(opened)):
             data = packing.annex_b(bytes(packet))
-            fitting.unit(frame, frame + offset, data, packet.pts, packet.dts)
+            check.check_access_unit(frame, frame + offset, data, packet.pts, packet.dts)
             if packet.pts is not None:
                 first = packet.pts if first is None else first
-                fitting.at(frame, (packet.pts - first) * unit)
+                check.check_frame_time(frame, (packet.pts - first) * unit)
     except (av.error.FFmpegError, ValueError) as error:
         why = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
         raise IncompatibleStreamError(f"it cannot be read: {why}") from None

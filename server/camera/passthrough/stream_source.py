@@ -1,4 +1,4 @@
-"""A network camera whose own access units are passed on."""
+"""A network camera whose access units are passed through."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from server.camera.sources.orientation import parse_orientation, pixel_aspect
 from server.system.address_redaction import ffmpeg_reason, redact_address
 from server.system.errors import UserError
 
-_LOOKED_AT_GOPS = 2
-"""GOPs that a camera sends before it is known to fit."""
+_CHECKED_GOPS = 2
+"""GOPs to check before a camera counts as compatible."""
 
 
 class PassthroughStream(LiveStream):
@@ -40,46 +40,46 @@ class PassthroughStream(LiveStream):
 
     Raises:
         UserError: it cannot be opened.
-        IncompatibleStreamError: what it sends cannot stand in the site's streams.
+        IncompatibleStreamError: its stream does not fit the site's.
     """
 
     def __init__(
-        self, url: str, options: Mapping[str, str], listener: LiveAudioSource | None, wanted: RequiredFormat
+        self, url: str, options: Mapping[str, str], listener: LiveAudioSource | None, required: RequiredFormat
     ) -> None:
-        _check(url, options, wanted)
-        self._wanted = wanted
-        self._waiting = AccessUnitQueue(wanted.gop)
+        _check(url, options, required)
+        self._required = required
+        self._waiting = AccessUnitQueue(required.gop)
         self._waiting_lock = threading.Lock()
-        self._frame_s = 1 / Fraction(wanted.fps).limit_denominator(1001)
+        self._frame_s = 1 / Fraction(required.fps).limit_denominator(1001)
         self._unbroken = False
-        """Nothing has been lost since the last key unit."""
+        """Whether no unit was lost since the last keyframe."""
         self.taken: PassthroughUnit | None = None
         super().__init__(url, options, listener)
 
     def take(self, pulse: int) -> Image | None:
-        """Return the picture of the access unit that goes with a pulse; None where none can."""
+        """Return the picture of a pulse's access unit; None: there is none."""
         with self._waiting_lock:
             self.taken = taken = self._waiting.take(pulse)
         if taken is None:
             return None
         if self._listener is not None and taken.time is not None:
-            # What is shown has waited. Sound is asked for at the next pulse, before its picture is taken.
+            # The picture has waited; audio is requested at the next pulse, before its picture is taken.
             self._listener.picture(taken.time + self._frame_s)
         return taken.image
 
     def _read(self, opened: OpenedVideo) -> bool:
         try:
-            CompatibilityCheck(self._wanted).opened(opened)
+            CompatibilityCheck(self._required).check_video(opened)
         except IncompatibleStreamError as misfit:
             opened.container.close()
-            self._lost(f"{redact_address(self._url)}: what it sends does not fit any more: {misfit}")
+            self._lost(f"{redact_address(self._url)}: its stream does not fit any more: {misfit}")
             return False
         decode_without_delay(opened)
         self._unbroken = False
         return super()._read(opened)
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
-        """Queue an access unit with its picture; tell whether there is one."""
+        """Queue an access unit with its picture; return whether it has one."""
         if not packet.size:
             return False
         try:
@@ -87,9 +87,9 @@ class PassthroughStream(LiveStream):
         except ValueError:
             data = b""
         key, image = is_keyframe(data), decode_unit(packet)
-        self._sized.set()  # how it lies was looked at, and it may not change
-        if image is not None and image.shape[1::-1] != self._wanted.size:
-            image = None  # it has changed since the connection began, which it may not
+        self._sized.set()  # the orientation was checked before, and may not change
+        if image is not None and image.shape[1::-1] != self._required.size:
+            image = None  # the size may not change within a connection
         self._unbroken = image is not None and bool(data) and (self._unbroken or key)
         if image is not None and self._unbroken:
             time = None
@@ -100,37 +100,37 @@ class PassthroughStream(LiveStream):
         return image is not None
 
 
-def _check(url: str, options: Mapping[str, str], wanted: RequiredFormat) -> None:
-    """Look at what a camera sends, from its first key unit on.
+def _check(url: str, options: Mapping[str, str], required: RequiredFormat) -> None:
+    """Check a camera's stream, from its first keyframe on.
 
     Raises:
         UserError: it cannot be opened, or stops meanwhile.
-        IncompatibleStreamError: what it sends cannot stand in the site's streams.
+        IncompatibleStreamError: its stream does not fit the site's.
     """
-    opened, fitting = open_video(url, options, (OPEN_S, READ_S)), CompatibilityCheck(wanted)
+    opened, check = open_video(url, options, (OPEN_S, READ_S)), CompatibilityCheck(required)
     try:
-        fitting.opened(opened)
+        check.check_video(opened)
         aspect = pixel_aspect(opened.stream)
         packing, begun = parse_packing(opened.stream.codec_context.extradata), -1
         for frame, packet in enumerate(access_unit_packets(opened)):
             data = packing.annex_b(bytes(packet))
             for picture in decode_pictures(packet):
-                fitting.lies(parse_orientation(picture, aspect))
+                check.check_orientation(parse_orientation(picture, aspect))
             if begun < 0 and is_keyframe(data):
                 begun = frame
             if begun >= 0:
-                fitting.unit(frame - begun, frame - begun, data, packet.pts, packet.dts)
-            if frame - max(begun, 0) >= _LOOKED_AT_GOPS * wanted.gop:
+                check.check_access_unit(frame - begun, frame - begun, data, packet.pts, packet.dts)
+            if frame - max(begun, 0) >= _CHECKED_GOPS * required.gop:
                 break
         if begun < 0:
             raise IncompatibleStreamError(
-                f"no GOP begins within {_LOOKED_AT_GOPS * wanted.gop} frames (encode.gop)"
+                f"no GOP begins within {_CHECKED_GOPS * required.gop} frames (encode.gop)"
             )
     except (av.error.InvalidDataError, ValueError) as error:
         why = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
         raise IncompatibleStreamError(f"it cannot be read: {why}") from None
-    except av.error.FFmpegError as error:  # it has gone, which says nothing of what it sends
+    except av.error.FFmpegError as error:  # the connection broke, which says nothing about the stream
         why = timeout_message(error, READ_S) or ffmpeg_reason(error)
-        raise UserError(f"{redact_address(url)}: it stopped while it was looked at: {why}") from None
+        raise UserError(f"{redact_address(url)}: it stopped while it was checked: {why}") from None
     finally:
         opened.container.close()

@@ -1,4 +1,4 @@
-"""Where a camera's pictures come from."""
+"""Picture sources: network cameras, recordings, image folders, synthetic scenes."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ __all__ = ["Image", "ImageFolder", "PictureSource", "Recording", "SourceEndedErr
 def open_source(
     camera: CameraSettings, site: SiteSettings, listener: LiveAudioSource | None = None, *, ready: bool = True
 ) -> PictureSource:
-    """Open a camera's source; a network camera's sound is handed to ``listener``, if there is one.
+    """Open a camera's source; a network camera's audio is passed to ``listener``, if given.
 
-    ``ready``: for the first pulse; else it is only looked whether it can be opened.
+    ``ready``: warm up for the first pulse; otherwise only check that it opens.
 
     Raises:
         UserError: it cannot be opened; the text says which camera and why.
-        UnavailableError: the same, of a network camera or device that may yet come.
+        UnavailableError: the same, of a network camera or device that may become available.
     """
     try:
         match source_kind(camera.source):
             case SourceKind.SCENE:
-                stage = SyntheticSource(camera.source, site)
-                return stage.warm_up() if ready else stage
+                scene = SyntheticSource(camera.source, site)
+                return scene.warm_up() if ready else scene
             case SourceKind.STREAM:
                 return LiveStream(camera.source, camera.options, listener)
             case SourceKind.FOLDER:
@@ -38,6 +38,6 @@ def open_source(
             case SourceKind.FILE:
                 return Recording(camera.source, camera.offset, camera.at_end, site.fps)
     except UserError as error:
-        # A network camera may only be switched off; a file that is not there will not come by itself.
+        # A network camera may be switched off for now; a missing file stays missing.
         away = source_kind(camera.source) is SourceKind.STREAM
         raise (UnavailableError if away else UserError)(f"camera {camera.id}: {error}") from error

@@ -1,4 +1,4 @@
-"""What every source of pictures can do."""
+"""The interface of picture sources."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class PictureSource(Protocol):
     size: tuple[int, int]
     """Width and height of its pictures in pixels."""
     recorded: bool
-    """A recording waits for nobody: its picture of a pulse is the same whenever it is asked for."""
+    """Whether it is a recording: a pulse's picture is the same whenever it is taken."""
 
     def take(self, pulse: int) -> Image | None:
-        """Return the picture of a pulse; pulses must grow. None: there is none (yet).
+        """Return the picture of a pulse; None: there is none (yet). Pulses must ascend.
 
         Raises:
             SourceEndedError: the recording is over.
@@ -33,12 +33,12 @@ class PictureSource(Protocol):
         ...
 
     def ahead(self, places: Sequence[int]) -> Iterator[Image]:
-        """Return the pictures at some places of a recording, counted from its beginning, by rising place.
+        """Return a recording's pictures at ascending positions, without moving the playback position.
 
-        What is played stays where it is. Fewer where the recording is shorter; none of what is no recording.
+        Fewer where the recording is shorter; none for a live source.
         """
         ...
 
     def close(self) -> None:
-        """Let go of files, devices and connections."""
+        """Close files, devices and connections."""
         ...

@@ -1,4 +1,4 @@
-"""The pictures of a recording one by one, each at its own time however damaged the file is."""
+"""Reads a recording's pictures one by one, each with its own time, even from a damaged file."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ from server.system.address_redaction import redact_address
 log = logging.getLogger(__name__)
 
 _COUNTED_WHEN_REORDERED = frozenset({"avi"})
-"""Containers that number packets in the order of decoding: where pictures are shown in another, these are no
-times of pictures."""
+"""Containers whose time stamps count packets in decoding order: with reordering they are no display times."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,9 +36,9 @@ class TimedPicture:
 
 
 def read_pictures(opened: OpenedVideo, *, again: bool = False) -> Iterator[TimedPicture]:
-    """Decode the pictures in the order in which they are shown, also those that cannot be decoded.
+    """Yield the pictures in display order, those that cannot be decoded included.
 
-    A file that cannot be read any further ends there, and that is said; not where it is read ``again``.
+    Reading ends at a read error, which is logged; not so when the file is read ``again``.
     """
     line: _Line | None = None
     for packet in _packets(opened, again=again):
@@ -52,11 +51,11 @@ def read_pictures(opened: OpenedVideo, *, again: bool = False) -> Iterator[Timed
 
 class _Line(Protocol):
     def after(self, packet: av.Packet[VideoStream]) -> Iterator[TimedPicture]:
-        """Decode a packet; give what is known to come next."""
+        """Decode a packet; yield the pictures that are now known to come next."""
         ...
 
     def rest(self) -> Iterator[TimedPicture]:
-        """Return what never came at the end."""
+        """Yield the lost pictures at the end."""
         ...
 
 
@@ -74,10 +73,10 @@ def _counted_or_timed(opened: OpenedVideo, first: av.Packet[VideoStream], *, aga
 
 
 class _TimedLine:
-    """Which pictures are to come, by the packets' times, so that one that never comes leaves a gap.
+    """Finds lost pictures by the packets' time stamps.
 
-    After a damaged key frame a decoder keeps silent until the next one, without an error. ``_spacing`` tells
-    lost pictures from packets that never were pictures (VP8's invisible ones are stamped beside others).
+    After a damaged keyframe a decoder returns nothing until the next one, without an error. ``_spacing``
+    separates lost pictures from packets without one (VP8's invisible frames are stamped close to others).
     """
 
     def __init__(self, opened: OpenedVideo) -> None:
@@ -91,7 +90,7 @@ class _TimedLine:
     def after(self, packet: av.Packet[VideoStream]) -> Iterator[TimedPicture]:
         if packet.pts is not None and not packet.is_discard:
             if self._last is not None and packet.pts < self._last:
-                yield self._at(packet.pts, None)  # a later picture was shown: a decoder that lost its thread
+                yield self._at(packet.pts, None)  # the decoder had skipped ahead
             else:
                 self._awaited.append(packet.pts)
         for picture in _decoded(packet):
@@ -124,16 +123,16 @@ class _TimedLine:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PacketNumber:
-    """Which packet it is. An object of its own: PyAV knows such by identity, which small numbers share."""
+    """A packet's number. An object, since PyAV compares such tags by identity."""
 
     number: int
 
 
 class _CountedLine:
-    """The same of a file without times of pictures: they are counted, at the rate that it is taken to have.
+    """Finds lost pictures in a file without display times, by counting at its assumed rate.
 
-    Each picture says which packet it is from. A packet whose picture is overdue, by more than pictures can
-    change places, has lost it.
+    Each picture carries its packet's number. A packet is lost when its picture is overdue by more than
+    reordering allows.
     """
 
     def __init__(self, opened: OpenedVideo) -> None:
@@ -151,7 +150,7 @@ class _CountedLine:
             if isinstance(picture.opaque, _PacketNumber):
                 number = picture.opaque.number
                 if number not in self._awaited:
-                    continue  # it was given up: after damage a decoder may lose its thread
+                    continue  # already counted as lost
                 overdue = [it for it in self._awaited if it < number - self._context.reorder_depth]
                 self._awaited = [it for it in self._awaited if it not in overdue and it != number]
                 if not picture.interlaced_frame:  # of which two packets may make one
@@ -167,7 +166,7 @@ class _CountedLine:
 
 
 def _decoded(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
-    """Decode a packet; nothing comes of a damaged one."""
+    """Decode a packet; empty where it is damaged."""
     try:
         return [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
     except av.error.FFmpegError:
@@ -178,15 +177,16 @@ def _packets(opened: OpenedVideo, *, again: bool) -> Iterator[av.Packet[VideoStr
     times = TimestampRepair(opened)
     try:
         for packet in opened.container.demux(opened.stream):
-            if times.leaps(packet) and not again:
+            if times.repair(packet) and not again:
                 log.warning(
-                    "%s: its times leap: it is taken to go on there", redact_address(opened.container.name)
+                    "%s: its time stamps jump: playback continues across the jump",
+                    redact_address(opened.container.name),
                 )
                 again = True  # once is enough
             yield packet
     except av.error.FFmpegError as error:
         if error.errno == errno.EINTR:
-            raise  # a signal has cut a read short: the file is not over
+            raise  # a signal interrupted the read: the file has not ended
         if not again:
             log.warning(
                 "%s: cannot be read any further: %s", redact_address(opened.container.name), error.strerror

@@ -1,4 +1,4 @@
-"""When a recording's pictures are shown on the site's clock, and how many there are a second."""
+"""A recording's frame rate, and its pictures' times on the pulse clock."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import math
 from av.video.stream import VideoStream
 
 DEFAULT_FPS = 25.0
-"""Pictures a second of what does not say."""
+"""Pictures a second where the file does not declare a rate."""
 _NEARLY = 0.05
-"""Part by which the mean rate may be off a usual one that pictures are spaced by: some are missing."""
+"""Relative deviation of the mean rate from a usual one, where pictures are missing."""
 _USUAL_DENOMINATORS = (1, 2, 1001)
-"""Of usual rates: 25, 12.5, 30000/1001."""
+"""Denominators of usual rates: 25, 12.5, 30000/1001."""
 _LATE = 0.45
-"""Part of a frame by which a picture may come after its pulse: what files say of times is rounded."""
+"""Share of a frame by which a picture may come after its pulse: times in files are rounded."""
 
 
 def frame_rate(stream: VideoStream) -> float:
-    """Return pictures a second: the usual rate that they are spaced by, else their mean."""
+    """Return pictures a second: the usual rate that fits their spacing, else their mean rate."""
     mean, spaced = stream.average_rate, stream.guessed_rate
     if not mean:
         return float(spaced) if spaced else DEFAULT_FPS
@@ -27,10 +27,10 @@ def frame_rate(stream: VideoStream) -> float:
 
 
 def frame_index(seconds: float, fps: float) -> int:
-    """Return the first frame of a clock that shows a picture of so many seconds after the first one."""
+    """Return the first frame, at ``fps``, that shows a picture ``seconds`` after the first one."""
     return math.ceil(seconds * fps - _LATE)
 
 
 def frame_count(seconds: float, rate: float, fps: float) -> int:
-    """Return the frames of a clock that a recording lasts whose last picture is at ``seconds``."""
+    """Return a recording's length in frames at ``fps``; its last picture is at ``seconds``."""
     return max(1, frame_index(seconds + 1 / rate, fps))

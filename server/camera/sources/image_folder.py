@@ -23,8 +23,8 @@ _ENDINGS = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp"}
 class ImageFolder:
     """Shows its image ``pulse - offset`` in the order of the file names, upright as EXIF says.
 
-    All are of the first one's size: others are fitted into that. One that cannot be read shows as the one
-    before it, and that is said.
+    All are letterboxed to the first one's size. One that cannot be read shows as the one before it, and is
+    logged.
 
     Raises:
         UserError: the folder cannot be read, there is no image in it, or the first cannot be read.
@@ -47,7 +47,7 @@ class ImageFolder:
         self.size = (first.shape[1], first.shape[0])
         self._gaps = MissingFrames(path)
         self._resized = False
-        """That one has another size has been said."""
+        """Whether an image of another size was logged."""
 
     def take(self, pulse: int) -> Image | None:
         """Return the image of a pulse; one that cannot be read shows as the one before it."""
@@ -55,13 +55,13 @@ class ImageFolder:
         if index < 0:
             return None
         if index >= len(self._files):
-            self._say_gaps()
+            self._log_unreadable()
             if not self._loop:
                 raise SourceEndedError(self._path)
             index %= len(self._files)
         image = _read(self._files[index])
         if image is None:
-            self._gaps.damaged(index)
+            self._gaps.add_damaged(index)
         else:
             self._newest = self._fitted(image, self._files[index])
         return self._newest
@@ -74,7 +74,7 @@ class ImageFolder:
 
     def close(self) -> None:
         """Log how many files could not be read, once."""
-        self._say_gaps()
+        self._log_unreadable()
 
     def _fitted(self, image: Image, file: Path) -> Image:
         size = (image.shape[1], image.shape[0])
@@ -88,8 +88,8 @@ class ImageFolder:
             )
         return Letterbox(size, self.size).image(image)
 
-    def _say_gaps(self) -> None:
-        self._gaps.say(len(self._files), 1.0)
+    def _log_unreadable(self) -> None:
+        self._gaps.log_summary(len(self._files), 1.0)
 
 
 def _read(file: Path) -> Image | None:
@@ -97,6 +97,6 @@ def _read(file: Path) -> Image | None:
         data = np.fromfile(file, dtype=np.uint8)
     except OSError:
         return None
-    # From memory: by its name OpenCV turns no TIFF.
+    # From memory: given a file name, OpenCV ignores the orientation of a TIFF.
     image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
     return None if image is None else np.asarray(image, dtype=np.uint8)

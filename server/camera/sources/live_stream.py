@@ -1,4 +1,4 @@
-"""A camera: RTSP, HTTP, V4L2 or whatever else FFmpeg opens; its newest picture at every pulse."""
+"""A live camera, by RTSP, HTTP, V4L2 or anything else that FFmpeg opens: its newest picture at each pulse."""
 
 from __future__ import annotations
 
@@ -26,17 +26,16 @@ from server.system.errors import UnavailableError, UserError
 log = logging.getLogger(__name__)
 
 OPEN_S, READ_S = 10.0, 5.0
-"""Seconds in which a camera must answer, and send something."""
+"""Timeouts of connecting and of reading, in seconds."""
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
-_LET_GO_S = 0.5
-_FIRST_S = 2.0
-"""Seconds that are waited for the first picture, which says how all lie."""
+_JOIN_S = 0.5
+_FIRST_PICTURE_S = 2.0
+"""Seconds to wait for the first picture, which carries the orientation."""
 _STALE_S = 1.5
-"""A picture older than this is not shown again: the camera counts as away, and others have half a second
-to take over within the two that are promised."""
+"""Age in seconds from which a picture is not shown again: the camera counts as away, and the view can change
+within the two seconds that are promised."""
 _HELD_BACK = 2
-"""Pictures that wait for the next one's beginning: one in what takes a stream apart, one in what finds its
-pictures."""
+"""Pictures that FFmpeg holds back until the next one begins: one in the demuxer, one in the parser."""
 
 
 class LiveStream:
@@ -51,9 +50,9 @@ class LiveStream:
         self._orientation = Orientation(pixel_aspect=pixel_aspect(opened.stream))
         self.size = self._orientation.size(self._stored)
         self._sized = threading.Event()
-        """The first picture has come, and with it the size is known for good."""
+        """Set by the first picture, from which on the size is fixed."""
         self._resized: tuple[int, int] | None = None
-        """The size of its pictures, where it is another one since."""
+        """The new size of its pictures, where it has changed."""
         self._lock = threading.Lock()
         self._newest: VideoFrame | None = None
         self._newest_at = 0.0
@@ -62,7 +61,7 @@ class LiveStream:
         self._away = LogThrottle(quiet_s=0.0)
         self._thread = threading.Thread(target=self._run, args=(opened,), name="source", daemon=True)
         self._thread.start()
-        self._sized.wait(_FIRST_S)
+        self._sized.wait(_FIRST_PICTURE_S)
         self._sized.set()
 
     def take(self, pulse: int) -> Image | None:
@@ -80,13 +79,13 @@ class LiveStream:
         return None if picture is None else self._oriented(picture).image(picture)
 
     def ahead(self, places: Sequence[int]) -> Iterator[Image]:  # noqa: ARG002 — Source
-        """Return nothing: what a camera will show nobody knows."""
+        """Return nothing: a live camera has no pictures ahead."""
         return iter(())
 
     def close(self) -> None:
         """Stop reading."""
         self._closing.set()
-        self._thread.join(_LET_GO_S)  # a silent camera holds it up for longer: it ends by itself
+        self._thread.join(_JOIN_S)  # a silent camera blocks the thread for longer; it ends by itself
 
     def _run(self, opened: OpenedVideo | None) -> None:
         backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
@@ -102,7 +101,7 @@ class LiveStream:
                 self._lost(str(error))
 
     def _read(self, opened: OpenedVideo) -> bool:
-        """Read until the connection ends; tell whether any picture came."""
+        """Read until the connection ends; return whether any picture came."""
         aspect = pixel_aspect(opened.stream)
         size = replace(self._orientation, pixel_aspect=aspect).size(opened.size)
         if size != self.size:
@@ -112,17 +111,17 @@ class LiveStream:
         any_picture, why = False, "the connection has ended"
         self._silence = _Silence()
         try:
-            for packet in opened.container.demux(opened.stream, *self._listened_to(opened)):
+            for packet in opened.container.demux(opened.stream, *self._audio_streams(opened)):
                 if self._closing.is_set():
                     break
                 if packet.stream is opened.stream:
                     if self._decode(cast("av.Packet[VideoStream]", packet)):
                         any_picture = True
-                        self._back()
+                        self._log_recovered()
                 elif self._listener is not None:
                     self._listener.packet(cast("av.Packet[AudioStream]", packet))
-        except _OddSizeError as error:
-            why = str(error)  # by damage or for good: a new connection will tell
+        except _SizeChangedError as error:
+            why = str(error)  # damage, or a real change: the next connection shows which
         except (av.error.FFmpegError, OSError) as error:
             why = f"reading stopped: {timeout_message(error, READ_S) or ffmpeg_reason(error)}"
         finally:
@@ -134,26 +133,26 @@ class LiveStream:
     def _other_size(self, size: tuple[int, int]) -> str:
         return "its pictures are {}x{} now, they were {}x{}".format(*size, *self.size)
 
-    def _lost(self, why: str, *, mistake: bool = False) -> None:
+    def _lost(self, why: str, *, unexpected: bool = False) -> None:
         """Log that the camera is away, throttled for one that comes and goes."""
         if (more := self._away.record(why)) is not None:
-            log.warning("%s%s; retrying", why, more, exc_info=mistake)
+            log.warning("%s%s; retrying", why, more, exc_info=unexpected)
 
-    def _back(self) -> None:
+    def _log_recovered(self) -> None:
         if ended := self._away.end():
             log.info("%s: pictures come again, after %.0f s", redact_address(self._url), ended.seconds)
 
     def _read_alive(self, opened: OpenedVideo) -> bool:
-        """Do the same, and outlive mistakes: nobody would begin this thread anew."""
+        """Read, and survive unexpected errors: the thread is not restarted."""
         try:
             return self._read(opened)
-        except Exception as error:  # noqa: BLE001 — it is said, with its traceback
-            self._lost(f"{redact_address(self._url)}: a mistake of type {type(error).__name__}", mistake=True)
+        except Exception as error:  # noqa: BLE001 — logged with its traceback
+            self._lost(f"{redact_address(self._url)}: unexpected {type(error).__name__}", unexpected=True)
             opened.container.close()
             return False
 
-    def _listened_to(self, opened: OpenedVideo) -> tuple[AudioStream, ...]:
-        """Return what else is to be read than the pictures."""
+    def _audio_streams(self, opened: OpenedVideo) -> tuple[AudioStream, ...]:
+        """Return the audio stream to read beside the video, if any."""
         if self._listener is None:
             return ()
         streams = opened.container.streams.audio[:1]
@@ -164,13 +163,13 @@ class LiveStream:
         old = self._silence.was_before(packet, time.monotonic())
         try:
             pictures = [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
-        except av.error.FFmpegError:  # damage; that nothing can be read any more is no matter of decoding
+        except av.error.FFmpegError:  # damaged; read errors show up elsewhere
             return False
         if pictures and not self._sized.is_set():
-            self._lies_as(pictures[0])
+            self._set_orientation(pictures[0])
         for size in map(self._size_of, pictures):
             if size != self.size:
-                raise _OddSizeError(self._other_size(size))
+                raise _SizeChangedError(self._other_size(size))
         if pictures and not old:
             with self._lock:
                 self._newest, self._newest_at = pictures[-1], time.monotonic()
@@ -179,8 +178,8 @@ class LiveStream:
                 self._listener.picture(newest.pts * newest.time_base)
         return bool(pictures)
 
-    def _lies_as(self, first: VideoFrame) -> None:
-        """Learn from the first picture how all are turned, before anybody is told their size."""
+    def _set_orientation(self, first: VideoFrame) -> None:
+        """Set orientation and size by the first picture."""
         if (first.width, first.height) == self._stored:
             self._orientation = self._oriented(first)
             self.size = self._size_of(first)
@@ -195,15 +194,15 @@ class LiveStream:
         return self._oriented(picture).size((picture.width, picture.height))
 
 
-class _OddSizeError(Exception):
-    """A picture has not the size that the camera's had at the beginning."""
+class _SizeChangedError(Exception):
+    """A picture's size differs from the first one's."""
 
 
 class _Silence:
-    """Knows when a camera was silent, and whether what comes first after that is of before.
+    """Detects pictures from before a silence that arrive after it.
 
-    In some formats, such as MPEG-TS, a picture ends where the next one begins. So the last ones before a
-    silence come when it is over, as if they were new.
+    In some formats, such as MPEG-TS, a picture ends where the next one begins: the last ones before a silence
+    arrive after it, as if they were new.
     """
 
     def __init__(self) -> None:
@@ -212,13 +211,13 @@ class _Silence:
         self._until, self._left = 0.0, 0
 
     def was_before(self, packet: av.Packet[VideoStream], now: float) -> bool:
-        """Return whether a packet was sent before a silence that has just ended, as far as its time says."""
+        """Return whether a packet, by its time stamp, was sent before a silence that has just ended."""
         if packet.pts is None or packet.time_base is None:
             return False
         at, last = self._at, self._time
         self._at, self._time = now, float(packet.pts * packet.time_base)
         if at is not None and now - at > _STALE_S:
-            # Times may have jumped, too: then a few new pictures are taken for old ones, and that is all.
+            # If time stamps jumped as well, a few new pictures count as old; that does no harm.
             self._until, self._left = last + (now - at) / 2, _HELD_BACK
         if not self._left or self._time >= self._until:
             self._left = 0

@@ -1,4 +1,4 @@
-"""Frames of a recording that have no picture of their own, and the one line that says so."""
+"""A recording's damaged and missing frames, and the log lines about them."""
 
 from __future__ import annotations
 
@@ -10,46 +10,46 @@ from server.system.address_redaction import redact_address
 
 log = logging.getLogger(__name__)
 
-_MOST_SPANS = 5
-"""Places that are named."""
-_MOST_KEPT = 100_000
-"""Frames that are remembered: who has lost more needs no list."""
+_MAX_SPANS = 5
+"""Places to list in a log line."""
+_MAX_FRAMES = 100_000
+"""Frames to remember of each kind."""
 _UNEVEN = 0.1
-"""Part of the frames from which on missing pictures are no loss, but how the camera takes them."""
+"""Share of missing frames above which the camera's rate counts as uneven instead."""
 
 
 class MissingFrames:
-    """Counts the frames for which an earlier picture stands; from 0, and from 1 in log lines."""
+    """Collects the frames that repeat an earlier picture; numbered from 0, in log lines from 1."""
 
     def __init__(self, path: str) -> None:
         self._path = path
         self._damaged: set[int] = set()
         self._missing: set[int] = set()
-        self._said = False
+        self._is_logged = False
 
-    def damaged(self, frame: int) -> None:
-        """Note a picture that could not be decoded."""
-        if len(self._damaged) < _MOST_KEPT:
+    def add_damaged(self, frame: int) -> None:
+        """Add a frame that could not be decoded."""
+        if len(self._damaged) < _MAX_FRAMES:
             self._damaged.add(frame)
 
-    def missing(self, frames: Iterable[int]) -> None:
-        """Note pictures that the recording does not have, where others come one for each frame."""
+    def add_missing(self, frames: Iterable[int]) -> None:
+        """Add frames that the recording does not have."""
         for frame in frames:
-            if len(self._missing) >= _MOST_KEPT:
+            if len(self._missing) >= _MAX_FRAMES:
                 return
             self._missing.add(frame)
 
-    def say(self, length: int, rate: float) -> None:
+    def log_summary(self, length: int, rate: float) -> None:
         """Log once, at the end of the recording, its missing frames and its true frame rate."""
-        if self._said:
+        if self._is_logged:
             return
-        self._said = True
+        self._is_logged = True
         if self._damaged:
             log.warning(
                 "%s: %d damaged frames show as the picture before them: %s",
                 redact_address(self._path),
                 len(self._damaged),
-                _named(self._damaged),
+                _listed(self._damaged),
             )
         missing = self._missing - self._damaged
         if len(missing) > _UNEVEN * length:
@@ -63,16 +63,16 @@ class MissingFrames:
                 "%s: %d frames are missing from it and show as the picture before them: %s",
                 redact_address(self._path),
                 len(missing),
-                _named(missing),
+                _listed(missing),
             )
 
 
-def _named(frames: set[int]) -> str:
-    """Name frames by their first and last: `frame 4, 31 to 60`."""
+def _listed(frames: set[int]) -> str:
+    """List frames as spans: `frame 4, 31 to 60`."""
     spans = list(_spans(sorted(frames)))
     words = [f"{first + 1}" if first == last else f"{first + 1} to {last + 1}" for first, last in spans]
-    more = f" and {len(words) - _MOST_SPANS} other places" if len(words) > _MOST_SPANS else ""
-    return f"frame{'s' if len(frames) > 1 else ''} {', '.join(words[:_MOST_SPANS])}{more}"
+    more = f" and {len(words) - _MAX_SPANS} other places" if len(words) > _MAX_SPANS else ""
+    return f"frame{'s' if len(frames) > 1 else ''} {', '.join(words[:_MAX_SPANS])}{more}"
 
 
 def _spans(frames: list[int]) -> Iterator[tuple[int, int]]:

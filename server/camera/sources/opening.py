@@ -1,4 +1,4 @@
-"""Opening what FFmpeg opens, with errors that a person can act on."""
+"""Opens video by FFmpeg, with error texts that a user can act on."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from server.system.address_redaction import ffmpeg_reason, redact_address
 from server.system.errors import UserError
 
 _TEXT = "tty"
-"""The format of which FFmpeg takes any text to be: it would play it as letters."""
+"""FFmpeg's format for text files, which it would render as letters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +30,10 @@ class OpenedVideo:
     Attributes:
         container: the file or connection.
         stream: its first video.
-        size: width and height as pictures are stored; how they are shown is known from the first of them.
-        fps: pictures a second, as it says.
-        frames: how many there are, as it says; 0: it does not.
-        videos: how many videos are in it, without pictures of a cover.
+        size: width and height as stored; the first picture carries the orientation.
+        fps: its declared pictures a second.
+        frames: its declared number of pictures; 0: not declared.
+        videos: number of videos in it, without cover pictures.
     """
 
     container: InputContainer
@@ -61,7 +61,7 @@ def open_video(
         )
     except (av.error.FFmpegError, OSError, ValueError) as error:
         why = timeout_message(error, timeout[0]) if timeout else None
-        # FFmpeg's own words repeat the address, and so would a traceback that goes on to them.
+        # FFmpeg's text contains the address, and so would a chained traceback.
         raise UserError(f"{name}: cannot open this video: {why or _reason(source, error)}") from None
     if container.format.name == _TEXT:
         container.close()
@@ -91,12 +91,12 @@ def timeout_message(error: Exception, seconds: float) -> str | None:
 
 
 def _reason(source: str, error: Exception) -> str:
-    """Return why; of a host that nobody knows FFmpeg says no more than that it was an input/output error."""
+    """Return the reason; FFmpeg reports an unknown host as an input/output error only."""
     if isinstance(error, OSError) and error.errno == errno.EIO and "://" in source:
         try:
             socket.getaddrinfo(urlsplit(source).hostname, None)
         except socket.gaierror as unknown:
             return str(unknown.strerror)
         except ValueError:
-            pass  # no address that could be taken apart
+            pass  # not a valid address
     return ffmpeg_reason(error)

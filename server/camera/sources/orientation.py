@@ -1,4 +1,4 @@
-"""How a stored picture is turned, mirrored and stretched to be shown: phones are held upright."""
+"""Orientation and pixel aspect: how a stored picture is turned, mirrored and stretched for display."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from server.media.color_conversion import to_bgr
 
 _MATRIX_NAME = "DISPLAYMATRIX"
 _MATRIX = struct.Struct("=9i")
-_MOST_STRETCHED = 4.0
-"""Pixels that are said to be further from square than that are damage."""
+_MAX_ASPECT = 4.0
+"""A pixel aspect beyond this counts as damage."""
 INTERLACED = "it is interlaced, so two moments are in one picture: deinterlaced, people are found better"
-"""What is said of pictures whose lines are of two moments; they are taken as they are."""
+"""The warning about interlaced video, which is used as it is."""
 _SQUARE = 0.01
-"""Part by which pixels may be off square without being stretched: encoders round."""
+"""Deviation from square pixels that is ignored: encoders round."""
 
 
 @dataclass(frozen=True, slots=True)
 class Orientation:
-    """From a stored picture to the one that is shown.
+    """The transformation of a stored picture for display.
 
     Attributes:
         transposed: rows become columns, before anything is mirrored.
@@ -42,7 +42,7 @@ class Orientation:
 
     @property
     def words(self) -> str:
-        """How stored pictures are turned and stretched, in words; empty: they are shown as they are."""
+        """The transformation in words; empty: none."""
         if self.turned:
             return "turned or mirrored (display matrix)"
         if self.pixel_aspect != 1.0:
@@ -55,12 +55,12 @@ class Orientation:
         return self.transposed or self.mirrored_x or self.mirrored_y
 
     def size(self, stored: tuple[int, int]) -> tuple[int, int]:
-        """Return the width and height of what is shown of a picture of such a size."""
+        """Return the displayed width and height of a picture of a stored size."""
         width, height = max(1, round(stored[0] * self.pixel_aspect)), stored[1]
         return (height, width) if self.transposed else (width, height)
 
     def image(self, picture: VideoFrame) -> Image:
-        """Return the picture as it is shown, ``(height, width, 3)`` BGR."""
+        """Return the picture as displayed, ``(height, width, 3)`` BGR."""
         image = to_bgr(picture)
         if self.pixel_aspect != 1.0:
             upright = replace(self, transposed=False).size((image.shape[1], image.shape[0]))
@@ -89,16 +89,16 @@ _QUARTERS = (
 def parse_orientation(picture: VideoFrame, pixel_aspect: float = 1.0) -> Orientation:
     """Parse a picture's display matrix (ISO/IEC 14496-12, 6.2.2; an EXIF orientation becomes one, too).
 
-    What is between two quarter turns is taken for the nearer one. Of a photo's EXIF only the turn is known.
+    Rotations are rounded to quarter turns. Of a photo's EXIF only the rotation is available.
     """
     try:
         found = picture.side_data.get(_MATRIX_NAME)
-    except ValueError:  # beside it is what PyAV has no name for, such as all of a photo's EXIF
+    except ValueError:  # PyAV does not know some other side data, such as a photo's EXIF
         return replace(_QUARTERS[round(picture.rotation / 90) % 4], pixel_aspect=pixel_aspect)
     data = bytes(found) if isinstance(found, SideData) else b""
     if len(data) != _MATRIX.size:
         return Orientation(pixel_aspect=pixel_aspect)
-    # A point (x, y) is shown at (a x + c y, b x + d y).
+    # The matrix maps (x, y) to (a x + c y, b x + d y).
     a, b, _, c, d, *_ = _MATRIX.unpack(data)
     if abs(a) + abs(d) >= abs(b) + abs(c):
         return Orientation(mirrored_x=a < 0, mirrored_y=d < 0, pixel_aspect=pixel_aspect)
@@ -106,8 +106,8 @@ def parse_orientation(picture: VideoFrame, pixel_aspect: float = 1.0) -> Orienta
 
 
 def pixel_aspect(stream: VideoStream) -> float:
-    """Return how wide a stored pixel is, in heights of it; 1 where nothing else is sensibly said."""
-    said = stream.sample_aspect_ratio
-    aspect = float(said) if said else 1.0
-    sensible = 1.0 / _MOST_STRETCHED <= aspect <= _MOST_STRETCHED
-    return aspect if sensible and abs(aspect - 1.0) > _SQUARE else 1.0
+    """Return the width of a stored pixel over its height; 1 where nothing plausible is declared."""
+    declared = stream.sample_aspect_ratio
+    aspect = float(declared) if declared else 1.0
+    is_plausible = 1.0 / _MAX_ASPECT <= aspect <= _MAX_ASPECT
+    return aspect if is_plausible and abs(aspect - 1.0) > _SQUARE else 1.0

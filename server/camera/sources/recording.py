@@ -1,4 +1,4 @@
-"""A recorded video, replayed on the pulses by the times of its pictures."""
+"""A recorded video, replayed on the pulses by its pictures' times."""
 
 from __future__ import annotations
 
@@ -22,27 +22,26 @@ from server.system.errors import UserError
 log = logging.getLogger(__name__)
 
 SAME_RATE = 0.001
-"""Part by which a rate may be off another one and nobody has to be told: 29.97 is 30 in round numbers."""
-_MOST_COUNTED = 10_000
-"""Pulses whose pictures' own numbers are remembered: tracking is not that far behind."""
+"""Relative difference below which two rates count as equal: 29.97 is 30 in round numbers."""
+_MAX_NUMBERS = 10_000
+"""Pulses whose picture numbers are remembered; more than tracking can lag."""
 
 
 class Recording:
-    """Shows at pulse ``offset + n`` what it shows ``n / fps`` seconds after its first picture.
+    """Shows at pulse ``offset + n`` the picture due ``n / fps`` seconds after the first one.
 
-    That is the newest picture that is due then, give or take half a frame. So recorded views stay aligned
-    whatever their rates are and however busy the machine is. Where pictures come one for each pulse that is
-    picture ``n``.
+    That is the newest picture due by then, within half a frame; at equal rates it is picture ``n``. So
+    recorded views stay aligned at any rate and load.
 
-    A picture that is damaged or missing shows as the one before it, so that what follows keeps its place; at
-    the end that is said. Pictures are upright, their pixels square, and all of the first one's size.
+    A damaged or missing picture shows as the one before it, so that later ones keep their time; this is
+    logged at the end. Pictures are upright, with square pixels, and letterboxed to the first one's size.
 
     Args:
         path: the file.
-        offset: pulses by which it begins later.
-        at_end: whether it begins again.
-        fps: pulses a second; None: as many as it has pictures.
-        quiet: nothing is said of what is odd about it: somebody else does.
+        offset: the pulse of its first picture.
+        at_end: whether it stops or loops.
+        fps: pulses a second; None: the recording's own rate.
+        quiet: log no warnings about the file.
 
     Raises:
         UserError: there is no such file, no video in it, or not one picture that can be decoded.
@@ -66,19 +65,19 @@ class Recording:
         self._opened = open_video(path)
         self._aspect = pixel_aspect(self._opened.stream)
         self.fps = self._opened.fps
-        """Pictures a second, as the file says."""
+        """The declared pictures a second."""
         self.frames = self._opened.frames
-        """How many pictures the file says it has; 0 where it does not say."""
+        """The declared number of pictures; 0: not declared."""
         self._site_fps = fps or self.fps
         self._same_rate = abs(self.fps / self._site_fps - 1) <= SAME_RATE
         self._gaps: MissingFrames | None = None if quiet else MissingFrames(path)
         self._length: int | None = None
-        """Pulses that it lasts; None: not known before its end."""
-        self._moved: dict[int, int] = {}
-        """By pulse, how many pictures further the one shown is than if they were counted, where not none."""
+        """Its length in pulses; None: not known before its end."""
+        self._number_offsets: dict[int, int] = {}
+        """By pulse: the shown picture's number minus the pulse's position, where they differ."""
         self._begin()
         try:
-            first = self._forward(0)  # a broken file is refused now, not at its first pulse
+            first = self._forward(0)  # a broken file is rejected now, not at the first pulse
         except SourceEndedError:
             self._gaps = None  # all of it is damaged
             self.close()
@@ -86,15 +85,15 @@ class Recording:
                 f"{redact_address(path)}: there is not one picture in this video; is the file whole?"
             ) from None
         self.orientation = parse_orientation(first, self._aspect)
-        """How its first picture is turned, mirrored and stretched."""
+        """The first picture's orientation."""
         self.size = self.orientation.size((first.width, first.height))
         self._resized = quiet
-        """That its pictures have another size since has been said."""
+        """Whether a change of size was logged."""
         if not quiet:
-            self._say_what_is_odd(first)
+            self._log_peculiarities(first)
 
     def take(self, pulse: int) -> Image | None:
-        """Return what is shown at a pulse; None before the recording begins."""
+        """Return the picture of a pulse; None before the recording begins."""
         index = pulse - self._offset
         if index < 0:
             return None
@@ -102,7 +101,7 @@ class Recording:
             place = self._place(index)
             picture = self._forward(place)
         except SourceEndedError:
-            self._say_gaps()
+            self._log_missing_frames()
             if not self._loop or not self._length:
                 raise
             place = self._place(index)
@@ -110,9 +109,9 @@ class Recording:
         self._note_number(pulse, place)
         return self._shown(picture)
 
-    def counted(self, pulse: int) -> int:
-        """Return the pulse at which the picture that was shown at this one stands if pictures are counted."""
-        return pulse + self._moved.get(pulse, 0)
+    def counted_pulse(self, pulse: int) -> int:
+        """Return the pulse that this pulse's picture would have if pictures were counted one per pulse."""
+        return pulse + self._number_offsets.get(pulse, 0)
 
     def ahead(self, places: Sequence[int]) -> Iterator[Image]:
         """Decode the frames at some places, from the file opened once more."""
@@ -120,7 +119,7 @@ class Recording:
 
     def close(self) -> None:
         """Close the file."""
-        self._say_gaps()
+        self._log_missing_frames()
         self._opened.container.close()
 
     def _begin(self) -> None:
@@ -128,29 +127,29 @@ class Recording:
         self._pictures = read_pictures(self._opened, again=again)
         self._coming: TimedPicture | None = None
         self._newest: VideoFrame | None = None
-        self._at = self._number = self._asked = -1
-        """The newest picture's place, its number, and the place that was asked for last."""
+        self._at = self._number = self._requested = -1
+        """The newest picture's position and number, and the last requested position."""
         self._seconds = 0.0
 
     def _place(self, index: int) -> int:
-        """Return the place that stands at ``index`` of a recording that repeats, rewound if need be."""
+        """Return the position for an index, modulo the length of a loop; rewind where needed."""
         if self._length is None:
             return index
         if index >= self._length and not self._loop:
             raise SourceEndedError(self._path)
         index %= self._length
-        if index < self._asked:
+        if index < self._requested:
             self._opened.container.close()
             self._opened = open_video(self._path)
             self._begin()
         return index
 
     def _forward(self, place: int) -> VideoFrame:
-        """Decode up to what is shown at a place."""
-        self._asked = place
+        """Decode up to the picture shown at a position."""
+        self._requested = place
         while (coming := self._coming or next(self._pictures, None)) is not None:
             at = frame_index(coming.seconds, self._site_fps)
-            # Damaged from the start: what comes before the first good picture shows as that one.
+            # If the beginning is damaged, the first good picture stands for it.
             if at > place and self._newest is not None:
                 self._coming = coming
                 break
@@ -163,14 +162,14 @@ class Recording:
         return self._newest
 
     def _take_in(self, at: int, coming: TimedPicture) -> None:
-        """Go on to the next picture of the file, which stands at a place."""
+        """Advance to the file's next picture, which has a position."""
         self._number += 1
         self._seconds = max(self._seconds, coming.seconds)
         noted = self._gaps if self._length is None else None
         if noted is not None and coming.picture is None:
-            noted.damaged(at)
+            noted.add_damaged(at)
         if noted is not None and self._same_rate:
-            noted.missing(range(self._at + 1, at))
+            noted.add_missing(range(self._at + 1, at))
         self._at = max(self._at, at)
         self._newest = coming.picture or self._newest
 
@@ -181,9 +180,9 @@ class Recording:
     def _note_number(self, pulse: int, place: int) -> None:
         moved = self._number - place if self._at <= place else 0
         if moved:
-            self._moved[pulse] = moved
-            if len(self._moved) > _MOST_COUNTED:
-                del self._moved[next(iter(self._moved))]
+            self._number_offsets[pulse] = moved
+            if len(self._number_offsets) > _MAX_NUMBERS:
+                del self._number_offsets[next(iter(self._number_offsets))]
 
     def _shown(self, picture: VideoFrame) -> Image:
         image = parse_orientation(picture, self._aspect).image(picture)
@@ -194,11 +193,11 @@ class Recording:
             self._resized = True
             log.warning(
                 "%s: its pictures are %dx%d from frame %d on, they were %dx%d: they are fitted into that",
-                *(redact_address(self._path), *size, self._asked + 1, *self.size),
+                *(redact_address(self._path), *size, self._requested + 1, *self.size),
             )
         return Letterbox(size, self.size).image(image)
 
-    def _say_what_is_odd(self, first: VideoFrame) -> None:
+    def _log_peculiarities(self, first: VideoFrame) -> None:
         if self._opened.videos > 1:
             log.warning(
                 "%s: there are %d videos in it: the first is taken",
@@ -214,10 +213,10 @@ class Recording:
                 *(redact_address(self._path), self.fps, self._site_fps, some),
             )
 
-    def _say_gaps(self) -> None:
+    def _log_missing_frames(self) -> None:
         if self._gaps is not None:
             length = self._at + 1
-            self._gaps.say(length, self._number / self._seconds if self._seconds else self.fps)
+            self._gaps.log_summary(length, self._number / self._seconds if self._seconds else self.fps)
 
 
 def decode_frames(path: str, places: Sequence[int], fps: float | None = None) -> Iterator[Image]:

@@ -1,4 +1,4 @@
-"""The synthetic scene as a camera: ``scene:room?camera=0&cameras=3&objects=4&seed=1``."""
+"""A synthetic scene as a picture source: ``scene:room?camera=0&cameras=3&objects=4&seed=1``."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class SyntheticSource:
         self.size = size
 
     def warm_up(self) -> Self:
-        """Draw once: painting the room takes a second, which must not be while pulses go by."""
+        """Draw one picture: painting the room takes a second, which must not delay the first pulse."""
         self._scene.image(self._camera, 0)
         return self
 
@@ -65,4 +65,4 @@ class SyntheticSource:
         return None if homography is None else [[float(entry) for entry in row] for row in homography]
 
     def close(self) -> None:
-        """Nothing is held open."""
+        """Nothing to close."""

@@ -1,4 +1,4 @@
-"""Times of packets that go on where a recording's own ones leap: joined films, clocks that were set."""
+"""Repair of time stamps that jump within a recording, as in joined files."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from server.camera.sources.opening import OpenedVideo
 
 _BACK_S = 1.0
 _FAR_S, _FAR_FRAMES = 60.0, 10
-"""A picture is not shown for longer than this, in seconds or in frames, whichever is more: that is a leap."""
+"""A step forward beyond this, in seconds or frames, whichever is more, is a jump."""
 
 
 class TimestampRepair:
-    """Moves time stamps so that they go on with the next frame after a jump."""
+    """Shifts time stamps so that they continue with the next frame after a jump."""
 
     def __init__(self, opened: OpenedVideo) -> None:
         unit = float(opened.stream.time_base or 1)
@@ -23,18 +23,18 @@ class TimestampRepair:
         self._last: int | None = None
         self._shift = 0
 
-    def leaps(self, packet: av.Packet[VideoStream]) -> bool:
-        """Set a packet's times right; tell whether they leap here. Packets come in the order of decoding."""
+    def repair(self, packet: av.Packet[VideoStream]) -> bool:
+        """Correct a packet's time stamps; return whether they jump here. Packets are in decoding order."""
         time = packet.pts if packet.dts is None else packet.dts
         if time is None:
             return False
         time += self._shift
-        leap = self._last is not None and not self._last - self._back <= time <= self._last + self._far
-        if leap and self._last is not None:
+        jumps = self._last is not None and not self._last - self._back <= time <= self._last + self._far
+        if jumps and self._last is not None:
             self._shift += self._last + self._frame - time
             time = self._last + self._frame
         self._last = time
         if self._shift:
             packet.pts = None if packet.pts is None else packet.pts + self._shift
             packet.dts = None if packet.dts is None else packet.dts + self._shift
-        return leap
+        return jumps

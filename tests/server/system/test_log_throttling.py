@@ -111,7 +111,7 @@ def test_a_camera_without_sound_is_told_of_once_however_often_it_is_opened(
     sound = LiveAudioSource(SoundSettings(source="c0"), 25.0)
     for _ in range(10):
         sound.opened(None)
-    assert caplog.messages == ["there is no sound in what the camera sends; the site is silent"]
+    assert caplog.messages == ["the camera sends no audio; the site is silent"]
 
 
 def test_a_damaged_recording_that_repeats_is_told_of_once(caplog: pytest.LogCaptureFixture) -> None:
@@ -135,10 +135,10 @@ def test_damaged_sound_that_repeats_is_told_of_once(
     container = SimpleNamespace(demux=demux, close=lambda: None)
     monkeypatch.setattr(recorded_source, "_open", lambda _: (container, None))
     sound = RecordedAudioSource.__new__(RecordedAudioSource)
-    sound._path, sound._told = "hall.mp4", False
+    sound._path, sound._has_warned = "hall.mp4", False
     for _ in range(5):
         assert not list(sound._once())
-    assert caplog.messages == ["hall.mp4: its sound cannot be read any further: damaged"]
+    assert caplog.messages == ["hall.mp4: its audio cannot be read any further: damaged"]
 
 
 def test_a_recording_that_repeats_is_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -86,7 +86,7 @@ def test_all_else_is_encoded_to_opus(
     path = write_flashes(tmp_path / name, FRAMES, codec=codec, rate=rate, channels=channels, options=options)
     sound = RecordedAudioSource(str(path), STEREO, FPS, 0, "stop")
     frames = [*sound.until(0), *sound.until(FRAMES + 10)]
-    way = getattr(sound._way, "_way", sound._way)
+    way = getattr(sound._framer, "_framer", sound._framer)
     assert isinstance(way, AudioEncoder)
     assert {packet_samples(frame.data) for frame in frames} == {960}
     assert beeps(as_mp4(frames)) == pytest.approx(BEEPS, abs=0.005), "also for what it looks ahead"
@@ -95,9 +95,9 @@ def test_all_else_is_encoded_to_opus(
 def test_a_site_of_aac_encodes_opus(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mkv", 2 * EVERY, codec="libopus")
     sound = RecordedAudioSource(str(path), SoundSettings(source="here"), FPS, 0, "stop")
-    assert isinstance(sound._way, AudioEncoder)
+    assert isinstance(sound._framer, AudioEncoder)
     assert not isinstance(
-        RecordedAudioSource(str(path), STEREO, FPS, 0, "stop")._way, AudioEncoder | AudioPassthrough
+        RecordedAudioSource(str(path), STEREO, FPS, 0, "stop")._framer, AudioEncoder | AudioPassthrough
     )
 
 

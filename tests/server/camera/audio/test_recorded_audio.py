@@ -59,7 +59,7 @@ def test_what_fits_is_passed_on_byte_for_byte(tmp_path: Path) -> None:
     with av.open(str(path)) as container:
         own = [bytes(it) for it in container.demux(audio=0) if it.size and it.pts is not None and it.pts >= 0]
     frames = all_until(sound, FRAMES + 10)
-    assert isinstance(sound._way, AudioPassthrough)
+    assert isinstance(sound._framer, AudioPassthrough)
     assert [frame.data for frame in frames] == own
     assert [frame.number for frame in frames] == list(range(len(own)))
 
@@ -83,7 +83,7 @@ def test_beeps_are_where_the_pictures_are(
     )
     sound = RecordedAudioSource(str(path), STEREO, FPS, offset, "stop")
     frames = all_until(sound, FRAMES + 10)
-    assert isinstance(sound._way, AudioPassthrough if name == "same.mp4" else AudioEncoder)
+    assert isinstance(sound._framer, AudioPassthrough if name == "same.mp4" else AudioEncoder)
     assert numbers_grow(frames)
     form = STEREO.format
     assert form is not None

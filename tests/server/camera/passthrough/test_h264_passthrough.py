@@ -401,7 +401,7 @@ def test_a_network_camera_that_falls_silent_while_it_is_looked_at_is_away(
     monkeypatch.setattr("server.camera.passthrough.stream_source.READ_S", 0.5)
     network.let = 2
     camera = {"options": {"probesize": "2000", "analyzeduration": "1000"}}
-    with pytest.raises(UnavailableError, match=r"stopped while it was looked at: no answer within 0\.5 s$"):
+    with pytest.raises(UnavailableError, match=r"stopped while it was checked: no answer within 0\.5 s$"):
         CameraPipeline(site(network.url, h264, camera=camera), "c0")
 
 
