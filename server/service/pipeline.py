@@ -305,7 +305,7 @@ class BestViewPipeline:
         self.state_replication.begin(epoch.last)
         with self.stage_timers.deciding():
             decisions = self.decider.step(epoch)
-        self.state_replication.take(epoch.last)  # before publishing: names are restored by then
+        self.state_replication.advance(epoch.last)  # before publishing: names are restored by then
         for decision in decisions:
             self._publish(decision)
         self.assist.step(epoch, self.config)

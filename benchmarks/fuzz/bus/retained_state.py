@@ -80,7 +80,7 @@ class RetainedStates(ScriptTarget):
             it.begin(last)
             words = [word(rng, camera, last // STRIDE) for camera in CAMERAS]
             people.update(Epoch(last // STRIDE, last, {said.camera: said for said in words}))
-            it.take(last)
+            it.advance(last)
             assert not set(people.registry.merged) & set(people.registry.everybody), (
                 "a number that is another's is somebody's"
             )

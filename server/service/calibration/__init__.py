@@ -1,1 +1,1 @@
-"""Calibrating from a walk, on the operator's page and at the command line: words, plan and ground file."""
+"""Calibration from a walk, for the operator's page and the command line."""

@@ -86,15 +86,17 @@ def calibrate_walk(recorded: RecordedWalk, settings: WalkSettings, person: float
     Raises:
         CalibrationError: the walk is insufficient.
     """
-    found = calibrate_from_walks(recorded.walks, settings, person)
-    missing = [line for it in found.cameras for line in coverage_gaps(it.camera, it.thirds, it.depth_ratio)]
-    homographies = {it.camera: it.homography for it in found.cameras}
+    calibration = calibrate_from_walks(recorded.walks, settings, person)
+    missing = [
+        line for it in calibration.cameras for line in coverage_gaps(it.camera, it.thirds, it.depth_ratio)
+    ]
+    homographies = {it.camera: it.homography for it in calibration.cameras}
     return CalibrationReport(
-        found,
-        (*report_lines(recorded, found, settings), *(it.text for it in missing)),
+        calibration,
+        (*report_lines(recorded, calibration, settings), *(it.text for it in missing)),
         next((it.text for it in missing if it.serious), ""),
-        offset_lines(recorded, found) if settings.maximum_offset else "",
-        ground_file_text("m", homographies, details(recorded, found, person)),
+        offset_lines(recorded, calibration) if settings.maximum_offset else "",
+        ground_file_text("m", homographies, details(recorded, calibration, person)),
     )
 
 
@@ -131,57 +133,57 @@ def coverage_gaps(camera: str, thirds: Sequence[float], depth_ratio: float) -> I
         yield CoverageGap(f"walk also nearer to camera {camera}, and farther from it", serious=True)
 
 
-def report_lines(recorded: RecordedWalk, found: WalkCalibration, settings: WalkSettings) -> list[str]:
+def report_lines(recorded: RecordedWalk, calibration: WalkCalibration, settings: WalkSettings) -> list[str]:
     """Return the lines about errors, coverage and offsets."""
-    on_floor, in_pictures = _heights(found.heights), _shares(found.picture)
+    on_floor, in_pictures = _heights(calibration.heights), _shares(calibration.picture)
     lines = [f"feet that two cameras see are {on_floor} apart, in the pictures {in_pictures} of the diagonal"]
-    for it in found.cameras:
+    for it in calibration.cameras:
         left, middle, right = (f"{100 * share:.0f}" for share in it.thirds)
         lines.append(
             f"{it.camera}: {_heights(it.heights)}, {_shares(it.picture)}; of the walk {left} % in the left, "
             f"{middle} % in the middle and {right} % in the right third, the nearest {it.depth_ratio:.1f} "
             "times as tall as the farthest"
         )
-    lines += [f"{it.camera}: left out: {it.reason}" for it in found.uncalibrated]
-    lines += _floors(found)
+    lines += [f"{it.camera}: left out: {it.reason}" for it in calibration.uncalibrated]
+    lines += _floors(calibration)
     if recorded.guessed:
         sizes = ", ".join(f"{it.camera} {it.size[0]}x{it.size[1]}" for it in recorded.walks)
         lines.append(f"picture sizes are estimated from the boxes ({sizes}); set them with --size")
     if recorded.rate_guessed:
         lines.append(f"{recorded.fps:g} frames a second are assumed; set the rate with --fps")
     if settings.maximum_offset:
-        lines += _offsets(recorded, found)
+        lines += _offsets(recorded, calibration)
     return lines
 
 
-def details(recorded: RecordedWalk, found: WalkCalibration, person: float) -> dict[str, Any]:
+def details(recorded: RecordedWalk, calibration: WalkCalibration, person: float) -> dict[str, Any]:
     """Return the content of the ground file besides the homographies."""
     return {
         "person": person,
-        "offset": {it.camera: _offset(recorded, it) for it in found.cameras},
-        "floor": {it.camera: it.floor for it in found.cameras},
+        "offset": {it.camera: _offset(recorded, it) for it in calibration.cameras},
+        "floor": {it.camera: it.floor for it in calibration.cameras},
         "residuals": {
             it.camera: {"heights": _numbers(it.heights), "picture": _numbers(it.picture)}
-            for it in found.cameras
+            for it in calibration.cameras
         },
-        "left_out": {it.camera: it.reason for it in found.uncalibrated},
+        "left_out": {it.camera: it.reason for it in calibration.uncalibrated},
     }
 
 
-def _floors(found: WalkCalibration) -> list[str]:
-    floors = sorted({it.floor for it in found.cameras})
+def _floors(calibration: WalkCalibration) -> list[str]:
+    floors = sorted({it.floor for it in calibration.cameras})
     if len(floors) == 1:
         return []
-    groups = (", ".join(it.camera for it in found.cameras if it.floor == floor) for floor in floors)
+    groups = (", ".join(it.camera for it in calibration.cameras if it.floor == floor) for floor in floors)
     text = f"there are {len(floors)} floors: {'; '.join(groups)}; no camera sees two of them"
     return [f"{text}; they are placed far apart in the file, and offsets hold within each"]
 
 
-def _offsets(recorded: RecordedWalk, found: WalkCalibration) -> list[str]:
+def _offsets(recorded: RecordedWalk, calibration: WalkCalibration) -> list[str]:
     """Return the report about the cameras' time offsets."""
-    first, fps = found.cameras[0].camera, recorded.fps
+    first, fps = calibration.cameras[0].camera, recorded.fps
     lines = []
-    for it in found.cameras:
+    for it in calibration.cameras:
         if it.offset or it.offset_error:
             how = "out of sync" if _is_out_of_sync(it) else "in sync, within the error"
             if _is_out_of_sync(it) and abs(it.offset) / fps < _DOUBTFUL_S:
@@ -194,9 +196,9 @@ def _offsets(recorded: RecordedWalk, found: WalkCalibration) -> list[str]:
     return lines
 
 
-def offset_lines(recorded: RecordedWalk, found: WalkCalibration) -> str:
+def offset_lines(recorded: RecordedWalk, calibration: WalkCalibration) -> str:
     """Return configuration lines that synchronize the cameras; empty if they are synchronized."""
-    moved = [it for it in found.cameras if _is_out_of_sync(it) and it.camera not in recorded.live]
+    moved = [it for it in calibration.cameras if _is_out_of_sync(it) and it.camera not in recorded.live]
     lines = [f"  - id: {it.camera}\n    offset: {_use(recorded, it)}\n" for it in moved]
     return "".join(["cameras:\n", *lines]) if lines else ""
 

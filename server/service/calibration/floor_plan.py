@@ -1,4 +1,4 @@
-"""The floor plan: what each camera sees of the floor, the foot points, and how far they are off."""
+"""Draws the floor plan: each camera's coverage, the foot points, and their errors."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from matplotlib.figure import Figure
 from bestview import to_ground
 from bestview.calibration import Floats, WalkCalibration
 
-_COLOURS = ("#1b7f5c", "#c8501e", "#4a5fc1", "#a8327d", "#8a7a10", "#2b8fb3", "#7b4a2b", "#555555")
+_COLORS = ("#1b7f5c", "#c8501e", "#4a5fc1", "#a8327d", "#8a7a10", "#2b8fb3", "#7b4a2b", "#555555")
 _INCHES = 9.0
 _MARGIN = 0.08
-_MOST_POINTS = 4000
+_MAX_POINTS = 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class FloorPlanCamera:
         camera: its name.
         homography: its pixels to the floor, (3, 3).
         image: the points in its picture, (N, 2) pixels.
-        place: where these are said to be, (N, 2) on the floor: marked, or agreed on by the cameras.
+        place: their positions on the floor, (N, 2): marked, or estimated from all cameras.
         floor: cameras of one number share a floor; each floor has a plan of its own.
     """
 
@@ -43,10 +43,11 @@ class FloorPlanCamera:
     floor: int = 0
 
 
-def floor_plan_cameras(found: WalkCalibration) -> list[FloorPlanCamera]:
+def floor_plan_cameras(calibration: WalkCalibration) -> list[FloorPlanCamera]:
     """Return the cameras of a calibration for the floor plan."""
     return [
-        FloorPlanCamera(it.camera, it.homography, it.image, it.position, it.floor) for it in found.cameras
+        FloorPlanCamera(it.camera, it.homography, it.image, it.position, it.floor)
+        for it in calibration.cameras
     ]
 
 
@@ -58,24 +59,24 @@ def plot_floor_plan(views: Sequence[FloorPlanCamera], unit: str, out: Path | Bin
     for axis, floor in zip(figure.subplots(len(floors), 1, squeeze=False)[:, 0], floors, strict=True):
         for number, view in enumerate(views):
             if view.floor == floor:
-                _draw(axis, view, _COLOURS[number % len(_COLOURS)])
+                _draw(axis, view, _COLORS[number % len(_COLORS)])
         axis.set_aspect("equal")
         axis.margins(_MARGIN)
         axis.autoscale_view()
         axis.set_xlabel(_plain(unit))
         axis.set_ylabel(_plain(unit))
         axis.legend(title="camera", markerscale=3)
-    figure.suptitle("Floor plan: what was covered, foot points, and how far they are off", fontsize="medium")
+    figure.suptitle("Floor plan: coverage, foot points and their errors", fontsize="medium")
     figure.savefig(out, dpi=100, format="png", bbox_inches="tight", metadata={"Software": None})
 
 
-def _draw(axis: Axes, view: FloorPlanCamera, colour: str) -> None:
-    step = -(-len(view.image) // _MOST_POINTS)
+def _draw(axis: Axes, view: FloorPlanCamera, color: str) -> None:
+    step = -(-len(view.image) // _MAX_POINTS)
     seen = to_ground(view.homography, view.image[::step])
-    axis.fill(*_area(view).T, facecolor=to_rgba(colour, 0.12), edgecolor=colour, linewidth=1)
+    axis.fill(*_area(view).T, facecolor=to_rgba(color, 0.12), edgecolor=color, linewidth=1)
     lines = np.stack([seen, view.place[::step]], axis=1)
-    axis.add_collection(LineCollection(list(lines), colors=colour, linewidths=0.6, alpha=0.6))
-    axis.plot(*seen.T, ".", markersize=3, color=colour, label=_plain(view.camera))
+    axis.add_collection(LineCollection(list(lines), colors=color, linewidths=0.6, alpha=0.6))
+    axis.plot(*seen.T, ".", markersize=3, color=color, label=_plain(view.camera))
 
 
 def _plain(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Recordings: what is kept of every stream, played from a moment on, and what was decided then."""
+"""Recordings: recorded streams, played from a point in time, and the decisions of that time."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class RecordingStatus:
 
 
 class RecordedStream:
-    """All that is kept of one stream, on disk and in memory. ``name`` is for messages, such as object 3."""
+    """One stream's recording, on disk and in memory. ``name`` is for messages, such as object 3."""
 
     def __init__(self, pipeline: BestViewPipeline, source: PlaybackSource, name: str) -> None:
         self._pipeline, self._source, self.name = pipeline, source, name
@@ -69,19 +69,19 @@ class RecordedStream:
         return self._source.end
 
     def available_from(self, pulse: int) -> int | None:
-        """Return the first pulse, this one or later, that is kept; None: none is."""
+        """Return the first recorded pulse from this one on; None: there is none."""
         return first_available(self._source, pulse)
 
     def spans(self, start: int, end: int) -> list[PulseRange]:
-        """Return the frames without a gap that are kept of pulses ``start … end - 1``."""
+        """Return the recorded ranges without a gap of pulses ``start … end - 1``."""
         return available_ranges(self._source, start, end)
 
     def views(self, start: int, end: int) -> list[CameraRange]:
-        """Return which camera's frames are kept of pulses ``start … end - 1``, in order."""
+        """Return the recorded ranges of pulses ``start … end - 1`` by camera shown, in order."""
         return available_camera_ranges(self._source, start, end)
 
     async def check_ends(self, start: int, end: int | None = None) -> None:
-        """Forget files that have gone from the disk at the two ends of a time.
+        """Drop index entries whose files are missing at the two ends of a range.
 
         Raises:
             OSError: the disk cannot be read.
@@ -89,7 +89,7 @@ class RecordedStream:
         await run_in_reader_thread(forget_missing_ends, self._source, start, end)
 
     async def check_all(self, start: int, end: int) -> None:
-        """Forget all files that have gone from the disk of pulses ``start … end - 1``.
+        """Drop all index entries of pulses ``start … end - 1`` whose files are missing.
 
         Raises:
             OSError: the disk cannot be read.
@@ -99,7 +99,7 @@ class RecordedStream:
     def play(
         self, playback: PlaybackRange, live: Callable[[], Broadcaster | None]
     ) -> AsyncGenerator[MediaChunk, None]:
-        """Play GOP after GOP from a moment on; ``live`` returns the stream to go on with at the present."""
+        """Play GOP after GOP; ``live`` returns the stream to continue with at the present."""
         fps, audio = self._pipeline.config.site.fps, self._pipeline.recorder.audio_buffer
         hearing = None if audio is None else PlaybackAudio(audio, self._recorded_audio, lambda: self.end)
         stream = TimeShiftStream(self._source, self._timeline(), fps, live, hearing)
@@ -141,7 +141,7 @@ class RecordedStream:
 
 
 class RecordingService:
-    """Queries about what is kept."""
+    """Queries about recordings."""
 
     def __init__(self, pipeline: BestViewPipeline) -> None:
         self._pipeline, self._recorder = pipeline, pipeline.recorder
@@ -158,7 +158,7 @@ class RecordingService:
         return RecordingStatus(writer is not None, "" if writer is None else writer.problem)
 
     def of_person(self, number: int, *, scoped: bool) -> RecordedStream:
-        """Return what is kept of a person, ``scoped``: blanked where nobody saw them."""
+        """Return a person's recorded stream; ``scoped``: blanked where no camera saw them."""
         pipeline, recorder = self._pipeline, self._recorder
         now = pipeline.decision_state.resolve(number)
         numbers = (number,) if number == now else (now, number)
@@ -171,7 +171,7 @@ class RecordingService:
         return RecordedStream(pipeline, PersonPlayback(recorder, numbers, presence), f"object {number}")
 
     def of_camera(self, camera: str) -> RecordedStream:
-        """Return what is kept of a camera.
+        """Return a camera's recorded stream.
 
         Raises:
             UnknownCameraError: there is no such camera.
@@ -181,7 +181,7 @@ class RecordingService:
         return RecordedStream(self._pipeline, CameraPlayback(self._recorder, camera), f"camera {camera}")
 
     def decisions(self, start: int, end: int) -> AsyncIterator[bytes]:
-        """Return the choices about pulses ``start … end - 1``, each a line of JSON."""
+        """Return the decisions about pulses ``start … end - 1``, each a line of JSON."""
         return read_decision_lines(self._recorder, start, end)
 
     def pulse_at(self, moment: str, now: int) -> int:
@@ -200,13 +200,13 @@ class RecordingService:
 
     @property
     def viewers(self) -> int:
-        """How many streams are watched in the past; those that have reached the present are not counted."""
+        """The number of time-shifted viewers; those that have reached the present are not counted."""
         return self._recorder.viewers
 
     def viewer_joined(self) -> None:
-        """Count a viewer of the past."""
+        """Count a time-shifted viewer."""
         self._recorder.viewers += 1
 
     def viewer_left(self) -> None:
-        """Count a viewer of the past no more."""
+        """Stop counting a time-shifted viewer."""
         self._recorder.viewers -= 1

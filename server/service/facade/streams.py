@@ -81,7 +81,7 @@ class StreamService:
     def of_person(self, number: int, *, scoped: bool) -> Broadcaster | None:
         """Return the best view of a person, by their current number; None: there is none.
 
-        ``scoped``: blanked while nobody has seen the person lately, for viewers who may see nobody else.
+        ``scoped``: blanked while no camera sees the person, for viewers restricted to this person.
         """
         return (self._splicer.scoped_persons if scoped else self._splicer.persons).get(number)
 

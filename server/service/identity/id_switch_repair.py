@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from bestview import IdentityRegistry, Split, TrackKey
 from server.service.identity.camera_window import CameraWindow, WindowReader
 from server.service.identity.id_switches import find_id_switches
-from server.service.identity.track_parts import NOBODY_YET, UNKNOWN, TrackPart, person_numbers
+from server.service.identity.track_parts import UNCONFIRMED, UNKNOWN, TrackPart, person_numbers
 from server.service.ingest.window_history import HistorySpan
 
 Parts = dict[TrackKey, Sequence[TrackPart]]
@@ -75,4 +75,4 @@ def _person_at(parts: Sequence[TrackPart], frame: int, needed_from: int) -> int:
     if frame < parts[0].first <= needed_from:
         frame = parts[0].first
     number = int(person_numbers([parts], frame, 1)[0, 0])
-    return 0 if number == NOBODY_YET else number
+    return 0 if number == UNCONFIRMED else number

@@ -46,22 +46,22 @@ def find_id_switches(revised: CameraWindow, before: Sequence[HistorySpan[CameraW
     new = revised.boxes[:, first - revised.first : last - revised.first + 1]
     old = _published_boxes(revised.keys, before, first, last)
     same = _overlap(new[:, None], old[None]) > _SAME_IOU  # (T, T, F): track now, track before
-    found = []
+    switches = []
     for one, two in combinations(range(len(revised.keys)), 2):
-        kept = np.flatnonzero(same[one, one] | same[two, two])
-        since = int(kept[-1]) + 1 if kept.size else 0
+        unchanged = np.flatnonzero(same[one, one] | same[two, two])
+        since = int(unchanged[-1]) + 1 if unchanged.size else 0
         count = int(min(same[one, two, since:].sum(), same[two, one, since:].sum()))
         if count >= _MIN_FRAMES:
-            frame = first + since if kept.size else revised.first
-            found.append((-count, IdSwitch(revised.keys[one], revised.keys[two], frame)))
+            frame = first + since if unchanged.size else revised.first
+            switches.append((-count, IdSwitch(revised.keys[one], revised.keys[two], frame)))
     # In a crowd a box overlaps several others: take the longest matches first, each track once.
-    taken: set[TrackKey] = set()
-    exchanges = []
-    for _, it in sorted(found):
-        if taken.isdisjoint((it.one, it.two)):
-            taken |= {it.one, it.two}
-            exchanges.append(it)
-    return exchanges
+    used: set[TrackKey] = set()
+    selected = []
+    for _, it in sorted(switches):
+        if used.isdisjoint((it.one, it.two)):
+            used |= {it.one, it.two}
+            selected.append(it)
+    return selected
 
 
 def _published_boxes(

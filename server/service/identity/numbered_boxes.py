@@ -29,10 +29,10 @@ def numbered_boxes(
         window, count = span.window, span.last - span.first + 1
         place = span.first - window.first
         boxes = window.boxes[:, place : place + count]
-        whose = numbers(window.keys, span.first, count)
+        person = numbers(window.keys, span.first, count)
         # Frame by frame, and in a frame in the tracks' order.
-        frame, track = np.nonzero((~np.isnan(boxes[..., 0]) & (whose >= 0)).T)
-        number = whose[track, frame]
+        frame, track = np.nonzero((~np.isnan(boxes[..., 0]) & (person >= 0)).T)
+        number = person[track, frame]
         order = np.lexsort((number, frame))
         frame, track, number = frame[order], track[order], number[order]
         new = np.ones(len(order), dtype=np.bool_)

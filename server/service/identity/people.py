@@ -21,7 +21,7 @@ from server.service.identity.person_registry import PersonRegistry
 from server.service.identity.published_tracks import PublishedTracks
 from server.service.identity.sharding import own_numbers
 from server.service.identity.track_parts import (
-    NOBODY_YET,
+    UNCONFIRMED,
     UNKNOWN,
     TrackPart,
     merge_settled_parts,
@@ -39,7 +39,7 @@ _RECENT_FRAMES = 100
 
 
 class PersonTracker:
-    """Associates the cameras' tracks epoch by epoch, and keeps everybody's recent boxes.
+    """Associates the cameras' tracks epoch by epoch, and keeps recent boxes.
 
     ``homographies`` map each camera's own picture to the ground; None where there is none. ``share`` is
     this service's shard; identities are computed for all people, identically in every service. Tracks are
@@ -120,8 +120,8 @@ class PersonTracker:
     @property
     def remote(self) -> list[int]:
         """The numbers of the other shards' people, in order."""
-        mine = set(self.known)
-        return [number for number in self.registry.everybody if number not in mine]
+        own = set(self.known)
+        return [number for number in self.registry.everybody if number not in own]
 
     @property
     def next_number(self) -> int:
@@ -150,10 +150,10 @@ class PersonTracker:
 
     def merge(self, kept: int, lost: int) -> None:
         """Merge two people by the operator's order, whatever the evidence says from now on."""
-        here = not {kept, lost} <= self.registry.away
+        is_present = not {kept, lost} <= self.registry.away
         self._overrides.merge(kept, lost, self.registry.away)
         self._merge(kept, lost)
-        if here:
+        if is_present:
             self.registry.away.discard(kept)
         self._corrections.append(Merge(kept, lost))
 
@@ -183,7 +183,7 @@ class PersonTracker:
     def number(self, camera: str, local: int, pulse: int) -> int | None:
         """Return the person of a camera's local track in a frame; None while it is not confirmed."""
         number = int(self.numbers([TrackKey(camera, local)], pulse, 1)[0, 0])
-        return None if number == NOBODY_YET else number
+        return None if number == UNCONFIRMED else number
 
     def boxes(self, camera: str, first: int, frames: int) -> list[list[NumberedBox]]:
         """Return the numbered boxes of each of a camera's frames from `first` on, by rising number."""
@@ -199,14 +199,14 @@ class PersonTracker:
         """Return whether a camera has reported this track recently."""
         return self._reader.locals.known(track.camera, track.boot, track.track) is not None
 
-    def followed(self, numbers: Collection[int], since: int) -> dict[int, list[TrackName]]:
+    def tracks_of(self, numbers: Collection[int], since: int) -> dict[int, list[TrackName]]:
         """Return these people's tracks that were reported since a pulse; people without any are left out."""
-        found: dict[int, list[TrackName]] = {}
-        wanted = set(numbers)
+        tracks: dict[int, list[TrackName]] = {}
+        selected = set(numbers)
         for key, parts in self._parts.items():
-            if parts[-1].number in wanted and self._last_reported.get(key, -1) >= since:
-                found.setdefault(parts[-1].number, []).append(self._reader.locals.origin(key))
-        return dict(sorted(found.items()))
+            if parts[-1].number in selected and self._last_reported.get(key, -1) >= since:
+                tracks.setdefault(parts[-1].number, []).append(self._reader.locals.origin(key))
+        return dict(sorted(tracks.items()))
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
         """Return the persons' numbers behind T tracks, frame by frame, (T, frames); -1: not confirmed."""

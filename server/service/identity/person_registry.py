@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from server.service.identity.track_parts import NOBODY_YET, TrackPart
+from server.service.identity.track_parts import UNCONFIRMED, TrackPart
 
 
 class PersonRegistry:
@@ -43,7 +43,7 @@ class PersonRegistry:
         """Record that a track was visible between two frames, for the person of each of its parts."""
         for place, part in enumerate(parts):
             ends = last if place + 1 == len(parts) else min(last, parts[place + 1].first - 1)
-            if part.number != NOBODY_YET and max(first, part.first) <= ends:
+            if part.number != UNCONFIRMED and max(first, part.first) <= ends:
                 # A person exists from the start of the part: frames not decided yet can still show them.
                 self.first_seen[part.number] = min(part.first, self.first_seen.get(part.number, part.first))
                 self.last_seen[part.number] = max(ends, self.last_seen.get(part.number, ends))

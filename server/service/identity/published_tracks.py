@@ -49,7 +49,7 @@ class PublishedTracks:
         """
         for first, _, tracks in reversed(self._published):
             if first <= pulse:
-                found = [tracks[camera, it] for it in numbers if (camera, it) in tracks]
-                if found:
-                    return found[0]
+                candidates = [tracks[camera, it] for it in numbers if (camera, it) in tracks]
+                if candidates:
+                    return candidates[0]
         return None

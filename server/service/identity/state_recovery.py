@@ -28,82 +28,88 @@ def state_for_cameras(
     people: PersonTracker, cameras: Iterable[str], pulse: int, recent: int, since: float
 ) -> dict[str, IdentitySnapshot]:
     """Build the snapshot for each camera: the people it tracked recently, and the first free number."""
-    followed = people.followed(people.registry.everybody, pulse - recent)
+    tracks_by_number = people.tracks_of(people.registry.everybody, pulse - recent)
     boots: dict[str, int] = {}
-    for it in chain.from_iterable(followed.values()):
+    for it in chain.from_iterable(tracks_by_number.values()):
         boots[it.camera] = max(it.boot, boots.get(it.camera, 0))
-    also: dict[int, list[int]] = {}
+    former: dict[int, list[int]] = {}
     for old, number in people.registry.merged.items():
         if old <= PERSON_NUMBER_MAX:
-            also.setdefault(number, []).append(old)
-    by_hand = set(people.merged_by_hand.values())
+            former.setdefault(number, []).append(old)
+    manual = set(people.merged_by_hand.values())
     known: dict[str, list[PersonSnapshot]] = {camera: [] for camera in cameras}
-    for number, tracks in followed.items():
+    for number, tracks in tracks_by_number.items():
         if number > PERSON_NUMBER_MAX:
             continue
-        mine: dict[str, list[int]] = {}
+        own_tracks: dict[str, list[int]] = {}
         for it in tracks:
             if it.boot == boots[it.camera]:  # tracks of an earlier run of the camera are over
-                mine.setdefault(it.camera, []).append(it.track)
-        for camera, local_ids in mine.items():
+                own_tracks.setdefault(it.camera, []).append(it.track)
+        for camera, local_ids in own_tracks.items():
             known[camera].append(
                 PersonSnapshot(
                     number=number,
                     tracks=local_ids,
-                    aliases=also.get(number, [])[-ALIASES_MAX:],
+                    aliases=former.get(number, [])[-ALIASES_MAX:],
                     name=people.registry.names.get(number, ""),
-                    manual=number in by_hand,
+                    manual=number in manual,
                 )
             )
-    following = min(people.next_number, PERSON_NUMBER_MAX + 1)
+    next_number = min(people.next_number, PERSON_NUMBER_MAX + 1)
     return {
         camera: IdentitySnapshot(
-            pulse=pulse, boot=boots.get(camera, 0), next_number=following, numbered_since=since, people=them
+            pulse=pulse,
+            boot=boots.get(camera, 0),
+            next_number=next_number,
+            numbered_since=since,
+            people=people_of_camera,
         )
-        for camera, them in known.items()
+        for camera, people_of_camera in known.items()
     }
 
 
 @dataclass(frozen=True, slots=True)
-class _Awaited:
+class _PendingPerson:
     """A person to recover, and their tracks in all cameras."""
 
     number: int
     tracks: tuple[TrackName, ...]
-    also: tuple[int, ...]
+    former: tuple[int, ...]
     name: str
-    by_hand: bool
+    manual: bool
 
 
 class StateRecovery:
     """Restores people's numbers and manual overrides after a restart, as their tracks reappear.
 
     Args:
-        said: each camera's snapshot; those older than ``longest`` only reserve numbers.
+        snapshots: each camera's snapshot; those older than ``longest`` only reserve numbers.
         pulse: the first pulse of this run.
         longest: the longest downtime, in frames.
     """
 
-    def __init__(self, said: dict[str, IdentitySnapshot], pulse: int, longest: int) -> None:
+    def __init__(self, snapshots: dict[str, IdentitySnapshot], pulse: int, longest: int) -> None:
         self._until = -1
         self._over = False
         self._tracks: dict[TrackName, int] = {}
-        self._awaited: list[_Awaited] = []
-        self._found: dict[TrackName, int] = {}
+        self._pending: list[_PendingPerson] = []
+        self._reappeared_at: dict[TrackName, int] = {}
         """The pulse at which each track reappeared."""
-        self.next_number = max((first_free_number(it) for it in said.values()), default=1)
+        self.next_number = max((first_free_number(it) for it in snapshots.values()), default=1)
         """The first number to assign in this run, whatever the downtime."""
-        recent = {camera: it for camera, it in said.items() if it.pulse < pulse <= it.pulse + longest}
+        recent = {camera: it for camera, it in snapshots.items() if it.pulse < pulse <= it.pulse + longest}
         # Recent snapshots agree; the median keeps a single deviating camera from deciding.
         since = sorted(it.numbered_since for it in recent.values())
         self.numbered_since = (
-            since[len(since) // 2] if since else max((it.numbered_since for it in said.values()), default=inf)
+            since[len(since) // 2]
+            if since
+            else max((it.numbered_since for it in snapshots.values()), default=inf)
         )
         """When numbering began, unix seconds; infinite: unknown."""
         if recent:
             self._until = max(it.pulse for it in recent.values()) + longest
-            self._awaited = _awaited(recent)
-            self._tracks = {track: it.number for it in self._awaited for track in it.tracks}
+            self._pending = _combine_snapshots(recent)
+            self._tracks = {track: it.number for it in self._pending for track in it.tracks}
 
     @property
     def over(self) -> bool:
@@ -113,46 +119,48 @@ class StateRecovery:
     @property
     def numbers(self) -> Collection[int]:
         """The numbers of the people still to be recovered, merged ones included."""
-        return {number for it in self._awaited for number in (it.number, *it.also)}
+        return {number for it in self._pending for number in (it.number, *it.former)}
 
     def begin(self, people: PersonTracker, pulse: int) -> None:
-        """Assign the awaited tracks to their people before any of them is reported."""
+        """Assign the pending tracks to their people before any of them is reported."""
         people.begin_at(self.next_number)
         people.expect(self._tracks, pulse - 1)
 
-    def look(self, people: PersonTracker, pulse: int) -> None:
+    def advance(self, people: PersonTracker, pulse: int) -> None:
         """Recover people whose tracks have reappeared, after the epoch that ends with a pulse."""
         if pulse > self._until:
-            self._awaited, self._over = [], True
+            self._pending, self._over = [], True
             people.cancel_expected(self._tracks)
-        self._awaited = [it for it in self._awaited if not self._restore(it, people, pulse)]
+        self._pending = [it for it in self._pending if not self._restore(it, people, pulse)]
 
-    def _restore(self, awaited: _Awaited, people: PersonTracker, pulse: int) -> bool:
+    def _restore(self, pending: _PendingPerson, people: PersonTracker, pulse: int) -> bool:
         """Restore a reappeared person's name and merges; return whether nothing is left to restore."""
-        found = [self._number(it, people, pulse) for it in awaited.tracks]
-        numbers = sorted({it for it in found if it is not None})
+        found_numbers = [self._number(it, people, pulse) for it in pending.tracks]
+        numbers = sorted({it for it in found_numbers if it is not None})
         if not numbers:
             return False
-        kept = awaited.number if awaited.number in numbers else numbers[0]
-        if awaited.name and kept not in people.registry.names:
-            people.registry.set_name(kept, awaited.name)
-        people.registry.add_aliases(kept, awaited.also)
-        for other in numbers if awaited.by_hand else ():
+        kept = pending.number if pending.number in numbers else numbers[0]
+        if pending.name and kept not in people.registry.names:
+            people.registry.set_name(kept, pending.name)
+        people.registry.add_aliases(kept, pending.former)
+        for other in numbers if pending.manual else ():
             if other != kept:
                 people.merge(kept, other)
-        return not awaited.by_hand or None not in found
+        return not pending.manual or None not in found_numbers
 
     def _number(self, track: TrackName, people: PersonTracker, pulse: int) -> int | None:
         """Return a track's person number when it reappeared; None: it has not, or is not confirmed."""
         if people.is_known(track):
-            self._found.setdefault(track, pulse)
-        first = self._found.get(track)
+            self._reappeared_at.setdefault(track, pulse)
+        first = self._reappeared_at.get(track)
         return None if first is None else people.person_of(track.camera, track.boot, track.track, first)
 
 
-def first_free_number(said: IdentitySnapshot) -> int:
+def first_free_number(snapshot: IdentitySnapshot) -> int:
     """Return the first unused number of a snapshot, which may contradict itself."""
-    return max([said.next_number, *(number + 1 for it in said.people for number in (it.number, *it.aliases))])
+    return max(
+        [snapshot.next_number, *(number + 1 for it in snapshot.people for number in (it.number, *it.aliases))]
+    )
 
 
 def trusted_first_free(firsts: Iterable[int]) -> int:
@@ -167,30 +175,30 @@ def trusted_first_free(firsts: Iterable[int]) -> int:
     return max(other + _NUMBER_SLACK, SINGLE_CAMERA_NUMBER_MAX)
 
 
-def _awaited(said: dict[str, IdentitySnapshot]) -> list[_Awaited]:
+def _combine_snapshots(snapshots: dict[str, IdentitySnapshot]) -> list[_PendingPerson]:
     """Combine the cameras' snapshots; of a person, the newest counts."""
     newest: dict[int, PersonSnapshot] = {}
     tracks: dict[int, set[TrackName]] = {}
-    whose: dict[int, int] = {}
+    kept_number: dict[int, int] = {}
     """By merged number: the number that was kept."""
-    for camera, it in sorted(said.items(), key=lambda named: (named[1].pulse, named[0])):
+    for camera, it in sorted(snapshots.items(), key=lambda named: (named[1].pulse, named[0])):
         for known in it.people:
             newest[known.number] = known
-            whose |= dict.fromkeys(known.aliases, known.number)
-            theirs = tracks.setdefault(known.number, set())
-            theirs |= {TrackName(camera, it.boot, track) for track in known.tracks}
-    for old in sorted(whose.keys() & newest.keys()):  # a camera's snapshot was older than a merge
-        kept = whose[old]
+            kept_number |= dict.fromkeys(known.aliases, known.number)
+            person_tracks = tracks.setdefault(known.number, set())
+            person_tracks |= {TrackName(camera, it.boot, track) for track in known.tracks}
+    for old in sorted(kept_number.keys() & newest.keys()):  # a camera's snapshot was older than a merge
+        kept = kept_number[old]
         if kept != old and kept in newest:
             tracks[kept] |= tracks.pop(old)
             del newest[old]
     return [
-        _Awaited(
+        _PendingPerson(
             number=number,
             tracks=tuple(sorted(tracks[number], key=lambda it: (it.camera, it.boot, it.track))),
-            also=tuple(old for old in known.aliases if whose[old] == number and old not in newest),
+            former=tuple(old for old in known.aliases if kept_number[old] == number and old not in newest),
             name=known.name,
-            by_hand=known.manual,
+            manual=known.manual,
         )
         for number, known in sorted(newest.items())
     ]

@@ -38,10 +38,10 @@ class StateReplication:
 
     Args:
         people: the person tracker.
-        cameras: all of them.
+        cameras: all cameras.
         fps: frames a second.
         send: sends a camera its snapshot.
-        tells: whether this service does so; of several one is enough, since they agree.
+        sends: whether this service sends snapshots; of several services one is enough, since they agree.
         clock: seconds that only go forward.
     """
 
@@ -125,8 +125,8 @@ class StateReplication:
             or self._people.registry.current(number) in self._people.registry.first_seen
         ):
             return True
-        comes = self._reported < set(self._cameras) and self._clock() < self._began_at + _JOIN_S
-        return (comes and number < self._free) or any(number in it.numbers for it in self._recoveries)
+        may_connect = self._reported < set(self._cameras) and self._clock() < self._began_at + _JOIN_S
+        return (may_connect and number < self._free) or any(number in it.numbers for it in self._recoveries)
 
     @property
     def numbers_since(self) -> float:
@@ -157,10 +157,10 @@ class StateReplication:
                 "%s: %d people restored from snapshots", ", ".join(sorted(snapshot)), len(recovery.numbers)
             )
 
-    def take(self, pulse: int) -> None:
+    def advance(self, pulse: int) -> None:
         """Continue recovery, and send snapshots, after the epoch that ends with a pulse was processed."""
         for recovery in self._recoveries:
-            recovery.look(self._people, pulse)
+            recovery.advance(self._people, pulse)
         self._recoveries = [it for it in self._recoveries if not it.over]
         if self._began_at is not None and self._sends:
             self._send_state(pulse)
@@ -180,7 +180,7 @@ class StateReplication:
 
 
 def _below(free: float, snapshot: IdentitySnapshot) -> IdentitySnapshot:
-    """Leave out people whose number this run may have assigned to somebody else."""
+    """Leave out people whose number this run may have assigned to another person."""
     known = [it for it in snapshot.people if max([it.number, *it.aliases]) < free]
     return msgspec.structs.replace(snapshot, people=known)
 

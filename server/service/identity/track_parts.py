@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bestview import TrackKey, TrackletKey
 
-NOBODY_YET = -1
+UNCONFIRMED = -1
 """The person number of a track that is not confirmed yet."""
 
 
@@ -24,7 +24,7 @@ class TrackPart(NamedTuple):
     number: int
 
 
-UNKNOWN = (TrackPart(0, NOBODY_YET),)
+UNKNOWN = (TrackPart(0, UNCONFIRMED),)
 """The parts of an unknown track."""
 
 
@@ -32,7 +32,7 @@ def track_parts(numbers: Mapping[TrackletKey, int]) -> dict[TrackKey, list[Track
     """Group the numbers of tracklets by track, in frame order."""
     parts: dict[TrackKey, list[TrackPart]] = {}
     for key, number in numbers.items():
-        parts.setdefault(key.track, []).append(TrackPart(key.first_frame, number or NOBODY_YET))
+        parts.setdefault(key.track, []).append(TrackPart(key.first_frame, number or UNCONFIRMED))
     return parts
 
 
@@ -47,8 +47,8 @@ def merge_settled_parts(
     if not settled:
         return parts
     ends = [*(part.first for part in settled[1:]), parts[0].first]
-    asked = [part for part, end in zip(settled, ends, strict=True) if end > needed_from]
-    return asked + parts
+    needed = [part for part, end in zip(settled, ends, strict=True) if end > needed_from]
+    return needed + parts
 
 
 def person_numbers(known: Sequence[Sequence[TrackPart]], first: int, frames: int) -> NDArray[np.int64]:
@@ -59,7 +59,7 @@ def person_numbers(known: Sequence[Sequence[TrackPart]], first: int, frames: int
         return np.broadcast_to(newest[:, None], (len(known), frames))
     numbers = np.repeat(newest[:, None], frames, axis=1)
     for row in np.flatnonzero(since > first).tolist():
-        numbers[row] = NOBODY_YET
+        numbers[row] = UNCONFIRMED
         for part in known[row]:
             numbers[row, max(0, part.first - first) :] = part.number
     return numbers

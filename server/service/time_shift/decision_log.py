@@ -1,4 +1,4 @@
-"""Reads the recorded decisions: who was where, and which camera was chosen for whom."""
+"""Reads the recorded decisions: people's boxes, and the camera selected for each."""
 
 from __future__ import annotations
 

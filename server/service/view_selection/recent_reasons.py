@@ -76,7 +76,7 @@ class RecentReasons:
         return self._keep(view, self._why)
 
     def at(self, number: int, pulse: int) -> SelectionReason | None:
-        """Explain the view of an object at a pulse; None: that is not kept."""
+        """Explain the view of an object at a pulse; None: its reasons are not kept."""
         reasons = self._reasons.get(number, [])
         place = bisect_right(reasons, pulse, key=lambda it: it.view.first) - 1
         if place < 0:

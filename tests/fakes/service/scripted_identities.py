@@ -15,7 +15,7 @@ def people(**settings: int) -> PersonTracker:
     return PersonTracker(identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
 
 
-class Dictated:
+class ScriptedRegistry:
     """An identity registry that returns the updates of a test."""
 
     def __init__(self, *updates: IdentityUpdate) -> None:

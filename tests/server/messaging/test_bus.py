@@ -55,7 +55,7 @@ class Presence:
                 self._changed.clear()
 
 
-async def test_a_message_comes_with_its_key_and_attachment(settings: ZenohSettings) -> None:
+async def test_a_message_arrives_with_its_key_and_attachment(settings: ZenohSettings) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
     heard, there = Heard(), Presence()
     router.subscribe("myview/hall/*/video", heard.queue.put_nowait)
@@ -70,7 +70,7 @@ async def test_a_message_comes_with_its_key_and_attachment(settings: ZenohSettin
     router.close()
 
 
-async def test_a_message_larger_than_any_is_dropped_and_all_others_come(settings: ZenohSettings) -> None:
+async def test_an_oversized_message_is_dropped_and_others_arrive(settings: ZenohSettings) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
     heard, there = Heard(), Presence()
     router.subscribe("myview/hall/camera/*/video", heard.queue.put_nowait)
@@ -101,7 +101,7 @@ async def test_messages_of_one_session_stay_in_order(settings: ZenohSettings) ->
     router.close()
 
 
-async def test_however_many_keys_there_were_few_are_kept_and_all_messages_come(
+async def test_publishers_are_bounded_and_all_messages_arrive(
     settings: ZenohSettings,
 ) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
@@ -123,7 +123,7 @@ async def test_however_many_keys_there_were_few_are_kept_and_all_messages_come(
     router.close()
 
 
-async def test_a_client_may_come_before_the_router_and_survives_its_restart(settings: ZenohSettings) -> None:
+async def test_a_client_may_start_before_the_router_and_survives_its_restart(settings: ZenohSettings) -> None:
     client = Bus.client(settings)
     there = Presence()
     client.watch_alive("router", there.note)
@@ -143,7 +143,7 @@ async def test_a_client_may_come_before_the_router_and_survives_its_restart(sett
     client.close()
 
 
-async def test_two_that_hear_each_other_do_so_through_the_router_until_one_listens_no_more(
+async def test_two_clients_exchange_messages_through_the_router_until_one_unsubscribes(
     settings: ZenohSettings,
 ) -> None:
     router = Bus.router(settings)
@@ -165,7 +165,7 @@ async def test_two_that_hear_each_other_do_so_through_the_router_until_one_liste
         bus.close()
 
 
-async def test_who_wants_to_hear_the_others_needs_the_router(
+async def test_a_session_that_hears_other_clients_needs_the_router(
     settings: ZenohSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 100)
@@ -173,7 +173,7 @@ async def test_who_wants_to_hear_the_others_needs_the_router(
         Bus.hearing(settings)
 
 
-async def test_who_closes_is_seen_to_be_gone_and_who_was_there_before_is_seen_to_be_there(
+async def test_liveliness_tokens_of_present_and_closed_sessions_are_reported(
     settings: ZenohSettings,
 ) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
@@ -189,7 +189,7 @@ async def test_who_closes_is_seen_to_be_gone_and_who_was_there_before_is_seen_to
     router.close()
 
 
-async def test_two_routers_of_one_address_cannot_be(settings: ZenohSettings) -> None:
+async def test_two_routers_cannot_share_an_address(settings: ZenohSettings) -> None:
     router = Bus.router(settings)
     with pytest.raises(UserError, match=r"zenoh\.listen: cannot listen on tcp/127") as caught:
         Bus.router(settings)
@@ -197,7 +197,7 @@ async def test_two_routers_of_one_address_cannot_be(settings: ZenohSettings) -> 
     router.close()
 
 
-async def test_an_address_that_is_none_is_refused() -> None:
+async def test_an_invalid_address_is_refused() -> None:
     for address in ("nonsense", "tcp/127.0.0.1", "127.0.0.1:7447", "tcp/a b:1", "tcp/a:65536", "tcp/a:0"):
         with pytest.raises(ValidationError, match="is not an address such as tcp"):
             ZenohSettings(connect=address)
@@ -232,7 +232,7 @@ def test_a_process_that_closes_its_sessions_exits() -> None:
     assert done.returncode == 0
 
 
-async def test_what_comes_from_threads_is_handled_on_the_loop_in_order() -> None:
+async def test_items_from_threads_are_handled_on_the_loop_in_order() -> None:
     got: list[tuple[int, int]] = []
     done = asyncio.Event()
 
@@ -250,7 +250,7 @@ async def test_what_comes_from_threads_is_handled_on_the_loop_in_order() -> None
     assert got == [(number, threading.get_ident()) for number in range(1000)]
 
 
-async def test_between_some_items_and_the_next_others_have_their_turn_and_the_order_stays() -> None:
+async def test_other_tasks_run_between_slices_and_the_order_is_kept() -> None:
     got: list[int] = []
     inbox = Inbox(got.append, turn_s=0.0)
     for number in range(20):
@@ -263,7 +263,7 @@ async def test_between_some_items_and_the_next_others_have_their_turn_and_the_or
     assert seen == list(range(1, 21))
 
 
-async def test_a_flood_without_end_keeps_nobody_from_the_loop() -> None:
+async def test_an_endless_flood_does_not_block_the_loop() -> None:
     """Each item is followed by another before it is handled: there is always one more."""
     most = 5_000_000  # some seconds of them
     inbox: Inbox[int] = Inbox(lambda left: inbox.put(left - 1) if left else None)
@@ -274,7 +274,7 @@ async def test_a_flood_without_end_keeps_nobody_from_the_loop() -> None:
     assert inbox.waiting
 
 
-async def test_a_busy_loop_loses_the_oldest_and_counts_them() -> None:
+async def test_a_busy_loop_drops_the_oldest_items_and_counts_them() -> None:
     got: list[int] = []
     inbox = Inbox(got.append, pending_max=10, turn_s=PATIENCE)
     for number in range(25):
@@ -284,7 +284,7 @@ async def test_a_busy_loop_loses_the_oldest_and_counts_them() -> None:
     assert inbox.lost == 15
 
 
-async def test_who_sends_very_much_takes_neither_the_places_nor_the_turns_of_others() -> None:
+async def test_a_flooding_sender_takes_neither_space_nor_turns_from_others() -> None:
     got: list[str] = []
     inbox = Inbox(got.append, pending_max=10, turn_s=PATIENCE, sender_of=lambda it: it[:2])
     for number in range(1000):
@@ -298,7 +298,7 @@ async def test_who_sends_very_much_takes_neither_the_places_nor_the_turns_of_oth
     assert (inbox.lost, inbox.waiting) == (990, 0)
 
 
-async def test_what_waits_of_one_sender_has_so_many_bytes_at_most() -> None:
+async def test_waiting_bytes_of_one_sender_are_limited() -> None:
     got: list[bytes] = []
     inbox = Inbox(got.append, turn_s=PATIENCE, size=lambda _: 1 << 24)
     for number in range(10):
@@ -308,7 +308,7 @@ async def test_what_waits_of_one_sender_has_so_many_bytes_at_most() -> None:
     assert inbox.lost == 6
 
 
-async def test_senders_without_end_are_taken_for_few() -> None:
+async def test_the_number_of_sender_queues_is_limited() -> None:
     got: list[int] = []
     inbox = Inbox(got.append, pending_max=10, sender_of=str)
     for number in range(5000):
@@ -319,7 +319,7 @@ async def test_senders_without_end_are_taken_for_few() -> None:
     assert got[:3] == [0, 1, 2]
 
 
-async def test_one_item_that_cannot_be_handled_keeps_back_no_other(caplog: pytest.LogCaptureFixture) -> None:
+async def test_an_item_that_raises_does_not_block_others(caplog: pytest.LogCaptureFixture) -> None:
     got: list[float] = []
     inbox: Inbox[int] = Inbox(lambda number: got.append(1 / number), turn_s=PATIENCE)
     for number in (1, 0, 2, *[0] * 20):

@@ -94,7 +94,7 @@ def router(settings: ZenohSettings) -> Bus:
     )
 
 
-async def test_a_camera_speaks_for_itself_alone(settings: ZenohSettings) -> None:
+async def test_a_camera_publishes_under_its_own_key_only(settings: ZenohSettings) -> None:
     heard = Heard()
     with opened(
         lambda: router(settings), lambda: Bus.client(settings, "c0"), lambda: Bus.client(settings, "c1")
@@ -110,7 +110,7 @@ async def test_a_camera_speaks_for_itself_alone(settings: ZenohSettings) -> None
         assert "c0/video false" not in heard.texts, "one session keeps its order: it would have come before"
 
 
-async def test_sound_is_sent_by_whose_it_is(settings: ZenohSettings) -> None:
+async def test_audio_is_published_by_the_audio_camera_only(settings: ZenohSettings) -> None:
     heard = Heard()
     with opened(
         lambda: router(settings), lambda: Bus.client(settings, "c0"), lambda: Bus.client(settings, "c1")
@@ -127,7 +127,7 @@ async def test_sound_is_sent_by_whose_it_is(settings: ZenohSettings) -> None:
         assert f"{SITE.sound} c0" not in heard.texts
 
 
-async def test_strangers_fail_to_publish_and_to_listen(
+async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
     settings: ZenohSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 300)
@@ -168,7 +168,7 @@ def _all(buses: Sequence[Bus], number: int) -> None:
 
 
 @pytest.mark.parametrize("what", ["position_corrections", "identities"])
-async def test_what_a_camera_is_told_is_said_by_the_best_view_and_heard_by_that_camera(
+async def test_camera_commands_come_from_the_service_and_reach_that_camera_only(
     settings: ZenohSettings, what: str
 ) -> None:
     heard, overheard = Heard(), Heard()
@@ -201,7 +201,7 @@ def _tell(bestview: Bus, other: Bus, what: str, number: int) -> None:
     bestview.publish(SITE.camera("c0", what), str(number).encode())
 
 
-async def test_cameras_hear_what_others_found_and_not_what_they_see(settings: ZenohSettings) -> None:
+async def test_cameras_receive_peers_detections_but_not_their_video(settings: ZenohSettings) -> None:
     heard = Heard()
     with opened(
         lambda: router(settings),
@@ -228,7 +228,7 @@ async def test_cameras_hear_what_others_found_and_not_what_they_see(settings: Ze
         )
 
 
-async def test_another_best_view_service_hears_and_says_all(settings: ZenohSettings) -> None:
+async def test_a_further_service_may_subscribe_and_publish_everything(settings: ZenohSettings) -> None:
     heard, told = Heard(), Heard()
     with opened(
         lambda: router(settings),
@@ -249,18 +249,18 @@ def _users(folder: Path, text: str) -> Path:
 
 
 @pytest.mark.parametrize("text", ["c0\n", "c0:\n", ":p\n", " c0:a\n", "c0:a\n\nc1:b\n"])
-def test_a_file_of_users_that_is_none_is_said_in_one_line(tmp_path: Path, text: str) -> None:
+def test_an_invalid_password_file_is_reported_in_one_line(tmp_path: Path, text: str) -> None:
     with pytest.raises(UserError, match=r"zenoh\.users: .*: line \d is not name:password"):
         read_users(_users(tmp_path, text), SETTING)
 
 
-def test_a_user_with_two_lines_is_refused_with_both(tmp_path: Path) -> None:
+def test_a_user_with_two_lines_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"zenoh\.users: .*: lines 1 and 3 are for the same name") as refused:
         read_users(_users(tmp_path, "c0:secret-1\nc1:b\nc0:secret-2\n"), SETTING)
     assert "secret" not in str(refused.value)
 
 
-def test_who_has_no_line_is_told_so(tmp_path: Path) -> None:
+def test_a_missing_user_is_reported(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="has no line for 'c1', the name of this process"):
         password_of(_users(tmp_path, "c0:a\n"), "c1", SETTING)
     with pytest.raises(UserError, match=r"zenoh\.users: cannot read .*none"):

@@ -24,74 +24,74 @@ class Counted:
         return Explanation(25, {}, {}, None, None, None, float(number))
 
 
-def test_a_decision_is_told_with_its_cuts_and_corrections() -> None:
+def test_a_decision_is_published_with_its_cuts_and_corrections() -> None:
     choices = (ObjectChoice(1, "c1", "c0", away=False), ObjectChoice(2, "c0", "c0", away=False))
     turned_out = (Merge(kept=1, lost=5), Split(kept=2, split_off=3, camera="c1"))
-    told = DecisionState(25.0).put(
+    message = DecisionState(25.0).put(
         GopDecision(20, 10, choices, {"c0": [], "c1": []}, {5: 1}, turned_out, _UNTOLD)
     )
-    assert told.choices == {1: "c1", 2: "c0"}
-    assert told.cuts == [ViewCut(object=1, pulse=20, from_camera="c0", to_camera="c1")]
-    assert told.merged == [PersonMerge(kept=1, lost=5)]
-    assert told.split == [PersonSplit(kept=2, new_object=3, camera="c1")]
+    assert message.choices == {1: "c1", 2: "c0"}
+    assert message.cuts == [ViewCut(object=1, pulse=20, from_camera="c0", to_camera="c1")]
+    assert message.merged == [PersonMerge(kept=1, lost=5)]
+    assert message.split == [PersonSplit(kept=2, new_object=3, camera="c1")]
 
 
-def decided(board: DecisionState, first: int, numbers: tuple[int, ...] = (1, 2)) -> Counted:
+def decided(state: DecisionState, first: int, numbers: tuple[int, ...] = (1, 2)) -> Counted:
     """Put a GOP of ten frames; give what explains it."""
     choices = tuple(ObjectChoice(number, "c0", "c0", away=False) for number in numbers)
     why = Counted()
-    board.put(GopDecision(first, 10, choices, {}, {7: 1}, (), cast("SelectionReasons", why)))
+    state.put(GopDecision(first, 10, choices, {}, {7: 1}, (), cast("SelectionReasons", why)))
     return why
 
 
-def test_nobody_is_explained_whom_nobody_asks_about() -> None:
-    board = DecisionState(25.0)
-    assert all(decided(board, first).asked == [] for first in range(0, 500, 10))
-    assert board.explain(9) is None
-    assert board.explain(2, 480) is None, "that was before the first question"
+def test_no_reasons_are_kept_without_queries() -> None:
+    state = DecisionState(25.0)
+    assert all(decided(state, first).asked == [] for first in range(0, 500, 10))
+    assert state.explain(9) is None
+    assert state.explain(2, 480) is None, "that was before the first question"
 
 
-def test_from_the_first_question_on_a_minute_is_explained_and_each_gop_once() -> None:
-    board = DecisionState(25.0)
-    whys = [decided(board, 0)]
+def test_reasons_are_kept_for_a_minute_from_the_first_query_on() -> None:
+    state = DecisionState(25.0)
+    whys = [decided(state, 0)]
     for first in range(10, 4000, 10):
-        newest = board.explain(7 if first % 20 else 1)
+        newest = state.explain(7 if first % 20 else 1)
         assert newest is not None
         assert newest.view.first == first - 10
-        whys.append(decided(board, first))
+        whys.append(decided(state, first))
     assert all(why.asked == [1] for why in whys)
-    assert board.explain(1, 3990 - 60 * 25) is not None
-    assert board.explain(1, 3990 - 70 * 25) is None
+    assert state.explain(1, 3990 - 60 * 25) is not None
+    assert state.explain(1, 3990 - 70 * 25) is None
     for pulse in (3990, 3985, 3000):
-        then = board.explain(1, pulse)
+        then = state.explain(1, pulse)
         assert then is not None
         assert then.view.first == pulse - pulse % 10
-    assert board.explain(1, 4000) is None, "not decided yet"
+    assert state.explain(1, 4000) is None, "not decided yet"
 
 
-def test_who_is_not_asked_about_any_more_is_not_explained() -> None:
-    board = DecisionState(25.0)
-    decided(board, 0)
-    board.explain(1)
-    asked = [decided(board, first).asked for first in range(10, 2000, 10)]
+def test_reasons_expire_without_queries() -> None:
+    state = DecisionState(25.0)
+    decided(state, 0)
+    state.explain(1)
+    asked = [decided(state, first).asked for first in range(10, 2000, 10)]
     assert asked.index([]) == 75, "half a minute later"
     assert not any(asked[75:])
-    assert board.explain(1, 500) is None
+    assert state.explain(1, 500) is None
 
 
-def test_pulses_that_begin_anew_take_their_reasons_with_them() -> None:
-    board = DecisionState(25.0)
-    decided(board, 1000)
-    board.explain(1)
-    decided(board, 1010)
-    decided(board, 0)
-    assert board.explain(1, 1015) is None
-    assert board.explain(1, 5) is not None
+def test_reasons_are_discarded_when_pulses_start_again() -> None:
+    state = DecisionState(25.0)
+    decided(state, 1000)
+    state.explain(1)
+    decided(state, 1010)
+    decided(state, 0)
+    assert state.explain(1, 1015) is None
+    assert state.explain(1, 5) is not None
 
 
-def test_who_is_gone_is_not_explained() -> None:
-    board = DecisionState(25.0)
-    decided(board, 0)
-    board.explain(2)
-    decided(board, 10, (1,))
-    assert board.explain(2) is None
+def test_a_person_who_is_gone_has_no_explanation() -> None:
+    state = DecisionState(25.0)
+    decided(state, 0)
+    state.explain(2)
+    decided(state, 10, (1,))
+    assert state.explain(2) is None

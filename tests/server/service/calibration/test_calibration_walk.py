@@ -17,7 +17,7 @@ from fakes.service.fed_site import A, B, Hall, opened
 from fakes.service.scripted_cameras import FPS, STRIDE
 from server.config.loader import build_config
 from server.http.access.csrf import CSRF_HEADER
-from server.service.calibration import walk_session as walking_module
+from server.service.calibration import walk_session as walk_session_module
 from server.service.calibration.walk_session import WalkSession, WalkState
 from server.service.calibration.worker import CalibrationResult, CalibrationTask, CameraBoxes, run_calibration
 
@@ -43,37 +43,37 @@ async def finished(hall: Hall) -> Any:
     return await hall.get_json(WALK)
 
 
-def walk(hall: Hall, frames: int, epoch: int = 0, **how: Any) -> None:
-    for said in words(hall.service.config, curved(frames, **how), epoch):
-        hall.service.walk_session.add(said)
+def walk(hall: Hall, frames: int, epoch: int = 0, **settings: Any) -> None:
+    for walk_epoch in words(hall.service.config, curved(frames, **settings), epoch):
+        hall.service.walk_session.add(walk_epoch)
 
 
-async def test_a_walk_becomes_homographies_that_are_the_scenes(wide: Hall, tmp_path: Path) -> None:
+async def test_a_walk_yields_the_scenes_homographies(wide: Hall, tmp_path: Path) -> None:
     before = wide.service.config
     assert (await wide.get_json(WALK))["state"] == "none"
-    status, told = await do(wide, action="start")
-    assert (status, told["state"], told["seconds"]) == (200, "walking", 0.0)
+    status, content = await do(wide, action="start")
+    assert (status, content["state"], content["seconds"]) == (200, "walking", 0.0)
     walk(wide, 500)
-    told = await wide.get_json(WALK)
-    assert told["seconds"] == 500 / FPS
-    [pair] = told["pairs"]
+    content = await wide.get_json(WALK)
+    assert content["seconds"] == 500 / FPS
+    [pair] = content["pairs"]
     assert (pair["one"], pair["other"]) == (A, B)
     assert 5 < pair["seconds"] <= 20
-    for camera in told["cameras"]:
+    for camera in content["cameras"]:
         assert sum(camera["thirds"]) == pytest.approx(1.0)
         assert camera["foot_points"] == round(pair["seconds"] * FPS / 5)
-    status, told = await do(wide, action="finish")
-    assert (status, told["state"]) == (200, "working")
-    told = await finished(wide)
-    assert (told["state"], told["error"]) == ("done", "")
-    assert told["lines"][0].startswith("feet that two cameras see are ")
+    status, content = await do(wide, action="finish")
+    assert (status, content["state"]) == (200, "working")
+    content = await finished(wide)
+    assert (content["state"], content["error"]) == ("done", "")
+    assert content["lines"][0].startswith("feet that two cameras see are ")
     async with wide.session.get(f"{WALK}/ground.json") as answer:
         assert answer.headers["Content-Disposition"] == 'attachment; filename="ground.json"'
         (tmp_path / "ground.json").write_bytes(await answer.read())
     async with wide.session.get(f"{WALK}/plan.png") as answer:
         assert (await answer.read()).startswith(b"\x89PNG")
     cameras = [{"id": name, "source": "scene:room"} for name in (A, B)]
-    assert told["configuration"].startswith("ground: ground.json\n")
+    assert content["configuration"].startswith("ground: ground.json\n")
     config = build_config({"cameras": cameras, "ground": "ground.json"}, where="walk", folder=tmp_path)
     errors = errors_on_floor([np.array(it.ground) for it in config.cameras])
     assert np.median(errors) < 0.15  # metres
@@ -83,21 +83,21 @@ async def test_a_walk_becomes_homographies_that_are_the_scenes(wide: Hall, tmp_p
     assert await wide.get(f"{WALK}/ground.json") == (404, {"error": "there is no calibration result yet"})
 
 
-async def test_a_walk_that_says_too_little_says_so_and_can_be_gone_on_with(wide: Hall) -> None:
+async def test_an_insufficient_walk_is_reported_and_can_be_resumed(wide: Hall) -> None:
     await do(wide, action="start")
     walk(wide, 50, wide=0.0)
     await do(wide, action="finish")
-    told = await finished(wide)
-    assert told["state"] == "done"
-    assert told["error"].startswith(f"{A} and {B}: ")
-    assert (told["lines"], told["configuration"]) == ([], "")
-    _, told = await do(wide, action="resume")
-    assert (told["state"], told["seconds"], told["error"]) == ("walking", 2.0, "")
+    content = await finished(wide)
+    assert content["state"] == "done"
+    assert content["error"].startswith(f"{A} and {B}: ")
+    assert (content["lines"], content["configuration"]) == ([], "")
+    _, content = await do(wide, action="resume")
+    assert (content["state"], content["seconds"], content["error"]) == ("walking", 2.0, "")
     walk(wide, 50, epoch=10)
     assert (await wide.get_json(WALK))["seconds"] == 4.0
 
 
-async def test_what_the_walk_lacks_is_said_while_it_goes_on(wide: Hall) -> None:
+async def test_uncovered_areas_are_reported_during_the_walk(wide: Hall) -> None:
     await do(wide, action="start")
     assert len((await wide.get_json(WALK))["uncovered"]) == 2  # nothing of either camera
     walk(wide, 100, wide=0.01)
@@ -115,105 +115,107 @@ async def test_what_the_walk_lacks_is_said_while_it_goes_on(wide: Hall) -> None:
         ({}, 400, "the request's JSON: "),
     ],
 )
-async def test_steps_that_make_no_sense_are_refused(hall: Hall, step: Any, status: int, error: str) -> None:
-    code, told = await do(hall, **step)
+async def test_invalid_steps_are_refused(hall: Hall, step: Any, status: int, error: str) -> None:
+    code, content = await do(hall, **step)
     assert code == status
-    assert told["error"].startswith(error)
+    assert content["error"].startswith(error)
     assert hall.service.walk_session.state is WalkState.NONE
 
 
-async def told_to(work: list[CalibrationTask], config: Any, *parts: Any) -> CalibrationTask:
+async def task_of(tasks: list[CalibrationTask], config: Any, *parts: Any) -> CalibrationTask:
     """Walk by hand; give what the process would be told."""
 
     async def note(task: CalibrationTask) -> CalibrationResult:
-        work.append(task)
+        tasks.append(task)
         return CalibrationResult()
 
-    walking = WalkSession(config, note)
-    walking.start()
+    active_walk = WalkSession(config, note)
+    active_walk.start()
     for part in parts:
-        part(walking)
-    walking.finish(1.7)
-    assert walking._task is not None
-    await walking._task
-    return work[-1]
+        part(active_walk)
+    active_walk.finish(1.7)
+    assert active_walk._task is not None
+    await active_walk._task
+    return tasks[-1]
 
 
-async def test_every_final_box_is_told_once_and_counts_from_the_start_of_the_walk() -> None:
+async def test_every_final_box_is_recorded_once_and_counted_from_the_start_of_the_walk() -> None:
     config = walk_config()
     places = curved(100)
 
-    def before_and_on(walking: WalkSession) -> None:
-        walking.discard()
-        for said in words(config, places[:50]):  # nobody has started yet
-            walking.add(said)
-        walking.start()
-        for said in words(config, places[50:], epoch=10):
-            walking.add(said)
-            walking.add(said)  # what was said before is not counted again
+    def before_and_on(active_walk: WalkSession) -> None:
+        active_walk.discard()
+        for walk_epoch in words(config, places[:50]):  # nobody has started yet
+            active_walk.add(walk_epoch)
+        active_walk.start()
+        for walk_epoch in words(config, places[50:], epoch=10):
+            active_walk.add(walk_epoch)
+            active_walk.add(walk_epoch)  # what was said before is not counted again
 
-    task = await told_to([], config, before_and_on)
+    task = await task_of([], config, before_and_on)
     assert task.person == 1.7
-    for seen in task.cameras:
-        frames = np.frombuffer(seen.frames, dtype=np.int64)
+    for camera_boxes in task.cameras:
+        frames = np.frombuffer(camera_boxes.frames, dtype=np.int64)
         assert len(set(frames.tolist())) == len(frames)
         assert frames.min() >= 0
         assert frames.max() <= 49
-        boxes = np.frombuffer(seen.boxes, dtype=np.float64).reshape(-1, 4)
-        assert len(boxes) == len(frames) == len(np.frombuffer(seen.track, dtype=np.int64))
+        boxes = np.frombuffer(camera_boxes.boxes, dtype=np.float64).reshape(-1, 4)
+        assert len(boxes) == len(frames) == len(np.frombuffer(camera_boxes.track, dtype=np.int64))
 
 
-async def test_a_camera_that_comes_again_has_other_tracks() -> None:
+async def test_a_restarted_camera_has_other_tracks() -> None:
     config = walk_config()
 
-    def twice(walking: WalkSession) -> None:
+    def twice(active_walk: WalkSession) -> None:
         for boot in (1, 2):
-            for said in words(config, curved(50), epoch=10 * (boot - 1), boot=boot):
-                walking.add(said)
+            for walk_epoch in words(config, curved(50), epoch=10 * (boot - 1), boot=boot):
+                active_walk.add(walk_epoch)
 
-    task = await told_to([], config, twice)
-    who = np.frombuffer(task.cameras[0].track, dtype=np.int64)
-    assert set(who.tolist()) == {0, 1}
+    task = await task_of([], config, twice)
+    track_index = np.frombuffer(task.cameras[0].track, dtype=np.int64)
+    assert set(track_index.tolist()) == {0, 1}
 
 
-async def test_a_walk_that_is_started_before_any_camera_speaks_counts_from_the_first_word() -> None:
+async def test_a_walk_started_before_any_camera_counts_from_the_first_window() -> None:
     config = walk_config()
 
-    def late(walking: WalkSession) -> None:
-        for said in words(config, curved(50), epoch=10_000_000):
-            walking.add(said)
+    def late(active_walk: WalkSession) -> None:
+        for walk_epoch in words(config, curved(50), epoch=10_000_000):
+            active_walk.add(walk_epoch)
 
-    task = await told_to([], config, late)
+    task = await task_of([], config, late)
     frames = np.frombuffer(task.cameras[0].frames, dtype=np.int64)
     assert 0 <= frames.min() <= frames.max() <= 49
 
 
-async def test_offsets_of_recordings_are_told_and_of_live_cameras_none() -> None:
+async def test_offsets_are_those_of_recordings_only() -> None:
     cameras = [{"id": "c0", "source": "c0.mp4", "offset": 7}, {"id": "c1", "source": "rtsp://10.0.0.1/a"}]
     config = walk_config(cameras=cameras)
-    assert (await told_to([], config)).offsets == {"c0": 7}
+    assert (await task_of([], config)).offsets == {"c0": 7}
 
 
-async def test_after_the_most_that_is_kept_nothing_more_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(walking_module, "MAX_WALK_S", 1.0)
+async def test_nothing_is_recorded_beyond_the_longest_walk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(walk_session_module, "MAX_WALK_S", 1.0)
     config = walk_config()
-    walking = WalkSession(config)
-    walking.start()
-    for said in words(config, curved(100)):
-        walking.add(said)
-    assert walking.seconds == 1.0
+    active_walk = WalkSession(config)
+    active_walk.start()
+    for walk_epoch in words(config, curved(100)):
+        active_walk.add(walk_epoch)
+    assert active_walk.seconds == 1.0
 
 
-async def test_whose_process_dies_learns_of_it_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_calibration_process_that_dies_is_reported_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     nonsense = CameraBoxes("c0", (WIDTH, HEIGHT), b"123", b"", b"")
-    done = await run_calibration(CalibrationTask([nonsense], FPS, 0.0, 1.75, {}))
-    assert done.error == "the calibration failed; see the server's log"
+    outcome = await run_calibration(CalibrationTask([nonsense], FPS, 0.0, 1.75, {}))
+    assert outcome.error == "the calibration failed; see the server's log"
     monkeypatch.setattr("sys.executable", "/nowhere/python")
-    done = await run_calibration(CalibrationTask([], FPS, 0.0, 1.75, {}))
-    assert done.error.startswith("the calibration cannot be started: ")
+    outcome = await run_calibration(CalibrationTask([], FPS, 0.0, 1.75, {}))
+    assert outcome.error.startswith("the calibration cannot be started: ")
 
 
-async def test_who_forgets_the_walk_ends_its_calculation(wide: Hall) -> None:
+async def test_discarding_the_walk_cancels_its_calibration(wide: Hall) -> None:
     await do(wide, action="start")
     walk(wide, 20 * STRIDE)
     await do(wide, action="finish")

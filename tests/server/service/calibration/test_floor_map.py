@@ -34,7 +34,7 @@ def camera(tilt: float, height: float, focal: float = 200.0) -> Floats:
     x=st.floats(0.0, 320.0),
     y=st.floats(0.0, 240.0),
 )
-def test_a_place_is_covered_where_the_picture_shows_it_and_it_is_not_too_far(
+def test_a_floor_point_is_covered_if_it_is_in_the_picture_and_not_too_far(
     tilt: float, height: float, sign: float, x: float, y: float
 ) -> None:
     own = camera(tilt, height) * sign
@@ -77,11 +77,11 @@ def test_the_outline_lies_in_the_picture() -> None:
 
 
 @pytest.mark.parametrize("tilt", [-0.8, -1.2])
-def test_a_camera_that_looks_up_covers_nothing(tilt: float) -> None:
+def test_a_camera_that_looks_up_covers_no_floor(tilt: float) -> None:
     assert floor_coverage(camera(tilt, 3.0), OWN, SITE).outline.shape == (0, 2)
 
 
-def test_a_plan_view_covers_all_of_its_picture() -> None:
+def test_an_overhead_camera_covers_its_whole_picture() -> None:
     plan = np.array([[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_allclose(
         floor_coverage(plan, OWN, SITE).outline, [[0.0, 24.0], [32.0, 24.0], [32.0, 0.0], [0.0, 0.0]]

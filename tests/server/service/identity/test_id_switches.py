@@ -41,7 +41,7 @@ def paths(tracks: int) -> NDArray[np.float64]:
     st.integers(0, 3),
     st.integers(0, FRAMES - 6),
 )
-def test_two_who_are_in_each_others_place_from_a_frame_on_have_exchanged_their_people(
+def test_two_tracks_that_swap_positions_have_switched_identities(
     tracks: int, order: list[int], since: int, newer: int, forgotten: int
 ) -> None:
     one, two = sorted([it for it in order if it < tracks][:2])
@@ -59,7 +59,7 @@ def test_two_who_are_in_each_others_place_from_a_frame_on_have_exchanged_their_p
     assert found == [IdSwitch(TrackKey("c0", one + 1), TrackKey("c0", two + 1), frame)]
 
 
-def test_who_stays_who_is_hidden_and_who_goes_round_in_a_ring_has_exchanged_nothing() -> None:
+def test_unchanged_hidden_and_cyclic_tracks_have_not_switched() -> None:
     old = paths(3)
     assert find_id_switches(window(old, FIRST), [HistorySpan(window(old, FIRST), FIRST, FIRST + 9)]) == []
     assert find_id_switches(window(old, FIRST), []) == []
@@ -72,7 +72,7 @@ def test_who_stays_who_is_hidden_and_who_goes_round_in_a_ring_has_exchanged_noth
     assert find_id_switches(window(hidden, FIRST), [HistorySpan(window(old, FIRST), FIRST, FIRST + 9)]) == []
 
 
-def test_in_a_crowd_nobody_exchanges_with_two_at_once() -> None:
+def test_in_a_crowd_a_track_switches_with_one_other_only() -> None:
     old = paths(3)
     old[2] = old[1] + 2.0
     now = old.copy()

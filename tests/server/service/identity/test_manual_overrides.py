@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bestview import IdentityUpdate, Merge, Split
 from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, STRIDE, epoch_of, word
-from fakes.service.scripted_identities import Dictated, boxes, identity_update, people
+from fakes.service.scripted_identities import ScriptedRegistry, boxes, identity_update, people
 from server.service.identity.manual_overrides import ManualOverrides
 from server.service.identity.people import PersonTracker
 
@@ -17,7 +17,7 @@ numbers = st.integers(1, 6)
 
 
 @given(st.lists(st.tuples(st.booleans(), numbers, numbers), max_size=12))
-def test_whoever_is_said_to_be_one_stays_one(steps: list[tuple[bool, int, int]]) -> None:
+def test_a_manual_merge_is_permanent(steps: list[tuple[bool, int, int]]) -> None:
     it = ManualOverrides()
     one: list[set[int]] = [{number} for number in range(1, 7)]
     for by_hand, first, second in steps:
@@ -45,7 +45,7 @@ def test_whoever_is_said_to_be_one_stays_one(steps: list[tuple[bool, int, int]])
 
 def dictated(*updates: IdentityUpdate) -> PersonTracker:
     it = people(departed_after=10)
-    it._registry = Dictated(*updates)  # type: ignore[assignment]
+    it._registry = ScriptedRegistry(*updates)  # type: ignore[assignment]
     return it
 
 
@@ -56,7 +56,7 @@ def seen(it: PersonTracker, epoch: int) -> None:
 TWO = identity_update({("c0", 1): 1, ("c1", 1): 2})
 
 
-def test_a_merge_by_hand_holds_while_the_evidence_goes_on_saying_two() -> None:
+def test_a_manual_merge_holds_against_the_evidence() -> None:
     it = dictated(TWO, TWO, replace(TWO, split=(Split(1, 2, "c1"),)), replace(TWO, merged=(Merge(2, 1),)))
     seen(it, 0)
     it.registry.set_name(2, "Ann")
@@ -74,7 +74,7 @@ def test_a_merge_by_hand_holds_while_the_evidence_goes_on_saying_two() -> None:
     assert it.take_corrections() == ()
 
 
-def test_who_is_said_to_be_somebody_is_whoever_that_turns_out_to_be() -> None:
+def test_a_manual_merge_follows_later_automatic_merges() -> None:
     three = identity_update({("c0", 1): 1, ("c1", 1): 2, ("c1", 2): 3})
     it = dictated(three, replace(three, merged=(Merge(3, 1),)), identity_update({("c0", 2): 2}))
     seen(it, 0)
@@ -86,7 +86,7 @@ def test_who_is_said_to_be_somebody_is_whoever_that_turns_out_to_be() -> None:
     assert boxes(it, "c0", 2 * STRIDE) == {3: SMALL}
 
 
-def test_who_is_two_to_the_evidence_is_away_when_both_are() -> None:
+def test_a_manually_merged_person_is_away_when_both_parts_are() -> None:
     it = dictated(TWO, replace(TWO, departed=(1,)), replace(TWO, departed=(2,)), replace(TWO, returned=(2,)))
     seen(it, 0)
     it.merge(1, 2)
@@ -95,7 +95,7 @@ def test_who_is_two_to_the_evidence_is_away_when_both_are() -> None:
         assert it.registry.away == away
 
 
-def test_a_name_that_both_have_is_the_one_that_is_kept() -> None:
+def test_of_two_names_the_kept_persons_remains() -> None:
     it = dictated(TWO)
     seen(it, 0)
     it.registry.set_name(1, "Ann")
@@ -106,7 +106,7 @@ def test_a_name_that_both_have_is_the_one_that_is_kept() -> None:
     assert it.registry.names == {}
 
 
-def test_whom_a_camera_shows_is_somebody_new_at_once_and_stays_it() -> None:
+def test_a_manual_split_takes_effect_at_once_and_is_permanent() -> None:
     it = people()
     for epoch in range(3):
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: LARGE}), word("c1", epoch, {1: SMALL})))

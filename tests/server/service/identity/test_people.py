@@ -12,44 +12,44 @@ from hypothesis import strategies as st
 
 from bestview import IdentitySettings, IdentityUpdate, Merge, Split, TrackKey, TrackletKey, TrackUpdate
 from fakes.service.scripted_cameras import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
-from fakes.service.scripted_identities import Dictated, boxes, identity_update, people
+from fakes.service.scripted_identities import ScriptedRegistry, boxes, identity_update, people
 from server.service.identity.local_numbers import LocalNumbers
 from server.service.identity.people import PersonTracker
 from server.service.ingest.window_history import WindowHistory
 
 
-class Heard:
+class RecordingRegistry:
     """An identity registry that notes what it is given."""
 
-    def __init__(self, heard: list[TrackUpdate]) -> None:
-        self._heard = heard
+    def __init__(self, track_updates: list[TrackUpdate]) -> None:
+        self._track_updates = track_updates
         self.pictures: dict[str, tuple[int, int]] = {}
 
     def update(
         self, tracks: list[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
         del last_frame
-        self._heard += tracks
+        self._track_updates += tracks
         self.pictures.update(pictures)
         return identity_update({})
 
 
-def dictated(*updates: IdentityUpdate) -> PersonTracker:
+def scripted_people(*updates: IdentityUpdate) -> PersonTracker:
     it = people()
-    it._registry = Dictated(*updates)  # type: ignore[assignment]
+    it._registry = ScriptedRegistry(*updates)  # type: ignore[assignment]
     return it
 
 
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.tuples(st.integers(0, 12), st.integers(-1, 6)), max_size=6), st.integers(0, 15))
-def test_the_newest_word_on_a_frame_counts(words: list[tuple[int, int]], old: int) -> None:
+def test_the_newest_window_of_a_frame_counts(windows: list[tuple[int, int]], old: int) -> None:
     history, expected = WindowHistory[int](), dict[int, int]()
-    for number, (first, more) in enumerate(words):
+    for number, (first, more) in enumerate(windows):
         history.put(number, first, first + more)
         expected |= dict.fromkeys(range(first, first + more + 1), number)
     history.forget_before(old)
-    told = [(pulse, it.window) for it in history.over(2, 14) for pulse in range(it.first, it.last + 1)]
-    assert told == sorted((pulse, it) for pulse, it in expected.items() if max(old, 2) <= pulse <= 14)
+    newest = [(pulse, it.window) for it in history.over(2, 14) for pulse in range(it.first, it.last + 1)]
+    assert newest == sorted((pulse, it) for pulse, it in expected.items() if max(old, 2) <= pulse <= 14)
 
 
 def test_a_restarted_cameras_first_track_is_not_its_former_first_track() -> None:
@@ -61,7 +61,7 @@ def test_a_restarted_cameras_first_track_is_not_its_former_first_track() -> None
     assert numbers.known("c0", 2, 1) == TrackKey("c0", 3)
 
 
-def test_a_forgotten_track_that_comes_back_has_a_new_number() -> None:
+def test_a_forgotten_track_that_reappears_has_a_new_number() -> None:
     numbers = LocalNumbers()
     numbers.of(word("c0", 0, {1: SMALL}))
     numbers.forget(TrackKey("c0", 1))
@@ -69,41 +69,43 @@ def test_a_forgotten_track_that_comes_back_has_a_new_number() -> None:
     assert numbers.of(word("c0", 5, {1: SMALL})) == (TrackKey("c0", 2),)
 
 
-def test_feet_that_the_lower_edge_cuts_off_do_not_say_where_somebody_stands() -> None:
+def test_the_registry_receives_picture_sizes_and_boxes_in_the_cameras_own_pixels() -> None:
     it = people()
-    heard: list[TrackUpdate] = []
-    it._registry = registry = Heard(heard)  # type: ignore[assignment]
+    track_updates: list[TrackUpdate] = []
+    it._registry = registry = RecordingRegistry(track_updates)  # type: ignore[assignment]
     it.update(epoch_of(0, word("c0", 0, {1: SMALL}, size=(WIDTH // 2, HEIGHT // 2)), word("c1", 0, {})))
     assert registry.pictures == {"c0": (WIDTH // 2, HEIGHT // 2), "c1": (WIDTH, HEIGHT)}, "also who sees none"
-    [track] = heard
+    [track] = track_updates
     assert track.picture_height == HEIGHT // 2, "of the camera's own picture, as its boxes"
     np.testing.assert_allclose(track.boxes, np.tile(np.array(SMALL) / 2, (STRIDE, 1)))
 
 
-def test_a_camera_that_could_not_see_anybody_is_not_asked_who_is_there() -> None:
+def test_a_camera_without_detection_is_no_evidence_of_absence() -> None:
     it = PersonTracker(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=STRIDE)
-    asked = []
+    has_picture = []
     for epoch in range(8):
-        it._registry = registry = Heard([])  # type: ignore[assignment]
+        it._registry = registry = RecordingRegistry([])  # type: ignore[assignment]
         away = range(epoch * STRIDE + (epoch == 6), (epoch + 1) * STRIDE) if 3 <= epoch < 7 else ()
         it.update(
             epoch_of(epoch, word("c0", epoch, {1: SMALL}), word("c1", epoch, {}, without_detection=[*away]))
         )
-        asked.append("c1" in registry.pictures)
-    assert asked == [True, True, True, True, False, False, False, True], "a stride later, when it is final"
+        has_picture.append("c1" in registry.pictures)
+    assert has_picture == [True, True, True, True, False, False, False, True], (
+        "a stride later, when it is final"
+    )
 
 
-def test_a_camera_whose_source_is_exchanged_has_boxes_in_its_new_picture() -> None:
+def test_a_camera_whose_picture_size_changes_has_boxes_in_the_new_size() -> None:
     it = people()
     for epoch, size in enumerate([(WIDTH, HEIGHT), (WIDTH // 2, HEIGHT // 2)]):
-        heard: list[TrackUpdate] = []
-        it._registry = Heard(heard)  # type: ignore[assignment]
+        track_updates: list[TrackUpdate] = []
+        it._registry = RecordingRegistry(track_updates)  # type: ignore[assignment]
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}, size=size, boot=1 + epoch)))
-        [track] = heard
+        [track] = track_updates
         np.testing.assert_allclose(track.boxes, np.tile(np.array(SMALL) * size[0] / WIDTH, (STRIDE, 1)))
 
 
-def test_people_are_where_their_tracks_are() -> None:
+def test_people_have_their_tracks_boxes() -> None:
     it = people()
     it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE}), word("c1", 0, {1: None})))
     first, second = it.known
@@ -121,14 +123,14 @@ def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
     assert (it.registry.first_seen[number], it.registry.last_seen[number]) == (0, 2 * STRIDE - 1)
 
 
-def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
+def test_a_person_confirmed_late_exists_from_their_first_box_on() -> None:
     def since(*numbers: tuple[int, int]) -> IdentityUpdate:
         return replace(
             identity_update({}), person_ids={TrackletKey("c0", 1, first): number for first, number in numbers}
         )
 
     later = 3 * STRIDE
-    it = dictated(
+    it = scripted_people(
         identity_update({}),
         since((STRIDE, 0)),
         since((STRIDE, 1)),
@@ -143,14 +145,14 @@ def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
     assert numbers == [-1] * STRIDE + [1] * (later - STRIDE) + [2] * (2 * STRIDE)
 
 
-def test_frames_that_are_not_decided_yet_keep_their_people_when_the_registry_has_settled_them() -> None:
+def test_undecided_frames_keep_their_numbers_after_the_registry_has_settled_them() -> None:
     def since(*parts: tuple[int, int]) -> IdentityUpdate:
         return replace(
             identity_update({}), person_ids={TrackletKey("c0", 1, first): number for first, number in parts}
         )
 
     second, third = 2 * STRIDE, 4 * STRIDE
-    it = dictated(
+    it = scripted_people(
         since((0, 1)),
         since((0, 1)),
         since((0, 1), (second, 2)),
@@ -160,21 +162,21 @@ def test_frames_that_are_not_decided_yet_keep_their_people_when_the_registry_has
         replace(since((third, 4)), merged=(Merge(kept=4, lost=2),)),
     )
 
-    def told() -> list[int]:
+    def current_numbers() -> list[int]:
         return [next(iter(boxes(it, "c0", first)), -1) for first in (0, second, third)]
 
     for epoch in range(5):
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL})))
-    assert told() == [1, 2, 3]
+    assert current_numbers() == [1, 2, 3]
     it.forget_boxes_before(second)
     it.update(epoch_of(5, word("c0", 5, {1: SMALL})))
-    assert told() == [-1, 2, 3]
+    assert current_numbers() == [-1, 2, 3]
     assert len(it._parts[TrackKey("c0", 1)]) == 2, "what is not asked for any more is let go"
     it.update(epoch_of(6, word("c0", 6, {1: SMALL})))
-    assert told() == [-1, 4, 4], "merges hold for what is settled, too"
+    assert current_numbers() == [-1, 4, 4], "merges hold for what is settled, too"
 
 
-def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None:
+def test_a_restarted_cameras_tracks_do_not_inherit_earlier_boxes() -> None:
     it = people()
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
     it.update(epoch_of(1, word("c0", 1, {1: LARGE}, boot=2)))
@@ -183,7 +185,7 @@ def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None
     assert it.person_of("c0", 2, 1, STRIDE) == after
 
 
-def test_of_merged_numbers_the_newest_are_remembered() -> None:
+def test_only_the_newest_merged_numbers_are_remembered() -> None:
     """Whoever stays all day has many short tracks merged into them."""
     it = people(maximum_departed_people=5)
     for lost in range(2, 40):
@@ -192,8 +194,8 @@ def test_of_merged_numbers_the_newest_are_remembered() -> None:
     assert it.registry.aliases(1) == [*range(35, 40)]
 
 
-def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> None:
-    it = dictated(
+def test_merged_numbers_resolve_through_chains() -> None:
+    it = scripted_people(
         identity_update({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 3}),
         identity_update({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 2}, Merge(kept=2, lost=3)),
         identity_update({("c0", 1): 1, ("c0", 2): 1, ("c1", 1): 1}, Merge(kept=1, lost=2)),
@@ -206,9 +208,9 @@ def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> Non
     assert it.registry.aliases(1) == [2, 3]
 
 
-def test_what_turned_out_is_taken_once_and_in_order() -> None:
+def test_corrections_are_returned_once_and_in_order() -> None:
     merge, split = Merge(kept=1, lost=2), Split(kept=1, split_off=4, camera="c0")
-    it = dictated(
+    it = scripted_people(
         identity_update({("c0", 1): 1}, merge),
         identity_update({("c0", 1): 4}, split),
         identity_update({("c0", 1): 4}),
@@ -220,21 +222,21 @@ def test_what_turned_out_is_taken_once_and_in_order() -> None:
     assert it.take_corrections() == ()
 
 
-def test_who_has_left_a_person_for_one_not_confirmed_yet_has_no_number() -> None:
-    it = dictated(identity_update({("c0", 1): 1}), identity_update({("c0", 1): 0}))
+def test_a_track_that_moves_to_an_unconfirmed_person_has_no_number() -> None:
+    it = scripted_people(identity_update({("c0", 1): 1}), identity_update({("c0", 1): 0}))
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
     it.update(epoch_of(1, word("c0", 1, {1: SMALL})))
     assert boxes(it, "c0", STRIDE) == {}
     assert it.number("c0", 1, STRIDE) is None
 
 
-def test_two_tracks_of_one_person_in_one_picture_give_one_box() -> None:
-    it = dictated(identity_update({("c0", 1): 1, ("c0", 2): 1}))
+def test_two_tracks_of_one_person_in_one_picture_are_one_box() -> None:
+    it = scripted_people(identity_update({("c0", 1): 1, ("c0", 2): 1}))
     it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE})))
     assert boxes(it, "c0", 0) == {1: SMALL}
 
 
-def test_people_who_were_gone_for_long_are_forgotten_with_all_that_is_known_of_them() -> None:
+def test_people_not_seen_for_long_are_forgotten_entirely() -> None:
     it = people(departed_after=STRIDE, forget_after=3 * STRIDE)
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
     [number] = it.known
@@ -251,5 +253,5 @@ def test_people_who_were_gone_for_long_are_forgotten_with_all_that_is_known_of_t
 
 
 @pytest.mark.parametrize("pulse", [-1, 0, 4, 1000])
-def test_nothing_is_known_of_frames_that_nobody_spoke_of(pulse: int) -> None:
+def test_frames_without_windows_have_no_boxes(pulse: int) -> None:
     assert boxes(people(), "c0", pulse) == {}

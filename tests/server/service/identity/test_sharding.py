@@ -45,7 +45,7 @@ def shared(index: int, of: int = 2, **more: Any) -> dict[str, Any]:
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(1, 4), st.integers(0, 2**32 - 1))
-def test_together_they_decide_what_one_alone_would(of: int, seed: int) -> None:
+def test_shards_together_decide_as_a_single_service(of: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     deciders = [
         ViewDecider(small_config(**shared(index, of)), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True)
@@ -71,7 +71,7 @@ def test_together_they_decide_what_one_alone_would(of: int, seed: int) -> None:
                 assert all(choice.number % of == index for choice in part.choices)
 
 
-def test_whoever_watches_an_old_number_stays_where_they_are() -> None:
+def test_viewers_of_a_merged_number_stay_at_their_service() -> None:
     share = ShareSettings(of=3, index=2)
     assert own_numbers([1, 2, 4, 5], {}, share) == [2, 5]
     assert own_numbers([1, 4], {5: 4}, share) == [4]
@@ -79,7 +79,7 @@ def test_whoever_watches_an_old_number_stays_where_they_are() -> None:
     assert [shard_of(it, share) for it in (3, 4, 5)] == [0, 1, 2]
 
 
-def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
+def test_a_merged_numbers_stream_continues_at_its_own_service() -> None:
     class Merging:
         """First two people, then one."""
 
@@ -120,14 +120,14 @@ def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
         ({"of": 0}, "view.share.of"),
     ],
 )
-def test_a_share_that_cannot_be_is_refused_in_one_line(share: dict[str, Any], why: str) -> None:
+def test_an_invalid_share_is_refused_in_one_line(share: dict[str, Any], why: str) -> None:
     with pytest.raises(UserError, match="share") as refusal:
         small_config(view={"share": share})
     assert why in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 
-def test_addresses_are_bases_however_they_are_written() -> None:
+def test_shard_addresses_are_normalized_to_base_urls() -> None:
     share = ShareSettings(of=2, servers=["http://a:1", "https://b/myview/"])
     assert (shard_address(2, share), shard_address(3, share)) == ("http://a:1/", "https://b/myview/")
     assert shard_address(3, ShareSettings(of=2)) is None
@@ -146,7 +146,7 @@ async def second(request: pytest.FixtureRequest) -> AsyncIterator[str]:
     service.close()
 
 
-async def test_objects_of_another_service_are_named_and_asking_for_one_leads_there(
+async def test_people_of_another_service_are_listed_and_redirected(
     second: str, request: pytest.FixtureRequest
 ) -> None:
     told = bool(request.node.callspec.params["second"])
@@ -184,7 +184,9 @@ def pair() -> Iterator[list[BestViewPipeline]]:
         service.close()
 
 
-async def test_both_hear_every_camera_and_tell_under_keys_of_their_own(pair: list[BestViewPipeline]) -> None:
+async def test_both_services_receive_all_cameras_and_publish_under_own_keys(
+    pair: list[BestViewPipeline],
+) -> None:
     for service in pair:
         service.open()
     keys, camera = ZenohKeys("hall"), Bus.client(pair[0].config.zenoh)

@@ -56,22 +56,23 @@ class Site:
     def __init__(self, **changes: object) -> None:
         self._changes = changes
         self.cameras = {
-            camera: RetainedState(lambda said, it=camera: self._hear(it, said)) for camera in CAMERAS
+            camera: RetainedState(lambda snapshot, it=camera: self._receive(it, snapshot))
+            for camera in CAMERAS
         }
         self.service = FedService(small_config())
 
-    def start(self, *, deaf: str | None = None) -> FedService:
+    def start(self, *, without_snapshot: str | None = None) -> FedService:
         """Start the service anew: the cameras hear of it, but for one."""
         self.service = it = FedService(small_config(**self._changes))
-        it.state_replication._send = self._tell
+        it.state_replication._send = self._send_identities
         for camera in CAMERAS:
             for part in (it.ingest, it.state_replication):
                 part.alive(KEYS.camera(camera, "alive"), is_present=True)
-            if camera != deaf:
+            if camera != without_snapshot:
                 self.cameras[camera].service(is_present=True)
         return it
 
-    def tell(self, epochs: Iterable[int], seen: Seen = ALL, boot: int = 1) -> None:
+    def track_epochs(self, epochs: Iterable[int], seen: Seen = ALL, boot: int = 1) -> None:
         """Push an epoch with these tracks; pictures do not matter here."""
         for epoch in epochs:
             for camera in CAMERAS:
@@ -85,23 +86,23 @@ class Site:
         assert number is not None
         return number
 
-    def _tell(self, camera: str, payload: bytes) -> None:
+    def _send_identities(self, camera: str, payload: bytes) -> None:
         self.cameras[camera].put(Message(KEYS.camera(camera, "identities"), payload, b""))
 
-    def _hear(self, camera: str, payload: bytes) -> None:
+    def _receive(self, camera: str, payload: bytes) -> None:
         self.service._retained_identities(Message(KEYS.camera(camera, "retained_identities"), payload, b""))
 
 
-def told(*, merge: bool = False, **changes: object) -> Site:
+def tracked_site(*, merge: bool = False, **changes: object) -> Site:
     """Run a service in which camera A's track 2 is Ann, and who is followed by its track 1, too, maybe."""
     site = Site(**changes)
     site.start()
-    site.tell(range(4))
+    site.track_epochs(range(4))
     people = site.service.decider.people
     people.registry.set_name(site.person_of(A, 2, 3), "Ann")
     if merge:
         people.merge(site.person_of(A, 2, 3), site.person_of(A, 1, 3))
-    site.tell(range(4, 6))
+    site.track_epochs(range(4, 6))
     return site
 
 
@@ -109,11 +110,11 @@ ONLY_LATE: Seen = {A: {9: SMALL, 2: LARGE}, B: {3: LARGE}}
 """Of who was there A's track 1 is gone; somebody new has come, who is heard of first."""
 
 
-def test_who_is_followed_all_along_keeps_their_number_and_name_and_nobody_else_gets_it() -> None:
-    site = told()
+def test_a_person_tracked_through_a_restart_keeps_number_and_name() -> None:
+    site = tracked_site()
     before = [site.person_of(A, 1, 5), site.person_of(A, 2, 5), site.person_of(B, 3, 5)]
     site.start()
-    site.tell(range(7, 9), ONLY_LATE)
+    site.track_epochs(range(7, 9), ONLY_LATE)
     assert [site.person_of(A, 2, 8), site.person_of(B, 3, 8)] == before[1:]
     assert site.person_of(A, 9, 8) > max(before), (
         "numbers are not used twice, not of those who have left either"
@@ -122,74 +123,74 @@ def test_who_is_followed_all_along_keeps_their_number_and_name_and_nobody_else_g
     assert site.service.decider.people.merged_by_hand == {}
 
 
-def test_the_same_goes_for_any_number_of_runs() -> None:
-    site = told()
+def test_numbers_survive_any_number_of_restarts() -> None:
+    site = tracked_site()
     before = [site.person_of(A, 1, 5), site.person_of(A, 2, 5), site.person_of(B, 3, 5)]
     for run in range(1, 4):
         site.start()
-        site.tell(range(6 * run, 6 * run + 5))
+        site.track_epochs(range(6 * run, 6 * run + 5))
         last = 6 * run + 4
         assert [site.person_of(A, 1, last), site.person_of(A, 2, last), site.person_of(B, 3, last)] == before
 
 
-def test_who_was_said_to_be_one_is_one_again_under_the_same_number() -> None:
-    site = told(merge=True)
+def test_manual_merges_survive_a_restart() -> None:
+    site = tracked_site(merge=True)
     kept, (old,) = site.person_of(A, 2, 5), site.service.decider.people.registry.merged
     site.start()
-    site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
-    site.tell(range(8, 12))  # the other track comes later
+    site.track_epochs(range(7, 8), {A: {2: LARGE}, B: {}})
+    site.track_epochs(range(8, 12))  # the other track comes later
     people = site.service.decider.people
     assert site.person_of(A, 1, 11) == site.person_of(A, 2, 11) == kept
     assert people.registry.merged[old] == kept, "an address with the old number goes on"
     assert people.registry.names == {kept: "Ann"}
 
 
-def test_a_camera_whose_last_word_was_late_is_remembered_all_the_same() -> None:
-    site = told()
+def test_a_camera_whose_last_window_was_late_is_recovered() -> None:
+    site = tracked_site()
     before = site.person_of(B, 3, 5)
-    site.tell(range(6, 7), {A: {1: SMALL, 2: LARGE}, B: {}})
+    site.track_epochs(range(6, 7), {A: {1: SMALL, 2: LARGE}, B: {}})
     site.start()
-    site.tell(range(7, 9))
+    site.track_epochs(range(7, 9))
     assert site.person_of(B, 3, 8) == before
 
 
-def test_tracks_of_a_camera_that_was_started_anew_are_not_taken_for_those_of_before() -> None:
-    site = told()
-    site.tell(range(6, 7), {A: {2: SMALL}, B: {}}, boot=2)
+def test_tracks_of_a_restarted_camera_are_not_recovered_as_earlier_ones() -> None:
+    site = tracked_site()
+    site.track_epochs(range(6, 7), {A: {2: SMALL}, B: {}}, boot=2)
     before, used = site.person_of(A, 2, 6, boot=2), site.service.decider.people.next_number
     site.start()
-    site.tell(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}}, boot=2)
+    site.track_epochs(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}}, boot=2)
     assert site.person_of(A, 2, 8, boot=2) == before
     assert site.person_of(A, 1, 8, boot=2) >= used
 
 
-def test_a_number_too_large_to_remember_keeps_nobody_else_from_being_remembered() -> None:
-    site = told()
+def test_a_number_too_large_to_retain_does_not_affect_others() -> None:
+    site = tracked_site()
     ann = site.person_of(A, 2, 5)
     site.service.decider.people.registry.add_aliases(ann, [PERSON_NUMBER_MAX + 1])
-    site.tell(range(6, 7))
+    site.track_epochs(range(6, 7))
     site.start()
-    site.tell(range(7, 9))
+    site.track_epochs(range(7, 9))
     assert site.person_of(A, 2, 8) == ann
     assert site.service.decider.people.registry.names == {ann: "Ann"}
 
 
-def test_numbers_have_begun_with_the_first_that_is_given_however_late_a_camera_says_it_is_there() -> None:
+def test_numbering_begins_with_the_first_number_however_late_a_camera_connects() -> None:
     site = Site()
     service = site.service = FedService(small_config())  # no camera's token has come
     assert service.state_replication.numbers_since == 0, "nobody has a number"
     before = time.time() - 60
-    site.tell(range(4))
+    site.track_epochs(range(4))
     assert site.person_of(A, 1, 3)
     assert service.state_replication.numbers_since > before, "a token of before is for somebody else, maybe"
 
 
-def test_a_camera_that_remembers_nothing_learns_from_what_the_others_do() -> None:
-    site = told()
+def test_without_a_cameras_snapshot_only_its_tracks_get_new_numbers() -> None:
+    site = tracked_site()
     ann, other = site.person_of(A, 2, 5), site.person_of(B, 3, 5)
-    site.cameras[B] = RetainedState(lambda said: site._hear(B, said))  # it was started anew, too
+    site.cameras[B] = RetainedState(lambda snapshot: site._receive(B, snapshot))  # it was started anew, too
     site.start()
-    site.tell(range(7, 9))
+    site.track_epochs(range(7, 9))
     assert site.person_of(A, 2, 8) == ann
     assert site.person_of(B, 3, 8) not in {ann, other}, "nobody knows who that is: it is a new number"
 
@@ -205,91 +206,91 @@ LONG_AGO = 6 + int(MAX_DOWNTIME_S * FPS / STRIDE)
         (range(2), 1),  # pulses began anew
     ],
 )
-def test_nobody_is_given_a_number_or_name_that_may_be_anothers(epochs: range, boot: int) -> None:
-    site = told()
+def test_no_number_or_name_is_assigned_that_may_be_another_persons(epochs: range, boot: int) -> None:
+    site = tracked_site()
     used = max(site.service.decider.people.registry.everybody)
     site.start()
-    site.tell(epochs, boot=boot)
+    site.track_epochs(epochs, boot=boot)
     people = site.service.decider.people
     assert people.known
     assert min(people.known) > used
     assert people.registry.names == {}
 
 
-def test_a_camera_that_says_late_what_it_remembers_keeps_numbers_from_being_used_twice() -> None:
-    site = told()
+def test_a_late_snapshot_prevents_numbers_from_being_used_twice() -> None:
+    site = tracked_site()
     used = max(site.service.decider.people.registry.everybody)
-    site.cameras[A] = RetainedState(lambda said: site._hear(A, said))
-    site.start(deaf=B)
-    site.tell(range(7, 8), {A: {}, B: {}})
+    site.cameras[A] = RetainedState(lambda snapshot: site._receive(A, snapshot))
+    site.start(without_snapshot=B)
+    site.track_epochs(range(7, 8), {A: {}, B: {}})
     site.cameras[B].service(is_present=True)
-    site.tell(range(8, 10))
+    site.track_epochs(range(8, 10))
     assert min(site.service.decider.people.known) > used
 
 
-def test_a_camera_that_says_late_what_it_remembers_is_heard_all_the_same() -> None:
-    site = told()
+def test_a_late_snapshot_is_used() -> None:
+    site = tracked_site()
     ann, b = site.person_of(A, 2, 5), site.person_of(B, 3, 5)
-    site.start(deaf=B)
-    site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
+    site.start(without_snapshot=B)
+    site.track_epochs(range(7, 8), {A: {2: LARGE}, B: {}})
     assert site.service.state_replication.may_recover(b), "camera B may still come"
     site.cameras[B].service(is_present=True)
-    site.tell(range(8, 12), {A: {2: LARGE, 9: SMALL}, B: {3: LARGE}})
+    site.track_epochs(range(8, 12), {A: {2: LARGE, 9: SMALL}, B: {3: LARGE}})
     assert [site.person_of(A, 2, 11), site.person_of(B, 3, 11)] == [ann, b]
 
 
-def test_of_what_is_said_late_nothing_counts_that_may_be_anothers_by_now() -> None:
-    site = told()
+def test_numbers_of_a_late_snapshot_that_may_be_reassigned_are_ignored() -> None:
+    site = tracked_site()
     before = [site.person_of(A, 1, 5), site.person_of(A, 2, 5), site.person_of(B, 3, 5)]
-    site.cameras[A] = RetainedState(lambda said: site._hear(A, said))
-    site.start(deaf=B)
-    site.tell(range(7, 8), {A: {1: SMALL, 2: LARGE}, B: {}})
+    site.cameras[A] = RetainedState(lambda snapshot: site._receive(A, snapshot))
+    site.start(without_snapshot=B)
+    site.track_epochs(range(7, 8), {A: {1: SMALL, 2: LARGE}, B: {}})
     assert site.person_of(A, 1, 7) in before, "nobody had said that it was taken"
     site.cameras[B].service(is_present=True)
-    site.tell(range(8, 12))
+    site.track_epochs(range(8, 12))
     assert site.person_of(B, 3, 11) > max(before)
     assert site.service.decider.people.registry.names == {}
 
 
-def test_a_track_that_comes_late_is_whose_number_its_own_has_become_meanwhile() -> None:
+def test_a_late_track_gets_the_current_number_of_its_merged_person() -> None:
     site = Site()
     site.start()
-    site.tell(range(4))
+    site.track_epochs(range(4))
     site.service.decider.people.merge(site.person_of(A, 1, 3), site.person_of(B, 3, 3))
-    site.tell(range(4, 6))
+    site.track_epochs(range(4, 6))
     one, ann = site.person_of(A, 1, 5), site.person_of(A, 2, 5)
     site.start()
-    site.tell(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}})
-    site.tell(range(9, 11), {A: {2: LARGE}, B: {}})
+    site.track_epochs(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}})
+    site.track_epochs(range(9, 11), {A: {2: LARGE}, B: {}})
     site.service.decider.people.merge(ann, one)
-    site.tell(range(11, 14), {A: {2: LARGE}, B: {3: LARGE}})
+    site.track_epochs(range(11, 14), {A: {2: LARGE}, B: {3: LARGE}})
     assert site.person_of(B, 3, 13) == ann
 
 
-def test_a_name_that_was_given_meanwhile_stays_and_one_that_was_taken_back_is_not_given_again() -> None:
-    site = told()
+def test_names_set_or_removed_meanwhile_are_not_overwritten_by_recovery() -> None:
+    site = tracked_site()
     site.start()
-    site.tell(range(7, 9))
+    site.track_epochs(range(7, 9))
     people = site.service.decider.people
     people.registry.set_name(site.person_of(A, 2, 8), "")
     people.registry.set_name(site.person_of(A, 1, 8), "Bob")
-    site.tell(range(9, 10))
+    site.track_epochs(range(9, 10))
     site.start()
-    site.tell(range(10, 12))
+    site.track_epochs(range(10, 12))
     assert site.service.decider.people.registry.names == {site.person_of(A, 1, 11): "Bob"}
 
 
-def test_of_several_services_the_first_one_tells_and_all_begin_with_it() -> None:
-    site = told(view={"share": {"of": 2, "index": 1}})
+def test_the_first_service_replicates_and_all_services_recover() -> None:
+    site = tracked_site(view={"share": {"of": 2, "index": 1}})
     assert site.service.decider.people.known
     site.start()
-    site.tell(range(7, 9))
+    site.track_epochs(range(7, 9))
     assert site.service.decider.people.registry.names == {}, "the second one told nobody"
-    first = told()
+    first = tracked_site()
     first._changes = {"view": {"share": {"of": 2, "index": 1}}}
     ann = first.person_of(A, 2, 5)
     first.start()
-    first.tell(range(7, 9))
+    first.track_epochs(range(7, 9))
     assert first.person_of(A, 2, 8) == ann
 
 
@@ -303,7 +304,7 @@ class Clock:
         return self.now
 
 
-def test_nothing_is_decided_before_every_camera_that_is_there_has_had_time_to_say_what_it_remembers() -> None:
+def test_decisions_wait_for_the_snapshots_of_connected_cameras() -> None:
     clock, service = Clock(), FedService(small_config())
     it = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
     it.begin(4)
@@ -325,8 +326,8 @@ def test_nothing_is_decided_before_every_camera_that_is_there_has_had_time_to_sa
     assert not it.is_waiting, "only at the beginning"
 
 
-async def test_who_may_be_found_again_is_not_said_to_be_nobody() -> None:
-    site = told()
+async def test_a_number_that_may_be_recovered_is_not_reported_as_unknown() -> None:
+    site = tracked_site()
     number = site.person_of(A, 1, 5)
     service = site.start()
     async with TestClient(TestServer(make_app(BestViewService(service)))) as client:
@@ -335,10 +336,10 @@ async def test_who_may_be_found_again_is_not_said_to_be_nobody() -> None:
             answer = await client.get(asked)
             assert answer.status == 503, asked
             assert int(answer.headers["Retry-After"]) > 0
-        site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
+        site.track_epochs(range(7, 8), {A: {2: LARGE}, B: {}})
         assert (await client.get(path)).status == 503
         assert (await client.get("/objects/77/best.mp4")).status == 404
-        site.tell([LONG_AGO], {A: {2: LARGE}, B: {}})
+        site.track_epochs([LONG_AGO], {A: {2: LARGE}, B: {}})
         assert (await client.get(path)).status == 404, "they are not waited for for ever"
 
 
@@ -346,25 +347,25 @@ NESTED = b'{"more": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
 
 
 @pytest.mark.parametrize("damage", [b"\xff", b"[]", b'{"pulse": 1}', b"{" * 100_000, NESTED])
-def test_what_a_camera_says_that_is_none_is_counted(damage: bytes, caplog: pytest.LogCaptureFixture) -> None:
-    site = told()
+def test_an_invalid_snapshot_is_counted(damage: bytes, caplog: pytest.LogCaptureFixture) -> None:
+    site = tracked_site()
     site.cameras[B].put(Message("", damage, b""))
     with caplog.at_level(logging.ERROR):
         service = site.start()
     assert service.ingest.states[B].bad_messages == 1
     assert caplog.messages == []
-    site.tell(range(7, 9))
+    site.track_epochs(range(7, 9))
     assert site.service.decider.people.registry.names == {site.person_of(A, 2, 8): "Ann"}
 
 
-def test_a_camera_keeps_no_more_than_it_can() -> None:
-    said: list[bytes] = []
-    it = RetainedState(said.append)
+def test_a_snapshot_is_limited_in_size() -> None:
+    snapshot: list[bytes] = []
+    it = RetainedState(snapshot.append)
     it.put(Message("", b"one", b""))
     it.put(Message("", b"2" * (SNAPSHOT_BYTES_MAX + 1), b""))
     it.service(is_present=False)
     it.service(is_present=True)
-    assert said == [b"one"]
+    assert snapshot == [b"one"]
 
 
 numbers = st.integers(1, 8)
@@ -388,29 +389,27 @@ remembered = st.builds(
 
 @settings(max_examples=40)
 @given(remembered, remembered)
-def test_whatever_cameras_remember_two_tracks_seen_at_once_in_a_camera_are_two(
+def test_two_simultaneous_tracks_of_a_camera_are_two_people_whatever_snapshots_say(
     one: IdentitySnapshot, other: IdentitySnapshot
 ) -> None:
     site = Site()
     for camera, it in zip(CAMERAS, (one, other), strict=True):
         people = [msgspec.structs.replace(them, manual=False) for them in it.people]
-        said = msgspec.json.encode(msgspec.structs.replace(it, people=people))
-        site.cameras[camera].put(Message("", said, b""))
+        snapshot = msgspec.json.encode(msgspec.structs.replace(it, people=people))
+        site.cameras[camera].put(Message("", snapshot, b""))
     site.start()
-    site.tell(range(7, 12), {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}})
+    site.track_epochs(range(7, 12), {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}})
     assert site.person_of(A, 1, 11) != site.person_of(A, 2, 11)
 
 
 @settings(max_examples=40)
 @given(remembered, remembered)
-def test_whatever_cameras_remember_the_service_goes_on(
-    one: IdentitySnapshot, other: IdentitySnapshot
-) -> None:
+def test_arbitrary_snapshots_do_not_stop_the_service(one: IdentitySnapshot, other: IdentitySnapshot) -> None:
     site = Site()
     for camera, it in zip(CAMERAS, (one, other), strict=True):
         site.cameras[camera].put(Message("", msgspec.json.encode(it), b""))
     site.start()
-    site.tell(range(7, 10))
+    site.track_epochs(range(7, 10))
     people = site.service.decider.people
     assert people.known
     assert set(people.registry.merged).isdisjoint(people.registry.everybody)
@@ -418,8 +417,10 @@ def test_whatever_cameras_remember_the_service_goes_on(
 
 def lying(site: Site, camera: str, **changes: object) -> None:
     """Let a camera remember something else than what it was told."""
-    said = msgspec.json.decode(site.cameras[camera]._state, type=IdentitySnapshot)
-    site.cameras[camera].put(Message("", msgspec.json.encode(msgspec.structs.replace(said, **changes)), b""))
+    snapshot = msgspec.json.decode(site.cameras[camera]._state, type=IdentitySnapshot)
+    site.cameras[camera].put(
+        Message("", msgspec.json.encode(msgspec.structs.replace(snapshot, **changes)), b"")
+    )
 
 
 @pytest.mark.parametrize(
@@ -431,34 +432,34 @@ def lying(site: Site, camera: str, **changes: object) -> None:
     ],
 )
 @pytest.mark.parametrize("again", [False, True])
-def test_no_camera_alone_moves_everybodys_numbers_far_ahead(lie: dict[str, object], again: bool) -> None:
-    site = told()
+def test_no_single_camera_can_raise_the_next_number_far(lie: dict[str, object], again: bool) -> None:
+    site = tracked_site()
     ann = site.person_of(A, 2, 5)
     if not again:
         lying(site, B, **lie)
     site.start()
-    site.tell(range(7, 9))
+    site.track_epochs(range(7, 9))
     lying(site, B, **lie)
     for _ in range(3):
         site.cameras[B].service(is_present=True)
-    site.tell(range(9, 12), {A: {1: SMALL, 2: LARGE, 9: SMALL}, B: {3: LARGE}})
+    site.track_epochs(range(9, 12), {A: {1: SMALL, 2: LARGE, 9: SMALL}, B: {3: LARGE}})
     people = site.service.decider.people
     assert people.next_number <= SINGLE_CAMERA_NUMBER_MAX + 10
     assert site.person_of(A, 2, 11) == ann
     assert people.registry.names == {ann: "Ann"}
 
 
-def test_large_numbers_that_two_cameras_remember_go_on() -> None:
-    site = told()
+def test_large_numbers_confirmed_by_two_cameras_continue() -> None:
+    site = tracked_site()
     for camera in CAMERAS:
         lying(site, camera, next_number=50_000_000 + len(camera))
     site.start()
-    site.tell(range(7, 9))
+    site.track_epochs(range(7, 9))
     assert site.service.decider.people.next_number >= 50_000_000
 
 
 @given(st.lists(st.integers(1, PERSON_NUMBER_MAX), max_size=6), st.integers(1, PERSON_NUMBER_MAX))
-def test_whatever_one_camera_says_the_others_say_how_far_it_is_believed(others: list[int], lie: int) -> None:
+def test_a_single_cameras_first_free_number_is_bounded_by_the_others(others: list[int], lie: int) -> None:
     most = max([trusted_first_free(others), SINGLE_CAMERA_NUMBER_MAX])
     assert trusted_first_free([*others, lie]) <= max(most, max(others, default=0) + 10_000)
 
@@ -468,12 +469,12 @@ def remembers(since: float, pulse: int = 90) -> IdentitySnapshot:
 
 
 @pytest.mark.parametrize("lie", [0.0, 1e12])
-def test_no_camera_alone_says_since_when_numbers_mean_what_they_do(lie: float) -> None:
-    said = {"c0": remembers(lie), "c1": remembers(1000.0), "c2": remembers(1000.0)}
-    assert StateRecovery(said, 100, 50).numbered_since == 1000.0
+def test_no_single_camera_determines_when_numbering_began(lie: float) -> None:
+    snapshot = {"c0": remembers(lie), "c1": remembers(1000.0), "c2": remembers(1000.0)}
+    assert StateRecovery(snapshot, 100, 50).numbered_since == 1000.0
 
 
-def test_of_two_words_on_when_numbers_began_the_later_counts() -> None:
+def test_of_two_numbering_times_the_later_counts() -> None:
     assert StateRecovery({"c0": remembers(900.0), "c1": remembers(1000.0)}, 100, 50).numbered_since == 1000.0
     long_ago = {"c0": remembers(900.0, pulse=1), "c1": remembers(900.0, pulse=1)}
     assert StateRecovery({**long_ago, "c2": remembers(1000.0)}, 100, 50).numbered_since == 1000.0
@@ -481,7 +482,7 @@ def test_of_two_words_on_when_numbers_began_the_later_counts() -> None:
     assert StateRecovery({}, 100, 50).numbered_since == float("inf")
 
 
-def test_a_camera_that_comes_and_goes_and_never_says_what_it_remembers_is_waited_for_once() -> None:
+def test_a_flapping_camera_without_a_snapshot_is_waited_for_once() -> None:
     clock, service = Clock(), FedService(small_config())
     it = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
     for _ in range(4):

@@ -28,11 +28,11 @@ def lost(behind: Sequence[int], every_s: float = 1.0) -> list[bool]:
     ],
     ids=["in time", "catching up", "not for long", "now and then"],
 )
-def test_who_keeps_up_or_catches_up_leaves_nothing_out(behind: list[int]) -> None:
+def test_nothing_is_skipped_while_decisions_keep_up_or_catch_up(behind: list[int]) -> None:
     assert not any(lost(behind))
 
 
 @pytest.mark.parametrize("more", [0, 5, 25])
-def test_who_does_not_catch_up_leaves_out_and_is_given_time_anew(more: int) -> None:
+def test_a_backlog_that_does_not_shrink_is_skipped_and_then_has_time_again(more: int) -> None:
     behind = [REACH + 1 + more * it for it in range(3)]
     assert lost(behind + behind) == [False, False, True] * 2

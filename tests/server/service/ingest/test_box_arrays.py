@@ -16,18 +16,18 @@ TOLD = st.lists(st.lists(st.tuples(SIDE, SIDE, SIDE, SIDE) | st.none(), max_size
 
 @settings(deadline=None, max_examples=100)
 @given(TOLD)
-def test_every_number_arrives_to_the_bit_and_the_hidden_are_not_numbers(told: list[list[Box | None]]) -> None:
+def test_boxes_are_converted_exactly_and_hidden_ones_are_nan(told: list[list[Box | None]]) -> None:
     heard = msgspec.json.decode(msgspec.json.encode(told), type=list[list[Box | None]])
     expected = [box or (np.nan,) * 4 for boxes in told for box in boxes]
     assert np.array_equal(boxes_array(heard), np.array(expected).reshape(-1, 4), equal_nan=True)
 
 
-def test_as_many_boxes_as_there_may_be_are_read() -> None:
+def test_any_number_of_boxes_is_converted() -> None:
     for count in (0, 1, 15, 16, 65_535, 65_536):
         boxes: list[Box | None] = [(1.0, 2.0, 3.0, float(number)) for number in range(count)]
         assert boxes_array([boxes])[:, 3].tolist() == list(range(count))
 
 
-def test_whole_numbers_are_read_as_well() -> None:
+def test_integer_coordinates_are_converted() -> None:
     assert boxes_array([[(1, 2, 3.5, 4), None]])[0].tolist() == [1.0, 2.0, 3.5, 4.0]
     assert boxes_array([[(2**40, 2**41, 2**42, 2**43)]]).tolist() == [[2.0**it for it in range(40, 44)]]

@@ -16,7 +16,7 @@ from server.service.ingest.backlog import BacklogMonitor
 from server.service.ingest.epoch_aligner import Epoch
 
 
-async def test_between_two_epochs_others_have_their_turn() -> None:
+async def test_other_tasks_run_between_two_epochs() -> None:
     service, turns = behind(), list[int]()
     deciding = asyncio.create_task(service.decide_cooperatively())
     while not deciding.done():
@@ -26,7 +26,7 @@ async def test_between_two_epochs_others_have_their_turn() -> None:
     service.close()
 
 
-async def test_what_has_come_is_taken_in_before_the_next_epoch_is_decided() -> None:
+async def test_waiting_messages_are_handled_before_the_next_epoch() -> None:
     service, taken, waited = behind(), list[int](), list[int]()
     inbox = Inbox(taken.append, turn_s=0.0)
     service.bus.inboxes.append(inbox)
@@ -56,7 +56,7 @@ async def test_a_flood_does_not_keep_the_service_from_deciding() -> None:
     service.close()
 
 
-async def test_what_can_be_decided_only_after_its_pictures_are_gone_is_left_out(
+async def test_epochs_whose_frames_are_no_longer_buffered_are_skipped(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     """Half as fast as the pulses: after each epoch they are two further on."""
@@ -78,7 +78,7 @@ async def test_what_can_be_decided_only_after_its_pictures_are_gone_is_left_out(
     service.close()
 
 
-async def test_who_is_told_to_end_does_not_finish_first() -> None:
+async def test_a_cancelled_service_does_not_finish_its_backlog() -> None:
     service = behind()
     deciding = asyncio.create_task(service.decide_cooperatively())
     await asyncio.sleep(0)
@@ -89,7 +89,7 @@ async def test_who_is_told_to_end_does_not_finish_first() -> None:
     service.close()
 
 
-async def test_by_turns_or_at_once_the_same_is_decided() -> None:
+async def test_cooperative_decisions_equal_those_made_at_once() -> None:
     one, other = behind(), behind()
     at_once, by_turns = noted(one), noted(other)
     one.decide()

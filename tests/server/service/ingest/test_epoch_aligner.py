@@ -13,7 +13,7 @@ STRIDE, GRACE = 5, 12
 CAMERAS = ("c0", "c1", "c2")
 
 
-def word(camera: str, epoch: int, *, boot: int = 1, ended: bool = False) -> CameraTracks:
+def window(camera: str, epoch: int, *, boot: int = 1, ended: bool = False) -> CameraTracks:
     last = (epoch + 1) * STRIDE - 1
     return CameraTracks(
         camera=camera,
@@ -30,7 +30,7 @@ def word(camera: str, epoch: int, *, boot: int = 1, ended: bool = False) -> Came
     )
 
 
-def begun(*cameras: str) -> EpochAligner:
+def connected_aligner(*cameras: str) -> EpochAligner:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE)
     for camera in cameras:
         aligner.camera_connected(camera)
@@ -38,91 +38,91 @@ def begun(*cameras: str) -> EpochAligner:
     return aligner
 
 
-def heard(epochs: list[Epoch]) -> list[tuple[int, tuple[str, ...], tuple[str, ...]]]:
+def summary(epochs: list[Epoch]) -> list[tuple[int, tuple[str, ...], tuple[str, ...]]]:
     return [(epoch.number, tuple(epoch.tracks), epoch.late) for epoch in epochs]
 
 
-def test_an_epoch_waits_for_every_camera_that_is_there() -> None:
-    aligner = begun("c0", "c1")
-    aligner.add_tracks(word("c0", 0))
+def test_an_epoch_waits_for_every_connected_camera() -> None:
+    aligner = connected_aligner("c0", "c1")
+    aligner.add_tracks(window("c0", 0))
     assert aligner.ready(now=5) == []
-    aligner.add_tracks(word("c1", 0))
-    assert heard(aligner.ready(now=5)) == [(0, ("c0", "c1"), ())]
+    aligner.add_tracks(window("c1", 0))
+    assert summary(aligner.ready(now=5)) == [(0, ("c0", "c1"), ())]
 
 
 @given(st.permutations([(camera, epoch) for camera in CAMERAS for epoch in range(4)]))
 def test_the_epochs_are_the_same_in_whatever_order_the_cameras_messages_mix(
     order: list[tuple[str, int]],
 ) -> None:
-    aligner = begun(*CAMERAS)
+    aligner = connected_aligner(*CAMERAS)
     counts = dict.fromkeys(CAMERAS, 0)
     epochs = []
     for camera, _ in order:  # a camera's own messages stay in order, as on the bus
-        aligner.add_tracks(word(camera, counts[camera]))
+        aligner.add_tracks(window(camera, counts[camera]))
         counts[camera] += 1
         epochs += aligner.ready(now=0)
-    assert heard(epochs) == [(number, CAMERAS, ()) for number in range(4)]
+    assert summary(epochs) == [(number, CAMERAS, ()) for number in range(4)]
 
 
-def test_a_camera_that_is_late_is_left_out_once_and_not_waited_for_until_it_is_in_time_again() -> None:
-    aligner = begun("c0", "c1")
-    aligner.add_tracks(word("c0", 0))
+def test_a_late_camera_is_not_waited_for_until_it_is_in_time_again() -> None:
+    aligner = connected_aligner("c0", "c1")
+    aligner.add_tracks(window("c0", 0))
     assert aligner.ready(now=4) == []
     assert aligner.ready(now=4 + GRACE) == []
-    assert heard(aligner.ready(now=5 + GRACE)) == [(0, ("c0",), ("c1",))]
-    aligner.add_tracks(word("c0", 1))
-    assert heard(aligner.ready(now=10)) == [(1, ("c0",), ())], "no waiting for the late one"
-    aligner.add_tracks(word("c1", 0))
+    assert summary(aligner.ready(now=5 + GRACE)) == [(0, ("c0",), ("c1",))]
+    aligner.add_tracks(window("c0", 1))
+    assert summary(aligner.ready(now=10)) == [(1, ("c0",), ())], "no waiting for the late one"
+    aligner.add_tracks(window("c1", 0))
     assert aligner.late_messages["c1"] == 1
-    aligner.add_tracks(word("c1", 2))
+    aligner.add_tracks(window("c1", 2))
     assert aligner.ready(now=15) == [], "in time again: c0 is waited for as c1 would be"
-    aligner.add_tracks(word("c0", 2))
-    assert heard(aligner.ready(now=15)) == [(2, ("c0", "c1"), ())]
+    aligner.add_tracks(window("c0", 2))
+    assert summary(aligner.ready(now=15)) == [(2, ("c0", "c1"), ())]
 
 
-def test_a_camera_that_is_gone_is_not_waited_for() -> None:
-    aligner = begun("c0", "c1")
-    aligner.add_tracks(word("c0", 0))
+def test_a_disconnected_camera_is_not_waited_for() -> None:
+    aligner = connected_aligner("c0", "c1")
+    aligner.add_tracks(window("c0", 0))
     aligner.camera_disconnected("c1")
-    assert heard(aligner.ready(now=5)) == [(0, ("c0",), ())]
+    assert summary(aligner.ready(now=5)) == [(0, ("c0",), ())]
 
 
-def test_a_camera_that_comes_back_takes_part_from_its_first_frame_on() -> None:
-    aligner = begun("c0", "c1")
+def test_a_reconnected_camera_is_expected_from_its_first_frame_on() -> None:
+    aligner = connected_aligner("c0", "c1")
     aligner.camera_disconnected("c1")
     aligner.camera_connected("c1")
     aligner.frame_received("c1", 2, 7)
-    aligner.add_tracks(word("c0", 0))
-    assert heard(aligner.ready(now=5)) == [(0, ("c0",), ())]
-    aligner.add_tracks(word("c0", 1))
+    aligner.add_tracks(window("c0", 0))
+    assert summary(aligner.ready(now=5)) == [(0, ("c0",), ())]
+    aligner.add_tracks(window("c0", 1))
     assert aligner.ready(now=10) == [], "frame 7 is in epoch 1"
-    aligner.add_tracks(word("c1", 1, boot=2))
-    assert heard(aligner.ready(now=10)) == [(1, ("c0", "c1"), ())]
+    aligner.add_tracks(window("c1", 1, boot=2))
+    assert summary(aligner.ready(now=10)) == [(1, ("c0", "c1"), ())]
 
 
-def test_a_camera_whose_recording_is_over_is_not_waited_for_and_the_last_ends_everything() -> None:
-    aligner = begun("c0", "c1")
+def test_a_camera_whose_recording_has_ended_is_not_waited_for() -> None:
+    aligner = connected_aligner("c0", "c1")
     aligner.camera_disconnected("c2")
     for camera in ("c0", "c1"):
-        aligner.add_tracks(word(camera, 0, ended=camera == "c0"))
-    assert heard(aligner.ready(now=5)) == [(0, ("c0", "c1"), ())]
+        aligner.add_tracks(window(camera, 0, ended=camera == "c0"))
+    assert summary(aligner.ready(now=5)) == [(0, ("c0", "c1"), ())]
     assert not aligner.all_ended
-    aligner.add_tracks(word("c1", 1))
-    assert heard(aligner.ready(now=10)) == [(1, ("c1",), ())]
+    aligner.add_tracks(window("c1", 1))
+    assert summary(aligner.ready(now=10)) == [(1, ("c1",), ())]
 
 
-def test_when_every_camera_is_gone_time_goes_on() -> None:
-    aligner = begun("c0")
+def test_epochs_continue_without_any_camera() -> None:
+    aligner = connected_aligner("c0")
     aligner.camera_disconnected("c0")
-    assert heard(aligner.ready(now=9 + GRACE + 1)) == [(0, (), ()), (1, (), ())]
+    assert summary(aligner.ready(now=9 + GRACE + 1)) == [(0, (), ()), (1, (), ())]
 
 
-def test_a_camera_whose_word_on_an_epoch_was_lost_is_not_waited_for_and_the_loss_is_told() -> None:
-    aligner = begun("c0", "c1")
-    aligner.add_tracks(word("c0", 1))
-    aligner.add_tracks(word("c1", 0))
-    aligner.add_tracks(word("c1", 1))
-    assert heard(aligner.ready(now=0)) == [(0, ("c1",), ("c0",)), (1, ("c0", "c1"), ())]
+def test_a_camera_whose_window_was_lost_is_not_waited_for_and_reported_as_late() -> None:
+    aligner = connected_aligner("c0", "c1")
+    aligner.add_tracks(window("c0", 1))
+    aligner.add_tracks(window("c1", 0))
+    aligner.add_tracks(window("c1", 1))
+    assert summary(aligner.ready(now=0)) == [(0, ("c1",), ("c0",)), (1, ("c0", "c1"), ())]
 
 
 FAR = 300
@@ -133,23 +133,23 @@ def taken(aligner: EpochAligner, now: int, count: int) -> list[Epoch]:
     return [epoch for _ in range(count) if (epoch := aligner.next_ready(now)) is not None]
 
 
-def test_what_nobody_spoke_of_and_is_long_past_is_left_out_at_once() -> None:
+def test_long_past_epochs_without_windows_are_skipped_at_once() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
     for camera in ("c0", "c1"):
         aligner.frame_received(camera, 1, 0)
-        aligner.add_tracks(word(camera, 0))
-    assert heard(aligner.ready(now=4)) == [(0, ("c0", "c1"), ())]
-    aligner.add_tracks(word("c0", 2))
-    aligner.add_tracks(word("c1", 1_000_000))
-    aligner.add_tracks(word("c0", 1_000_001, ended=True))
+        aligner.add_tracks(window(camera, 0))
+    assert summary(aligner.ready(now=4)) == [(0, ("c0", "c1"), ())]
+    aligner.add_tracks(window("c0", 2))
+    aligner.add_tracks(window("c1", 1_000_000))
+    aligner.add_tracks(window("c0", 1_000_001, ended=True))
     (leap,) = taken(aligner, 5_000_020, 2)
     (after,) = taken(aligner, 5_000_021 + GRACE, 1)
-    assert heard([leap, after]) == [(1_000_000, ("c1",), ("c0",)), (1_000_001, ("c0",), ("c1",))]
+    assert summary([leap, after]) == [(1_000_000, ("c1",), ("c0",)), (1_000_001, ("c0",), ("c1",))]
     assert (leap.skipped, after.skipped) == (999_999, 0)
     assert aligner.late_messages == {"c0": 1, "c1": 0, "c2": 0}
 
 
-def test_with_nobody_left_it_goes_on_with_now() -> None:
+def test_without_cameras_it_skips_to_the_present() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
     aligner.frame_received("c0", 1, 0)
     assert aligner.ready(now=0) == []
@@ -159,39 +159,39 @@ def test_with_nobody_left_it_goes_on_with_now() -> None:
     assert (epoch.number, epoch.skipped) == (1_000_000, 1_000_000)
 
 
-def test_what_is_not_long_past_and_what_somebody_spoke_of_are_taken_out_one_by_one() -> None:
+def test_recent_epochs_and_those_with_windows_are_not_skipped() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
     aligner.frame_received("c0", 1, 0)
     assert aligner.ready(now=0) == []
     one_by_one = (FAR - GRACE) // STRIDE
     assert [it.number for it in aligner.ready(now=FAR)] == list(range(one_by_one))
-    aligner.add_tracks(word("c0", one_by_one))
+    aligner.add_tracks(window("c0", one_by_one))
     (spoken,) = taken(aligner, 1000 * FAR, 2)
     (leap,) = taken(aligner, 1000 * FAR + STRIDE + GRACE, 1)
     assert (spoken.number, spoken.skipped) == (one_by_one, 0)
     assert leap.skipped
 
 
-def test_words_of_another_time_do_not_say_where_to_begin() -> None:
+def test_windows_far_from_the_present_do_not_determine_the_first_epoch() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
     for camera, epoch in (("c0", 3), ("c1", 1_000_000), ("c2", 9_000_000)):
         aligner.frame_received(camera, 1, epoch * STRIDE)
-        aligner.add_tracks(word(camera, epoch))
+        aligner.add_tracks(window(camera, epoch))
     assert taken(aligner, 5_000_004, 1) == [], "c0 may still come to its senses"
-    assert heard(taken(aligner, 5_000_005 + GRACE, 1)) == [(1_000_000, ("c1",), ("c0",))]
+    assert summary(taken(aligner, 5_000_005 + GRACE, 1)) == [(1_000_000, ("c1",), ("c0",))]
     assert aligner.late_messages == {"c0": 1, "c1": 0, "c2": 1}
 
 
-def test_of_recordings_nothing_is_left_out() -> None:
-    aligner = begun("c0")
-    aligner.add_tracks(word("c0", 1000))
+def test_no_epoch_of_recordings_is_skipped() -> None:
+    aligner = connected_aligner("c0")
+    aligner.add_tracks(window("c0", 1000))
     assert [it.number for it in taken(aligner, 10**9, 1001)] == list(range(1001))
 
 
 BEHIND = 50
 
 
-def test_cameras_that_are_all_behind_are_waited_for_and_nobody_is_left_out() -> None:
+def test_cameras_that_are_all_behind_are_waited_for() -> None:
     """As on a machine with too much to do: everybody speaks two seconds late."""
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, BEHIND)
     for camera in CAMERAS:
@@ -202,41 +202,41 @@ def test_cameras_that_are_all_behind_are_waited_for_and_nobody_is_left_out() -> 
         for place, camera in enumerate(CAMERAS):
             epoch, rest = divmod(now - BEHIND - 3 * place + 1, STRIDE)
             if rest == 0 and epoch > 0:
-                aligner.add_tracks(word(camera, epoch - 1))
+                aligner.add_tracks(window(camera, epoch - 1))
         epochs += aligner.ready(now)
-    assert heard(epochs) == [(number, CAMERAS, ()) for number in range(len(epochs))]
+    assert summary(epochs) == [(number, CAMERAS, ()) for number in range(len(epochs))]
     assert len(epochs) > 60
 
 
-def test_nobody_is_waited_for_longer_than_they_may_be_behind() -> None:
+def test_cameras_are_waited_for_no_longer_than_the_backlog_limit() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, BEHIND)
     aligner.camera_connected("c0")
     aligner.frame_received("c0", 1, 0)
     assert aligner.ready(now=4 + GRACE + BEHIND) == []
-    assert heard(aligner.ready(now=5 + GRACE + BEHIND)) == [(0, (), ("c0",))]
+    assert summary(aligner.ready(now=5 + GRACE + BEHIND)) == [(0, (), ("c0",))]
     aligner.camera_disconnected("c0")
     assert aligner.ready(now=9 + GRACE) == []
-    assert heard(aligner.ready(now=10 + GRACE)) == [(1, (), ())], "nobody is there to be behind"
+    assert summary(aligner.ready(now=10 + GRACE)) == [(1, (), ())], "nobody is there to be behind"
 
 
-def test_the_others_are_waited_for_from_the_first_word_on() -> None:
+def test_the_grace_period_begins_with_the_first_window() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, BEHIND)
     for camera in ("c0", "c1"):
         aligner.camera_connected(camera)
         aligner.frame_received(camera, 1, 0)
-    aligner.add_tracks(word("c0", 0))
+    aligner.add_tracks(window("c0", 0))
     assert aligner.ready(now=40) == []
     assert aligner.ready(now=40 + GRACE) == []
-    assert heard(aligner.ready(now=41 + GRACE)) == [(0, ("c0",), ("c1",))]
+    assert summary(aligner.ready(now=41 + GRACE)) == [(0, ("c0",), ("c1",))]
 
 
-def test_what_cannot_be_decided_in_time_is_left_out_up_to_the_newest_word_of_now() -> None:
+def test_skipping_goes_to_the_newest_reported_epoch() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE)
     for camera in CAMERAS:
         aligner.camera_connected(camera)
     for epoch in (0, 1, 2, 3, 4, 90):  # the last one is of a camera that has counted too far
         for camera in CAMERAS:
-            aligner.add_tracks(word(camera, epoch))
+            aligner.add_tracks(window(camera, epoch))
     now = end_of_epoch(4, STRIDE)
     assert [it.number for it in [aligner.next_ready(now)] if it] == [0]
     assert aligner.backlog(now) == 3 * STRIDE
@@ -247,17 +247,17 @@ def test_what_cannot_be_decided_in_time_is_left_out_up_to_the_newest_word_of_now
     assert aligner.skip_to(now) == 0
 
 
-def test_who_speaks_of_what_is_to_come_takes_nobody_elses_word_from_them() -> None:
+def test_a_window_ahead_of_time_does_not_cut_other_cameras_off() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
     for camera in ("c0", "c1"):
         aligner.frame_received(camera, 1, 0)
     for epoch in range(30):
-        aligner.add_tracks(word("c0", epoch))
+        aligner.add_tracks(window("c0", epoch))
     late = STRIDE - 1 + GRACE + 1
     assert aligner.ready(now=0) == []
     epochs = aligner.ready(now=late)
     assert (epochs[0].number, epochs[0].late) == (0, ("c1",)), "it was waited for"
-    aligner.add_tracks(word("c1", 8))
+    aligner.add_tracks(window("c1", 8))
     taken_out = [it for now in range(late, 9 * STRIDE) for it in aligner.ready(now)]
     assert "c1" in next(it.tracks for it in taken_out if it.number == 8)
     assert aligner.late_messages["c1"] == 0

@@ -67,7 +67,7 @@ KINDS = ["video", "tracks", "status", "thumbs"]
 
 
 @pytest.mark.parametrize("what", KINDS)
-def test_json_that_is_no_text_is_counted_and_dropped(what: str) -> None:
+def test_invalid_utf8_is_counted_and_dropped(what: str) -> None:
     hall = Hall()
     broken = b'{"camera": "\xff", "histogram": "\xc3\x28", "state": "\xed\xa0\x80", "\xff": "\xff"}'
     hall.handle(what, Message(KEYS.camera("c0", what), broken, broken))
@@ -75,7 +75,7 @@ def test_json_that_is_no_text_is_counted_and_dropped(what: str) -> None:
 
 
 @pytest.mark.parametrize("field", ["missed", "shed", "boot"])
-def test_a_count_that_no_metric_could_say_is_refused(field: str) -> None:
+def test_a_count_too_large_for_a_metric_is_refused(field: str) -> None:
     hall = Hall()
     hall.handle("status", status("c0", **{field: 10**400}))
     assert hall.bad() == 1
@@ -83,14 +83,14 @@ def test_a_count_that_no_metric_could_say_is_refused(field: str) -> None:
 
 
 @pytest.mark.parametrize("words", ["\x1b[2J", "searching\n", "x" * 201, "suchend: zu groß"])
-def test_what_is_left_out_is_told_in_words_that_a_terminal_can_show(words: str) -> None:
+def test_a_load_text_with_unprintable_characters_is_refused(words: str) -> None:
     hall = Hall()
     hall.handle("status", status("c0", load=words))
     assert hall.bad() == 1
     assert hall.ingest.states["c0"].status is None
 
 
-def test_a_camera_that_leaves_frames_out_says_so_while_it_is_there() -> None:
+def test_a_connected_cameras_load_text_is_its_message() -> None:
     hall = Hall()
     words = "searching every 3rd frame: the machine is too busy"
     state = hall.ingest.states["c0"]
@@ -112,7 +112,7 @@ anything = st.recursive(
 
 @settings(deadline=None, max_examples=200)
 @given(what=st.sampled_from(KINDS), payload=st.binary(max_size=100), attachment=st.binary(max_size=100))
-def test_any_bytes_are_counted_and_dropped(what: str, payload: bytes, attachment: bytes) -> None:
+def test_arbitrary_bytes_are_counted_and_dropped(what: str, payload: bytes, attachment: bytes) -> None:
     hall = Hall()
     hall.handle(what, Message(KEYS.camera("c0", what), payload, attachment))
     assert hall.bad() == 1
@@ -122,7 +122,7 @@ def test_any_bytes_are_counted_and_dropped(what: str, payload: bytes, attachment
 
 @settings(deadline=None, max_examples=100)
 @given(what=st.sampled_from(KINDS), key=st.text(max_size=40))
-def test_any_key_is_ignored(what: str, key: str) -> None:
+def test_arbitrary_keys_are_ignored(what: str, key: str) -> None:
     hall = Hall()
     hall.handle(what, Message(key, b"", b""))
     hall.ingest.alive(key, is_present=True)
@@ -139,7 +139,7 @@ GOOD: dict[str, Message] = {
 
 @settings(deadline=None, max_examples=80)
 @given(data=st.data(), what=st.sampled_from(KINDS))
-def test_one_wrong_field_raises_neither_here_nor_further_on(data: st.DataObject, what: str) -> None:
+def test_a_message_with_one_wrong_field_raises_no_error(data: st.DataObject, what: str) -> None:
     hall, good = Hall(), GOOD[what]
     in_head = bool(good.attachment)
     fields: dict[str, Any] = msgspec.json.decode(good.attachment if in_head else good.payload)
@@ -169,7 +169,7 @@ def test_one_wrong_field_raises_neither_here_nor_further_on(data: st.DataObject,
         {"tracks": word("c0", 0, {1: SMALL}).tracks * 2},
     ],
 )
-def test_a_word_that_cannot_be_true_is_refused(changes: dict[str, Any]) -> None:
+def test_inconsistent_tracks_are_refused(changes: dict[str, Any]) -> None:
     hall = Hall()
     fields = {**msgspec.json.decode(GOOD["tracks"].payload), **msgspec.to_builtins(changes)}
     payload = json.dumps(fields).encode()
@@ -177,7 +177,7 @@ def test_a_word_that_cannot_be_true_is_refused(changes: dict[str, Any]) -> None:
     assert hall.bad() == 1
 
 
-def test_cameras_that_nobody_configured_are_ignored(caplog: pytest.LogCaptureFixture) -> None:
+def test_unconfigured_cameras_are_ignored(caplog: pytest.LogCaptureFixture) -> None:
     hall = Hall()
     hall.ingest.video(video("cellar", encoded(0)[0]))
     hall.ingest.tracks(tracks(word("cellar", 0, {})))
@@ -188,7 +188,7 @@ def test_cameras_that_nobody_configured_are_ignored(caplog: pytest.LogCaptureFix
     assert not hall.frames
 
 
-def test_a_camera_of_other_parameters_is_refused_and_its_frames_reach_nobody() -> None:
+def test_a_camera_with_other_parameter_sets_is_refused() -> None:
     hall = Hall()
     hall.ingest.video(video("c0", encoded(0)[0]))
     for unit in encoded(1, crf=40)[:10]:
@@ -202,7 +202,7 @@ def test_a_camera_of_other_parameters_is_refused_and_its_frames_reach_nobody() -
     assert not any(hall.frame_buffers["c1"].has(pulse) for pulse in range(10))
 
 
-def test_a_refused_camera_that_is_started_again_with_the_right_settings_is_welcome() -> None:
+def test_a_refused_camera_is_accepted_after_a_restart_with_the_right_settings() -> None:
     hall = Hall()
     hall.ingest.video(video("c0", encoded(0)[0]))
     hall.ingest.video(video("c1", encoded(1, crf=40)[0]))
@@ -213,7 +213,7 @@ def test_a_refused_camera_that_is_started_again_with_the_right_settings_is_welco
     assert hall.frame_buffers["c1"].has(5)
 
 
-def test_a_cameras_state_follows_what_it_does() -> None:
+def test_a_cameras_state_follows_its_messages() -> None:
     hall = Hall()
     state = hall.ingest.states["c0"]
     words = [state.label]
@@ -231,7 +231,7 @@ def test_a_cameras_state_follows_what_it_does() -> None:
     assert words == ["starting", "live", "gone", "ended", "ended", "live"]
 
 
-def test_small_pictures_are_kept_by_run_and_track_until_they_are_old_or_the_camera_is_gone() -> None:
+def test_thumbnails_are_kept_by_boot_and_track_until_they_expire_or_the_camera_disconnects() -> None:
     hall = Hall()
     hall.ingest.thumbnail(thumbnail("c0", 1, b"old", pulse=5))
     hall.ingest.thumbnail(thumbnail("c0", 2, b"new", pulse=50))
@@ -242,7 +242,7 @@ def test_small_pictures_are_kept_by_run_and_track_until_they_are_old_or_the_came
     assert list(hall.ingest.thumbnails) == [("c0", 1, 2)]
 
 
-def test_what_is_of_pulses_that_nobody_can_have_counted_to_is_counted_and_dropped() -> None:
+def test_messages_of_pulses_far_in_the_future_are_counted_and_dropped() -> None:
     hall = Hall()
     hall.ingest = Ingest(
         hall.frame_buffers, hall.aligner, lambda *_: None, current_pulse=lambda: 20, max_ahead=50
@@ -260,7 +260,7 @@ def test_what_is_of_pulses_that_nobody_can_have_counted_to_is_counted_and_droppe
     assert [epoch.number for epoch in hall.aligner.ready(now=4)] == [0]
 
 
-def test_small_pictures_of_a_camera_are_so_many_at_most_and_take_no_other_cameras_place() -> None:
+def test_thumbnails_are_limited_for_each_camera() -> None:
     hall = Hall()
     hall.ingest.thumbnail(thumbnail("c1", 7, b"jpeg"))
     for track in range(1200):
@@ -270,14 +270,14 @@ def test_small_pictures_of_a_camera_are_so_many_at_most_and_take_no_other_camera
     assert ("c1", 1, 7) in hall.ingest.thumbnails
 
 
-def test_a_small_picture_that_is_none_is_counted_and_dropped() -> None:
+def test_an_invalid_thumbnail_is_counted_and_dropped() -> None:
     hall = Hall()
     hall.ingest.thumbnail(thumbnail("c0", 1, bytes(1 << 18)))
     assert hall.bad() == 1
     assert not hall.ingest.thumbnails
 
 
-def test_a_camera_that_comes_and_goes_without_end_is_few_lines_of_the_log(
+def test_a_flapping_camera_writes_few_log_lines(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level("INFO")
@@ -298,7 +298,7 @@ def test_a_status_is_kept() -> None:
     assert told.fps == 24.5
 
 
-def test_frames_and_words_become_epochs() -> None:
+def test_frames_and_tracks_become_epochs() -> None:
     hall = Hall()
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed)[:STRIDE]:

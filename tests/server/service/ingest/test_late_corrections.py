@@ -18,7 +18,7 @@ MENDED = STRIDE
 """The first frame in which the camera had taken each for the other."""
 
 
-def mended(epoch: int) -> CameraTracks:
+def late_revision(epoch: int) -> CameraTracks:
     """Return a camera's word that the two were in each other's place since then."""
     last = end_of_epoch(epoch, STRIDE)
     said = word("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, revised_from=MENDED)
@@ -28,13 +28,13 @@ def mended(epoch: int) -> CameraTracks:
 
 
 @pytest.mark.parametrize("late", [1, 2, 3])
-def test_tracks_exchange_their_names_once_however_many_words_say_so(late: int) -> None:
+def test_tracks_exchange_their_keys_once_however_many_late_revisions_report_it(late: int) -> None:
     people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), 0)
     for epoch in range(4):
         [said] = people.update(epoch_of(epoch, word("c0", epoch, {1: LEFT, 2: RIGHT})))
     left, right = said.keys
     now = 4 + late
-    words = tuple(mended(epoch) for epoch in range(4, now))
+    revisions = tuple(late_revision(epoch) for epoch in range(4, now))
     newest = {"c0": word("c0", now, {1: RIGHT, 2: LEFT})}
-    for window in people.update(Epoch(now, end_of_epoch(now, STRIDE), newest, late_revisions=words)):
+    for window in people.update(Epoch(now, end_of_epoch(now, STRIDE), newest, late_revisions=revisions)):
         assert window.keys == (right, left), "a name stays where it was: on the left, or on the right"

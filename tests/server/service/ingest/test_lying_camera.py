@@ -50,7 +50,7 @@ LIAR, OTHER = CAMERAS
 EPOCHS = 8
 FAR = 500_000_000_000
 """Half a million million: within what a pulse may be."""
-Lie = Callable[[int], Sequence[Message]]
+LyingMessages = Callable[[int], Sequence[Message]]
 """What the camera says at an epoch."""
 
 
@@ -63,7 +63,7 @@ def frames(epoch: int, /, **changes: Any) -> list[Message]:
     ]
 
 
-def said(epoch: int, /, **changes: Any) -> list[Message]:
+def altered_tracks(epoch: int, /, **changes: Any) -> list[Message]:
     """Return its word on an epoch, as it is not."""
     right = msgspec.to_builtins(word(LIAR, epoch, {1: SMALL}))
     return [Message(KEYS.camera(LIAR, "tracks"), json.dumps(right | changes).encode(), b"")]
@@ -71,32 +71,34 @@ def said(epoch: int, /, **changes: Any) -> list[Message]:
 
 def of_one(epoch: int, /, **changes: Any) -> list[Message]:
     (track,) = msgspec.to_builtins(word(LIAR, epoch, {1: SMALL}))["tracks"]
-    return said(epoch, tracks=[track | changes])
+    return altered_tracks(epoch, tracks=[track | changes])
 
 
 def very_many(epoch: int) -> list[Message]:
     boxes = [SMALL] * STRIDE
     many = [TrackMessage(id=it, boxes=[*boxes], confidence=1.0) for it in range(TRACKS_MAX + 1)]
-    return said(epoch, tracks=msgspec.to_builtins(many))
+    return altered_tracks(epoch, tracks=msgspec.to_builtins(many))
 
 
 SOLVED = {"objective": 1.0, "bound": 1.0, "gap": 0.0, "integral": True, "rounds": 1}
-REFUSED: dict[str, Lie] = {
+REFUSED: dict[str, LyingMessages] = {
     "frames far ahead": lambda epoch: frames(epoch, pulse=FAR + epoch),
     "frames of 2^53": lambda epoch: frames(epoch, pulse=2**53 + epoch),
     "frames of 2^63": lambda epoch: frames(epoch, pulse=2**63 + epoch),
     "decoded by frames that are none": lambda epoch: frames(epoch, after=2**63),
     "taken at no time": lambda epoch: frames(epoch, due=-1e308, taken=1e308),
-    "windows far ahead": lambda epoch: said(
+    "windows far ahead": lambda epoch: altered_tracks(
         epoch, epoch=FAR, first=FAR * STRIDE, last=FAR * STRIDE - 1, final_to=FAR * STRIDE - 1, tracks=[]
     ),
-    "final for ever": lambda epoch: said(epoch, final_to=FAR),
-    "final to 2^63": lambda epoch: said(epoch, final_to=2**63, revised_from=epoch * STRIDE),
-    "not searched for ever": lambda epoch: said(epoch, without_detection=list(range(FAR, FAR + 1000))),
-    "shed in times to come": lambda epoch: said(epoch, shed=[FAR]),
-    "alone in times to come": lambda epoch: said(epoch, without_peers=[FAR]),
-    "solved at no time": lambda epoch: said(epoch, solved_at=1e308),
-    "a gap without measure": lambda epoch: said(epoch, solve=SOLVED | {"gap": 1e308}),
+    "final for ever": lambda epoch: altered_tracks(epoch, final_to=FAR),
+    "final to 2^63": lambda epoch: altered_tracks(epoch, final_to=2**63, revised_from=epoch * STRIDE),
+    "not searched for ever": lambda epoch: altered_tracks(
+        epoch, without_detection=list(range(FAR, FAR + 1000))
+    ),
+    "shed in times to come": lambda epoch: altered_tracks(epoch, shed=[FAR]),
+    "alone in times to come": lambda epoch: altered_tracks(epoch, without_peers=[FAR]),
+    "solved at no time": lambda epoch: altered_tracks(epoch, solved_at=1e308),
+    "a gap without measure": lambda epoch: altered_tracks(epoch, solve=SOLVED | {"gap": 1e308}),
     "sure without measure": lambda epoch: of_one(epoch, confidence=1e308),
     "more people than there is room for": very_many,
     "a status that no metric can say": lambda _: [status(LIAR, fps=1e308)],
@@ -112,14 +114,16 @@ REFUSED: dict[str, Lie] = {
     "small pictures far ahead": lambda _: [thumbnail(LIAR, 1, b"jpeg", pulse=FAR)],
     "small pictures that are none": lambda _: [thumbnail(LIAR, 1, bytes(10**6))],
 }
-TAKEN: dict[str, Lie] = {
+TAKEN: dict[str, LyingMessages] = {
     "nothing": lambda _: [],
     "frames long past": lambda epoch: frames(epoch, pulse=epoch),
     "frames a minute ahead": lambda epoch: frames(epoch, pulse=1400 + epoch),
-    "windows a minute ahead": lambda epoch: [it for ahead in range(40) for it in said_right(epoch + ahead)],
-    "another run each time": lambda epoch: [*frames(epoch, boot=epoch), *said(epoch, boot=epoch)],
-    "ended, again and again": lambda epoch: [*frames(epoch), *said(epoch, ended=True)],
-    "pictures of any size": lambda epoch: said(epoch, size=[1 + epoch * 997, 1 + epoch * 31]),
+    "windows a minute ahead": lambda epoch: [
+        it for ahead in range(40) for it in correct_tracks(epoch + ahead)
+    ],
+    "another run each time": lambda epoch: [*frames(epoch, boot=epoch), *altered_tracks(epoch, boot=epoch)],
+    "ended, again and again": lambda epoch: [*frames(epoch), *altered_tracks(epoch, ended=True)],
+    "pictures of any size": lambda epoch: altered_tracks(epoch, size=[1 + epoch * 997, 1 + epoch * 31]),
     "boxes as far as can be": lambda epoch: of_one(epoch, boxes=[[-1e6, -1e6, 1e6, 1e6]] * STRIDE),
     "boxes of nothing": lambda epoch: of_one(epoch, boxes=[[1e6, 1e6, -1e6, -1e6]] * STRIDE),
     "looks of any length": lambda epoch: of_one(
@@ -133,21 +137,21 @@ TAKEN: dict[str, Lie] = {
 }
 
 
-def said_right(epoch: int) -> list[Message]:
+def correct_tracks(epoch: int) -> list[Message]:
     return [tracks(word(LIAR, epoch, {1: SMALL}))]
 
 
-def take(service: FedService, message: Message) -> None:
+def deliver(service: FedService, message: Message) -> None:
     what = message.key.split("/")[4]
     ingest = service.ingest
     handlers = {"video": ingest.video, "tracks": ingest.tracks, "status": ingest.status}
     handlers.get(what, ingest.thumbnail)(message)
 
 
-class Lived:
+class LyingSite:
     """Both cameras send for a while, one of them lies, and all of it is decided."""
 
-    def __init__(self, lie: Lie) -> None:
+    def __init__(self, lying_messages: LyingMessages) -> None:
         self.service = service = FedService(small_config())
         self.decided: list[GopChoices] = []
         service.on_decision.append(self.decided.append)
@@ -159,8 +163,8 @@ class Lived:
         service.ingest.video(video(OTHER, encoded(1)[0]))
         for epoch in range(EPOCHS):
             self._send(epoch)
-            for message in lie(epoch):
-                take(service, message)
+            for message in lying_messages(epoch):
+                deliver(service, message)
             self._pass(end_of_epoch(epoch, STRIDE))
         self.last = end_of_epoch(EPOCHS - 2, STRIDE)
         """The last pulse of which all that there is to look ahead to has come."""
@@ -183,7 +187,7 @@ class Lived:
             self._viewer._queue.clear()
 
 
-def told(service: FedService) -> None:
+def check_reported_values(service: FedService) -> None:
     """Ask for all that is told of cameras: numbers that are none would take it from everybody."""
     facade = BestViewService(service)
     for camera in facade.cameras.diagnose_cameras():
@@ -193,29 +197,29 @@ def told(service: FedService) -> None:
 
 
 @pytest.mark.parametrize("name", [*REFUSED, *TAKEN])
-async def test_whatever_a_camera_says_the_other_one_goes_on(name: str) -> None:
-    lie = (REFUSED | TAKEN)[name]
-    lived = Lived(lie)
-    service, people = lived.service, lived.service.decider.people
-    number = people.person_of(OTHER, 1, 7, lived.last)
+async def test_implausible_messages_of_one_camera_do_not_affect_the_other(name: str) -> None:
+    lying_messages = (REFUSED | TAKEN)[name]
+    site = LyingSite(lying_messages)
+    service, people = site.service, site.service.decider.people
+    number = people.person_of(OTHER, 1, 7, site.last)
     assert number is not None, "its person is somebody"
     assert number < 20
-    told_of = [it for it in lived.decided if STRIDE <= it.first <= lived.last]
-    assert [it.first for it in told_of] == list(range(STRIDE, lived.last, GOP)), (
+    decisions = [it for it in site.decided if STRIDE <= it.first <= site.last]
+    assert [it.first for it in decisions] == list(range(STRIDE, site.last, GOP)), (
         "all is decided, and in order"
     )
-    assert all(it.choices.get(number) in CAMERAS for it in told_of), "they are shown all the time"
-    sent = [picture.pulse for it in lived.shown for picture in it.pictures]
-    assert [it for it in sent if it <= lived.last] == list(range(lived.last + 1)), "and the stream goes on"
+    assert all(it.choices.get(number) in CAMERAS for it in decisions), "they are shown all the time"
+    sent = [picture.pulse for it in site.shown for picture in it.pictures]
+    assert [it for it in sent if it <= site.last] == list(range(site.last + 1)), "and the stream goes on"
     assert any(camera == OTHER for camera, *_ in service.ingest.thumbnails)
     states = service.ingest.states
     assert states[OTHER].bad_messages == 0
     assert (states[LIAR].bad_messages > 0) == (name in REFUSED)
     assert sum(map(len, people.undetected._frames.values())) < 1000
-    told(service)
+    check_reported_values(service)
 
 
-def test_when_all_recordings_are_over_nothing_is_decided_of_pulses_that_nobody_has_had() -> None:
+def test_finishing_decides_no_pulses_beyond_the_last_epoch() -> None:
     """Before the first pulse nobody can tell that a frame is far ahead."""
     service = FedService(small_config())
     service.come(*CAMERAS)
@@ -232,7 +236,7 @@ def test_when_all_recordings_are_over_nothing_is_decided_of_pulses_that_nobody_h
     assert left[-1].first + left[-1].frames == 2 * STRIDE
 
 
-def test_sound_of_more_frames_than_any_is_none_and_takes_no_time() -> None:
+def test_an_audio_message_with_too_many_frames_is_refused_quickly() -> None:
     head = {"first": 2**62, "sizes": [1] * (AUDIO_FRAMES_MAX + 1)}
     with pytest.raises(msgspec.ValidationError):
         msgspec.json.decode(json.dumps(head).encode(), type=AudioHeader)
@@ -242,9 +246,9 @@ def test_sound_of_more_frames_than_any_is_none_and_takes_no_time() -> None:
     assert len(frame_buffer._frames) == 469
 
 
-def test_what_is_said_by_hand_here_is_what_cameras_say() -> None:
+def test_the_scripted_messages_here_are_like_a_cameras() -> None:
     right = [video(LIAR, unit) for unit in encoded(0)[:STRIDE]]
     assert [msgspec.json.decode(it.attachment) for it in frames(0)] == [
         msgspec.json.decode(it.attachment) for it in right
     ]
-    assert msgspec.json.decode(said(1)[0].payload, type=CameraTracks) == word(LIAR, 1, {1: SMALL})
+    assert msgspec.json.decode(altered_tracks(1)[0].payload, type=CameraTracks) == word(LIAR, 1, {1: SMALL})

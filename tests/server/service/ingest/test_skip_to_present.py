@@ -68,7 +68,7 @@ def service(tmp_path: Path) -> FedService:
 
 
 @pytest.mark.parametrize("hours", [8, 24 * 365])
-def test_who_slept_decides_what_is_of_now_and_nothing_of_what_is_long_past(
+def test_a_service_that_was_suspended_skips_to_the_present(
     service: FedService, tmp_path: Path, hours: int
 ) -> None:
     decided = noted(service)
@@ -91,7 +91,7 @@ def test_who_slept_decides_what_is_of_now_and_nothing_of_what_is_long_past(
 
 
 @pytest.mark.parametrize("minutes", [5, 8 * 60])
-def test_streams_go_on_after_a_leap_with_one_picture_that_bridges_it_or_with_a_hole(
+def test_streams_continue_after_a_skip_with_one_filler_picture_or_a_gap(
     service: FedService, minutes: int
 ) -> None:
     lived(service, range(BEFORE))
@@ -112,7 +112,7 @@ def test_streams_go_on_after_a_leap_with_one_picture_that_bridges_it_or_with_a_h
     service.close()
 
 
-def test_what_is_a_minute_late_is_decided_epoch_by_epoch(service: FedService) -> None:
+def test_a_backlog_of_a_minute_is_decided_epoch_by_epoch(service: FedService) -> None:
     decided = noted(service)
     lived(service, range(BEFORE))
     then = HOUR // 60
@@ -149,7 +149,7 @@ class Started(FedService):
 
 
 @pytest.mark.parametrize("other", [3, 3000 * HOUR], ids=["behind", "ahead"])
-async def test_who_is_heard_first_and_counts_alone_does_not_say_where_to_begin(other: int) -> None:
+async def test_a_camera_that_counts_alone_does_not_determine_the_first_epoch(other: int) -> None:
     service, now = Started(), 720 * HOUR
     decided = noted(service)
     running = asyncio.create_task(service.run())
@@ -169,7 +169,7 @@ async def test_who_is_heard_first_and_counts_alone_does_not_say_where_to_begin(o
     service.close()
 
 
-async def test_a_site_without_a_pulse_server_is_decided_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_site_without_a_pulse_server_is_decided(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.service.pipeline._FIRST_PULSE_S", 0.0)
     service = Started()
     decided = noted(service)
@@ -182,7 +182,7 @@ async def test_a_site_without_a_pulse_server_is_decided_all_the_same(monkeypatch
     service.close()
 
 
-def test_a_camera_that_slept_is_not_followed_by_hours_of_silence() -> None:
+def test_a_suspended_cameras_gap_is_not_filled_with_hours_of_pictures() -> None:
     following = AudioFollower(AudioBuffer(AudioFormat(48_000, 2), FPS, 10.0))
     following.next_audio(0, FPS)
     hours = 8 * 3600 * FPS

@@ -31,7 +31,7 @@ def places(frame: int) -> list[float]:
     return [300.0 - off, 300.0 + off]
 
 
-def found(frame: int) -> Detections:
+def detections_in(frame: int) -> Detections:
     left = np.clip(np.array(places(frame)), 0, WIDTH - 40)
     boxes = np.stack([left, np.full(2, 100.0), left + 40.0, np.full(2, 220.0)], axis=1)
     if abs(frame - MET) < 6:
@@ -48,12 +48,12 @@ class Camera:
         self._tracker = InteractiveTracker(WINDOW, CostSettings(), solver, ASSIST)
         self._reporter = TrackMessageBuilder("c0", 1, (WIDTH, HEIGHT), WINDOW.stride)
 
-    def take(self, frame: int, said: Sequence[PositionCorrection] = ()) -> CameraTracks | None:
-        result = self._tracker.push(frame, found(frame))
+    def take(self, frame: int, marked: Sequence[PositionCorrection] = ()) -> CameraTracks | None:
+        result = self._tracker.push(frame, detections_in(frame))
         if result is None:
             return None
-        anew = self._tracker.apply_corrections(said) if said else None
-        return self._reporter.regular(result if anew is None else corrected_messages(result, anew))
+        revised = self._tracker.apply_corrections(marked) if marked else None
+        return self._reporter.regular(result if revised is None else corrected_messages(result, revised))
 
 
 def at(people: PersonTracker, pulse: int) -> dict[int, float]:
@@ -63,7 +63,7 @@ def at(people: PersonTracker, pulse: int) -> dict[int, float]:
 
 
 def played(
-    said_at: int, of: Sequence[int], *, late: bool = False, frames: int = FRAMES
+    corrected_at: int, of: Sequence[int], *, late: bool = False, frames: int = FRAMES
 ) -> tuple[PersonTracker, dict[int, dict[int, float]]]:
     """Let the two meet; say at a window's end where the first was in some frames.
 
@@ -72,74 +72,78 @@ def played(
     """
     people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), WINDOW.lag)
     people.published.frames = ASSIST.memory_frames
-    camera, told, first = Camera(), {}, 0
-    held: list[CameraTracks] = []
+    camera, positions, first = Camera(), {}, 0
+    pending: list[CameraTracks] = []
     for frame in range(frames):
-        said: list[PositionCorrection] = []
-        if frame == said_at:
-            [left] = [number for number, where in told[20].items() if where < 300]
-            asked = corrections_for_tracker(
+        marked: list[PositionCorrection] = []
+        if frame == corrected_at:
+            [left] = [number for number, where in positions[20].items() if where < 300]
+            request = corrections_for_tracker(
                 people, "c0", left, [PointedPosition(it, places(it)[0] + 20, 160, 10) for it in of]
             )
-            assert asked is not None
-            said = [
-                PositionCorrection(it.pulse, it.track, it.x, it.y, it.tolerance) for it in asked.corrections
+            assert request is not None
+            marked = [
+                PositionCorrection(it.pulse, it.track, it.x, it.y, it.tolerance) for it in request.corrections
             ]
-        message = camera.take(frame, said)
+        message = camera.take(frame, marked)
         if message is None:
             continue
-        assert (message.revised_from is not None) == bool(said), "only then the past has changed"
-        missed = late and bool(said)
-        tracks, came = {} if missed else {"c0": message}, tuple(held)
-        held = [message] if missed else []
-        people.update(Epoch(message.epoch, frame, tracks, late_revisions=came))
+        assert (message.revised_from is not None) == bool(marked), "only then the past has changed"
+        missed = late and bool(marked)
+        tracks, late_messages = {} if missed else {"c0": message}, tuple(pending)
+        pending = [message] if missed else []
+        people.update(Epoch(message.epoch, frame, tracks, late_revisions=late_messages))
         for pulse in range(first, frame - 19):
-            told[pulse] = at(people, pulse)
+            positions[pulse] = at(people, pulse)
         first = max(first, frame - 19)
         people.forget_boxes_before(first)
-    return people, told
+    return people, positions
 
 
-def sides(told: dict[int, dict[int, float]], pulse: int) -> list[int]:
+def sides(positions: dict[int, dict[int, float]], pulse: int) -> list[int]:
     """Return who is shown left and right."""
-    return sorted(told[pulse], key=told[pulse].__getitem__)
+    return sorted(positions[pulse], key=positions[pulse].__getitem__)
 
 
-def test_alike_who_meet_and_turn_back_are_taken_for_each_other() -> None:
-    people, told = played(said_at=-1, of=[])
-    assert sides(told, 30) == list(reversed(sides(told, 110)))
+def test_similar_people_who_meet_and_turn_back_are_confused() -> None:
+    people, positions = played(corrected_at=-1, of=[])
+    assert sides(positions, 30) == list(reversed(sides(positions, 110)))
     assert people.take_corrections() == ()
 
 
 @pytest.mark.parametrize("late", [False, True], ids=["in time", "too late for its epoch"])
-@pytest.mark.parametrize("said_at", [84, 99, 124])
-def test_numbers_follow_from_what_is_told_next(said_at: int, *, late: bool) -> None:
-    people, told = played(said_at, range(MET + 8, MET + 14), late=late)
-    left, right = sides(told, 30)
+@pytest.mark.parametrize("corrected_at", [84, 99, 124])
+def test_numbers_follow_a_correction_in_later_frames(corrected_at: int, *, late: bool) -> None:
+    people, positions = played(corrected_at, range(MET + 8, MET + 14), late=late)
+    left, right = sides(positions, 30)
     behind = WINDOW.stride if late else 0
-    if said_at - 20 > MET + 10:
-        assert sides(told, said_at - 20 - WINDOW.stride) == [right, left], "what was told before stays"
-    for pulse in range(max(said_at - 19 + behind, MET + 10), FRAMES - 20):
-        assert sides(told, pulse) == [left, right]
+    if corrected_at - 20 > MET + 10:
+        assert sides(positions, corrected_at - 20 - WINDOW.stride) == [right, left], (
+            "what was told before stays"
+        )
+    for pulse in range(max(corrected_at - 19 + behind, MET + 10), FRAMES - 20):
+        assert sides(positions, pulse) == [left, right]
     splits, all_ = people.take_corrections(), (Split(left, right, "c0"), Split(right, left, "c0"))
-    assert splits == all_ or (splits == () and said_at == 84), "soon after, nobody was told to be anybody"
+    assert splits == all_ or (splits == () and corrected_at == 84), (
+        "soon after, nobody was told to be anybody"
+    )
 
 
-@pytest.mark.parametrize("said_at", [249, 299])
-def test_numbers_follow_where_the_meeting_was_long_ago(said_at: int) -> None:
+@pytest.mark.parametrize("corrected_at", [249, 299])
+def test_numbers_follow_a_correction_of_a_meeting_long_ago(corrected_at: int) -> None:
     """Of that time nobody is asked any more who was who; what was seen in it is remembered for as long."""
-    frames = said_at + 51
-    people, told = played(said_at, range(MET + 8, MET + 14), frames=frames)
-    left, right = sides(told, 30)
-    assert sides(told, said_at - 20 - WINDOW.stride) == [right, left]
-    for pulse in range(said_at - 19, frames - 20):
-        assert sides(told, pulse) == [left, right]
+    frames = corrected_at + 51
+    people, positions = played(corrected_at, range(MET + 8, MET + 14), frames=frames)
+    left, right = sides(positions, 30)
+    assert sides(positions, corrected_at - 20 - WINDOW.stride) == [right, left]
+    for pulse in range(corrected_at - 19, frames - 20):
+        assert sides(positions, pulse) == [left, right]
     assert people.take_corrections() == (Split(left, right, "c0"), Split(right, left, "c0"))
 
 
-def test_who_points_again_after_it_was_mended_still_means_the_same() -> None:
-    people, told = played(99, range(MET + 8, MET + 14))
-    left, right = sides(told, 30)
+def test_points_after_a_correction_still_refer_to_the_same_person() -> None:
+    people, positions = played(99, range(MET + 8, MET + 14))
+    left, right = sides(positions, 30)
     before, after = (people.published.of("c0", [left], it) for it in (40, 120))
     assert before is not None
     assert after is not None

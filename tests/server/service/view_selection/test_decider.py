@@ -51,7 +51,7 @@ def shown(decisions: list[GopDecision], number: int = 1) -> list[str | None]:
     return [choice.camera for it in decisions for choice in it.choices if choice.number == number]
 
 
-def said(decision: GopDecision) -> str:
+def reason_of(decision: GopDecision) -> str:
     return reason(decision.choices[0], decision.why.of(decision.choices[0].number))
 
 
@@ -77,15 +77,15 @@ def test_a_little_better_is_not_worth_a_cut_and_much_better_is() -> None:
     after: Seen = {A: {1: SMALL}, B: {1: LARGE}}
     decisions = decide(decider(), [before] * 2 + [between] * 3 + [after] * 3)
     assert shown(decisions) == [A, A, A, A, B, B, B]
-    assert "a little better than c0, but not enough" in said(decisions[2])
+    assert "a little better than c0, but not enough" in reason_of(decisions[2])
 
 
-def test_a_person_who_is_seen_by_one_camera_alone_is_shown_by_it() -> None:
+def test_a_person_seen_by_a_single_camera_is_shown_by_it() -> None:
     decisions = decide(decider(), [{A: {}, B: {1: SMALL}}] * 3)
     assert shown(decisions) == [B, B]
 
 
-def test_views_change_only_where_gops_begin_and_boxes_are_of_the_gops_frames() -> None:
+def test_views_change_only_at_gops_and_boxes_are_of_their_frames() -> None:
     story = [{A: {1: LARGE}, B: {}}] * 3 + [{A: {}, B: {}}] * 3
     decisions = decide(decider(), story, end=6 * STRIDE - 1)
     assert [it.first for it in decisions] == [n * GOP for n in range(6)]
@@ -95,22 +95,22 @@ def test_views_change_only_where_gops_begin_and_boxes_are_of_the_gops_frames() -
     assert decisions[3].boxes[A] == [[]] * GOP
 
 
-def test_a_camera_of_which_a_frame_is_missing_is_not_chosen_for_that_gop() -> None:
+def test_a_camera_with_a_missing_frame_is_not_selected_for_the_gop() -> None:
     it = decider(has=lambda camera, pulse: (camera, pulse) != (A, GOP + 2))
     decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
     assert shown(decisions) == [A, B, A, A, A]
     assert decisions[1].why.of(1).views[A].cost is None
 
 
-def test_where_no_camera_can_be_shown_none_is_chosen_and_the_stream_goes_on_after() -> None:
+def test_no_camera_is_selected_while_none_can_be_shown() -> None:
     it = decider(has=lambda _camera, pulse: pulse // GOP != 1)
     decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
     assert shown(decisions) == [A, None, A, A, A]
-    assert said(decisions[1]) == "No camera's picture can be shown at the moment."
+    assert reason_of(decisions[1]) == "No camera's picture can be shown at the moment."
 
 
 @pytest.mark.parametrize("left", range(1, GOP + 1))
-def test_the_end_decides_what_is_left_a_partial_gop_too(left: int) -> None:
+def test_finishing_decides_the_rest_including_a_partial_gop(left: int) -> None:
     end = 2 * GOP + left - 1
     decisions = decide(decider(), [{A: {1: LARGE}, B: {}}] * 3, end=end)
     assert [(it.first, it.frames) for it in decisions] == [(0, GOP), (GOP, GOP), (2 * GOP, left)]
@@ -118,11 +118,11 @@ def test_the_end_decides_what_is_left_a_partial_gop_too(left: int) -> None:
     assert all(len(frames) == left for frames in decisions[-1].boxes.values())
 
 
-def test_the_end_of_nothing_decides_nothing() -> None:
+def test_finishing_without_epochs_decides_nothing() -> None:
     assert decider().finish(100) == []
 
 
-def test_a_service_that_starts_in_the_middle_begins_with_the_next_gop() -> None:
+def test_a_service_started_within_a_gop_begins_with_the_next() -> None:
     it = decider(encode={"gop": 10}, view={"lookahead": 20})
     decisions = []
     for number in range(5, 12):
@@ -144,7 +144,7 @@ def test_a_service_that_starts_in_the_middle_begins_with_the_next_gop() -> None:
     ),
     st.sets(st.tuples(st.sampled_from(CAMERAS), st.integers(0, 39)), max_size=5),
 )
-def test_the_same_epochs_give_the_same_decisions_and_none_shows_what_is_missing(
+def test_decisions_are_deterministic_and_show_no_missing_frames(
     story: list[Seen], missing: set[tuple[str, int]]
 ) -> None:
     end = len(story) * STRIDE - 1
@@ -160,42 +160,42 @@ def test_the_same_epochs_give_the_same_decisions_and_none_shows_what_is_missing(
                 assert (choice.camera, pulse) not in missing
 
 
-def test_a_cut_is_told_once_with_both_cameras() -> None:
+def test_a_cut_is_published_once_with_both_cameras() -> None:
     it = decider(has=lambda camera, pulse: (camera, pulse // GOP) != (A, 1))
-    board = DecisionState(25.0)
-    told = [board.put(decision) for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19)]
-    assert [[(cut.from_camera, cut.to_camera, cut.pulse) for cut in it.cuts] for it in told] == [
+    state = DecisionState(25.0)
+    gop_choices = [state.put(decision) for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19)]
+    assert [[(cut.from_camera, cut.to_camera, cut.pulse) for cut in it.cuts] for it in gop_choices] == [
         [],
         [(A, B, GOP)],
         [(B, A, 2 * GOP)],
         [],
     ]
-    assert board.cuts == 2
-    assert board.selected_views[1].since == 2 * GOP
-    assert board.selected_views[1].cameras == (A,)
-    assert told[0].choices == {1: A}
-    assert told[0].boxes[A][0] == [(1, *LARGE)]
+    assert state.cuts == 2
+    assert state.selected_views[1].since == 2 * GOP
+    assert state.selected_views[1].cameras == (A,)
+    assert gop_choices[0].choices == {1: A}
+    assert gop_choices[0].boxes[A][0] == [(1, *LARGE)]
 
 
-def test_after_a_hole_the_same_camera_is_no_cut() -> None:
+def test_the_same_camera_after_a_gap_is_no_cut() -> None:
     it = decider(has=lambda _camera, pulse: pulse // GOP != 1)
-    board = DecisionState(25.0)
+    state = DecisionState(25.0)
     for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19):
-        board.put(decision)
-    assert board.cuts == 0
+        state.put(decision)
+    assert state.cuts == 0
 
 
-def test_the_reason_is_one_plain_sentence_for_every_case() -> None:
+def test_every_selection_has_a_one_sentence_reason() -> None:
     story: list[Seen] = [{A: {1: LARGE}, B: {}}] * 2
     only_a = decide(decider(has=lambda camera, _pulse: camera == A), story)[0]
-    assert said(only_a) == "c0 is the only camera whose picture can be shown."
+    assert reason_of(only_a) == "c0 is the only camera whose picture can be shown."
     best = decide(decider(), story)[0]
-    assert said(best) == "c0 sees this person best over the next frames."
+    assert reason_of(best) == "c0 sees this person best over the next frames."
     away = decide(decider(), [*story, *[{A: {}, B: {}}] * 3])[-1]
-    assert said(away) == "No camera sees this person at the moment; c0 saw them last."
+    assert reason_of(away) == "No camera sees this person at the moment; c0 saw them last."
 
 
-def test_a_camera_that_dies_in_the_middle_of_a_window_is_left_at_the_gop_it_dies_in() -> None:
+def test_a_camera_that_dies_within_the_look_ahead_is_left_at_that_gop() -> None:
     dies = 2 * GOP + 2
     story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 8
     alive = {A: 10 * GOP}
@@ -210,7 +210,7 @@ def test_a_camera_that_dies_in_the_middle_of_a_window_is_left_at_the_gop_it_dies
     assert after[0].why.of(1).views[A].cost is None
 
 
-def test_what_was_seen_ahead_of_a_death_is_decided_again_without_the_camera() -> None:
+def test_the_look_ahead_is_evaluated_again_without_a_dead_camera() -> None:
     story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 3
     late = decider(has=lambda camera, pulse: camera == B or pulse < 2 * GOP, view={"lookahead": 4 * GOP})
     early = decide(late, [*story, *[{B: {1: SMALL}}] * 4])
@@ -218,10 +218,10 @@ def test_what_was_seen_ahead_of_a_death_is_decided_again_without_the_camera() ->
     sum_ahead = early[0].why.of(1)
     assert sum_ahead.stay is None
     assert sum_ahead.views[A].cost is None, "it cannot be shown to the end of the look-ahead"
-    assert said(early[0]) == "c0 is shown for as long as it can be: some of its next frames are missing."
+    assert reason_of(early[0]) == "c0 is shown for as long as it can be: some of its next frames are missing."
 
 
-def test_before_a_cut_that_is_planned_it_is_said_to_come() -> None:
+def test_the_reason_announces_a_planned_cut() -> None:
     story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 3 + [{A: {1: SMALL}, B: {1: LARGE}}] * 7
     decisions = decide(decider(view={"lookahead": 4 * GOP, "switch_cost_s": 0.04}), story)
     last = shown(decisions).index(B) - 1
@@ -230,12 +230,13 @@ def test_before_a_cut_that_is_planned_it_is_said_to_come() -> None:
     assert why.cut is not None
     assert why.stay > why.cut, "for the whole look-ahead the other one would be better"
     assert (
-        said(decisions[last]) == "Another camera will see this person better than c0: it is too soon to cut."
+        reason_of(decisions[last])
+        == "Another camera will see this person better than c0: it is too soon to cut."
     )
 
 
 @pytest.mark.parametrize(("min_shot_s", "cuts"), [(0.0, 4), (0.5, 2)])
-def test_a_shot_is_as_long_as_asked_for(min_shot_s: float, cuts: int) -> None:
+def test_shots_have_the_minimum_length(min_shot_s: float, cuts: int) -> None:
     here: Seen = {A: {1: LARGE}, B: {1: SMALL}}
     there: Seen = {A: {1: SMALL}, B: {1: LARGE}}
     story = [here, here, there, there, here, here, there, there, here, here, here]
@@ -246,13 +247,13 @@ def test_a_shot_is_as_long_as_asked_for(min_shot_s: float, cuts: int) -> None:
     assert all(b - a >= it.min_shot_gops for a, b in itertools.pairwise(changes))
 
 
-def test_a_shot_that_shows_nobody_may_be_short() -> None:
+def test_a_shot_without_the_person_may_be_short() -> None:
     here, gone = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
     it = decider(view={"min_shot_s": 2.0})
     assert shown(decide(it, [here, here, *[gone] * 4])) == [A, A, B, B, B]
 
 
-def test_a_track_that_becomes_another_person_inside_a_window_is_each_of_them_in_their_frames() -> None:
+def test_a_track_that_changes_person_within_the_window_counts_for_each_in_their_frames() -> None:
     it = decider()
     changes = STRIDE + 2
     it.people.numbers = lambda keys, first, frames: np.where(  # type: ignore[method-assign]
@@ -263,7 +264,7 @@ def test_a_track_that_becomes_another_person_inside_a_window_is_each_of_them_in_
     assert decisions[1].why.of(1).views[A].seen == pytest.approx(2 / (2 * GOP))
 
 
-def test_how_far_away_everybody_is_makes_no_difference() -> None:
+def test_with_relative_quality_distance_makes_no_difference() -> None:
     tiny: Box = (30.0, 30.0, 31.0, 33.0)
     half: Box = (30.0, 30.0, 30.5, 31.5)
     story: list[Seen] = [{A: {1: tiny}, B: {1: half}}] * 3 + [{A: {1: half}, B: {1: tiny}}] * 3
@@ -273,15 +274,13 @@ def test_how_far_away_everybody_is_makes_no_difference() -> None:
 
 
 @pytest.mark.parametrize(("presence_decay_s", "expected"), [(0.0, [A, B, A, A]), (1.0, [A, A, A, A])])
-def test_who_is_missed_for_a_moment_is_not_worth_two_cuts(
-    presence_decay_s: float, expected: list[str]
-) -> None:
+def test_a_short_missed_detection_causes_no_cuts(presence_decay_s: float, expected: list[str]) -> None:
     here, missed = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
     it = decider(view={"presence_decay_s": presence_decay_s})
     assert shown(decide(it, [here, missed, here, here, here])) == expected
 
 
-def test_who_is_not_found_again_is_left_in_the_end() -> None:
+def test_a_camera_that_keeps_missing_the_person_is_left_eventually() -> None:
     here, gone = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
     views = shown(decide(decider(view={"presence_decay_s": 1.0}), [here, *[gone] * 8]))
     assert (views[0], views[-1]) == (A, B)

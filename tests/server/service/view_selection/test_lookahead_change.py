@@ -41,7 +41,7 @@ def looking(view: ViewSettings, frames: int) -> ViewSettings:
 
 @settings(deadline=None, max_examples=15)
 @given(CHANGED, st.sampled_from([5, 10]), st.sampled_from([0.0, 0.6]))
-def test_every_gop_is_decided_once_in_order_and_by_frames_that_are_known(
+def test_every_gop_is_decided_once_in_order_with_known_frames(
     changes: Changes, gop: int, min_shot_s: float
 ) -> None:
     config = small_config(encode={"gop": gop}, view={"lookahead": 20, "min_shot_s": min_shot_s})
@@ -65,8 +65,8 @@ def test_every_gop_is_decided_once_in_order_and_by_frames_that_are_known(
     assert decider.view.lookahead - gop <= ahead < decider.view.lookahead
 
 
-def test_a_look_ahead_that_was_changed_and_settled_chooses_as_if_it_had_always_been() -> None:
-    def told(*changes: tuple[int, int]) -> list[GopDecision]:
+def test_after_a_change_settles_views_are_selected_as_if_it_had_always_applied() -> None:
+    def decisions_after(*changes: tuple[int, int]) -> list[GopDecision]:
         config = small_config(view={"lookahead": 20})
         decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
         decider.people._registry = TrackNumbers()  # type: ignore[assignment]
@@ -80,12 +80,12 @@ def test_a_look_ahead_that_was_changed_and_settled_chooses_as_if_it_had_always_b
         return decided
 
     for changes in ([(3, 35), (8, 20)], [(3, 10), (9, 20)]):
-        assert told(*changes) == told()
+        assert decisions_after(*changes) == decisions_after()
 
 
 @settings(deadline=None, max_examples=20)
 @given(st.dictionaries(st.integers(0, EPOCHS - 1), st.integers(GOP, 30), max_size=4))
-def test_streams_are_the_chosen_cameras_gops_without_a_hole(changes: Changes) -> None:
+def test_streams_are_the_selected_cameras_gops_without_a_gap(changes: Changes) -> None:
     service = FedService(small_config())
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     service.come(*CAMERAS)
@@ -125,37 +125,37 @@ def test_streams_are_the_chosen_cameras_gops_without_a_hole(changes: Changes) ->
         (10.5, "to try out: view.lookahead: Input should be a valid integer"),
     ],
 )
-async def test_a_look_ahead_that_cannot_be_is_refused_with_what_can(
+async def test_an_invalid_look_ahead_is_refused_with_the_limits(
     busy: Hall, frames: float, error: str
 ) -> None:
-    asked = {"lookahead": frames}
-    async with busy.session.put("/api/operator/view_selection", headers=MINE, json=asked) as answer:
+    request = {"lookahead": frames}
+    async with busy.session.put("/api/operator/view_selection", headers=MINE, json=request) as answer:
         assert answer.status == 400
-        said = (await answer.json())["error"]
-    assert said.startswith(error)
-    assert "\n" not in said
+        refusal = (await answer.json())["error"]
+    assert refusal.startswith(error)
+    assert "\n" not in refusal
     assert busy.service.decider.view == busy.service.config.view
 
 
-async def test_the_site_says_the_look_ahead_that_is_in_force(busy: Hall) -> None:
+async def test_the_api_reports_the_look_ahead_in_force(busy: Hall) -> None:
     most = (await busy.get_json("/api/operator/view_selection"))["max_lookahead"]
     for frames in (most, 5):
-        asked: dict[str, Any] = {"lookahead": frames}
-        async with busy.session.put("/api/operator/view_selection", headers=MINE, json=asked) as answer:
-            told = await answer.json()
-        assert told["values"]["lookahead"] == frames
-        assert f"lookahead: {frames}\n" in told["lines"]
+        request: dict[str, Any] = {"lookahead": frames}
+        async with busy.session.put("/api/operator/view_selection", headers=MINE, json=request) as answer:
+            decisions_after = await answer.json()
+        assert decisions_after["values"]["lookahead"] == frames
+        assert f"lookahead: {frames}\n" in decisions_after["lines"]
         assert (await busy.get_json("/api/site"))["lookahead_frames"] == frames
 
 
-def test_what_is_kept_reaches_as_far_as_can_be_looked_ahead() -> None:
+def test_frame_buffers_cover_the_longest_look_ahead() -> None:
     for view in ({}, {"buffer_s": 1.0}, {"buffer_s": 60.0}, {"lookahead": 200}):
         service = FedService(small_config(view=view))
         config, fps = service.config, service.config.site.fps
-        kept = service.frame_buffers[A]._max_frames
+        buffered = service.frame_buffers[A]._max_frames
         late = round(config.view.late_after_s * fps) + round(config.track.backlog_s * fps)
         assert service.max_lookahead >= config.view.lookahead
-        assert service.max_lookahead + late + STRIDE + GOP <= kept
+        assert service.max_lookahead + late + STRIDE + GOP <= buffered
         with pytest.raises(UserError):
             service.apply_view_settings(looking(config.view, service.max_lookahead + 1))
         service.close()

@@ -45,16 +45,16 @@ class Drifting(PersonTracker):
 
 def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]) -> CameraTracks:
     """Return a window of three epochs, the first ones of a recording shorter."""
-    told = word(camera, epoch, dict.fromkeys(boxes))
-    first = max(0, told.last - WINDOW + 1)
+    message_of_epoch = word(camera, epoch, dict.fromkeys(boxes))
+    first = max(0, message_of_epoch.last - WINDOW + 1)
     tracks = [
         type(it)(
             id=it.id,
-            boxes=list(boxes[it.id][: told.last - first + 1]),
+            boxes=list(boxes[it.id][: message_of_epoch.last - first + 1]),
             appearance=it.appearance,
             confidence=1.0,
         )
-        for it in told.tracks
+        for it in message_of_epoch.tracks
     ]
     return word(camera, epoch, {}, first=first, tracks=tracks)
 
@@ -63,7 +63,7 @@ def slowly(
     story: Sequence[Epoch], quality_buffer: ViewQualityBuffer, people: Drifting
 ) -> dict[tuple[int, str, int], float]:
     """Return the quality of every view by pulse, camera and number, one box after the other."""
-    found: dict[tuple[int, str, int], float] = {}
+    quality_of_view: dict[tuple[int, str, int], float] = {}
     newest: dict[tuple[int, str], CameraTracks] = {}
     for epoch in story:
         for camera, message in epoch.tracks.items():
@@ -75,13 +75,15 @@ def slowly(
             box = message.tracks[track].boxes[pulse - message.first]
             number = people.one(key, pulse)
             if box is not None and number > 0 and number in people.known:
-                found.setdefault((pulse, camera, number), float(seen.quality[pulse - message.first, track]))
-    return found
+                quality_of_view.setdefault(
+                    (pulse, camera, number), float(seen.quality[pulse - message.first, track])
+                )
+    return quality_of_view
 
 
 @settings(deadline=None, max_examples=60)
 @given(STORY, st.sets(st.tuples(st.sampled_from(CAMERAS), st.integers(0, 24)), max_size=4), st.booleans())
-def test_it_holds_every_view_once_and_compares_it_with_the_best(
+def test_the_window_has_every_view_once_with_relative_quality(
     story: list[dict[str, dict[int, list[Box | None]]]], missing: set[tuple[str, int]], relative: bool
 ) -> None:
     config = small_config()
@@ -89,8 +91,8 @@ def test_it_holds_every_view_once_and_compares_it_with_the_best(
     people._registry = TrackNumbers()  # type: ignore[assignment]
     quality_buffer = ViewQualityBuffer(config, dict.fromkeys(CAMERAS), people.letterboxes)
     epochs = [
-        epoch_of(number, *(long_word(camera, number, boxes) for camera, boxes in said.items()))
-        for number, said in enumerate(story)
+        epoch_of(number, *(long_word(camera, number, boxes) for camera, boxes in boxes_of_camera.items()))
+        for number, boxes_of_camera in enumerate(story)
     ]
     for epoch in epochs:
         quality_buffer.put(people.update(epoch))
@@ -105,7 +107,7 @@ def test_it_holds_every_view_once_and_compares_it_with_the_best(
         relative=relative,
     )
     views = outlook.views
-    found = {
+    quality_of_view = {
         (int(n) + 2, CAMERAS[c], int(outlook.numbers[k])): (quality, worth)
         for n, c, k, quality, worth in zip(
             views.frame,
@@ -121,12 +123,12 @@ def test_it_holds_every_view_once_and_compares_it_with_the_best(
         for (pulse, camera, number), quality in slowly(epochs, quality_buffer, people).items()
         if pulse >= 2 and (camera, pulse) not in missing and quality > 0
     }
-    assert len(found) == len(views.frame)
-    assert {it: quality for it, (quality, _) in found.items()} == expected
-    for (pulse, camera, number), (quality, worth) in found.items():
+    assert len(quality_of_view) == len(views.frame)
+    assert {it: quality for it, (quality, _) in quality_of_view.items()} == expected
+    for (pulse, camera, number), (quality, worth) in quality_of_view.items():
         best = max(expected.get((pulse, it, number), 0.0) for it in CAMERAS) if relative else 1.0
         assert worth == quality / best, camera
-    for view, (quality, _) in enumerate(found.values()):
+    for view, (quality, _) in enumerate(quality_of_view.values()):
         weights = config.view.quality.weights
         terms = dict(zip(config.view.quality.terms, outlook.terms(view).tolist(), strict=True))
         assert np.prod([1 - weights[it] * (1 - term) for it, term in terms.items()]) == pytest.approx(quality)

@@ -24,7 +24,7 @@ A, B = CAMERAS
 GROUND = {A: np.eye(3), B: np.diag([0.5, 0.5, 1.0])}
 """Both look straight down, B from half as high: everybody is twice as large in it."""
 NOWHERE: dict[str, np.ndarray | None] = {A: np.eye(3), B: None}
-Told = Mapping[str, Mapping[int, Box | None]]
+CameraBoxes = Mapping[str, Mapping[int, Box | None]]
 
 
 def at(x: float, y: float, camera: str = A) -> Box:
@@ -39,10 +39,10 @@ def decider(ground: Mapping[str, np.ndarray | None] = GROUND, **view: Any) -> Vi
     return it
 
 
-def decide(it: ViewDecider, story: Sequence[Told]) -> list[GopDecision]:
+def decide(it: ViewDecider, story: Sequence[CameraBoxes]) -> list[GopDecision]:
     epochs = (
-        epoch_of(number, *(word(camera, number, boxes) for camera, boxes in said.items()))
-        for number, said in enumerate(story)
+        epoch_of(number, *(word(camera, number, boxes) for camera, boxes in boxes_of_camera.items()))
+        for number, boxes_of_camera in enumerate(story)
     )
     return [decision for epoch in epochs for decision in it.step(epoch)]
 
@@ -54,40 +54,40 @@ def shown(decisions: Sequence[GopDecision], number: int = 1) -> list[str | None]
 PLACE = 15.0, 20.0
 LOST = {3: at(26.0, 14.0)}
 """Somebody whom B never finds where A sees them stand: it misses people, then."""
-FOUND: Told = {A: {1: at(*PLACE), **LOST}, B: {1: at(*PLACE, B)}}
-COVERED: Told = {A: FOUND[A], B: {1: None, 2: at(17.0, 20.0, B)}}
+FOUND: CameraBoxes = {A: {1: at(*PLACE), **LOST}, B: {1: at(*PLACE, B)}}
+COVERED: CameraBoxes = {A: FOUND[A], B: {1: None, 2: at(17.0, 20.0, B)}}
 """Somebody else's box is there."""
-GONE: Told = {A: FOUND[A], B: {1: None}}
+GONE: CameraBoxes = {A: FOUND[A], B: {1: None}}
 
 
-def test_who_is_lost_beside_somebody_is_still_shown_where_they_are_larger() -> None:
+def test_a_person_missed_beside_another_is_still_shown_where_larger() -> None:
     story = [FOUND] * 20 + [COVERED] * 12
     assert shown(decide(decider(undetected_weight=0.0), story))[-1] == A, "missed for longer than a moment"
     assert shown(decide(decider(), story)) == [B] * 31
     assert shown(decide(decider(NOWHERE), story))[-1] == A, "nobody knows where the other camera looks"
 
 
-def test_where_no_box_is_at_all_they_are_taken_to_be_behind_something() -> None:
+def test_without_any_box_the_person_is_assumed_occluded() -> None:
     views = shown(decide(decider(), [FOUND] * 20 + [GONE] * 12))
     assert views[:20] == [B] * 20
     assert views[-1] == A
 
 
-def test_whom_a_camera_does_not_find_that_misses_nobody_is_hidden() -> None:
-    story = [{A: {1: at(*PLACE)}, B: said[B]} for said in [FOUND] * 100 + [COVERED] * 4]
+def test_a_person_missed_by_a_reliable_camera_is_hidden() -> None:
+    story = [{A: {1: at(*PLACE)}, B: boxes_of_camera[B]} for boxes_of_camera in [FOUND] * 100 + [COVERED] * 4]
     views = shown(decide(decider(presence_decay_s=0.0), story))
     assert views[98] == B
     assert views[-1] == A
 
 
-def test_a_camera_that_never_finds_anybody_at_a_place_shows_nobody_there() -> None:
+def test_no_view_is_inferred_where_a_camera_never_detects() -> None:
     learned = [COVERED] * 60
     assert shown(decide(decider(presence_decay_s=0.0), [FOUND, *learned]))[-1] == A
     assert shown(decide(decider(presence_decay_s=0.0), [FOUND] * 60 + learned[:12]))[-1] == B
 
 
 @pytest.mark.parametrize("speaks", [False, True], ids=["is silent", "sees nothing"])
-def test_nothing_is_learned_of_a_camera_that_is_not_there(speaks: bool) -> None:
+def test_nothing_is_learned_about_a_disconnected_camera(speaks: bool) -> None:
     it = decider()
     decide(it, [FOUND] * 20)
     trust = it._cross_view_inference._detection_probability._cell_rate.copy()
@@ -98,14 +98,14 @@ def test_nothing_is_learned_of_a_camera_that_is_not_there(speaks: bool) -> None:
     assert changed.max() < 0.05, "but for forgetting"
 
 
-def test_who_stands_outside_the_picture_is_not_expected_in_it() -> None:
+def test_a_person_outside_the_picture_is_not_expected_in_it() -> None:
     there = {A: {1: at(*PLACE), 2: at(60.0, 40.0)}, B: {1: at(*PLACE, B)}}
     decisions = decide(decider(), [there] * 20)
     assert shown(decisions, 2) == [A] * 19
     assert decisions[-1].why.of(2).views[B].undetected == 0.0
 
 
-def test_why_says_who_does_not_find_them_and_what_that_view_is_worth() -> None:
+def test_the_explanation_includes_undetected_views_and_their_quality() -> None:
     decisions = decide(decider(), [FOUND] * 20 + [COVERED] * 6)
     why = decisions[-1].why.of(1)
     assert (why.views[A].seen, why.views[A].undetected) == (1.0, 0.0)
@@ -121,7 +121,7 @@ def test_why_says_who_does_not_find_them_and_what_that_view_is_worth() -> None:
 
 
 @pytest.mark.parametrize("frames", [1, 4, 10, 13, 25])
-def test_a_look_stands_for_the_frames_to_the_next_one_and_for_none_that_are_decided_later(
+def test_a_test_counts_for_the_decided_frames_up_to_the_next_test(
     frames: int,
 ) -> None:
     it = CrossViewInference(small_config(), ViewQualityBuffer(small_config(), GROUND, {}))
@@ -129,10 +129,10 @@ def test_a_look_stands_for_the_frames_to_the_next_one_and_for_none_that_are_deci
     cameras, feet = np.zeros(3, int), np.full((3, 2), 20.0)
     tested = Looked(looks, cameras, feet, np.ones(3, dtype=np.bool_))
     it.learn(replace(UndetectedViews.empty(), tested=tested), frames)
-    assert it._detection_probability._counts[0].sum() == frames, "the next outlook begins with a look"
+    assert it._detection_probability._counts[0].sum() == frames, "the next window begins with an inference"
 
 
-def test_the_factor_is_what_such_views_are_worth() -> None:
+def test_the_weight_scales_the_quality_of_undetected_views() -> None:
     story = [FOUND] * 20 + [COVERED] * 6
     whole, half = (decide(decider(undetected_weight=it), story)[-1].why.of(1).views[B] for it in (1.0, 0.5))
     assert half.undetected_quality == pytest.approx(0.5 * (whole.undetected_quality or 0.0))
@@ -143,11 +143,11 @@ SOMEBODY = st.tuples(PLACES, st.booleans(), st.booleans())
 STORY = st.lists(st.tuples(SOMEBODY, SOMEBODY, SOMEBODY), min_size=6, max_size=20)
 
 
-def told(moment: Sequence[tuple[tuple[float, float], bool, bool]]) -> Told:
+def boxes_at(moment: Sequence[tuple[tuple[float, float], bool, bool]]) -> CameraBoxes:
     return {
         camera: {
-            number: at(*place, camera) if found[CAMERAS.index(camera)] else None
-            for number, (place, *found) in enumerate(moment, start=1)
+            number: at(*place, camera) if detected[CAMERAS.index(camera)] else None
+            for number, (place, *detected) in enumerate(moment, start=1)
         }
         for camera in CAMERAS
     }
@@ -155,13 +155,13 @@ def told(moment: Sequence[tuple[tuple[float, float], bool, bool]]) -> Told:
 
 @settings(deadline=None, max_examples=15)
 @given(STORY)
-def test_services_that_share_the_people_choose_as_one_service_does(
+def test_shards_select_views_as_a_single_service(
     story: list[tuple[tuple[tuple[float, float], bool, bool], ...]],
 ) -> None:
-    words = [told(moment) for moment in story]
-    alone = decide(decider(), words)
+    moments = [boxes_at(moment) for moment in story]
+    alone = decide(decider(), moments)
     for index in range(2):
-        part = decide(decider(share={"of": 2, "index": index}), words)
+        part = decide(decider(share={"of": 2, "index": index}), moments)
         for one, mine in zip(alone, part, strict=True):
             expected = [choice for choice in one.choices if choice.number % 2 == index]
             assert list(mine.choices) == expected
