@@ -95,7 +95,7 @@ def watch(path: Path) -> None:
         (Ingest, "tracks", "tracks in"),
         (Ingest, "video", "frames in"),
         (Ingest, "thumbnail", "frames in"),
-        (EpochAligner, "ready", "align"),
+        (EpochAligner, "next_ready", "align"),
         (IdentityRegistry, "update", "who is who"),
         (PersonTracker, "update", "people"),
         (ViewQualityBuffer, "put", "quality"),

@@ -205,7 +205,7 @@ async def test_a_camera_and_a_service_prove_who_they_are_to_pulses_that_ask(
     assert it.pulses.refused == 0
 
 
-@pytest.mark.parametrize("what", ["pipeline.CameraPipeline.follow", "status_meter.StatusMeter.status"])
+@pytest.mark.parametrize("what", ["pipeline.CameraPipeline.track_detections", "status_meter.StatusMeter.status"])
 async def test_a_camera_whose_work_fails_ends_with_that_error(
     tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
@@ -248,7 +248,7 @@ class Overloaded(LoadMonitor):
 
     def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
         super().__init__(config, camera_id, live=live)
-        self._ladder = LoadShedder(
+        self._shedder = LoadShedder(
             shed_levels(config.track.window.stride, live=True)[-1:], LevelBounds(1e9, 1e9)
         )
 
