@@ -205,7 +205,9 @@ async def test_a_camera_and_a_service_prove_who_they_are_to_pulses_that_ask(
     assert it.pulses.refused == 0
 
 
-@pytest.mark.parametrize("what", ["pipeline.CameraPipeline.track_detections", "status_meter.StatusMeter.status"])
+@pytest.mark.parametrize(
+    "what", ["pipeline.CameraPipeline.track_detections", "status_meter.StatusMeter.status"]
+)
 async def test_a_camera_whose_work_fails_ends_with_that_error(
     tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:

@@ -101,7 +101,7 @@ async def test_events_are_of_one_camera_alone(site: Hall) -> None:
 
 async def test_flags_are_of_who_may_be_seen_alone(site: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "server.service.operator_assist.flag_budget._ONE_S", -1.0
+        "server.service.operator_assist.flag_budget._COOLDOWN_S", -1.0
     )  # both have a flag, though they are of one
     troubles = [
         RiskEvent(reason="crossing", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
