@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthetic.cameras.pinhole import Floats, PinholeCamera
-from synthetic.drawing.limbs import Body
+from synthetic.drawing.limbs import CapsuleBody
 
 _ARC = 7  # corners of a capsule's end
 _SHIFT = 4  # fractional bits of cv2's coordinates
@@ -53,13 +53,13 @@ def clip_to_image(figure: Figure, view: PinholeCamera) -> ClipRegion | None:
     )
 
 
-def draw_figure(view: PinholeCamera, body: Body, joints: Floats, light: float) -> Figure | None:
+def draw_figure(view: PinholeCamera, body: CapsuleBody, joints: Floats, light: float) -> Figure | None:
     """Draw a body by its joints ``(J, 3)`` in meters; `light` scales its colors.
 
     The patch reaches beyond the picture's edge where the body does. None where the body is behind the camera.
     """
     pixels, depth = view.project(joints)
-    if depth.min() < 0.3:  # noqa: PLR2004 — meters; nobody can stand inside the lens
+    if depth.min() < 0.3:  # noqa: PLR2004 — meters: inside the lens
         return None
     scale = view.focal / depth
     first, last = pixels[body.starts], pixels[body.ends]

@@ -35,7 +35,7 @@ class LimbGroup:
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class CapsuleBody:
     """The limbs of one dressed body as arrays, for drawing many at once."""
 
     starts: NDArray[np.intp]  # (L,)
@@ -48,12 +48,12 @@ class Body:
 
 
 @lru_cache(maxsize=256)
-def build_body(outfit: Outfit) -> Body:
+def build_body(outfit: Outfit) -> CapsuleBody:
     """Build the limbs of a body in an outfit."""
     groups = [*_legs(outfit), *_trunk(outfit), *_arms(outfit), *_head(outfit)]
     limbs = [limb for group in groups for limb in group.limbs]
     ends = np.cumsum([len(group.limbs) for group in groups])
-    return Body(
+    return CapsuleBody(
         np.array([limb.start for limb in limbs], dtype=np.intp),
         np.array([limb.end for limb in limbs], dtype=np.intp),
         np.array([(limb.radius_start, limb.radius_end) for limb in limbs]) * outfit.height,

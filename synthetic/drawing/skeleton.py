@@ -18,7 +18,7 @@ _HIP_SIDE, _SHOULDER_SIDE = 0.050, 0.104
 _UPPER_ARM, _FOREARM, _FOOT = 0.168, 0.165, 0.125
 _STANCE = 0.6  # the share of a stride in which a foot stands
 _BRISK = 0.75  # meters per second: the pace of a full swing
-_RUN = (2.6, 4.6)  # meters per second: from the first on somebody runs, from the second as hard as they can
+_RUN = (2.6, 4.6)  # meters per second at which running begins, and is at its fastest
 
 
 class Joint(IntEnum):

@@ -96,13 +96,13 @@ def wall(room: Room, points: Floats, axis: int, *, far: bool) -> Floats:
     return color * (hollow * bright)[:, None]
 
 
-def corridor_color(points: Floats, beyond: Floats) -> Floats:
-    """Return the colors of points seen through a doorway, `beyond` meters behind the wall."""
+def corridor_color(points: Floats, depth: Floats) -> Floats:
+    """Return the colors of points seen through a doorway, `depth` ``(N,)`` meters behind the wall."""
     ground = points[:, 2] < 1e-6  # noqa: PLR2004 — on the floor
     color = np.where(ground[:, None], _FLOOR * 0.62, _CORRIDOR * 1.15)
-    jamb = beyond < 0.16  # noqa: PLR2004 — the wall's thickness, meters
+    jamb = depth < 0.16  # noqa: PLR2004 — the wall's thickness, meters
     color = np.where((jamb & ~ground)[:, None], _WHITE * 0.8, color)
-    return color * (0.45 + 0.55 * np.exp(-beyond / 0.7))[:, None]
+    return color * (0.45 + 0.55 * np.exp(-depth / 0.7))[:, None]
 
 
 def _edge(value: Floats, start: float) -> Floats:

@@ -11,7 +11,7 @@ ROOM = Room(
     depth=8.0,
     height=3.4,
     doors=(Door("north", 7.75), Door("east", 5.45)),
-    # Along the walls and beneath the cameras, where nobody wants to go; only the pillar stands in the room.
+    # Along the walls and beneath the cameras, off the walkers' routes; only the pillar stands in the room.
     furniture=(
         pillar(5.6, 6.0, 3.4),
         bench(4.75, 0.45),

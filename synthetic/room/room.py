@@ -67,7 +67,7 @@ class Room:
     furniture: tuple[Furniture, ...]
     rug: tuple[float, float, float, float]  # west, south, east and north bound
     viewpoints: tuple[Viewpoint, ...]
-    style: StyleName = "house"  # what floor, walls and light are like: finish.py
+    style: StyleName = "house"  # of floor, walls and light: surface_styles.py
 
     def beyond(self, door: Door, along: float, out: float) -> Point:
         """Return the floor point `out` meters beyond a door's wall, `along` from the opening's middle."""

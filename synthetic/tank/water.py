@@ -35,7 +35,7 @@ Bytes = NDArray[np.uint8]
 
 
 def attenuate_by_water(colors: Floats, meters: Floats, water: Floats) -> Floats:
-    """Return colors ``(..., 3)`` seen through meters ``(...)`` of water of a color ``(..., 3)``."""
+    """Attenuate colors ``(..., 3)`` over ``meters`` ``(...)`` towards the water's color ``(..., 3)``."""
     left = np.exp(-_MURK * meters[..., None])
     seen: Floats = colors * left + water * (1 - left)
     return seen

@@ -1,4 +1,4 @@
-"""Collision avoidance: paths that are planned together are bent apart, and a single path steps aside."""
+"""Collision avoidance: paths planned together are pushed apart; a single path steps aside."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from synthetic.room.room import Room
 
 _ROUNDS = 60
 _SMOOTH = 0.45  # seconds over which a path is bent
-_SIDE = np.radians(50.0)  # both turn to the same hand: so they pass, and do not push each other back
-_FIRM = 0.7  # of what is missing is made up for in each round
-_EASE = 0.6  # seconds at either end that stay as they are
-MIN_DISTANCE = 0.8  # meters: nearer than this is a bump
+_SIDE = np.radians(50.0)  # both swerve to the same hand, so that they pass each other
+_FIRM = 0.7  # share of the missing distance that each round corrects
+_EASE = 0.6  # seconds at either end over which bending fades
+MIN_DISTANCE = 0.8  # meters between two people
 _RAMP = 1.5  # seconds to step aside, and to come back
 _WALL = 0.45  # meters kept from walls
 _FURNITURE = 0.25  # meters kept from furniture
 
 
-def push_paths_apart(paths: Floats, keep: Floats, rate: float) -> Floats:
-    """Bend paths ``(P, T, 2 or 3)``, sampled `rate` times a second, until pairs keep ``(P, P)`` meters apart.
+def push_paths_apart(paths: Floats, distances: Floats, rate: float) -> Floats:
+    """Bend paths ``(P, T, 2 or 3)``, sampled `rate` times a second, to distances ``(P, P)`` in meters.
 
-    Ends stay where they are. Without room for all, some pairs come nearer than that.
+    Ends stay where they are. Where space is short, some pairs come nearer.
     """
     people, count, axes = paths.shape
-    if people < 2:  # noqa: PLR2004 — nobody to give way to
+    if people < 2:  # noqa: PLR2004 — a pair takes two
         return paths
     clock = np.arange(count)
     ease = np.clip(np.minimum(clock, count - 1 - clock) / (_EASE * rate), 0, 1)[None, :, None]
@@ -37,7 +37,7 @@ def push_paths_apart(paths: Floats, keep: Floats, rate: float) -> Floats:
     for _ in range(_ROUNDS):
         gaps = bent[:, None] - bent[None]
         far = np.linalg.norm(gaps, axis=3)
-        short = np.maximum(keep[..., None] - far, 0)
+        short = np.maximum(distances[..., None] - far, 0)
         short[np.arange(people), np.arange(people)] = 0
         if not short.any():
             break
@@ -45,7 +45,7 @@ def push_paths_apart(paths: Floats, keep: Floats, rate: float) -> Floats:
         push = (away @ turn * (short / 2)[..., None]).sum(axis=1)
         flat = np.ascontiguousarray(push.transpose(0, 2, 1).reshape(axes * people, count))
         soft = cv2.GaussianBlur(flat, (kernel, 1), _SMOOTH * rate, borderType=cv2.BORDER_REPLICATE)
-        # A short push is flattened by the smoothing: it is brought back to its height.
+        # Smoothing flattens a short push: scale it back to its height.
         peak = np.abs(flat).max(axis=1, keepdims=True) / np.maximum(
             np.abs(soft).max(axis=1, keepdims=True), 1e-9
         )
@@ -53,27 +53,27 @@ def push_paths_apart(paths: Floats, keep: Floats, rate: float) -> Floats:
     return bent
 
 
-def proximity_cost(mine: Floats, others: Floats, keep: float = MIN_DISTANCE) -> float:
-    """Compute the cost of a path ``(T, 2)`` that comes nearer than `keep` to others ``(O, T, 2)``."""
-    apart = np.hypot(*(others - mine).transpose(2, 0, 1))
-    return float((np.maximum(keep - apart, 0) ** 2).sum())
+def proximity_cost(path: Floats, others: Floats, distance: float = MIN_DISTANCE) -> float:
+    """Compute the cost of a path ``(T, 2)`` for coming nearer than `distance` to others ``(O, T, 2)``."""
+    apart = np.hypot(*(others - path).transpose(2, 0, 1))
+    return float((np.maximum(distance - apart, 0) ** 2).sum())
 
 
-def sidestep(room: Room, mine: Floats, others: Floats, rate: float) -> Floats:
+def sidestep(room: Room, path: Floats, others: Floats, rate: float) -> Floats:
     """Move a path ``(T, 2)``, sampled `rate` times a second, aside where it meets others ``(O, T, 2)``.
 
-    At every encounter the path is moved in one direction, away from the other at their closest, and back:
-    as far as walls and furniture allow, so not at all in a doorway.
+    At each encounter the path moves away from the other one at their closest point, and back, as far as walls
+    and furniture allow: not at all in a doorway.
     """
-    path = mine.copy()
+    moved = path.copy()
     for other in others:
-        apart = np.hypot(*(mine - other).T)
+        apart = np.hypot(*(path - other).T)
         near = np.flatnonzero(apart < MIN_DISTANCE)
         for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1):
             if len(run):
                 closest = run[apart[run].argmin()]
-                path = _aside(room, path, path[closest] - other[closest], run, rate)
-    return path
+                moved = _aside(room, moved, moved[closest] - other[closest], run, rate)
+    return moved
 
 
 def _aside(room: Room, path: Floats, away: Floats, run: NDArray[np.intp], rate: float) -> Floats:

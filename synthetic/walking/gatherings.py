@@ -1,4 +1,4 @@
-"""Rounds of a crowd that gathers: who meets whom, where they stand together, and where they part to."""
+"""Rounds of a gathering crowd: groups that meet, stand together and part."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from synthetic.walking.round_paths import (
 )
 
 _PACE = (0.95, 1.3)  # meters per second
-_SLOWEST = 0.7  # meters per second: whoever would be slower stands and waits
+_SLOWEST = 0.7  # meters per second: people who would be slower stand and wait
 _TALK = (1.0, 4.0)  # seconds that all of a group stand together
 _LINGER = 0.8  # seconds between the first and the last to leave
 _SIZES = (1, 2, 3, 4)  # of groups
@@ -31,10 +31,10 @@ _KEEP_GROUP = 0.46  # meters between two who stand together
 _KEEP_OTHERS = 0.75  # meters between others, at least, wherever there is room
 _CANDIDATES = 40
 _DETOUR = 0.65  # share of the walks with a detour
-_DAWDLE = 0.5  # seconds, at most, before somebody sets out
+_DAWDLE = 0.5  # seconds, at most, before a person sets out
 _SHORTLIST = 5  # plans whose collisions are avoided, to choose the best then
 _HURRY = 4.0  # cost of a second too late
-_PAUSE = 1.5  # seconds: the longest that somebody alone stands
+_PAUSE = 1.5  # seconds, at most, that a single person stands
 
 Area: TypeAlias = tuple[float, float, float, float]  # west, south, east and north bound, meters
 
@@ -43,9 +43,9 @@ class Gatherings:
     """Rounds in which people meet, stand together and part; at the end of each all are apart.
 
     Args:
-        area: where they go.
-        people: how many.
-        seed: of everything random.
+        area: the floor area they use.
+        people: number of people.
+        seed: the random seed.
     """
 
     def __init__(self, area: Area, people: int, seed: int) -> None:
@@ -57,13 +57,13 @@ class Gatherings:
         return plan_gathering(rng, self._places(number), self._places(number + 1), self._area)
 
     def _places(self, number: int) -> Floats:
-        """Return where everybody is when a round begins: ``(P, 2)``."""
+        """Return everybody's place at the beginning of a round: ``(P, 2)``."""
         rng = np.random.default_rng([self._seed, 0x91A5, number + BEFORE])
         return draw_separated_places(rng, self._people, self._area)
 
 
 def draw_separated_places(rng: np.random.Generator, count: int, area: Area) -> Floats:
-    """Draw random places ``(count, 2)`` that lie apart: the best of some draws."""
+    """Draw random places ``(count, 2)`` far apart: the best of some draws."""
     west, south, east, north = area
     drawn = rng.uniform((west, south), (east, north), (_CANDIDATES, count, 2))
     gaps = np.linalg.norm(drawn[:, :, None] - drawn[:, None], axis=3)
@@ -187,7 +187,7 @@ def _trip(
 
 
 def _path(trip: _Trip, begin: float, leave: float, look: Floats) -> RoundPath:
-    """Time a trip: whoever would be at its end too early walks more slowly on the way there."""
+    """Compute a trip's timed path; a walker who would arrive too early walks more slowly."""
     spans = trip.spans
     spans[trip.slot :] *= min((ROUND - leave) / trip.back, trip.pace / _SLOWEST)
     there = begin + np.cumsum([0.0, *spans[: trip.slot]])

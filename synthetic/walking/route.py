@@ -10,7 +10,9 @@ import numpy as np
 from synthetic.room.room import Door, Point, Room
 
 _MARGIN = 1.0  # meters kept from walls
-_CORNER = 2.6  # meters kept from the room's corners: cameras hang there, and see nobody's feet beneath them
+_CORNER = (
+    2.6  # meters kept from the room's corners: cameras hang there, and feet beneath them are out of view
+)
 _CLEARANCE = 0.45  # meters kept from furniture
 _TRIES = 40
 _CHOICE = 6  # places that one chooses from

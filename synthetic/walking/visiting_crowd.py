@@ -1,7 +1,7 @@
 """A crowd that comes and goes: visits, planned so that people meet but do not walk through each other.
 
-A walker's time is cut into visits of a fixed length. A visit is a pure function of the seed, the walker and
-the visit's number, so any frame can be drawn at once, in any process. Of several random routes a
+A walker's time is divided into visits of a fixed length. A visit is a pure function of the seed, the walker
+and the visit's number, so any frame can be drawn directly, in any process. Of several random routes a
 walker takes the one that keeps furthest from the walkers with smaller numbers.
 """
 
@@ -29,10 +29,10 @@ _FIRST_STEP = 2.3  # seconds, for every four walkers more
 _UNDER_WAY = 1.0  # seconds from the first visits' beginning to frame 0: everybody walks in it
 _RESTLESS = (
     _UNDER_WAY + 4.5
-)  # seconds of the first visits in which nobody stands: detectors learn the background
+)  # seconds of the first visits without standing, so that detectors learn the background
 _CANDIDATES = 16
-_CROWD = (6, 8)  # from walker 6 on there are 8 candidates: in a crowd nobody keeps clear of all
-_BRISK = 0.5  # meters per second, at least, as long as nobody stands
+_CROWD = (6, 8)  # from walker 6 on there are 8 candidates: in a crowd no route is clear
+_BRISK = 0.5  # meters per second, at least, during these
 _COARSE = 4  # every fourth sample is compared
 _RATE = SAMPLES_PER_SECOND / _COARSE
 _STAGED_CAMERAS = 3  # cameras between which the best view should change: the room's first
@@ -107,15 +107,15 @@ class VisitingCrowd:
         sidestepped = sidestep(self._room, _coarse(best, others), others, _RATE)
         return best.moved(sidestepped, _COARSE)
 
-    def _cost(self, mine: Floats, others: Floats, *, first: bool) -> float:
+    def _cost(self, path: Floats, others: Floats, *, first: bool) -> float:
         """Compute the cost of a path ``(T, 2)`` beside those of others ``(O, T, 2)``; less is better."""
-        cost = proximity_cost(mine, others)
+        cost = proximity_cost(path, others)
         if first:
             start = slice(int(_UNDER_WAY * _RATE), int(_RESTLESS * _RATE))
-            cost += _FIRST_SIGHT * proximity_cost(mine[start], others[:, start], _SPREAD)
-            speeds = np.hypot(*np.diff(mine[start], axis=0).T) * _RATE
+            cost += _FIRST_SIGHT * proximity_cost(path[start], others[:, start], _SPREAD)
+            speeds = np.hypot(*np.diff(path[start], axis=0).T) * _RATE
             cost += float(np.maximum(_BRISK - speeds, 0).sum())
-            cost += lateral_motion_penalty(mine[start][: int(_LEARNING * _RATE)], self._camera_array)
+            cost += lateral_motion_penalty(path[start][: int(_LEARNING * _RATE)], self._camera_array)
         return cost
 
     def _meetings(self, begin: float, length: float) -> tuple[Meeting, ...]:
@@ -148,12 +148,12 @@ def _coarse(trajectory: Trajectory, others: Floats) -> Floats:
     return trajectory.places[: others.shape[1] * _COARSE : _COARSE]
 
 
-def lateral_motion_penalty(mine: Floats, camera_positions: Floats) -> float:
+def lateral_motion_penalty(path: Floats, camera_positions: Floats) -> float:
     """Compute the cost of a path ``(T, 2)`` for moving too little across the cameras' ``(C, 2)`` pictures."""
     rate = 0.0
     for camera in camera_positions:
-        sight = mine[0] - camera
-        step = mine[-1] - mine[0]
+        sight = path[0] - camera
+        step = path[-1] - path[0]
         across = abs(float(sight[0] * step[1] - sight[1] * step[0])) / max(float(np.hypot(*sight)), 1e-6)
         rate += max(_STEP - across, 0.0) ** 2
     return rate
