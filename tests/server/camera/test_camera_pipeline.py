@@ -1,4 +1,4 @@
-"""What a camera does with its frames: live as offline, and it says which frames nobody was looked for in."""
+"""The camera pipeline tracks alike live and offline, and reports frames without detection."""
 
 from __future__ import annotations
 
@@ -128,8 +128,8 @@ def test_frames_that_were_missed_are_reported_once_and_begin_a_new_gop_where_the
 ) -> None:
     missed = frozenset({7, 10, 11, 12, 33})
     units, words = live(config_of(recording), missed)
-    for told in ([word.shed for word in words], [word.without_detection for word in words]):
-        assert sorted(pulse for frames in told for pulse in frames) == sorted(missed)
+    for reported in ([word.shed for word in words], [word.without_detection for word in words]):
+        assert sorted(pulse for frames in reported for pulse in frames) == sorted(missed)
     assert [unit.pulse for unit in units if unit.key] == [0, 13, 20, 30, 40]
 
 
@@ -140,7 +140,9 @@ def test_of_a_hole_of_days_its_end_is_told(recording: Path) -> None:
     pipeline.close()
     shed = [word.shed for word in words if word]
     assert max(map(len, shed)) <= 50_000 + 2 * STRIDE
-    assert [pulse for told in shed for pulse in told][-STRIDE - 1 :] == [*range(late - 1, late + STRIDE)]
+    assert [pulse for reported in shed for pulse in reported][-STRIDE - 1 :] == [
+        *range(late - 1, late + STRIDE)
+    ]
 
 
 def test_a_frame_of_which_only_the_number_is_left_is_reported(recording: Path) -> None:
@@ -209,7 +211,7 @@ def test_sharpness_is_measured_where_it_counts_alone(recording: Path) -> None:
     )
     for given, measured in ((config, False), (weighs, True)):
         tracks = [track for word in live(given)[1] for track in word.tracks]
-        assert tracks, "somebody is there"
+        assert tracks, "there are tracks"
         assert any(track.sharpness is not None for track in tracks) == measured
     assert live(weighs)[1] == [batch.tracks for batch in offline(weighs)]
 

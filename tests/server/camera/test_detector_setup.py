@@ -1,4 +1,4 @@
-"""The configuration chooses the detector, and what is wrong with it is said in one line."""
+"""The configuration selects the detector; errors in it are reported in one line."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_a_detection_file_goes_before_the_kind(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("detect", "camera", "said"),
+    ("detect", "camera", "expected"),
     [
         ({"kind": "onnx"}, {}, "detect: onnx.model: kind onnx needs the path"),
         ({"kind": "onnx", "onnx": {"model": "none.onnx"}}, {}, "camera c0: detect: "),
@@ -97,11 +97,11 @@ def test_a_detection_file_goes_before_the_kind(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(
-    tmp_path: Path, detect: dict[str, Any], camera: dict[str, Any], said: str
+    tmp_path: Path, detect: dict[str, Any], camera: dict[str, Any], expected: str
 ) -> None:
     with pytest.raises(UserError) as caught:
         observer(tmp_path, detect, **camera)
-    assert said in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

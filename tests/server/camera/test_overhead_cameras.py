@@ -142,12 +142,12 @@ def test_two_people_are_tracked_from_above_by_command_line(tmp_path: Path) -> No
         tmp_path / "room" / "c0.mp4", None, out, site, None, lambda _: None, tracker="temporal"
     )
     assert people == 2
-    told: dict[int, list[list[float]]] = {}
+    boxes_of: dict[int, list[list[float]]] = {}
     for row in read_rows(out):
         box = [row.left, row.top, row.left + row.width, row.top + row.height]
-        told.setdefault(row.frame - 1, []).append(box)
+        boxes_of.setdefault(row.frame - 1, []).append(box)
     near = [
-        float(iou(box, np.array(told[frame])).max())
+        float(iou(box, np.array(boxes_of[frame])).max())
         for frame in range(0, 200, 5)
         for box in scene.truth(frame)[0].boxes
     ]

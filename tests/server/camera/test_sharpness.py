@@ -60,6 +60,6 @@ def test_who_is_hidden_is_as_sharp_as_they_were_and_who_went_is_forgotten() -> N
 
 def test_the_rest_of_the_message_stays() -> None:
     message = word("c0", 0, {1: BOX})
-    told = SharpnessMemory().measured(message, picture())
-    bare = [msgspec.structs.replace(track, sharpness=None) for track in told.tracks]
-    assert msgspec.structs.replace(told, tracks=bare) == message
+    measured = SharpnessMemory().measured(message, picture())
+    bare = [msgspec.structs.replace(track, sharpness=None) for track in measured.tracks]
+    assert msgspec.structs.replace(measured, tracks=bare) == message

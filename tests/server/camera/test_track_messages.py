@@ -17,12 +17,16 @@ def test_moments_of_hiding_are_told_where_the_tracker_bridges_them() -> None:
     bridged = boxes.copy()
     bridged[1] = SEEN
     track = WindowTrack(7, boxes, bridged, np.full(4, 0.25), 0.5)
-    told = TrackMessageBuilder("c0", 1, (640, 360), stride=4).regular(WindowResult(0, 3, 3, (track,), None))
-    assert [it.boxes for it in told.tracks] == [[SEEN, SEEN, SEEN, None]]
+    message = TrackMessageBuilder("c0", 1, (640, 360), stride=4).regular(
+        WindowResult(0, 3, 3, (track,), None)
+    )
+    assert [it.boxes for it in message.tracks] == [[SEEN, SEEN, SEEN, None]]
 
 
 def test_a_box_beyond_all_pictures_can_still_be_told() -> None:
     boxes = np.array([(-4e9, 20.0, 3e9, 110.0)])
     track = WindowTrack(7, boxes, boxes, np.full(1, 0.25), 0.5)
-    told = TrackMessageBuilder("c0", 1, (640, 360), stride=1).regular(WindowResult(0, 0, 1, (track,), None))
-    assert msgspec.json.decode(msgspec.json.encode(told), type=CameraTracks) == told
+    message = TrackMessageBuilder("c0", 1, (640, 360), stride=1).regular(
+        WindowResult(0, 0, 1, (track,), None)
+    )
+    assert msgspec.json.decode(msgspec.json.encode(message), type=CameraTracks) == message

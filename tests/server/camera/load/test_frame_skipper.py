@@ -1,4 +1,4 @@
-"""Frames that are left out on purpose cost nobody their track: what was probably there stands in for them."""
+"""Skipped frames do not break tracks: the tracker receives interpolated detections for them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def followed(current: ShedLevel) -> list[WindowResult]:
 @pytest.mark.parametrize(
     "current", shed_levels(WINDOW.stride, live=False), ids=lambda it: f"every {it.searched}"
 )
-def test_somebody_is_one_person_however_few_frames_are_searched(current: ShedLevel) -> None:
+def test_a_person_keeps_one_track_however_few_frames_are_searched(current: ShedLevel) -> None:
     results = followed(current)
     assert [it.last for it in results] == [
         it.last for it in followed(ShedLevel())
@@ -57,7 +57,7 @@ def test_somebody_is_one_person_however_few_frames_are_searched(current: ShedLev
     }
     assert {number for number, _ in final.values()} == {1}
     assert len(final) >= FRAMES - WINDOW.stride
-    for frame in range(WINDOW.stride, FRAMES):  # before the first sighting nobody knows
+    for frame in range(WINDOW.stride, FRAMES):  # before the first detection there is nothing to interpolate
         assert abs(final[frame][1][0] - (20.0 + 2.0 * frame)) < 3.0
 
 

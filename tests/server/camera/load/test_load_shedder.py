@@ -1,4 +1,4 @@
-"""The load ladder: up at once, down slowly, never to and fro."""
+"""The load shedder goes up at once, down slowly, and does not oscillate."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ def simulated(seconds: float, carried: Callable[[float], float], *, live: bool =
 
     Searching a frame takes three quarters of a frame's time, all else the rest.
     """
-    ladder = LoadShedder(shed_levels(STRIDE, live=live), BOUNDS)
+    shedder = LoadShedder(shed_levels(STRIDE, live=live), BOUNDS)
     free, levels = 0.0, []
     for pulse in range(round(seconds * FPS)):
-        due, current = pulse / FPS, ladder.current
-        work = 0.75 * current.searches(pulse, STRIDE) + 0.25 * current.takes(pulse, STRIDE, GOP)
+        due, level = pulse / FPS, shedder.current
+        work = 0.75 * level.searches(pulse, STRIDE) + 0.25 * level.takes(pulse, STRIDE, GOP)
         start = max(due, free)
         free = min(start + work / FPS / carried(start), due + BACKLOG_S)
-        ladder.measure_lag(free - due, free)
-        levels.append(ladder.level)
+        shedder.measure_lag(free - due, free)
+        levels.append(shedder.level)
     return levels
 
 
@@ -46,14 +46,13 @@ def test_a_camera_that_keeps_up_leaves_nothing_out() -> None:
 @pytest.mark.parametrize("share", [0.9, 0.7, 0.6, 0.5, 0.4])
 def test_whatever_the_machine_carries_the_camera_is_soon_where_it_keeps_up(share: float) -> None:
     levels = simulated(600.0, lambda _: share)
-    current = shed_levels(STRIDE, live=True)[max(levels)]
+    level = shed_levels(STRIDE, live=True)[max(levels)]
     work = sum(
-        0.75 * current.searches(it, STRIDE) + 0.25 * current.takes(it, STRIDE, GOP)
-        for it in range(STRIDE * GOP)
+        0.75 * level.searches(it, STRIDE) + 0.25 * level.takes(it, STRIDE, GOP) for it in range(STRIDE * GOP)
     )
     assert work / (STRIDE * GOP) < share  # so high as needed
     assert levels.index(max(levels)) < 10 * FPS
-    assert changes(levels[-round(240 * FPS) :]) <= 18  # a current down is tried now and then, no more
+    assert changes(levels[-round(240 * FPS) :]) <= 18  # a lower level is tried now and then, no more
 
 
 def test_it_comes_back_by_itself() -> None:
@@ -70,26 +69,26 @@ def test_a_short_stall_is_caught_up_with() -> None:
 
 
 @given(stride=st.integers(1, 20), gop=st.integers(1, 40), live=st.booleans(), pulse=st.integers(0, 10**9))
-def test_no_rung_leaves_out_the_end_of_a_window_or_the_beginning_of_a_gop(
+def test_no_level_skips_the_end_of_a_window_or_the_beginning_of_a_gop(
     stride: int, gop: int, *, live: bool, pulse: int
 ) -> None:
-    for current in shed_levels(stride, live=live):
+    for level in shed_levels(stride, live=live):
         end = (pulse + 1) * stride - 1
-        assert current.searches(end, stride)
-        assert current.takes(end, stride, gop)
-        assert current.takes(pulse * gop, stride, gop)
+        assert level.searches(end, stride)
+        assert level.takes(end, stride, gop)
+        assert level.takes(pulse * gop, stride, gop)
 
 
 @given(stride=st.integers(1, 20), live=st.booleans())
 def test_every_rung_leaves_out_more_and_a_recording_is_always_shown_whole(stride: int, *, live: bool) -> None:
-    ladder = shed_levels(stride, live=live)
-    assert ladder[0] == ShedLevel()
+    levels = shed_levels(stride, live=live)
+    assert levels[0] == ShedLevel()
     frames = range(stride * 60)
-    searched = [sum(it.searches(pulse, stride) for pulse in frames) for it in ladder]
-    taken = [sum(it.takes(pulse, stride, 60) for pulse in frames) for it in ladder]
+    searched = [sum(it.searches(pulse, stride) for pulse in frames) for it in levels]
+    taken = [sum(it.takes(pulse, stride, 60) for pulse in frames) for it in levels]
     assert all(one >= other for one, other in pairwise(searched))
     assert (
-        len(set(zip(searched, taken, strict=True))) >= len(ladder) - 1
+        len(set(zip(searched, taken, strict=True))) >= len(levels) - 1
     )  # of a stride of 1, the last is alike
     if not live:
         assert set(taken) == {len(frames)}

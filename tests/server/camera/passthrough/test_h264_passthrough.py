@@ -1,4 +1,4 @@
-"""A camera's own H.264 passes through to the byte where it fits, and where not the reason is said."""
+"""A camera's own H.264 passes through byte for byte where it fits; otherwise the reason is logged."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def site(source: Path | str, h264: str = "pass", **changes: Any) -> Config:
 
 
 def written(folder: Path, form: str, seed: int = 0) -> Path:
-    """Write what a camera of the site encoded, as somebody else would have recorded it."""
+    """Write what a camera of the site encoded, as another recorder would have written it."""
     units, path = encoded(seed)[:FRAMES], folder / f"own.{form}"
     if form == "h264":
         path.write_bytes(b"".join(unit.data for unit in units))

@@ -1,4 +1,4 @@
-"""Whose word is waited for: nobody's twice in vain, and everybody's who would have been in time."""
+"""The buffer waits for each peer that is in time, and not twice in vain for one that is late."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def buffer(*others: str, near: bool = True) -> PeerDetectionBuffer:
 
 
 def pulses(it: PeerDetectionBuffer, pulse: int) -> list[tuple[str, int]]:
-    return [(said.camera, said.pulse) for said in it.detections_at(pulse).messages]
+    return [(message.camera, message.pulse) for message in it.detections_at(pulse).messages]
 
 
 def test_words_that_came_before_are_there_in_the_order_of_the_configuration() -> None:
@@ -42,7 +42,7 @@ def test_a_camera_that_was_never_there_costs_one_wait() -> None:
     for pulse in range(1, 50):
         it.expect(pulse, pulse / 25)
         assert not it.is_missing(pulse)
-        assert it.detections_at(pulse).is_incomplete, "it is said all the same"
+        assert it.detections_at(pulse).is_incomplete, "it is reported all the same"
 
 
 def test_a_camera_that_was_late_is_waited_for_once_it_would_have_been_in_time() -> None:
@@ -120,23 +120,23 @@ def test_two_waits_in_vain_have_a_word_in_time_between_them(steps: list[tuple[bo
     """However words and questions come: ``steps`` are a word of so many pulses later, or a question."""
     it = buffer()
     it.put(word(0), 0.0)
-    now, said, asked = 0.0, 0, -1
+    now, sent, expected = 0.0, 0, -1
     trusted = True
     times: dict[int, float] = {}
     for speaks, ahead, later in steps:
         now += later
         if speaks:
-            said += 1 + ahead
-            it.put(word(said), now)
-            if said > asked or now <= times.get(said, -1.0) + PATIENCE:
+            sent += 1 + ahead
+            it.put(word(sent), now)
+            if sent > expected or now <= times.get(sent, -1.0) + PATIENCE:
                 trusted = True
         else:
-            asked += 1
-            times[asked] = now
-            it.expect(asked, now + PATIENCE)
-            waits = it.is_missing(asked)
-            assert waits == (trusted and said < asked)
+            expected += 1
+            times[expected] = now
+            it.expect(expected, now + PATIENCE)
+            waits = it.is_missing(expected)
+            assert waits == (trusted and sent < expected)
             if waits:
                 now += PATIENCE
-                it.give_up(asked)
+                it.give_up(expected)
                 trusted = False
