@@ -6,27 +6,26 @@ clients. The wire format is in `camsync.protocol`.
 
 from camsync.client import PulseClient
 from camsync.client_connection import ClientInfo
+from camsync.client_types import (
+    ClientSettings,
+    LoginError,
+    Pulse,
+    ReplacedError,
+    ScheduleLostError,
+    SyncError,
+    SyncStatus,
+    VersionError,
+)
 from camsync.clock import steady_unix_clock
 from camsync.limits import ServerLimits
 from camsync.login import Credentials
 from camsync.messages import ListedClient
 from camsync.protocol import VERSION
-from camsync.pulse import (
-    AxisLostError,
-    ClientSettings,
-    LoginError,
-    Pulse,
-    ReplacedError,
-    SyncError,
-    SyncStatus,
-    VersionError,
-)
 from camsync.query import query_clients
 from camsync.server import PulseServer
 
 __all__ = [
     "VERSION",
-    "AxisLostError",
     "ClientInfo",
     "ClientSettings",
     "Credentials",
@@ -36,6 +35,7 @@ __all__ = [
     "PulseClient",
     "PulseServer",
     "ReplacedError",
+    "ScheduleLostError",
     "ServerLimits",
     "SyncError",
     "SyncStatus",

@@ -9,6 +9,16 @@ from collections import deque
 from types import TracebackType
 from typing import Self
 
+from camsync.client_types import (
+    ClientSettings,
+    LoginError,
+    Pulse,
+    ReplacedError,
+    ScheduleLostError,
+    SyncError,
+    SyncStatus,
+    VersionError,
+)
 from camsync.clock import Clock, steady_unix_clock
 from camsync.clock_offset import ClockOffset
 from camsync.login import Credentials
@@ -24,16 +34,6 @@ from camsync.messages import (
 )
 from camsync.persistent_connection import PersistentConnection
 from camsync.protocol import VERSION, is_name
-from camsync.pulse import (
-    AxisLostError,
-    ClientSettings,
-    LoginError,
-    Pulse,
-    ReplacedError,
-    SyncError,
-    SyncStatus,
-    VersionError,
-)
 from camsync.pulse_counter import PulseCounter
 from logthrottle import LogThrottle
 
@@ -64,7 +64,7 @@ class PulseClient:
     Raises:
         ValueError: a name that the protocol cannot carry or that is not the user's, or a rate not above zero.
         SyncError: while iterating, for a reason that reconnecting cannot solve: ReplacedError, VersionError,
-            LoginError, AxisLostError, or a malformed host name.
+            LoginError, ScheduleLostError, or a malformed host name.
     """
 
     def __init__(
@@ -224,7 +224,7 @@ class PulseClient:
             self._put(number, due, now, own=False)
         elif self._axis_lost(now):
             self._fail(
-                AxisLostError(f"the server is at pulse {number}, {self._name} at {self._counter.last}")
+                ScheduleLostError(f"the server is at pulse {number}, {self._name} at {self._counter.last}")
             )
         self._schedule()
 

@@ -7,10 +7,10 @@ import logging
 import ssl
 from collections.abc import Callable
 
+from camsync.client_types import ClientSettings
 from camsync.clock import Clock
 from camsync.login import Credentials
 from camsync.messages import Hello, ServerLine
-from camsync.pulse import ClientSettings
 from camsync.server_connection import ServerConnection
 from expbackoff import Backoff
 from logthrottle import LogThrottle

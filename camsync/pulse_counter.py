@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from camsync.messages import CountedPulse
-from camsync.pulse_axis import PulseAxis
+from camsync.pulse_schedule import PulseSchedule
 
 
 class PulseCounter:
@@ -18,7 +18,7 @@ class PulseCounter:
     def __init__(self, fps: float, catch_up: float) -> None:
         self._fps = fps
         self._catch_up = catch_up
-        self._axis: PulseAxis | None = None
+        self._axis: PulseSchedule | None = None
         self._last: int | None = None
 
     @property
@@ -29,7 +29,7 @@ class PulseCounter:
     def set_rate(self, fps: float) -> None:
         """Set the server's rate, from the last pulse on."""
         if self._axis is not None and self._last is not None and fps != self._fps:
-            self._axis = PulseAxis.through(self._last, self._axis.due(self._last), fps)
+            self._axis = PulseSchedule.through(self._last, self._axis.due(self._last), fps)
         self._fps = fps
 
     def fill_gap(self, number: int, due: float) -> Iterator[tuple[int, float]]:
@@ -40,14 +40,14 @@ class PulseCounter:
         """
         if self._last is None or number - self._next > self._catch_up * self._fps:
             return
-        axis = PulseAxis.through(number, due, self._fps)
+        axis = PulseSchedule.through(number, due, self._fps)
         while self._next < number:
             self._last = self._next
             yield self._last, axis.due(self._last)
 
     def accept(self, number: int, due: float) -> bool:
         """Count a pulse of the server; return whether its number is new."""
-        self._axis = PulseAxis.through(number, due, self._fps)
+        self._axis = PulseSchedule.through(number, due, self._fps)
         if self._last is not None and number <= self._last:
             return False
         self._last = number
@@ -56,7 +56,7 @@ class PulseCounter:
     def start_at(self, now: float) -> None:
         """Start an axis of its own, with pulse 0 now, unless a server's axis is known."""
         if self._axis is None:
-            self._axis = PulseAxis(now, self._fps)
+            self._axis = PulseSchedule(now, self._fps)
 
     def ahead(self, now: float) -> float:
         """Return by how many seconds the count is ahead of the server's axis."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import ssl
 
+from camsync.client_types import LoginError, SyncError, VersionError
 from camsync.clock import steady_unix_clock
 from camsync.login import Credentials
 from camsync.messages import (
@@ -17,7 +18,6 @@ from camsync.messages import (
     ServerLine,
 )
 from camsync.protocol import VERSION
-from camsync.pulse import LoginError, SyncError, VersionError
 from camsync.server_connection import ServerConnection
 
 

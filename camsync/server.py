@@ -9,7 +9,6 @@ from collections.abc import Collection, Mapping
 from types import TracebackType
 from typing import Self
 
-from camsync.axis_claims import MEASUREMENT_ERROR, AxisClaims
 from camsync.client_connection import ClientInfo
 from camsync.client_registry import ClientRegistry
 from camsync.clock import Clock, steady_unix_clock
@@ -17,7 +16,8 @@ from camsync.limits import ServerLimits
 from camsync.login import LoginGate
 from camsync.messages import Greeting, Hello, PulseMessage, WaitMessage
 from camsync.protocol import MAX_FPS, MIN_FPS, VERSION, encode, is_name
-from camsync.pulse_axis import PulseAxis
+from camsync.pulse_schedule import PulseSchedule
+from camsync.schedule_claims import MEASUREMENT_ERROR, ScheduleClaims
 from logthrottle import LogThrottle
 
 _log = logging.getLogger(__name__)
@@ -85,11 +85,11 @@ class PulseServer:
             tls,
             self._expect.union(users or ()),
         )
-        self._claims = AxisClaims(fps, self._expect, self._limits, self._clock)
+        self._claims = ScheduleClaims(fps, self._expect, self._limits, self._clock)
         self._server: asyncio.Server | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._claims_timer: asyncio.TimerHandle | None = None
-        self._axis: PulseAxis | None = None
+        self._axis: PulseSchedule | None = None
         self._started_at = 0.0
         self._next = 0
         self._pulse: int | None = None
@@ -204,7 +204,7 @@ class PulseServer:
             loop = asyncio.get_running_loop()
             self._claims_timer = loop.call_later(self._limits.claims_for, self._end_claims)
 
-    def _move_forward(self, before: PulseAxis) -> None:
+    def _move_forward(self, before: PulseSchedule) -> None:
         now = self._clock()
         if now - self._started_at > self._limits.adopt_for:
             return
@@ -244,7 +244,7 @@ class PulseServer:
         self._started_at = now = self._clock()
         self._claims.keep_only(self._registry.names())
         agreed = self._claims.agreed_axis()
-        self._axis = agreed or PulseAxis(now, self._fps)
+        self._axis = agreed or PulseSchedule(now, self._fps)
         if agreed is not None:
             self._next = agreed.number_at(now) + 1
             _log.info("clients have counted to %d: going on from there", self._next - 1)

@@ -2,8 +2,7 @@
 
 from bestview.calibration.homography import Floats, fit_homography
 from bestview.calibration.marked_points import CalibrationError, MarkedPoints, PointSettings
-from bestview.calibration.point_fit import PointFit, fit_cameras, fit_points
-from bestview.calibration.walk import Walk, WalkTrack, boxes_at_edge, build_walk
+from bestview.calibration.point_calibration import PointFit, fit_cameras, fit_points
 from bestview.calibration.walk_calibration import (
     CameraCalibration,
     ErrorSummary,
@@ -12,6 +11,7 @@ from bestview.calibration.walk_calibration import (
     calibrate_from_walks,
 )
 from bestview.calibration.walk_settings import WalkSettings
+from bestview.calibration.walk_tracks import Walk, WalkTrack, boxes_at_edge, build_walk
 
 __all__ = [
     "CalibrationError",

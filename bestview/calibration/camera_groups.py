@@ -25,8 +25,8 @@ from bestview.calibration.floor_agreement import mutual_matches
 from bestview.calibration.pinhole import EAST, NORTH, PAN, POSE, Pinhole
 from bestview.calibration.samples import WalkSamples, candidate_matches, sample_walk
 from bestview.calibration.single_camera import fit_tilt_and_height
-from bestview.calibration.walk import Walk
 from bestview.calibration.walk_settings import WalkSettings
+from bestview.calibration.walk_tracks import Walk
 
 _ROUNDS = 3
 

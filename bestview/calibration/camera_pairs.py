@@ -26,8 +26,8 @@ from bestview.calibration.homography import Floats
 from bestview.calibration.pair_hypotheses import RelativePose, propose_relative_poses
 from bestview.calibration.pinhole import EAST, NORTH, PAN, Pinhole
 from bestview.calibration.samples import CandidateMatches, WalkSamples, candidate_matches, sample_walk
-from bestview.calibration.walk import Walk, halves_swapped, time_reversed
 from bestview.calibration.walk_settings import WalkSettings
+from bestview.calibration.walk_tracks import Walk, halves_swapped, time_reversed
 
 _MAX_HYPOTHESES = 60
 """Poses tried for each offset."""

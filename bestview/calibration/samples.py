@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.calibration.homography import Floats
-from bestview.calibration.walk import Walk
+from bestview.calibration.walk_tracks import Walk
 from bestview.geometry.ground_plane import foot_points
 
 Indices = NDArray[np.intp]

@@ -11,8 +11,8 @@ from bestview.calibration.bundle_adjustment import Correspondences, offset_stand
 from bestview.calibration.camera_groups import CameraGroup, CameraPair, align_camera_pairs, group_cameras
 from bestview.calibration.homography import Floats
 from bestview.calibration.marked_points import CalibrationError
-from bestview.calibration.walk import Walk
 from bestview.calibration.walk_settings import WalkSettings
+from bestview.calibration.walk_tracks import Walk
 
 _FLOOR_DISTANCE = 100.0
 """Person heights between floors that no camera connects, beyond any error."""

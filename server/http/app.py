@@ -15,7 +15,7 @@ from server.config.running_config import ConfigFileState
 from server.config.sections import HttpSettings
 from server.config.site_config import Config
 from server.http import static_files
-from server.http.access import sign_in
+from server.http.access import session_routes
 from server.http.access.authentication import Authenticator
 from server.http.access.authorization import ACCESS, AccessControl, authorize, forbid_shared_caching
 from server.http.access.cors import answer_preflight
@@ -26,7 +26,7 @@ from server.http.api.query_validation import validate_query
 from server.http.api.shard_redirect import redirect_to_shard
 from server.http.app_keys import ON_DISK, SERVICE
 from server.http.connections.connection_limit import FOR_OPERATORS, connection_limit
-from server.http.connections.connection_pool import ConnectionLimits, ConnectionPool
+from server.http.connections.connection_limiter import ConnectionLimiter, ConnectionLimits
 from server.http.connections.listener import Listener
 from server.http.connections.malformed_requests import AIOHTTP_LOG, refuse_expectations
 from server.http.connections.overload import limit_connections
@@ -54,7 +54,7 @@ _SHUTDOWN_S = 1.0
 """How long viewers have to take what was sent before the server ends."""
 _ROUTES = (
     handlers,
-    sign_in,
+    session_routes,
     site_handlers,
     recordings,
     http_collector,
@@ -126,7 +126,7 @@ async def serving(app: web.Application, settings: HttpSettings) -> AsyncIterator
     runner.server.request_handler = refuse_expectations(runner.server.request_handler)
     context = None if certificate is None else certificate.context
     limits = _limits(app[SERVICE].config.model_copy(update={"http": settings}))
-    listener = Listener(runner.server, ConnectionPool(limits), context, auto_decompress=False, **handling)
+    listener = Listener(runner.server, ConnectionLimiter(limits), context, auto_decompress=False, **handling)
     watching_certificate = (
         None if certificate is None else asyncio.create_task(certificate.run(), name="certificate")
     )

@@ -25,7 +25,7 @@ from camsync import (
 from camsync.clock import steady_unix_clock
 from camsync.messages import Greeting, PulseMessage
 from camsync.protocol import encode
-from camsync.pulse_axis import PulseAxis
+from camsync.pulse_schedule import PulseSchedule
 from fakes.camsync.pulse_clients import BUSY, FPS, QUICK, JumpingClock, pretended_server, take
 from fakes.timeouts import PATIENCE
 
@@ -213,7 +213,7 @@ async def take_all(client: PulseClient) -> list[Pulse]:
 
 async def test_a_silent_server_is_disconnected_and_reconnected() -> None:
     clock = steady_unix_clock()
-    axis = PulseAxis.through(7, clock(), FPS)
+    axis = PulseSchedule.through(7, clock(), FPS)
 
     def one_pulse() -> bytes:
         number = axis.number_at(clock())

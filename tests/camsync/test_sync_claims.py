@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camsync import ClientSettings, Credentials, PulseClient, PulseServer, ServerLimits, SyncError
-from camsync.axis_claims import AxisClaims
 from camsync.messages import CountedPulse, Hello, LoginMessage, LoginRequest, Pong
 from camsync.protocol import LAST_PULSE, ProtocolError, encode, parse_client_line, parse_server_line
-from camsync.pulse_axis import PulseAxis
+from camsync.pulse_schedule import PulseSchedule
+from camsync.schedule_claims import ScheduleClaims
 from fakes.camsync.pulse_clients import BUSY, ByHand, Connect
 from fakes.timeouts import PATIENCE
 from server.messaging import number_types
@@ -136,11 +136,11 @@ async def test_a_client_far_ahead_of_all_others_has_to_restart() -> None:
 def agreed(counts: Sequence[int | None], expect: int, *, at: int | None = None) -> int | None:
     """Return where claims lead, by name c0, c1, …: None claims nothing; a server ``at`` a pulse has begun."""
     names = [f"c{number}" for number in range(len(counts))]
-    claims = AxisClaims(1.0, [f"c{number}" for number in range(expect)], ServerLimits(), lambda: 0.0)
+    claims = ScheduleClaims(1.0, [f"c{number}" for number in range(expect)], ServerLimits(), lambda: 0.0)
     for name, count in zip(names, counts, strict=True):
         claims.record(Hello(name, None if count is None else CountedPulse(count, 0.0)))
     claims.keep_only(names)
-    axis = claims.agreed_axis(None if at is None else PulseAxis.through(at, 0.0, 1.0))
+    axis = claims.agreed_axis(None if at is None else PulseSchedule.through(at, 0.0, 1.0))
     return None if axis is None else axis.number_at(0.0)
 
 

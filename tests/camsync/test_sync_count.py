@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camsync.clock_offset import ClockOffset
-from camsync.pulse_axis import PulseAxis
 from camsync.pulse_counter import PulseCounter
+from camsync.pulse_schedule import PulseSchedule
 
 rates = st.sampled_from([1.0, 12.5, 25.0, 30000 / 1001, 60.0, 500.0])
 epochs = st.floats(1.7e9, 1.9e9)
@@ -19,7 +19,7 @@ epochs = st.floats(1.7e9, 1.9e9)
 @settings(deadline=None, max_examples=60)
 @given(epochs, rates, st.integers(0, 10**9))
 def test_a_pulse_is_the_one_due_at_its_due_time(epoch: float, fps: float, number: int) -> None:
-    axis = PulseAxis(epoch, fps)
+    axis = PulseSchedule(epoch, fps)
     assert axis.due(number) == epoch + number / fps
     assert axis.number_at(axis.due(number)) == number
 
@@ -27,7 +27,7 @@ def test_a_pulse_is_the_one_due_at_its_due_time(epoch: float, fps: float, number
 @settings(deadline=None, max_examples=60)
 @given(epochs, rates, st.floats(-1e3, 1e7))
 def test_the_number_now_is_due_and_the_next_is_not(epoch: float, fps: float, passed: float) -> None:
-    axis = PulseAxis(epoch, fps)
+    axis = PulseSchedule(epoch, fps)
     number = axis.number_at(epoch + passed)
     assert axis.due(number) <= epoch + passed < axis.due(number + 1)
 

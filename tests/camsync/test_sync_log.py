@@ -10,7 +10,7 @@ from camsync import PulseClient, PulseServer
 from camsync.clock import steady_unix_clock
 from camsync.messages import Greeting, Pong, PulseMessage
 from camsync.protocol import encode
-from camsync.pulse_axis import PulseAxis
+from camsync.pulse_schedule import PulseSchedule
 from fakes.camsync.pulse_clients import FPS, QUICK, Connect, JumpingClock, pretended_server, take
 from fakes.timeouts import PATIENCE
 
@@ -20,7 +20,7 @@ async def test_a_server_that_comes_and_goes_is_one_event_of_the_log(
 ) -> None:
     caplog.set_level(logging.INFO, "camsync")
     clock = steady_unix_clock()
-    axis = PulseAxis.through(7, clock(), FPS)
+    axis = PulseSchedule.through(7, clock(), FPS)
 
     def one_pulse() -> bytes:
         number = axis.number_at(clock())

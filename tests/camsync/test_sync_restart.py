@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from camsync import AxisLostError, ClientSettings, Pulse, PulseClient, PulseServer, ServerLimits
+from camsync import ClientSettings, Pulse, PulseClient, PulseServer, ScheduleLostError, ServerLimits
 from camsync.messages import Pong
 from fakes.camsync.pulse_clients import BUSY, Connect
 from fakes.timeouts import PATIENCE
@@ -132,7 +132,7 @@ async def test_a_running_server_is_not_moved_and_the_client_reports_a_lost_axis(
         client = PulseClient("127.0.0.1", port, "c0", settings=settings)
         await until(client, lambda pulse: pulse.number >= 150)
     async with PulseServer(FPS, port=port, limits=ServerLimits(adopt_for=-1.0)) as again:
-        with pytest.raises(AxisLostError, match="c0"):
+        with pytest.raises(ScheduleLostError, match="c0"):
             await until(client, lambda pulse: pulse.number > 100_000)
         assert again.skipped == 0
     await client.close()

@@ -11,7 +11,7 @@ from tracking.evaluation.multi_camera import (
 )
 from tracking.evaluation.occlusions import Occlusion, find_occlusions, identities_kept
 from tracking.evaluation.oracle_association import oracle_association
-from tracking.evaluation.scores import HEADINGS, Scores, evaluate, format_scores
+from tracking.evaluation.track_scores import HEADINGS, Scores, evaluate, format_scores
 
 __all__ = [
     "HEADINGS",

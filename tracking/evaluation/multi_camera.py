@@ -8,7 +8,7 @@ from statistics import fmean
 from typing import Any
 
 from tracking.evaluation.frame_matching import FrameSimilarity, align_frames
-from tracking.evaluation.scores import DEFAULT_MIN_IOU, Scores, score_frames
+from tracking.evaluation.track_scores import DEFAULT_MIN_IOU, Scores, score_frames
 from tracking.motchallenge import MotRow
 
 

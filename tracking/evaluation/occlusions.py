@@ -10,7 +10,7 @@ import numpy as np
 
 from tracking.boxes import BOX_SIDES, areas, intersections
 from tracking.evaluation.frame_matching import align_frames, match_frames
-from tracking.evaluation.scores import DEFAULT_MIN_IOU
+from tracking.evaluation.track_scores import DEFAULT_MIN_IOU
 from tracking.motchallenge import MotRow
 
 HIDDEN_BELOW = 0.25

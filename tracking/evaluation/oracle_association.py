@@ -9,7 +9,7 @@ import numpy as np
 
 from tracking.assignment import assign_pairs
 from tracking.boxes import BOX_SIDES, iou
-from tracking.evaluation.scores import DEFAULT_MIN_IOU
+from tracking.evaluation.track_scores import DEFAULT_MIN_IOU
 from tracking.motchallenge import MotRow
 
 

@@ -103,7 +103,7 @@ class ConfigFile(_IsolatedConfig):
         self._folder.cleanup()
 
 
-class TokenFile(Target):
+class TokenStore(Target):
     """The file that says who may come."""
 
     name = "config-tokens"
@@ -228,4 +228,4 @@ def _plain(value: Any) -> Any:
     return json.loads(TypeAdapter(Any).dump_json(value))
 
 
-TARGETS = (ConfigFile, TokenFile, ConfigValues, TrialSettings)
+TARGETS = (ConfigFile, TokenStore, ConfigValues, TrialSettings)

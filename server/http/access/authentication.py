@@ -19,7 +19,7 @@ from server.config.tokens_file import Token, token_digest
 from server.http.access.login_rate_limit import LoginRateLimit
 from server.http.access.permissions import Grant
 from server.http.access.sessions import Sessions
-from server.http.access.token_file import TokenFile
+from server.http.access.token_store import TokenStore
 from server.http.json_responses import error_response
 
 COOKIE_PREFIX = "myview"
@@ -57,7 +57,7 @@ class Authenticator:
         self.cookie = f"{COOKIE_PREFIX}_{what}"
         """Each service has its own: cookies do not tell the ports of a machine apart (RFC 6265, 8.5)."""
         self.sessions = Sessions(now)
-        self.file = None if tokens is None else TokenFile(tokens)
+        self.file = None if tokens is None else TokenStore(tokens)
         self._numbered_since = numbered_since
         self._rate_limit = LoginRateLimit(now)
         self._valid: OrderedDict[tuple[str, str], None] = OrderedDict()

@@ -13,7 +13,7 @@ import msgspec
 from aiohttp import web
 
 from server.http.access.permissions import Permission, permission_for
-from server.http.access.sign_in import SessionInfo
+from server.http.access.session_routes import SessionInfo
 from server.http.api.query_validation import CAMERA_QUERY, OVERLAY, TIME_SHIFT
 from server.http.api.schema import Cameras, FlagList, Objects, Past, SiteInfo
 from server.http.json_responses import Problem

@@ -17,7 +17,7 @@ from typing import Any
 from aiohttp import web
 
 from logthrottle import LogThrottle
-from server.http.connections.connection_pool import Connection, ConnectionPool
+from server.http.connections.connection_limiter import Connection, ConnectionLimiter
 from server.http.periodic import run_periodically
 from server.system.accept_errors import AcceptErrors
 
@@ -40,7 +40,7 @@ class PooledHandler(web.RequestHandler):
     __slots__ = ("connection", "pool")
 
     def __init__(
-        self, pool: ConnectionPool, connection: Connection, server: web.Server, **settings: Any
+        self, pool: ConnectionLimiter, connection: Connection, server: web.Server, **settings: Any
     ) -> None:
         super().__init__(server, loop=asyncio.get_running_loop(), **settings)
         self.pool, self.connection = pool, connection
@@ -100,7 +100,7 @@ class Listener:
     """Accepts connections for a server, as far as the pool admits them; ``settings`` are its handlers'."""
 
     def __init__(
-        self, server: web.Server, pool: ConnectionPool, tls: ssl.SSLContext | None, **settings: Any
+        self, server: web.Server, pool: ConnectionLimiter, tls: ssl.SSLContext | None, **settings: Any
     ) -> None:
         self._pool, self._tls = pool, tls
         self._server, self._settings = server, settings

@@ -21,7 +21,7 @@ from bestview.calibration.floor_agreement import (
 from bestview.calibration.pair_hypotheses import propose_relative_poses
 from bestview.calibration.pinhole import Pinhole
 from bestview.calibration.samples import candidate_matches, sample_walk
-from bestview.calibration.walk import halves_swapped, time_reversed
+from bestview.calibration.walk_tracks import halves_swapped, time_reversed
 from bestview.geometry.ground_plane import foot_points
 from fakes.bestview.walkers import SIZE, Noise, camera_at, seen, stroll
 

@@ -19,7 +19,7 @@ from fakes.service.fed_site import A, B, Hall
 from fakes.service.scripted_cameras import CAMERAS, SMALL
 from server.config.tokens_file import token_digest
 from server.http.access.csrf import CSRF_HEADER
-from server.http.access.token_file import TokenFile
+from server.http.access.token_store import TokenStore
 from server.messaging.identity_snapshot import IdentitySnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
@@ -139,7 +139,7 @@ async def test_a_sign_in_ends_in_time_though_the_disk_with_the_tokens_hangs(
 ) -> None:
     looked, hangs = threading.Event(), threading.Event()
 
-    def look(_: TokenFile) -> None:
+    def look(_: TokenStore) -> None:
         looked.set()
         hangs.wait(30.0)
 
@@ -147,7 +147,7 @@ async def test_a_sign_in_ends_in_time_though_the_disk_with_the_tokens_hangs(
     async with site.session.post("/api/session", headers=sessions, json={"token": token_of("desk")}) as done:
         [cookie] = done.cookies.values()
     answer = await stream(site, "/api/events", Cookie=f"{cookie.key}={cookie.value}")
-    monkeypatch.setattr(TokenFile, "reload_if_changed", look)
+    monkeypatch.setattr(TokenStore, "reload_if_changed", look)
     try:
         await asyncio.to_thread(looked.wait, 10.0)
         monkeypatch.setattr(
@@ -202,7 +202,7 @@ class Looked:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.file = TokenFile(write_tokens(path, line_of("desk")))
+        self.file = TokenStore(write_tokens(path, line_of("desk")))
 
     def has(self, name: str) -> bool:
         return self.file.find(token_digest(token_of(name))) is not None

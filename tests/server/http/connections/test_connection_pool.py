@@ -21,7 +21,7 @@ from fakes.service.scripted_cameras import SMALL
 from fakes.system.few_descriptors import MYVIEW, awaited, connected, running, written
 from server.http.access.csrf import CSRF_HEADER
 from server.http.access.networks import network_of
-from server.http.connections.connection_pool import Connection, ConnectionLimits, ConnectionPool
+from server.http.connections.connection_limiter import Connection, ConnectionLimiter, ConnectionLimits
 
 Pair = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
@@ -232,7 +232,7 @@ ACTS = st.lists(
 @given(ACTS)
 def test_no_more_than_may_be_are_there_and_whoever_is_busy_stays(acts: list[tuple[str, str, int]]) -> None:
     clock, there, busy = Clock(), list[Connection](), set[int]()
-    places = ConnectionPool(BOUNDS, clock)
+    places = ConnectionLimiter(BOUNDS, clock)
     for act, address, which in acts:
         it = there[which % len(there)] if there else None
         if act == "comes":
@@ -270,7 +270,7 @@ def test_no_more_than_may_be_are_there_and_whoever_is_busy_stays(acts: list[tupl
 
 
 def test_of_one_address_the_own_make_way_and_then_it_is_told_to_come_again() -> None:
-    places = ConnectionPool(BOUNDS)
+    places = ConnectionLimiter(BOUNDS)
     own = [places.admit("10.0.0.1", Fake()) for _ in range(3)]
     assert all(it is not None for it in own)
     fourth = places.admit("10.0.0.1", Fake())
@@ -286,7 +286,7 @@ def test_of_one_address_the_own_make_way_and_then_it_is_told_to_come_again() -> 
 
 
 def test_this_machine_and_a_proxy_on_it_are_bound_by_all_places_only() -> None:
-    places = ConnectionPool(BOUNDS)
+    places = ConnectionLimiter(BOUNDS)
     for _ in range(BOUNDS.most):
         it = places.admit("127.0.0.1", Fake())
         assert it is not None
@@ -295,7 +295,7 @@ def test_this_machine_and_a_proxy_on_it_are_bound_by_all_places_only() -> None:
 
 
 def test_who_comes_in_great_numbers_takes_no_operators_place_from_another() -> None:
-    places = ConnectionPool(BOUNDS)
+    places = ConnectionLimiter(BOUNDS)
     for number in range(BOUNDS.most):
         it = places.admit(f"10.0.1.{number}", Fake())
         assert it is not None
@@ -310,7 +310,7 @@ def test_who_comes_in_great_numbers_takes_no_operators_place_from_another() -> N
 
 def test_an_answer_that_nobody_takes_ends_and_one_that_is_taken_slowly_does_not() -> None:
     clock = Clock()
-    places = ConnectionPool(BOUNDS, clock)
+    places = ConnectionLimiter(BOUNDS, clock)
     wires = {name: Fake() for name in ("slow", "stalled")}
     for wire in wires.values():
         wire.unsent = 500_000

@@ -21,7 +21,7 @@ class LoginError(SyncError):
     """The server needs a login, or refuses this one."""
 
 
-class AxisLostError(SyncError):
+class ScheduleLostError(SyncError):
     """The server's count stays far behind what this client has counted."""
 
 
@@ -89,6 +89,6 @@ class ClientSettings:
     silence: float = 5.0
     """Seconds without a byte from the server, which answers every ping, until the connection is closed."""
     ahead_most: float = 5.0
-    """Seconds that the count may be ahead of the server's before AxisLostError; below, the client waits."""
+    """Seconds that the count may lead the server's before ScheduleLostError; below, the client waits."""
     settle: float = 2.0
-    """Seconds that a new connection has to take up the client's count before AxisLostError."""
+    """Seconds that a new connection has to take up the client's count before ScheduleLostError."""

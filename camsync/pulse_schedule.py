@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class PulseAxis:
+class PulseSchedule:
     """Pulse n is due at ``epoch + n / fps``: computed from n, so that no error adds up.
 
     ``epoch`` is when pulse 0 was due (unix seconds on one clock), ``fps`` the pulses per second.
@@ -17,7 +17,7 @@ class PulseAxis:
     fps: float
 
     @classmethod
-    def through(cls, number: int, due: float, fps: float) -> PulseAxis:
+    def through(cls, number: int, due: float, fps: float) -> PulseSchedule:
         """Return the axis on which pulse ``number`` is due at ``due``."""
         return cls(due - number / fps, fps)
 

@@ -12,7 +12,7 @@ from camsync.clock import Clock
 from camsync.limits import ServerLimits
 from camsync.messages import Hello
 from camsync.protocol import LAST_PULSE
-from camsync.pulse_axis import PulseAxis
+from camsync.pulse_schedule import PulseSchedule
 from logthrottle import LogThrottle
 
 _log = logging.getLogger(__name__)
@@ -24,7 +24,7 @@ MEASUREMENT_ERROR = 2
 """Pulses by which two claims of the same axis may differ."""
 
 
-class AxisClaims:
+class ScheduleClaims:
     """The newest claim of each client of one server.
 
     ``expect`` names the clients whose claims count; empty: all do. ``fps`` is in pulses per second.
@@ -45,7 +45,7 @@ class AxisClaims:
         if hello.known is None or (self._expect and hello.name not in self._expect):
             return False
         now = self._clock()
-        axis = PulseAxis.through(hello.known.number, now - hello.known.ago, self._fps)
+        axis = PulseSchedule.through(hello.known.number, now - hello.known.ago, self._fps)
         number = axis.number_at(now)
         if number >= self._max_number:
             if (more := self._implausible.record()) is not None:
@@ -59,7 +59,7 @@ class AxisClaims:
         self._connected = self._expect.intersection(connected) if self._expect else frozenset(connected)
         self._epochs = {name: epoch for name, epoch in self._epochs.items() if name in self._connected}
 
-    def agreed_axis(self, current: PulseAxis | None = None) -> PulseAxis | None:
+    def agreed_axis(self, current: PulseSchedule | None = None) -> PulseSchedule | None:
         """Return the axis of the median claim; None: too few clients claim one.
 
         Connected clients without a claim count for the server's ``current`` axis, where it has one.
@@ -69,16 +69,16 @@ class AxisClaims:
             return None
         if current is not None:
             epochs += [current.epoch] * (len(self._connected) - len(epochs))
-        return PulseAxis(sorted(epochs)[len(epochs) // 2], self._fps)
+        return PulseSchedule(sorted(epochs)[len(epochs) // 2], self._fps)
 
-    def log_minority(self, axis: PulseAxis) -> None:
+    def log_minority(self, axis: PulseSchedule) -> None:
         """Log the clients that claim to have counted further than ``axis``."""
         now = self._clock()
         number = axis.number_at(now)
         ahead = [
             name
             for name, epoch in self._epochs.items()
-            if PulseAxis(epoch, self._fps).number_at(now) > number + MEASUREMENT_ERROR
+            if PulseSchedule(epoch, self._fps).number_at(now) > number + MEASUREMENT_ERROR
         ]
         if ahead and (more := self._minorities.record()) is not None:
             text = "%s: claimed to have counted further than %d, but too few other clients do%s"

@@ -72,7 +72,7 @@ class _Pool:
         return next(iter(self.receiving if len(self.receiving) >= len(self.idle) else self.idle), None)
 
 
-class ConnectionPool:
+class ConnectionLimiter:
     """Admits connections and follows their states; ``clock`` is in seconds and never steps."""
 
     def __init__(self, limits: ConnectionLimits, clock: Callable[[], float] = time.monotonic) -> None:

@@ -13,7 +13,7 @@ from server.system.file_state import file_state
 log = logging.getLogger(__name__)
 
 
-class TokenFile:
+class TokenStore:
     """The tokens in force. A file that cannot be read, or has a mistake in it, leaves them as they are."""
 
     def __init__(self, path: Path) -> None:
