@@ -1,8 +1,8 @@
-"""What each term of the tracker brings: its scores without it, on the same public detections.
+"""Ablation of the tracker: scores with one part switched off, on the same public detections.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.ablation --data ../shared/data --out out/bench --jobs 2
 
-A term is switched off by settings of the configuration's section `track`; to add one, add a row to TERMS.
+A part is switched off by settings of the configuration's section `track`; to add one, add a row to ABLATIONS.
 """
 
 from __future__ import annotations
@@ -23,40 +23,40 @@ from tracking.evaluation import Scores, average_scores
 
 @dataclass(frozen=True, slots=True)
 class Ablation:
-    """Something the tracker does, and the settings without it."""
+    """A part of the tracker that is switched off, and the settings that do it."""
 
     name: str
     off: TrackSettings = field(default_factory=dict)
 
 
-DEFAULT = Ablation("all of it")
+DEFAULT = Ablation("default")
 
 TERMS = (
     Ablation("no confidence in the cost", {"costs": {"confidence": 0.0}}),
-    Ablation("leaving is free", {"costs": {"disappearance": 0.0}}),
-    Ablation("off course is free", {"costs": {"motion": 0.0}}),
-    Ablation("out of hiding anywhere", {"costs": {"reappearance": 0.0}}),
-    Ablation("steps of any length", {"costs": {"gate": None}}),
-    Ablation("new people from weak boxes alone", {"window": {"birth_min_peak_score": 0.0}}),
-    Ablation("hidden moments are left out", {"window": {"max_interpolated_gap": 0}}),
-    Ablation("no displacement", {"costs": {"displacement": 0.0}}),
+    Ablation("no cost of disappearing", {"costs": {"disappearance": 0.0}}),
+    Ablation("no motion cost", {"costs": {"motion": 0.0}}),
+    Ablation("no cost of reappearing elsewhere", {"costs": {"reappearance": 0.0}}),
+    Ablation("no gate on displacement", {"costs": {"gate": None}}),
+    Ablation("births from weak boxes alone", {"window": {"birth_min_peak_score": 0.0}}),
+    Ablation("no interpolation of gaps", {"window": {"max_interpolated_gap": 0}}),
+    Ablation("no displacement cost", {"costs": {"displacement": 0.0}}),
     Ablation(
         "displacement in pixels",
         {"costs": {"displacement_unit": "pixels", "displacement": 0.01, "gate": None}},
     ),
-    Ablation("no change of appearance", {"costs": {"appearance": 0.0}}),
+    Ablation("no appearance cost", {"costs": {"appearance": 0.0}}),
     Ablation("conflicts by corners", {"costs": {"conflict_rule": "corners"}}),
     Ablation("conflict rows of II.D", {"costs": {"conflict_rows": "star"}}),
     Ablation(
-        "anybody anywhere (no reach)",
+        "no gating",
         {"window": {"gate_heights": 1e3, "gate_growth": 1e3, "max_height_ratio": 1e3}},
     ),
-    Ablation("boxes of one window: 5 frames", {"window": {"window": 5, "birth_window": 5}}),
-    Ablation("no return after long", {"window": {"reidentify_max_distance": 0.0}}),
-    Ablation("templates stay as they were", {"window": {"template_update_rate": 0.0}}),
+    Ablation("window of 5 frames", {"window": {"window": 5, "birth_window": 5}}),
+    Ablation("no re-identification", {"window": {"reidentify_max_distance": 0.0}}),
+    Ablation("fixed templates", {"window": {"template_update_rate": 0.0}}),
     Ablation("the paper's costs", {"costs": asdict(PAPER_COSTS)}),
 )
-"""What is switched off, one at a time."""
+"""The parts that are switched off, one at a time."""
 
 SCORES = ("idf1", "hota", "mota", "switches")
 _NAMES = {"idf1": "IDF1, %", "hota": "HOTA, %", "mota": "MOTA, %", "switches": "identity switches"}
@@ -64,30 +64,30 @@ _NAMES = {"idf1": "IDF1, %", "hota": "HOTA, %", "mota": "MOTA, %", "switches": "
 
 @dataclass(frozen=True, slots=True)
 class InputSequence:
-    """A recording, with its pictures or without."""
+    """A sequence of detections, with or without its video."""
 
     recording: Recording
     pictures: bool = False
 
     @property
     def name(self) -> str:
-        """What the table calls it."""
+        """The name in the table."""
         return f"{self.recording.name}, pictures" if self.pictures else self.recording.name
 
 
 def inputs(recordings: list[Recording]) -> list[InputSequence]:
-    """Return every recording's detections, with and without the pictures that appearance needs."""
+    """Return each sequence, and once more with its video (needed for appearance) where there is one."""
     alone = [InputSequence(it) for it in recordings]
     return alone + [InputSequence(it, pictures=True) for it in recordings if it.video and it.video.is_file()]
 
 
 def score(term: Ablation, given: InputSequence) -> Scores:
-    """Track without the term, and score it."""
+    """Track one sequence with the ablation's settings, and score the tracks."""
     return given.recording.score(track(given.recording, term.off, pictures=given.pictures))
 
 
 def cell(name: str, without: Scores, default: Scores | None) -> str:
-    """Return a number, or its difference to the default's."""
+    """Format a score, as a difference to the default's where that is given."""
     value = getattr(without, name)
     if default is not None:
         value -= getattr(default, name)
@@ -96,7 +96,7 @@ def cell(name: str, without: Scores, default: Scores | None) -> str:
 
 
 def tables(report: Report, names: list[str], found: dict[str, list[Scores]]) -> None:
-    """Print a table for each score: the default's, and what each term's absence changes."""
+    """Print a table for each score: the default's, and its change by each ablation."""
     several = len(names) > 1
     wide = {name: scores + [average_scores(scores)] * several for name, scores in found.items()}
     for name in SCORES:
@@ -105,11 +105,11 @@ def tables(report: Report, names: list[str], found: dict[str, list[Scores]]) -> 
             for term, scores in wide.items()
         ]
         last = ["total" if name == "switches" else "mean"] * several
-        report.table(f"{_NAMES[name]}, and what changes without", ["", *names, *last], rows)
+        report.table(f"{_NAMES[name]}, and its change by each ablation", ["", *names, *last], rows)
 
 
 def _beside(term: str, wide: dict[str, list[Scores]]) -> Sequence[Scores | None]:
-    """Return what a row's scores are compared with: the default's are not."""
+    """Return the scores that a row is compared with; the default's row is compared with none."""
     default = wide[DEFAULT.name]
     return [None] * len(default) if term == DEFAULT.name else default
 
@@ -137,7 +137,7 @@ def _all_scores(pairs: list[tuple[Ablation, InputSequence]], jobs: int) -> list[
 
 
 def main() -> None:
-    """Run it with the command line's options."""
+    """Run the benchmark."""
     options = parser(__doc__, "ablation")
     options.add_argument("--sequence", action="append", help="only this one; may be repeated")
     options.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at once")

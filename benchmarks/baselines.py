@@ -40,7 +40,7 @@ _VIEWS = (("pets09", "view1", 7.0), ("terrace", "c0", 25.0), ("terrace", "c1", 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchedView:
-    """One camera's pictures, what was found in them, and who is really there."""
+    """One camera's frames with their detections, and the ground truth."""
 
     name: str
     frames: Sequence[DetectedFrame]
@@ -49,7 +49,7 @@ class SearchedView:
 
     @property
     def detections(self) -> list[MotRow]:
-        """All that was found, as rows of nobody."""
+        """All detections, as rows without a track."""
         return [
             MotRow(it.number + 1, -1, box[0], box[1], box[2] - box[0], box[3] - box[1], score)
             for it in self.frames
@@ -58,10 +58,10 @@ class SearchedView:
 
 
 def views(data: Path, most: int | None) -> list[SearchedView]:
-    """Search the first `most` frames of every view there is.
+    """Detect people in the first `most` frames of every available view.
 
     Raises:
-        CannotRunError: there is none.
+        CannotRunError: no view is available.
     """
     found = []
     for scene, name, rate in _VIEWS:
@@ -80,7 +80,7 @@ def views(data: Path, most: int | None) -> list[SearchedView]:
 
 
 def follow(name: str, view: SearchedView) -> tuple[list[MotRow], float]:
-    """Return a tracker's tracks, and the milliseconds that it took for each frame."""
+    """Return a tracker's tracks, and its milliseconds per frame."""
     frames = view.frames
     tracker = create_tracker(
         name, WindowSettings(), CostSettings(), lambda: create_solver(DEFAULT_SOLVER), fps=view.fps

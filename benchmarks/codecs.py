@@ -1,4 +1,4 @@
-"""What a camera's pictures cost and weigh: encoded as H.264 or VP8, or the camera's own passed through.
+"""Cost and size of a camera's stream: encoded as H.264 or VP8, or passed through.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.codecs --out out/bench
 
@@ -38,7 +38,7 @@ _PEAK = 255.0
 
 @dataclass(frozen=True, slots=True)
 class StreamVariant:
-    """One way to a camera's stream."""
+    """A way to produce a camera's stream."""
 
     name: str
     encode: dict[str, Any]
@@ -47,7 +47,7 @@ class StreamVariant:
 
 @dataclass(frozen=True, slots=True)
 class StreamCost:
-    """What it costs and gives; milliseconds are of processor time, for a frame."""
+    """Cost and quality of a stream; milliseconds of processor time per frame."""
 
     taken: float
     """To read and decode the picture."""
@@ -60,7 +60,7 @@ class StreamCost:
 
     @property
     def whole(self) -> float:
-        """All of it."""
+        """The total."""
         return self.taken + self.encoded + self.tracked
 
 
@@ -75,7 +75,7 @@ WAYS = (
 
 
 def record(path: Path, site: SiteSettings, frames: int) -> Path:
-    """Write the room as the site's own encoder sends it."""
+    """Write the synthetic room as encoded by the site's encoder."""
     scene, encoder = (
         Scene("room", 3, 4, 1, site.width, site.height, site.fps),
         Encoder(site, EncodeSettings()),
@@ -86,7 +86,7 @@ def record(path: Path, site: SiteSettings, frames: int) -> Path:
 
 
 def measure(way: StreamVariant, film: Path, site: SiteSettings, frames: int) -> StreamCost:
-    """Run a camera over a recording."""
+    """Run a camera pipeline over a recording, and measure it."""
     pipeline = CameraPipeline(_config(way, film, site), "c0")
     spent, sizes, error = np.zeros(3), 0, 0.0
     decoder = av.CodecContext.create(way.encode.get("codec", "h264"), "r")
@@ -155,7 +155,7 @@ def main() -> None:
         rows.append([way.name, *times, f"{it.kbps:.0f}", quality])
     report.table(
         f"One camera, {chosen.size} at {site.fps:g} a second; milliseconds of processor time a frame",
-        ["way", "take", "encode", "track", "all", "kbit/s", "PSNR, dB"],
+        ["stream", "capture", "encode", "track", "total", "kbit/s", "PSNR, dB"],
         rows,
     )
     report.save(chosen.out / "codecs.txt")

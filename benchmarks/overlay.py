@@ -1,9 +1,9 @@
-"""What pictures cost: boxes burnt in once, for one viewer and for ten, and JPEG of every frame.
+"""Cost of rendering: boxes burnt in, for one viewer and for ten, and JPEG of every frame.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.overlay --out out/bench
 
-Runs a real drawing process on a stream of the synthetic room, as the best-view service does, without HTTP:
-sending costs what it costs of any stream. Costs are processor time of the two processes.
+Runs a real render worker on a stream of the synthetic room, as the best-view service does, but without HTTP:
+sending costs the same for any stream. Costs are processor time of the two processes.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from synthetic import Scene
 
 _MS = 1e3
 _DRAWN = 100
-"""Different frames of the scene; the stream goes through them again and again."""
+"""Different frames of the scene; the stream repeats them."""
 _START = 200
 """The scene's first frame: people are in sight."""
 _MANY = 10
 _LOOK_S = 0.003
-"""So seldom is looked whether a GOP is drawn that it costs nothing."""
+"""Seconds between two checks for a rendered GOP: seldom enough to cost nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class ViewerLoad:
-    """Who watches what."""
+    """The viewers of one measurement."""
 
     name: str
     films: int = 0
@@ -50,18 +50,18 @@ class ViewerLoad:
 
 @dataclass(frozen=True, slots=True)
 class RenderingCost:
-    """What a wish costs; milliseconds of processor time a frame, but for the start."""
+    """Cost of serving these viewers; milliseconds of processor time per frame, except `start_s`."""
 
     start_s: float
-    """Until the first GOP is drawn."""
+    """Seconds until the first GOP is rendered."""
     drawing: float
     service: float
     megabytes: float
-    """Resident memory of the drawing process."""
+    """Resident memory of the render worker."""
 
 
 class RoomStream:
-    """A stream of the room with true boxes."""
+    """An encoded stream of the synthetic room with the boxes of its ground truth."""
 
     def __init__(self, site: SiteSettings, encode: EncodeSettings) -> None:
         scene = Scene("room", 3, 4, 1, site.width, site.height, site.fps)
@@ -106,7 +106,7 @@ class RoomStream:
 
 
 async def measure(stage: RoomStream, wish: ViewerLoad, gops: int) -> RenderingCost:
-    """Let a process draw; every GOP is given when the one before is done."""
+    """Have a worker render; every GOP is published when the previous one is done."""
     stream = Broadcaster()
     source = RenderedStream("the room", stream, stage.told, stage.settings, live=True, queue_gops=8)
     source.use()
@@ -119,7 +119,7 @@ async def measure(stage: RoomStream, wish: ViewerLoad, gops: int) -> RenderingCo
     stream.publish(chunks[0])
     await source.still("plain", _last(stage, chunks[0]))
     start, pid = time.perf_counter() - began, source.pid
-    assert pid is not None  # noqa: S101 — it has just drawn
+    assert pid is not None  # noqa: S101 — it has just rendered
     drawing, service = _processor_seconds(pid), time.process_time()
     for chunk in chunks[1:]:
         stream.publish(chunk)
@@ -159,7 +159,7 @@ def _resident_megabytes(pid: int) -> float:
 
 
 def wishes(fps: float) -> list[ViewerLoad]:
-    """List what is measured."""
+    """Return the viewers of each measurement."""
     plain, boxed = MjpegVariant(fps, boxed=False), MjpegVariant(fps, boxed=True)
     return [
         ViewerLoad("decoded only, for stills"),
@@ -199,7 +199,7 @@ def main() -> None:
         )
     report.table(
         f"Pictures of one stream of {chosen.size} at {stage.site.fps:g} a second",
-        ["wanted", "drawing, ms a frame", "service, ms a frame", "% of a core", "start, s", "MB"],
+        ["viewers", "worker, ms a frame", "service, ms a frame", "% of a core", "start, s", "MB"],
         rows,
     )
     report.save(chosen.out / "overlay.txt")

@@ -1,8 +1,8 @@
-"""From a fresh clone to the first picture: what `make demo` takes, part by part; a plot.
+"""From a fresh clone to the first picture: the time of `make demo`, step by step; a plot.
 
     python -m benchmarks.startup --out out/bench
 
-A clone of the committed tree in a temporary folder; nothing of it is installed before. Packages come from the
+Clones the committed tree into a temporary folder; nothing is installed before. Packages come from the
 index, or from the caches of pip and uv where they are: `tests/bare_machine.sh` has none.
 """
 
@@ -31,28 +31,28 @@ _ANSI = re.compile(r"\x1b\[[0-9;]*m")
 
 @dataclass(frozen=True, slots=True)
 class Milestone:
-    """A line of the output at which a part has ended."""
+    """A line of the output that ends a step."""
 
     part: str
     line: re.Pattern[str]
     times: int = 1
-    """How often the line must come."""
+    """How often the line must appear."""
 
 
 MILESTONES = (
     Milestone("make the virtual environment", re.compile(r"pip install .*\buv$")),
     Milestone("install uv", re.compile(r"uv pip install")),
-    Milestone("install what MyView runs on", re.compile(r"^\S*myview demo$")),
+    Milestone("install dependencies", re.compile(r"^\S*myview demo$")),
     Milestone("start the demo", re.compile(r"^Three cameras at")),
     Milestone("start the best-view service: the page answers", re.compile(r"page, streams and API on")),
     Milestone("start the cameras", re.compile(r"camera c\d connected"), 3),
-    Milestone("find somebody and show them", re.compile(r"^MyView is ready")),
+    Milestone("detect and show a person", re.compile(r"^MyView is ready")),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class StartupStep:
-    """What a part took, and when it was over."""
+    """How long a step took, and when it ended."""
 
     name: str
     seconds: float
@@ -60,10 +60,10 @@ class StartupStep:
 
 
 def measure(clone: Path) -> list[StartupStep]:
-    """Run `make demo` in a fresh clone until it shows somebody; return the seconds of every part.
+    """Run `make demo` in a fresh clone until it shows a person; return the time of every step.
 
     Raises:
-        RuntimeError: it ended before.
+        RuntimeError: the demo ended before that.
     """
     found: list[StartupStep] = []
     said: list[str] = []
@@ -85,7 +85,7 @@ def measure(clone: Path) -> list[StartupStep]:
 
 @contextlib.contextmanager
 def _demo(clone: Path) -> Iterator[Iterator[str]]:
-    """Run it, and give the lines that it prints; in the end it is told to end."""
+    """Run `make demo`; yield the lines that it prints, and terminate it in the end."""
     environment = {**os.environ, "PYTHONUNBUFFERED": "1", "BROWSER": "true"}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # or every process would compile everything for itself
     process = subprocess.Popen(
@@ -109,7 +109,7 @@ def _demo(clone: Path) -> Iterator[Iterator[str]]:
 
 
 def plot(parts: Sequence[StartupStep], path: Path) -> None:
-    """Draw a bar for every part, each from when the one before was over."""
+    """Draw a bar for every step, each starting where the previous one ended."""
     figure = Figure(figsize=(8, 3), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
@@ -130,7 +130,7 @@ def main() -> None:
         subprocess.run(["git", "clone", "--quiet", "--local", str(ROOT), str(clone)], check=True)
         parts = measure(clone)
     rows = [[it.name, f"{it.seconds:.1f}", f"{it.over:.1f}"] for it in parts]
-    report.table("From a fresh clone to the first picture, seconds", ["part", "took", "over after"], rows)
+    report.table("From a fresh clone to the first picture, seconds", ["step", "took", "done after"], rows)
     plot(parts, chosen.out / "startup.png")
     report.save(chosen.out / "startup.txt")
 

@@ -1,1 +1,1 @@
-"""Who is who across cameras, and the best view of everybody."""
+"""Identities across cameras, and the best view of each person."""

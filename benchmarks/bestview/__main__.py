@@ -1,27 +1,27 @@
-"""Who is who across cameras, and the best view of everybody, beside simpler ways and beside the truth.
+"""Identities across cameras, and the best view of each person, beside simpler methods and the ground truth.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.bestview --data ../shared/data --out out/bench
 
-Joint IDF1 takes all cameras as one recording, in which a number is one person everywhere. The choices are
-scored as `myview evaluate --views` does, beside the exact offline optimum of what could really be seen.
+Joint IDF1 takes all cameras as one recording, in which an id is one person everywhere. The choices are
+scored as `myview evaluate --views` does, beside the exact offline optimum of the true visibility.
 
-The truth stands in for MyView's stages, one after the other; what is lost between two rows is that stage's:
-*true boxes* of those who are visible; *own boxes, true ids*: those that MyView's cameras tracked, each with
-the number of the person it is at, and the same with short gaps bridged; *own parts, true joins*: each part of
-a track that identity takes for one person's, with the number of the person it is mostly at; *own tracks, true
-joins*: the same of whole tracks; *again*: all as MyView numbered it at last, known at once, and
-nobody ever away. The mean of *own tracks, not joined* is what each camera's tracker is worth by itself.
+The ground truth replaces MyView's stages, one after the other; the loss between two rows is that stage's:
+*true boxes* of visible people; *own boxes, true ids*: the boxes that MyView's cameras tracked, each with the
+id of the person it is on, and the same with short gaps interpolated; *own tracklets, true ids*: each tracklet
+with the id of the person it is mostly on; *own tracks, true ids*: the same of whole tracks; *final ids*: the
+ids that MyView ended with, known from the start, and every person always present. The mean of *own tracks,
+not associated* is the score of each camera's tracker by itself.
 
-Recordings are looked at ahead, as MyView does with recordings; `--as-live` has them learned as they go.
+Detectors prescan recordings, as MyView does; `--as-live` has them learn the background as they go.
 
-*Looks alone* are those of sites whose cameras have no floor in common, told without travel times.
+*Appearance only* is for sites whose cameras share no floor: association without travel times.
 
-*Found only* leaves out views of people whom a camera does not find though others know where they stand. *No
-evidence* is without what the cameras tell each other about each frame. *Calibrated* has the homographies
-that `myview calibrate` makes of the cameras' own tracks. *Largest* chooses frame by frame the camera with the
-largest box. *Nearest feet* joins whole tracks of our cameras, each by itself (or of ByteTrack, on the same
-boxes), by the median distance of their feet, and chooses so, too. *Occupancy map* finds everybody on the
-ground from all cameras' foreground and joins places by the flow of least cost; its views are chosen by
+*Detected only* leaves out views of people whom a camera does not detect, though others know where they stand.
+*No peer evidence* is without the detections that cameras exchange. *Calibrated* has the homographies that
+`myview calibrate` computes from the cameras' own tracks. *Largest* selects frame by frame the camera with the
+largest box. *Nearest feet* associates whole tracks of each camera's own tracker (or of ByteTrack, on the same
+boxes) by the median distance of their foot points, and selects the largest box, too. *Occupancy map* detects
+people on the ground from all cameras' foreground and links them by min-cost flow; its views are selected by
 MyView's program. The sweeps are on true boxes.
 """
 
@@ -38,9 +38,16 @@ import cv2
 from benchmarks.bestview.association_baselines import own_tracks
 from benchmarks.bestview.camera_tracks import SceneDetections, followed
 from benchmarks.bestview.identity_errors import MatchedBoxes
-from benchmarks.bestview.methods import LEAST_IOU, MethodResult, MethodScores, SearchedScene, outcome, ways
+from benchmarks.bestview.methods import (
+    LEAST_IOU,
+    MethodResult,
+    MethodScores,
+    SearchedScene,
+    run_methods,
+    score_method,
+)
 from benchmarks.bestview.parameter_sweep import SweepResult, sweep, sweep_tables
-from benchmarks.bestview.plots import plot_sweeps, plot_ways
+from benchmarks.bestview.plots import plot_methods, plot_sweeps
 from benchmarks.bestview.scenes import BenchmarkScene, auditorium, gallery, room, terrace
 from benchmarks.bestview.track_calibration import CannotCalibrateError, calibrated
 from benchmarks.bestview.visibility_losses import VisibilityLosses, losses
@@ -63,13 +70,18 @@ GALLERY, QUICK_GALLERY = (6, 240.0), (3, 30.0)
 COLUMNS = ["", "joint", "mean", "Agree", "Regret", "Visible", "Chosen", "Cuts", "Best", "Shot"]
 
 LATER_S = (1.0, 15.0)
-"""Seconds after which cameras are compared with themselves."""
-WHO = ["", "whole", "pure", *(word for it in LATER_S for word in (f"{it:g} s: whole", "pure"))]
-WHY = ["", "Visible", "choice", "number", "missed"]
+"""Seconds after which a camera's identities are compared with its own earlier ones."""
+IDENTITY_COLUMNS = [
+    "",
+    "recall",
+    "precision",
+    *(word for it in LATER_S for word in (f"{it:g} s: recall", "precision")),
+]
+LOSS_COLUMNS = ["", "Visible", "selection", "identity", "detection"]
 
 
-def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator[BenchmarkScene]:
-    """Yield the scenes one after the other; those that are not there are said."""
+def scenes(options: argparse.Namespace, folder: Path, report: Report) -> Iterator[BenchmarkScene]:
+    """Yield the scenes one after the other; report those whose recordings are missing."""
     wanted = options.scene or SCENES
     for name, find in (("terrace", terrace), ("auditorium", auditorium)):
         if name in wanted:
@@ -84,13 +96,13 @@ def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator
         yield gallery(folder, *(QUICK_GALLERY if options.quick else GALLERY))
 
 
-def as_live(case: BenchmarkScene) -> BenchmarkScene:
-    """Return the scene as cameras would show it: nothing is known of it before its first frame."""
-    return replace(case, content={**case.content, "detect": {"prescan_frames": 0}})
+def as_live(scene: BenchmarkScene) -> BenchmarkScene:
+    """Return the scene without prescan: nothing is known before its first frame."""
+    return replace(scene, content={**scene.content, "detect": {"prescan_frames": 0}})
 
 
-def row_of(it: MethodScores) -> list[str]:
-    """Return a row of the table: percent, cuts a minute, and the shortest shot in frames."""
+def score_row(it: MethodScores) -> list[str]:
+    """Return a row of the main table: percent, cuts a minute, and the shortest shot in frames."""
     idf1 = (
         ["", ""] if it.tracks is None else [f"{100 * s.idf1:.1f}" for s in (it.tracks.joint, it.tracks.mean)]
     )
@@ -106,21 +118,21 @@ def row_of(it: MethodScores) -> list[str]:
     ]
 
 
-def losses_of(name: str, it: VisibilityLosses) -> list[str]:
-    """Return a row of the other table, percent."""
-    return [name, *(f"{100 * share:.1f}" for share in (it.visible, it.choice, it.number, it.missed))]
+def loss_row(name: str, it: VisibilityLosses) -> list[str]:
+    """Return a row of the table of visibility losses, percent."""
+    return [name, *(f"{100 * share:.1f}" for share in (it.visible, it.selection, it.identity, it.detection))]
 
 
-def agreements_of(case: BenchmarkScene, way: MethodResult) -> list[str]:
-    """Return a row of the table of who is who, percent."""
-    met = MatchedBoxes.of(way.rendering.tracks, case.gt, LEAST_IOU)
-    fps = float(case.content["site"]["fps"])
-    told = (met.at_once(), *(met.later(round(seconds * fps)) for seconds in LATER_S))
-    return [way.name, *(f"{100 * share:.1f}" for it in told for share in (it.whole, it.pure))]
+def identity_row(scene: BenchmarkScene, result: MethodResult) -> list[str]:
+    """Return a row of the table of identity errors, percent."""
+    matched = MatchedBoxes.of(result.rendering.tracks, scene.gt, LEAST_IOU)
+    fps = float(scene.content["site"]["fps"])
+    scores = (matched.across_cameras(), *(matched.over_time(round(seconds * fps)) for seconds in LATER_S))
+    return [result.name, *(f"{100 * share:.1f}" for it in scores for share in (it.recall, it.precision))]
 
 
-def peers_of(options: argparse.Namespace, report: Report) -> OtherTrackerEnvironment | None:
-    """Return the other trackers' environment, or say why there is none."""
+def find_other_trackers(options: argparse.Namespace, report: Report) -> OtherTrackerEnvironment | None:
+    """Return the environment of the other trackers; report why where it cannot be made."""
     if options.no_peers or options.quick:
         return None
     try:
@@ -130,15 +142,17 @@ def peers_of(options: argparse.Namespace, report: Report) -> OtherTrackerEnviron
         return None
 
 
-def walked_of(
-    case: BenchmarkScene, blind: SceneDetections, folder: Path, report: Report
+def self_calibrated_scene(
+    scene: BenchmarkScene, uncalibrated_detections: SceneDetections, folder: Path, report: Report
 ) -> SearchedScene | None:
-    """Return the scene calibrated by its own tracks, or say why it cannot be."""
+    """Return the scene calibrated by its own tracks; report why where that fails."""
     try:
-        walked = calibrated(case, own_tracks(followed(case.config(ground=False), blind.frames)), folder)
-        return SearchedScene(walked, walked.watch())
+        calibrated_scene = calibrated(
+            scene, own_tracks(followed(scene.config(ground=False), uncalibrated_detections.frames)), folder
+        )
+        return SearchedScene(calibrated_scene, calibrated_scene.detect())
     except CannotCalibrateError as problem:
-        report.say(f"{case.name}: not calibrated by its own tracks: {problem}")
+        report.say(f"{scene.name}: not calibrated by its own tracks: {problem}")
         return None
 
 
@@ -146,37 +160,55 @@ def measure(options: argparse.Namespace) -> None:
     """Measure, print and save."""
     cv2.setNumThreads(1)
     report = Report()
-    peers = peers_of(options, report)
-    found: dict[str, list[MethodScores]] = {}
+    peers = find_other_trackers(options, report)
+    scores: dict[str, list[MethodScores]] = {}
     swept: dict[str, list[SweepResult]] = {}
     with tempfile.TemporaryDirectory(prefix="myview-bestview-") as name:
-        for found_case in cases(options, Path(name), report):
-            case = as_live(found_case) if options.as_live else found_case
-            truth = case.truth()
-            seen = case.watch()
-            blind = case.watch(ground=False) if case.calibrated else seen
-            walked = None if options.quick else walked_of(case, blind, Path(name), report)
-            tried = list(ways(case, truth, seen, blind, peers, walked))
-            found[case.name] = [outcome(case, truth, way) for way in tried]
-            report.table(f"{case.name}: {case.about}", COLUMNS, [row_of(it) for it in found[case.name]])
-            who = [agreements_of(case, way) for way in tried if not way.given]
-            report.table(f"{case.name}: who is who, at once and later", WHO, who)
-            why = [(way.name, losses(case, truth, way)) for way in tried if not way.given]
-            report.table(f"{case.name}: why not visible", WHY, [losses_of(name, it) for name, it in why])
+        for full_scene in scenes(options, Path(name), report):
+            scene = as_live(full_scene) if options.as_live else full_scene
+            truth = scene.truth()
+            detections = scene.detect()
+            uncalibrated_detections = scene.detect(ground=False) if scene.calibrated else detections
+            calibrated_scene = (
+                None
+                if options.quick
+                else self_calibrated_scene(scene, uncalibrated_detections, Path(name), report)
+            )
+            results = list(
+                run_methods(scene, truth, detections, uncalibrated_detections, peers, calibrated_scene)
+            )
+            scores[scene.name] = [score_method(scene, truth, result) for result in results]
+            report.table(
+                f"{scene.name}: {scene.about}", COLUMNS, [score_row(it) for it in scores[scene.name]]
+            )
+            identity_rows = [identity_row(scene, result) for result in results if not result.ground_truth]
+            report.table(
+                f"{scene.name}: identities, across cameras and over time", IDENTITY_COLUMNS, identity_rows
+            )
+            loss_rows = [
+                (result.name, losses(scene, truth, result)) for result in results if not result.ground_truth
+            ]
+            report.table(
+                f"{scene.name}: why people are not visible in the selected view",
+                LOSS_COLUMNS,
+                [loss_row(name, it) for name, it in loss_rows],
+            )
             if not options.no_sweeps:
-                swept[case.name] = sweep(case, truth, quick=options.quick)
-    report.say("joint, mean: IDF1. Cuts, Best: a minute, the choice's and the optimum's. Shot: frames.")
+                swept[scene.name] = sweep(scene, truth, quick=options.quick)
     report.say(
-        "Who is who: of pairs of boxes at one person, in two cameras at once or in one camera so long after, "
-        "those that have one number are whole; of pairs of one number those at one person are pure."
+        "joint, mean: IDF1. Cuts, Best: cuts a minute, selected and optimal. Shot: shortest, in frames."
     )
     report.say(
-        "Not visible in the chosen view, though in some: by choice, their number was at them in a camera "
-        "that shows them; by number, only others were; missed, none was."
+        "Identities: pairs of boxes in two cameras at once, or in one camera so many seconds apart. Recall: "
+        "the share of pairs on one person with one id; precision: of pairs with one id on one person."
+    )
+    report.say(
+        "Not visible in the selected view, though in another: selection, a camera that shows them had them "
+        "under their own id; identity, only under another id; detection, no camera had a box on them."
     )
     sweep_tables(report, swept)
     report.save(options.out / "bestview.txt")
-    plot_ways(found, options.out / "bestview.png")
+    plot_methods(scores, options.out / "bestview.png")
     if swept:
         plot_sweeps(swept, options.out / "bestview_sweeps.png")
 
@@ -187,7 +219,7 @@ def main() -> None:
     options.add_argument(
         "--scene", action="append", choices=SCENES + ONE_ROOM, help="only this one; may be repeated"
     )
-    options.add_argument("--as-live", action="store_true", help="recordings are not looked at ahead")
+    options.add_argument("--as-live", action="store_true", help="no prescan of recordings")
     options.add_argument("--quick", action="store_true", help="short synthetic scenes, no other trackers")
     options.add_argument("--no-peers", action="store_true", help="leave out the other tracker")
     options.add_argument(

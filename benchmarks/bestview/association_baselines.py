@@ -1,4 +1,4 @@
-"""Other ways to say who is who across cameras: by the nearest feet, and by the truth."""
+"""Baselines of cross-camera association: by the nearest foot points, and by the ground truth."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tracking.evaluation.frame_matching import align_frames
 from tracking.motchallenge import MotRow
 
 LEAST_COMMON = 5
-"""Frames that two tracks must share to be compared."""
+"""Frames that two tracks must have in common to be compared."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -28,19 +28,19 @@ class _TrackKey:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _GroundTrack:
-    """Where a track stands: `(F,)` frames, `(F, 2)` feet on the ground."""
+    """A track on the ground: `(F,)` frames, `(F, 2)` foot points."""
 
     frames: np.ndarray[tuple[int], np.dtype[np.int64]]
     feet: Floats
 
 
 def own_tracks(messages: Messages) -> dict[str, list[MotRow]]:
-    """Return each camera's final boxes by its own numbers: what `myview track` finds, without its bridges."""
+    """Return each camera's final boxes by local track id: `myview track` without interpolation."""
     tracks: dict[str, list[MotRow]] = {}
-    for camera, said in messages.items():
+    for camera, camera_messages in messages.items():
         rows: list[MotRow] = []
         done = -1
-        for message in said:
+        for message in camera_messages:
             final_to = message.last if message.ended else message.final_to
             for track in message.tracks:
                 for frame in range(max(done + 1, message.first), final_to + 1):
@@ -53,8 +53,8 @@ def own_tracks(messages: Messages) -> dict[str, list[MotRow]]:
     return tracks
 
 
-def not_joined(rows: Rows) -> dict[str, list[MotRow]]:
-    """Return every track of every camera a number of its own."""
+def unassociated_tracks(rows: Rows) -> dict[str, list[MotRow]]:
+    """Return the tracks with an id of its own for each track of each camera."""
     keys = sorted({_TrackKey(camera, row.id) for camera, found in rows.items() for row in found})
     number = {key: place for place, key in enumerate(keys, start=1)}
     return {
@@ -64,9 +64,9 @@ def not_joined(rows: Rows) -> dict[str, list[MotRow]]:
 
 
 def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[MotRow]]:
-    """Join whole tracks of different cameras by the median distance of their feet, the nearest first.
+    """Associate whole tracks of different cameras by the median distance of foot points, the nearest first.
 
-    The gate is MyView's own, `gate_heights` of a person. Two tracks of one camera that are there at once are
+    The gate is MyView's own, `gate_heights` of a person. Two tracks of one camera that overlap in time are
     never joined, and neither are those of a camera without homography.
     """
     walks, heights = _walks(rows, ground)
@@ -76,19 +76,19 @@ def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[
         (distance, one, other)
         for place, one in enumerate(keys)
         for other in keys[place + 1 :]
-        if one.camera != other.camera and (distance := _apart(walks[one], walks[other])) <= gate
+        if one.camera != other.camera and (distance := _distance(walks[one], walks[other])) <= gate
     )
     group = {key: [key] for key in keys}
     for _, one, other in near:
-        ours, theirs = group[one], group[other]
-        if ours is not theirs and not _clash(ours, theirs, walks):
-            ours += theirs
-            group.update(dict.fromkeys(theirs, ours))
-    alone = not_joined(rows)
+        group_a, group_b = group[one], group[other]
+        if group_a is not group_b and not _clash(group_a, group_b, walks):
+            group_a += group_b
+            group.update(dict.fromkeys(group_b, group_a))
+    unassociated = unassociated_tracks(rows)
     number = {
         _TrackKey(camera, it.id): new.id
         for camera in rows
-        for it, new in zip(rows[camera], alone[camera], strict=True)
+        for it, new in zip(rows[camera], unassociated[camera], strict=True)
     }
     joined = {key: min(number[member] for member in members) for key, members in group.items()}
     return {
@@ -102,48 +102,50 @@ def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[
 
 
 def boxes_by_truth(rows: Rows, gt: Rows) -> dict[str, list[MotRow]]:
-    """Return each box the number of the person it is at; boxes at nobody go."""
+    """Return each box with the id of the person it is on; boxes on nobody are dropped."""
     return {camera: oracle_association(found, gt[camera]) for camera, found in rows.items()}
 
 
 def tracks_by_truth(rows: Rows, gt: Rows, least_iou: float = 0.5) -> dict[str, list[MotRow]]:
-    """Return each track, for all its life, the number of the person it is most often at.
+    """Return each whole track with the id of the person it is most often on.
 
-    A track that is never at anybody goes. Where two of a person are there at once, the one that is with them
-    for longer stays.
+    A track that is never on a person is dropped. Where two tracks of one person overlap, the one that is on
+    them for longer stays.
     """
     joined = {}
     for camera, found in rows.items():
-        met: dict[int, Counter[int]] = defaultdict(Counter)
+        overlaps: dict[int, Counter[int]] = defaultdict(Counter)
         for frame in align_frames(gt[camera], found, least_iou):
             for person, track in zip(*np.nonzero(frame.similarity >= least_iou), strict=True):
-                met[int(frame.tracks[track])][int(frame.truth[person])] += 1
-        best = {track: max(sorted(people), key=people.__getitem__) for track, people in met.items()}
-        long = {track: people[best[track]] for track, people in met.items()}
-        kept = sorted((row for row in found if row.id in best), key=lambda row: (row.frame, -long[row.id]))
-        joined[camera] = _first_of_each([replace(row, id=best[row.id]) for row in kept])
+                overlaps[int(frame.tracks[track])][int(frame.truth[person])] += 1
+        best = {track: max(sorted(people), key=people.__getitem__) for track, people in overlaps.items()}
+        frames_on_person = {track: people[best[track]] for track, people in overlaps.items()}
+        matched = sorted(
+            (row for row in found if row.id in best), key=lambda row: (row.frame, -frames_on_person[row.id])
+        )
+        joined[camera] = _first_of_each([replace(row, id=best[row.id]) for row in matched])
     return joined
 
 
-def bridged(rows: Rows, most: int) -> dict[str, list[MotRow]]:
-    """Put boxes, on the straight line, where a camera finds somebody again within `most` frames."""
+def interpolated_gaps(rows: Rows, most: int) -> dict[str, list[MotRow]]:
+    """Interpolate boxes linearly where a camera detects a person again within `most` frames."""
     filled = {}
     for camera, found in rows.items():
         by_person: dict[int, list[MotRow]] = defaultdict(list)
         for row in sorted(found, key=lambda row: row.frame):
             by_person[row.id].append(row)
-        between = [
-            _between(one, other, frame)
+        interpolated = [
+            _interpolated(one, other, frame)
             for track in by_person.values()
             for one, other in pairwise(track)
             if other.frame - one.frame <= most
             for frame in range(one.frame + 1, other.frame)
         ]
-        filled[camera] = sorted([*found, *between], key=lambda row: (row.frame, row.id))
+        filled[camera] = sorted([*found, *interpolated], key=lambda row: (row.frame, row.id))
     return filled
 
 
-def _between(one: MotRow, other: MotRow, frame: int) -> MotRow:
+def _interpolated(one: MotRow, other: MotRow, frame: int) -> MotRow:
     share = (frame - one.frame) / (other.frame - one.frame)
     sides = {
         name: (1.0 - share) * getattr(one, name) + share * getattr(other, name)
@@ -153,15 +155,15 @@ def _between(one: MotRow, other: MotRow, frame: int) -> MotRow:
 
 
 def _first_of_each(rows: Sequence[MotRow]) -> list[MotRow]:
-    """Keep the first row of each number in each frame."""
-    kept: dict[tuple[int, int], MotRow] = {}
+    """Keep the first row of each id in each frame."""
+    matched: dict[tuple[int, int], MotRow] = {}
     for row in rows:
-        kept.setdefault((row.frame, row.id), row)
-    return list(kept.values())
+        matched.setdefault((row.frame, row.id), row)
+    return list(matched.values())
 
 
 def _walks(rows: Rows, ground: Mapping[str, Floats]) -> tuple[dict[_TrackKey, _GroundTrack], float]:
-    """Return where each track stands, and the height of a person in ground units."""
+    """Return each track on the ground, and the height of a person in ground units."""
     tracks: dict[_TrackKey, list[MotRow]] = defaultdict(list)
     for camera, found in rows.items():
         for row in found:
@@ -178,8 +180,8 @@ def _walks(rows: Rows, ground: Mapping[str, Floats]) -> tuple[dict[_TrackKey, _G
     return walks, float(np.nanmedian(known)) if known.size else 0.0
 
 
-def _apart(one: _GroundTrack, other: _GroundTrack) -> float:
-    """Return the median distance in the frames that both are in; infinite where these are few."""
+def _distance(one: _GroundTrack, other: _GroundTrack) -> float:
+    """Return the median distance in the common frames; infinite where these are few."""
     _, here, there = np.intersect1d(one.frames, other.frames, return_indices=True)
     distances = np.linalg.norm(one.feet[here] - other.feet[there], axis=1)
     distances = distances[~np.isnan(distances)]
@@ -187,10 +189,10 @@ def _apart(one: _GroundTrack, other: _GroundTrack) -> float:
 
 
 def _clash(
-    ours: Sequence[_TrackKey], theirs: Sequence[_TrackKey], walks: Mapping[_TrackKey, _GroundTrack]
+    group_a: Sequence[_TrackKey], group_b: Sequence[_TrackKey], walks: Mapping[_TrackKey, _GroundTrack]
 ) -> bool:
     return any(
         one.camera == other.camera and np.intersect1d(walks[one].frames, walks[other].frames).size > 0
-        for one in ours
-        for other in theirs
+        for one in group_a
+        for other in group_b
     )

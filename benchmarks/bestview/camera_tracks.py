@@ -1,4 +1,4 @@
-"""What every camera of a scene finds, in pictures or in files, and what they say when they follow it."""
+"""Each camera's detections, from pictures or files, and the track messages made of them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tracking.detectors import MotFileDetector
 from tracking.motchallenge import MotRow
 
 Messages = Mapping[str, list[CameraTracks]]
-"""What each camera said, epoch by epoch."""
+"""Each camera's track messages, epoch by epoch."""
 
 Rows = Mapping[str, list[MotRow]]
 """Boxes of each camera."""
@@ -31,26 +31,26 @@ _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
 @dataclass(frozen=True, slots=True)
 class CameraDetections:
-    """What one camera found, frame by frame.
+    """One camera's detections, frame by frame.
 
     Attributes:
-        size: of its own pictures.
-        found: its detections.
-        looked: whether the frame could be searched.
+        size: of the camera's own pictures.
+        detections: of each frame.
+        searched: whether the detector could search the frame.
     """
 
     size: tuple[int, int]
-    found: list[Detections]
-    looked: list[bool]
+    detections: list[Detections]
+    searched: list[bool]
 
 
 @dataclass(frozen=True, slots=True)
 class SceneDetections:
-    """What the cameras of a scene found, each by itself.
+    """The detections of all cameras of a scene, each by itself.
 
     Attributes:
-        frames: all of it.
-        boxes: the detections that other trackers get: those of a file, or what the detector is sure of.
+        frames: all detections.
+        boxes: the detections that other trackers get: those of a file, or the confident ones of the detector.
     """
 
     frames: Mapping[str, CameraDetections]
@@ -58,16 +58,16 @@ class SceneDetections:
 
 
 def in_pictures(config: Config, camera: str) -> CameraDetections:
-    """Search a recording as a camera's process does, without encoding anything."""
+    """Detect people in a recording as a camera process does, without encoding."""
     pipeline = CameraPipeline(config, camera)
     frames = CameraDetections(pipeline.source.size, [], [])
     for pulse in count():
         try:
-            searched = pipeline.detect(pulse, pipeline.take(pulse))
+            search_result = pipeline.detect(pulse, pipeline.take(pulse))
         except SourceEndedError:
             break
-        frames.found.append(searched.detections)
-        frames.looked.append(searched.is_searched)
+        frames.detections.append(search_result.detections)
+        frames.searched.append(search_result.is_searched)
     pipeline.close()
     return frames
 
@@ -75,50 +75,50 @@ def in_pictures(config: Config, camera: str) -> CameraDetections:
 def in_file(config: Config, path: Path) -> CameraDetections:
     """Read detections without pictures, as `myview track --det` does."""
     detector = MotFileDetector(path)
-    found = [detector.detect(_NO_PICTURE, pulse) for pulse in range(detector.last_frame + 1)]
-    return CameraDetections((config.site.width, config.site.height), found, [True] * len(found))
+    detections = [detector.detect(_NO_PICTURE, pulse) for pulse in range(detector.last_frame + 1)]
+    return CameraDetections((config.site.width, config.site.height), detections, [True] * len(detections))
 
 
 def sure_rows(frames: CameraDetections) -> list[MotRow]:
-    """Return what the detector is sure of."""
-    rows = (row for pulse, found in enumerate(frames.found) for row in rows_of(pulse, found))
+    """Return the confident detections."""
+    rows = (row for pulse, detections in enumerate(frames.detections) for row in rows_of(pulse, detections))
     return [row for row in rows if row.confidence >= SURE]
 
 
 def followed(config: Config, frames: Mapping[str, CameraDetections]) -> dict[str, list[CameraTracks]]:
-    """Follow everybody in all cameras, in step, as `myview render` does; give what each of them says."""
+    """Track people in all cameras, in step, as `myview render` does; return each camera's messages."""
     cameras = {camera: _Camera(config, camera, it) for camera, it in frames.items()}
     messages: dict[str, list[CameraTracks]] = {camera: [] for camera in frames}
-    for pulse in range(max(len(it.found) for it in frames.values())):
-        there = {camera: it for camera, it in cameras.items() if pulse < len(frames[camera].found)}
-        words = {
-            camera: it.witness.build_message(pulse, it.told(pulse))
+    for pulse in range(max(len(it.detections) for it in frames.values())):
+        there = {camera: it for camera, it in cameras.items() if pulse < len(frames[camera].detections)}
+        shared = {
+            camera: it.scorer.build_message(pulse, it.shared(pulse))
             for camera, it in there.items()
-            if it.witness
+            if it.scorer
         }
         for camera, it in there.items():
-            detections = frames[camera].found[pulse]
-            if it.witness is not None:
-                others = [word for other, word in words.items() if other != camera]
-                detections = it.witness.rescore(detections, others)
+            detections = frames[camera].detections[pulse]
+            if it.scorer is not None:
+                others = [message for other, message in shared.items() if other != camera]
+                detections = it.scorer.rescore(detections, others)
             result = it.tracker.push(pulse, detections)
             if result is not None:
-                messages[camera].append(it.reporter.regular(result))
+                messages[camera].append(it.builder.regular(result))
     for camera, it in cameras.items():
-        messages[camera].append(it.reporter.closing(it.tracker.flush(), len(frames[camera].found) - 1))
+        messages[camera].append(it.builder.closing(it.tracker.flush(), len(frames[camera].detections) - 1))
     return messages
 
 
 class _Camera:
-    """What one camera follows people with."""
+    """The tracker, the message builder and the cross-view scorer of one camera."""
 
     def __init__(self, config: Config, camera: str, frames: CameraDetections) -> None:
         track = config.track
         self.tracker = OnlineTracker(track.window, track.costs, create_solver(track.solver))
-        self.reporter = TrackMessageBuilder(camera, 0, frames.size, track.window.stride)
-        self.witness = CrossViewScorer(config, camera, frames.size, 0) if config.witnesses(camera) else None
+        self.builder = TrackMessageBuilder(camera, 0, frames.size, track.window.stride)
+        self.scorer = CrossViewScorer(config, camera, frames.size, 0) if config.witnesses(camera) else None
         self._frames = frames
 
-    def told(self, pulse: int) -> Detections | None:
-        """Return what the others are told of a frame."""
-        return self._frames.found[pulse] if self._frames.looked[pulse] else None
+    def shared(self, pulse: int) -> Detections | None:
+        """Return the detections of a frame that other cameras get; None: the frame was not searched."""
+        return self._frames.detections[pulse] if self._frames.searched[pulse] else None

@@ -1,4 +1,4 @@
-"""Where who is who goes wrong: between cameras at one moment, or in a camera from one moment to the next."""
+"""Where identities go wrong: between cameras at one moment, or in one camera over time."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ Ints = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 @dataclass(frozen=True, slots=True)
 class PairScores:
-    """What numbers are worth where there are two boxes to compare.
+    """Pairwise scores of identities.
 
     Attributes:
-        whole: of the pairs of boxes at one person, the share that have one number; NaN where none are.
-        pure: of the pairs of boxes that have one number, the share that are at one person; likewise.
+        recall: of the pairs of boxes on one person, the share with one id; NaN where there are none.
+        precision: of the pairs of boxes with one id, the share on one person; NaN likewise.
     """
 
-    whole: float
-    pure: float
+    recall: float
+    precision: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MatchedBoxes:
-    """The boxes that are at somebody.
+    """The boxes that are matched to a person.
 
     Attributes:
-        camera: (N,) in which camera's picture.
-        frame: (N,) when.
-        person: (N,) at whom.
-        number: (N,) whom the box is said to show.
+        camera: (N,) index of the camera.
+        frame: (N,) frame number.
+        person: (N,) true identity.
+        number: (N,) id of the box.
     """
 
     camera: Ints
@@ -46,10 +46,10 @@ class MatchedBoxes:
 
     @classmethod
     def of(cls, tracks: Rows, gt: Rows, least_iou: float) -> MatchedBoxes:
-        """Find them: in each frame one box for a person at most, for the largest total overlap.
+        """Match boxes to people: at most one box for each person and frame, for the largest total overlap.
 
         Raises:
-            ValueError: an id is twice in one frame of a camera.
+            ValueError: an id occurs twice in one frame of a camera.
         """
         found: list[tuple[int, int, int, int]] = []
         for camera, (name, truth) in enumerate(sorted(gt.items())):
@@ -60,20 +60,20 @@ class MatchedBoxes:
                 found += [(camera, number, person, track) for person, track in pairs]
         return cls(*np.array(found, dtype=np.int64).reshape(-1, 4).T)
 
-    def at_once(self) -> PairScores:
-        """Compare the cameras with each other, frame by frame."""
+    def across_cameras(self) -> PairScores:
+        """Compare boxes of different cameras, frame by frame."""
         people = _pairs(self.frame, self.person)
         numbers = _pairs(self.frame, self.number)
         return _pair_scores(people, numbers, _pairs(self.frame, self.person, self.number))
 
-    def later(self, frames: int) -> PairScores:
-        """Compare each camera with itself so many frames later."""
-        people = self._still(frames, self.person)
-        numbers = self._still(frames, self.number)
-        return _pair_scores(people, numbers, self._still(frames, self.person, self.number))
+    def over_time(self, frames: int) -> PairScores:
+        """Compare boxes of the same camera so many frames apart."""
+        people = self._count_over_time(frames, self.person)
+        numbers = self._count_over_time(frames, self.number)
+        return _pair_scores(people, numbers, self._count_over_time(frames, self.person, self.number))
 
-    def _still(self, frames: int, *names: Ints) -> int:
-        """Count what has these names and is there in the same camera so many frames later."""
+    def _count_over_time(self, frames: int, *names: Ints) -> int:
+        """Count the boxes whose names occur in the same camera again so many frames later."""
         now = set(_rows(self.camera, self.frame, *names))
         return len(now.intersection(_rows(self.camera, self.frame + frames, *names)))
 
@@ -83,7 +83,7 @@ def _pair_scores(people: int, numbers: int, both: int) -> PairScores:
 
 
 def _pairs(*names: Ints) -> int:
-    """Count the pairs that have all of these in common."""
+    """Count the pairs of boxes that have all these names in common."""
     return sum(count * (count - 1) // 2 for count in Counter(_rows(*names)).values())
 
 

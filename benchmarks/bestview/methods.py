@@ -1,4 +1,4 @@
-"""The ways to a best view: MyView's, simpler ones, and MyView's with the truth in place of its stages."""
+"""The compared methods: MyView, simpler ones, and MyView with the ground truth in place of its stages."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from pathlib import Path
 
 from benchmarks.bestview.association_baselines import (
     boxes_by_truth,
-    bridged,
     by_nearest_feet,
-    not_joined,
+    interpolated_gaps,
     own_tracks,
     tracks_by_truth,
+    unassociated_tracks,
 )
 from benchmarks.bestview.camera_tracks import Rows, SceneDetections, followed
 from benchmarks.bestview.occupancy.foreground_masks import CannotMapError
-from benchmarks.bestview.occupancy.reference_tracker import occupancy_rows
+from benchmarks.bestview.occupancy.reference_tracker import track_by_occupancy
 from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.bestview.service_decisions import Rendering, decide, decide_given, largest
-from benchmarks.bestview.tracklet_cuts import own_parts
+from benchmarks.bestview.tracklet_cuts import own_tracklets
 from benchmarks.other_trackers.virtual_environment import PEERS, OtherTrackerEnvironment
 from bestview import ViewScore
 from server.cli.evaluate.choices_file import Choice
@@ -32,42 +32,42 @@ from tracking.evaluation import MultiCameraScores, TruthAndTracks, evaluate_came
 from tracking.motchallenge import MotRow, format_rows
 
 LEAST_IOU = 0.5
-BRIDGE = 20
-"""Frames that somebody may be hidden for and still count as shown."""
-FOUND_ONLY = {"undetected_weight": 0.0}
-LOOKS_ALONE = {"identity": {"maximum_travel_evidence": 0.0}}
+MAX_GAP = 20
+"""Frames of a gap that is interpolated."""
+DETECTED_ONLY = {"undetected_weight": 0.0}
+APPEARANCE_ONLY = {"identity": {"maximum_travel_evidence": 0.0}}
 TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
-OURS, CALIBRATED, WITHOUT = "MyView", "MyView, calibrated", "no homographies"
+OURS, CALIBRATED, UNCALIBRATED = "MyView", "MyView, calibrated", "no homographies"
 PEER = "ByteTrack"
 MAP = "occupancy map"
 
 
 @dataclass(frozen=True, slots=True)
 class MethodResult:
-    """One way's boxes by the person's number, and its choices."""
+    """The tracks by person and the view choices of one method."""
 
     name: str
     rendering: Rendering
-    given: bool = False
-    """Its boxes are the truth's: there is nothing to score in them."""
+    ground_truth: bool = False
+    """The tracks are the ground truth's, so they are not scored."""
 
 
 @dataclass(frozen=True, slots=True)
 class MethodScores:
-    """How good it is."""
+    """The scores of a method."""
 
     name: str
     tracks: MultiCameraScores | None
     views: ViewScore
 
 
-def visible_rows(case: BenchmarkScene, truth: SceneTruth) -> dict[str, list[MotRow]]:
-    """Return the true boxes of those who are visible: what a camera that misses nothing would find."""
+def visible_rows(scene: BenchmarkScene, truth: SceneTruth) -> dict[str, list[MotRow]]:
+    """Return the true boxes of visible people: the detections of a perfect camera."""
     place = {person: index for index, person in enumerate(truth.people)}
     return {
         camera: [
             row
-            for row in case.gt[camera]
+            for row in scene.gt[camera]
             if row.confidence != 0.0 and truth.views.visible[place[row.id], row.frame - 1, column]
         ]
         for column, camera in enumerate(truth.cameras)
@@ -76,117 +76,141 @@ def visible_rows(case: BenchmarkScene, truth: SceneTruth) -> dict[str, list[MotR
 
 @dataclass(frozen=True, slots=True)
 class SearchedScene:
-    """A scene as its cameras see it, whose search for people knows the ground.
+    """A calibrated scene with its detections.
 
     Attributes:
-        case: the scene.
-        watched: what they find.
+        scene: with homographies, which its detectors know.
+        detections: of its cameras.
     """
 
-    case: BenchmarkScene
-    watched: SceneDetections
+    scene: BenchmarkScene
+    detections: SceneDetections
 
 
-def ways(
-    case: BenchmarkScene,
+def run_methods(
+    scene: BenchmarkScene,
     truth: SceneTruth,
-    seen: SceneDetections,
-    blind: SceneDetections,
+    detections: SceneDetections,
+    uncalibrated_detections: SceneDetections,
     peers: OtherTrackerEnvironment | None,
-    walked: SearchedScene | None,
+    self_calibrated: SearchedScene | None,
 ) -> Iterator[MethodResult]:
-    """Yield them, truth first.
+    """Run all methods, those with true boxes first.
 
     Args:
-        case: the scene.
-        truth: who could be seen in it.
-        seen: what its cameras find.
-        blind: the same where no homographies are known.
+        scene: to run them on.
+        truth: its ground truth.
+        detections: of its cameras.
+        uncalibrated_detections: the detections where no homographies are known.
         peers: where the other tracker is installed.
-        walked: the scene with the homographies of its own tracks.
+        self_calibrated: the scene with the homographies of its own tracks.
     """
     frames = truth.boxes.shape[1]
-    config = case.config()
+    config = scene.config()
 
-    def chosen(rows: Rows) -> Rendering:
-        return Rendering(_lists(rows), decide_given(config, rows, frames).choices)
+    def select(rows: Rows) -> Rendering:
+        return Rendering(_as_lists(rows), decide_given(config, rows, frames).choices)
 
-    def simple(rows: Rows) -> Rendering:
-        return Rendering(_lists(rows), largest(rows, case.sizes, frames))
+    def select_largest(rows: Rows) -> Rendering:
+        return Rendering(_as_lists(rows), largest(rows, scene.sizes, frames))
 
-    there = visible_rows(case, truth)
-    yield MethodResult(TRUE, chosen(there), given=True)
-    yield MethodResult(TRUE_LARGEST, simple(there), given=True)
-    said = followed(config, seen.frames)
-    own = own_tracks(said)
-    named = boxes_by_truth(own, case.gt)
-    yield MethodResult("own boxes, true ids", chosen(named))
-    yield MethodResult("  and gaps bridged", chosen(bridged(named, BRIDGE)))
-    yield MethodResult("own parts, true joins", chosen(tracks_by_truth(own_parts(config, said), case.gt)))
-    yield MethodResult("own tracks, true joins", chosen(tracks_by_truth(own, case.gt)))
-    yield MethodResult("own tracks, not joined", simple(not_joined(own)))
-    uncalibrated = case.config(ground=False)
-    bare_said = followed(uncalibrated, blind.frames)
-    bare = decide(uncalibrated, bare_said)
-    yield MethodResult(WITHOUT, bare)
-    if case.apart:
-        yield MethodResult("  looks alone", decide(case.config(ground=False, view=LOOKS_ALONE), bare_said))
-    if not case.calibrated:
-        yield MethodResult(f"{WITHOUT}, largest", simple(bare.tracks))
-    for name, sight in ((OURS, SearchedScene(case, seen) if case.calibrated else None), (CALIBRATED, walked)):
-        if sight is None:
+    true_rows = visible_rows(scene, truth)
+    yield MethodResult(TRUE, select(true_rows), ground_truth=True)
+    yield MethodResult(TRUE_LARGEST, select_largest(true_rows), ground_truth=True)
+    messages = followed(config, detections.frames)
+    own_rows = own_tracks(messages)
+    true_ids = boxes_by_truth(own_rows, scene.gt)
+    yield MethodResult("own boxes, true ids", select(true_ids))
+    yield MethodResult("  with gaps interpolated", select(interpolated_gaps(true_ids, MAX_GAP)))
+    yield MethodResult(
+        "own tracklets, true ids", select(tracks_by_truth(own_tracklets(config, messages), scene.gt))
+    )
+    yield MethodResult("own tracks, true ids", select(tracks_by_truth(own_rows, scene.gt)))
+    yield MethodResult("own tracks, not associated", select_largest(unassociated_tracks(own_rows)))
+    uncalibrated = scene.config(ground=False)
+    uncalibrated_messages = followed(uncalibrated, uncalibrated_detections.frames)
+    uncalibrated_result = decide(uncalibrated, uncalibrated_messages)
+    yield MethodResult(UNCALIBRATED, uncalibrated_result)
+    if scene.disjoint:
+        yield MethodResult(
+            "  appearance only",
+            decide(scene.config(ground=False, view=APPEARANCE_ONLY), uncalibrated_messages),
+        )
+    if not scene.calibrated:
+        yield MethodResult(f"{UNCALIBRATED}, largest", select_largest(uncalibrated_result.tracks))
+    for name, searched in (
+        (OURS, SearchedScene(scene, detections) if scene.calibrated else None),
+        (CALIBRATED, self_calibrated),
+    ):
+        if searched is None:
             continue
-        scene, found = sight.case, sight.watched
-        said = said if scene is case else followed(scene.config(), found.frames)
-        apart = followed(uncalibrated, found.frames)
-        ours = decide(scene.config(), said)
-        yield MethodResult(name, ours)
-        yield MethodResult(f"{name}, found only", decide(scene.config(view=FOUND_ONLY), said))
-        yield MethodResult(f"{name}, no evidence", decide(scene.config(), apart))
-        if case.apart:
-            yield MethodResult(f"{name}, looks alone", decide(scene.config(view=LOOKS_ALONE), said))
-        yield MethodResult(f"{name}, again", chosen(ours.tracks))
-        yield MethodResult(f"{name}, largest", simple(ours.tracks))
-        ground = {camera: it for camera, it in camera_homographies(scene.config()).items() if it is not None}
-        short = "nearest feet" if scene is case else "nearest feet, calibr."
-        yield MethodResult(short, simple(by_nearest_feet(own_tracks(apart), ground)))
-        if case.detections is None and not case.apart:
-            title = MAP if scene is case else f"{MAP}, calibr."
-            yield from (MethodResult(title, chosen(rows)) for rows in _mapped(scene, found))
+        calibrated_scene, found = searched.scene, searched.detections
+        messages = (
+            messages if calibrated_scene is scene else followed(calibrated_scene.config(), found.frames)
+        )
+        without_peers = followed(uncalibrated, found.frames)
+        result = decide(calibrated_scene.config(), messages)
+        yield MethodResult(name, result)
+        yield MethodResult(
+            f"{name}, detected only", decide(calibrated_scene.config(view=DETECTED_ONLY), messages)
+        )
+        yield MethodResult(f"{name}, no peer evidence", decide(calibrated_scene.config(), without_peers))
+        if scene.disjoint:
+            yield MethodResult(
+                f"{name}, appearance only", decide(calibrated_scene.config(view=APPEARANCE_ONLY), messages)
+            )
+        yield MethodResult(f"{name}, final ids", select(result.tracks))
+        yield MethodResult(f"{name}, largest", select_largest(result.tracks))
+        ground = {
+            camera: it
+            for camera, it in camera_homographies(calibrated_scene.config()).items()
+            if it is not None
+        }
+        name_of_nearest = "nearest feet" if calibrated_scene is scene else "nearest feet, calibr."
+        yield MethodResult(
+            name_of_nearest, select_largest(by_nearest_feet(own_tracks(without_peers), ground))
+        )
+        if scene.detections is None and not scene.disjoint:
+            title = MAP if calibrated_scene is scene else f"{MAP}, calibr."
+            yield from (
+                MethodResult(title, select(rows)) for rows in _occupancy_tracks(calibrated_scene, found)
+            )
         if peers is not None:
-            theirs = by_nearest_feet(_peer_tracks(peers, found.boxes), ground)
-            yield MethodResult(f"{PEER}, {short}", simple(theirs))
+            other_tracks = by_nearest_feet(_peer_tracks(peers, found.boxes), ground)
+            yield MethodResult(f"{PEER}, {name_of_nearest}", select_largest(other_tracks))
 
 
-def _mapped(scene: BenchmarkScene, found: SceneDetections) -> Iterator[Rows]:
-    """Yield what the occupancy map finds; where there can be none, say why."""
+def _occupancy_tracks(calibrated_scene: BenchmarkScene, found: SceneDetections) -> Iterator[Rows]:
+    """Yield the tracks of the occupancy map; print why where it cannot be made."""
     try:
-        yield occupancy_rows(scene, found.boxes)
+        yield track_by_occupancy(calibrated_scene, found.boxes)
     except CannotMapError as problem:
-        print(f"{scene.name}: no occupancy map: {problem}")
+        print(f"{calibrated_scene.name}: no occupancy map: {problem}")
 
 
-def _lists(rows: Rows) -> dict[str, list[MotRow]]:
+def _as_lists(rows: Rows) -> dict[str, list[MotRow]]:
     return {camera: list(found) for camera, found in rows.items()}
 
 
-def outcome(case: BenchmarkScene, truth: SceneTruth, way: MethodResult) -> MethodScores:
-    """Score a way."""
-    recordings = {camera: TruthAndTracks(case.gt[camera], way.rendering.tracks[camera]) for camera in case.gt}
-    if way.given:
+def score_method(scene: BenchmarkScene, truth: SceneTruth, result: MethodResult) -> MethodScores:
+    """Score the result of a method."""
+    recordings = {
+        camera: TruthAndTracks(scene.gt[camera], result.rendering.tracks[camera]) for camera in scene.gt
+    }
+    if result.ground_truth:
         scores, person_of = None, {person: person for person in truth.people}
     else:
         scores = evaluate_cameras(recordings, LEAST_IOU)
         person_of = people_of_objects(truth.people, recordings, LEAST_IOU)
-    return MethodScores(way.name, scores, score_choices(case, truth, way.rendering.choices, person_of))
+    return MethodScores(result.name, scores, score_choices(scene, truth, result.rendering.choices, person_of))
 
 
 def score_choices(
-    case: BenchmarkScene, truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int]
+    scene: BenchmarkScene, truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int]
 ) -> ViewScore:
     """Score choices against the truth, as `myview evaluate --views` does."""
-    config = case.config()
-    facts = SiteInfo(config.site.fps, config.view.switch_cost_s, case.sizes)
+    config = scene.config()
+    facts = SiteInfo(config.site.fps, config.view.switch_cost_s, scene.sizes)
     return evaluate_views(truth, choices, person_of, facts).total
 
 
@@ -194,7 +218,7 @@ def _peer_tracks(peers: OtherTrackerEnvironment, boxes: Rows) -> dict[str, list[
     """Return the peer's tracks of every camera's detections.
 
     Raises:
-        OtherTrackersUnavailableError: it failed.
+        OtherTrackersUnavailableError: the tracker failed.
     """
     peer = next(it for it in PEERS if it.name == PEER)
     tracks = {}

@@ -1,4 +1,4 @@
-"""What look-ahead, the cost of a cut and the length of a GOP do to the choice, on true boxes."""
+"""Sweep over look-ahead, switch cost and GOP length of view selection, on true boxes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from server.cli.evaluate.ground_truth import SceneTruth
 from server.config.sections import EncodeSettings, ViewSettings
 
 STRIDE = 5
-"""Frames between two windows of the tracker, as by default; its delay is that of the true site."""
+"""Frames between two windows of the tracker, as by default, so that the delay is realistic."""
 LOOKAHEADS = (10, 15, 25, 50, 100)
 GOPS = (1, 5, 10, 25)
 SWITCH_COSTS_S = (0.0, 0.1, 0.2, 0.3, 0.5, 1.0)
@@ -30,7 +30,7 @@ DEFAULT_SWITCH_COST_S, DEFAULT_EXTRAPOLATE_S = ViewSettings().switch_cost_s, Vie
 
 @dataclass(frozen=True, slots=True)
 class SweepSetting:
-    """What is varied; a look-ahead of None: the whole recording is known."""
+    """One setting of the sweep; look-ahead None: the whole recording is known."""
 
     lookahead: int | None
     gop: int
@@ -38,13 +38,13 @@ class SweepSetting:
     extrapolate_s: float = DEFAULT_EXTRAPOLATE_S
 
     def delay_s(self, fps: float) -> float:
-        """Return the longest that the first frame of a GOP waits for its decision, seconds."""
+        """Return the longest time from the first frame of a GOP to its decision, seconds."""
         return 0.0 if self.lookahead is None else (self.lookahead + STRIDE - 2) / fps
 
 
 @dataclass(frozen=True, slots=True)
 class SweepResult:
-    """A setting and how good its choices are, beside the frame-exact optimum at the same cost of a cut."""
+    """The score of a setting against the frame-exact optimum at the same switch cost."""
 
     setting: SweepSetting
     delay_s: float
@@ -52,7 +52,7 @@ class SweepResult:
 
 
 def settings_of(*, quick: bool) -> Iterator[SweepSetting]:
-    """Yield the settings: look-ahead by GOP; at their defaults, the cost of a cut and what goes on."""
+    """Yield the settings: look-ahead by GOP; then, at their defaults, switch cost and extrapolation."""
     gops = QUICK_GOPS if quick else GOPS
     for gop in gops:
         for lookahead in QUICK_LOOKAHEADS if quick else LOOKAHEADS:
@@ -67,18 +67,18 @@ def settings_of(*, quick: bool) -> Iterator[SweepSetting]:
             yield SweepSetting(DEFAULT_LOOKAHEAD, DEFAULT_GOP, DEFAULT_SWITCH_COST_S, extrapolate_s)
 
 
-def sweep(case: BenchmarkScene, truth: SceneTruth, *, quick: bool) -> list[SweepResult]:
-    """Try them all."""
-    fps = case.config().site.fps
-    rows = visible_rows(case, truth)
+def sweep(scene: BenchmarkScene, truth: SceneTruth, *, quick: bool) -> list[SweepResult]:
+    """Score all settings."""
+    fps = scene.config().site.fps
+    rows = visible_rows(scene, truth)
     frames = truth.boxes.shape[1]
     results = []
     for setting in settings_of(quick=quick):
         switch_cost = setting.switch_cost_s * fps
         if setting.lookahead is None:
-            views = _known_whole(truth, setting.gop, switch_cost)
+            views = _offline_optimum(truth, setting.gop, switch_cost)
         else:
-            config = case.config(
+            config = scene.config(
                 encode={"gop": setting.gop},
                 track={"window": {"window": STRIDE, "stride": STRIDE, "birth_window": STRIDE}},
                 view={
@@ -95,10 +95,10 @@ def sweep(case: BenchmarkScene, truth: SceneTruth, *, quick: bool) -> list[Sweep
     return results
 
 
-def _known_whole(
+def _offline_optimum(
     truth: SceneTruth, gop: int, switch_cost: float
 ) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
-    """Return the optimum whose cuts are where a GOP begins."""
+    """Return the optimum with cuts at the first frames of GOPs only."""
     people, frames = truth.views.cost.shape[:2]
     starts = np.arange(frames) % gop == 0
     return select_views(truth.views.cost, np.full(people, NO_CAMERA), switch_cost, starts).views
@@ -106,10 +106,20 @@ def _known_whole(
 
 def sweep_tables(report: Report, swept: Mapping[str, Sequence[SweepResult]]) -> None:
     """Print a table for each scene."""
-    for name, found in swept.items():
+    for name, results in swept.items():
         report.table(
-            f"{name}, true boxes: look-ahead, GOP and the cost of a cut",
-            ["look-ahead", "GOP", "cut, s", "goes on, s", "delay, s", "Regret", "Visible", "Cuts", "Best"],
+            f"{name}, true boxes: look-ahead, GOP and switch cost",
+            [
+                "look-ahead",
+                "GOP",
+                "switch cost, s",
+                "extrapolation, s",
+                "delay, s",
+                "Regret",
+                "Visible",
+                "Cuts",
+                "Best",
+            ],
             [
                 [
                     "all" if it.setting.lookahead is None else str(it.setting.lookahead),
@@ -121,6 +131,6 @@ def sweep_tables(report: Report, swept: Mapping[str, Sequence[SweepResult]]) -> 
                     f"{it.score.cuts_per_minute:.1f}",
                     f"{it.score.optimum_cuts_per_minute:.1f}",
                 ]
-                for it in found
+                for it in results
             ],
         )

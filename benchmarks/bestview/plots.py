@@ -1,4 +1,4 @@
-"""The plots of the benchmark of best views."""
+"""The plots of the best-view benchmark."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from benchmarks.bestview.parameter_sweep import (
 from server.cli.render.plots import new_figure, save_figure
 
 
-def plot_ways(found: Mapping[str, Sequence[MethodScores]], out: Path) -> None:
-    """Draw joint IDF1, agreement and visibility of every way, a row for each scene."""
-    most = max(len(outcomes) for outcomes in found.values())
-    figure = new_figure((12.0, 0.8 + (0.8 + 0.2 * most) * len(found)))
-    axes = figure.subplots(len(found), 3, squeeze=False)
-    for line, (name, outcomes) in zip(axes, found.items(), strict=True):
+def plot_methods(scores: Mapping[str, Sequence[MethodScores]], out: Path) -> None:
+    """Draw joint IDF1, agreement and visibility of every method, a row for each scene."""
+    most = max(len(outcomes) for outcomes in scores.values())
+    figure = new_figure((12.0, 0.8 + (0.8 + 0.2 * most) * len(scores)))
+    axes = figure.subplots(len(scores), 3, squeeze=False)
+    for line, (name, outcomes) in zip(axes, scores.items(), strict=True):
         names = [it.name for it in outcomes]
         places = np.arange(len(names))[::-1]
         joint = [np.nan if it.tracks is None else 100 * it.tracks.joint.idf1 for it in outcomes]
@@ -35,35 +35,37 @@ def plot_ways(found: Mapping[str, Sequence[MethodScores]], out: Path) -> None:
         for axis, (title, values) in zip(line, columns.items(), strict=True):
             axis.barh(places, values, color="#2a7f3f")
             axis.set_xlim(0, 100)
-            axis.set_ylim(-0.6, len(names) - 0.4)  # where bars are missing, too
+            axis.set_ylim(-0.6, len(names) - 0.4)  # same range even where bars are missing
             axis.set_title(f"{name}: {title}, %", fontsize="small")
             axis.set_yticks(places, names if title == "joint IDF1" else [], fontsize="x-small")
     save_figure(figure, out)
 
 
 def plot_sweeps(swept: Mapping[str, Sequence[SweepResult]], out: Path) -> None:
-    """Draw regret over delay for each GOP, over the GOP, and cuts over the cost of a cut."""
+    """Draw regret over delay for each GOP, regret over the GOP, and cuts over the switch cost."""
     figure = new_figure((12.0, 0.8 + 3.0 * len(swept)))
     axes = figure.subplots(len(swept), 3, squeeze=False)
-    for line, (name, found) in zip(axes, swept.items(), strict=True):
-        plain = [it for it in found if it.setting.extrapolate_s == DEFAULT_EXTRAPOLATE_S]
-        usual = [it for it in plain if it.setting.switch_cost_s == DEFAULT_SWITCH_COST_S]
-        for gop in sorted({it.setting.gop for it in usual}):
-            mine = [it for it in usual if it.setting.gop == gop and it.setting.lookahead is not None]
+    for line, (name, scores) in zip(axes, swept.items(), strict=True):
+        default_extrapolation = [it for it in scores if it.setting.extrapolate_s == DEFAULT_EXTRAPOLATE_S]
+        default_cost = [
+            it for it in default_extrapolation if it.setting.switch_cost_s == DEFAULT_SWITCH_COST_S
+        ]
+        for gop in sorted({it.setting.gop for it in default_cost}):
+            live = [it for it in default_cost if it.setting.gop == gop and it.setting.lookahead is not None]
             line[0].plot(
-                [it.delay_s for it in mine], [100 * it.score.regret for it in mine], "o-", label=f"GOP {gop}"
+                [it.delay_s for it in live], [100 * it.score.regret for it in live], "o-", label=f"GOP {gop}"
             )
         line[0].set_xlabel("delay declared, s")
         line[0].legend(fontsize="x-small")
-        whole = [it for it in usual if it.setting.lookahead is None]
-        line[1].plot([it.setting.gop for it in whole], [100 * it.score.regret for it in whole], "o-")
-        line[1].set_xlabel("GOP, frames; everything known beforehand")
+        offline = [it for it in default_cost if it.setting.lookahead is None]
+        line[1].plot([it.setting.gop for it in offline], [100 * it.score.regret for it in offline], "o-")
+        line[1].set_xlabel("GOP, frames; whole recording known")
         for axis in line[:2]:
             axis.set_ylabel("regret, %")
         costs = sorted(
             (
                 it
-                for it in plain
+                for it in default_extrapolation
                 if it.setting.gop == DEFAULT_GOP and it.setting.lookahead == DEFAULT_LOOKAHEAD
             ),
             key=lambda it: it.setting.switch_cost_s,
@@ -71,7 +73,7 @@ def plot_sweeps(swept: Mapping[str, Sequence[SweepResult]], out: Path) -> None:
         values = [it.setting.switch_cost_s for it in costs]
         line[2].plot(values, [it.score.cuts_per_minute for it in costs], "o-", label="MyView's choice")
         line[2].plot(values, [it.score.optimum_cuts_per_minute for it in costs], "s--", label="optimum")
-        line[2].set_xlabel("what a cut costs, seconds of not seeing somebody")
+        line[2].set_xlabel("switch cost, seconds of not seeing a person")
         line[2].set_ylabel("cuts a minute")
         line[2].legend(fontsize="x-small")
         line[0].set_title(f"{name}, true boxes", fontsize="small")

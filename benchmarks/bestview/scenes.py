@@ -1,4 +1,4 @@
-"""The scenes that best views are measured on: recordings, what is really there, and where the floor is."""
+"""The scenes of the best-view benchmark: recordings, ground truth and homographies."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ class BenchmarkScene:
     """One scene.
 
     Attributes:
-        name: what the table calls it.
-        about: what it is, for the title.
-        content: the configuration, with the homographies that are known, if any.
+        name: in the table.
+        about: a description for the title.
+        content: the configuration, with the known homographies, if any.
         gt: the ground truth of each camera.
-        least_shown: the share of a person that has to show for a view to show them.
-        detections: files to track by; None: the pictures are searched.
-        apart: its cameras have no floor in common.
+        min_visible: the visible share of a person from which a view shows them.
+        detections: files of detections; None: the pictures are searched.
+        disjoint: the cameras have no floor in common.
     """
 
     name: str
     about: str
     content: Mapping[str, Any]
     gt: Rows
-    least_shown: float
+    min_visible: float
     detections: Mapping[str, Path] | None = None
-    apart: bool = False
+    disjoint: bool = False
 
     def config(self, *, ground: bool = True, **changes: Mapping[str, Any]) -> Config:
         """Return the configuration, with some settings changed, and with or without homographies."""
@@ -64,11 +64,11 @@ class BenchmarkScene:
         return dict.fromkeys(self.gt, (site["width"], site["height"]))
 
     def truth(self) -> SceneTruth:
-        """Return how well everybody could be seen."""
-        return build_truth(self.gt, self.sizes, self.least_shown)
+        """Return the true visibility of each person in each camera."""
+        return build_truth(self.gt, self.sizes, self.min_visible)
 
-    def watch(self, *, ground: bool = True) -> SceneDetections:
-        """Let every camera look for people by itself; how tall they are where it may know from the ground."""
+    def detect(self, *, ground: bool = True) -> SceneDetections:
+        """Detect people in every camera; with `ground`, the detectors know the homographies."""
         config = self.config(ground=ground)
         if self.detections is not None:
             files = self.detections
@@ -95,8 +95,8 @@ def terrace(data: Path) -> BenchmarkScene:
 def auditorium(data: Path) -> BenchmarkScene:
     """Four views without pictures or calibration, by public detections.
 
-    Its flag of who is hidden is set for nearly everybody in two cameras, so that it says nothing: whoever
-    has a box counts as visible.
+    The occlusion flag of its ground truth is set for nearly everybody in two cameras, so it is ignored:
+    whoever has a box counts as visible.
 
     Raises:
         CannotRunError: it is not there.
@@ -124,7 +124,7 @@ def room(folder: Path, cameras: int, people: int, seconds: float) -> BenchmarkSc
 def gallery(folder: Path, people: int, seconds: float) -> BenchmarkScene:
     """Draw the synthetic gallery, whose three cameras have no floor in common, into a new folder."""
     scene = Scene("gallery", 3, people, _ROOM_SEED, *_GALLERY_SIZE, _ROOM_FPS)
-    return replace(_drawn(folder, scene, seconds), apart=True)
+    return replace(_drawn(folder, scene, seconds), disjoint=True)
 
 
 def _drawn(folder: Path, scene: Scene, seconds: float) -> BenchmarkScene:

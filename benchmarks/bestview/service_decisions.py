@@ -1,4 +1,4 @@
-"""The best-view service's own classes on what cameras said, or on boxes whose people are given."""
+"""Decisions of the best-view service's own classes, on track messages or on boxes with true ids."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from tracking.motchallenge import MotRow, read_rows
 
 @dataclass(frozen=True, slots=True)
 class Rendering:
-    """What `myview render` would write: boxes by the person's number, and the chosen cameras."""
+    """What `myview render` would write: tracks by person, and the selected cameras."""
 
     tracks: dict[str, list[MotRow]]
     choices: list[Choice]
 
 
 class GroundTruthRegistry:
-    """A registry that knows who everybody is: a track's place is its person's, in every camera."""
+    """A person registry that knows the ground truth: a local track id is a place in `people`."""
 
     def __init__(self, people: Sequence[int]) -> None:
         self._people = people
@@ -47,14 +47,14 @@ class GroundTruthRegistry:
 
 
 def decide(config: Config, messages: Messages, people: Sequence[int] | None = None) -> Rendering:
-    """Line up what the cameras said, join it, choose views; with `people`, they are not joined but known."""
+    """Align the cameras' messages, associate tracks and select views; with `people`, identities are known."""
     aligner = EpochAligner(config.camera_ids, config.track.window.stride, grace=0)
-    last = {camera: said[-1].last for camera, said in messages.items()}
+    last = {camera: camera_messages[-1].last for camera, camera_messages in messages.items()}
     decider = ViewDecider(
         config, camera_homographies(config), lambda camera, pulse: 0 <= pulse <= last[camera]
     )
     if people is not None:
-        decider.people._registry = GroundTruthRegistry(people)  # type: ignore[assignment]  # noqa: SLF001 — truth in its place
+        decider.people._registry = GroundTruthRegistry(people)  # type: ignore[assignment]  # noqa: SLF001 — ground truth
     for camera in config.camera_ids:
         aligner.camera_connected(camera)
         aligner.frame_received(camera, messages[camera][0].boot, 0)
@@ -75,16 +75,16 @@ def decide(config: Config, messages: Messages, people: Sequence[int] | None = No
 
 
 def decide_given(config: Config, rows: Rows, frames: int) -> Rendering:
-    """Choose views by boxes that are final, and whose numbers are their people's, at once."""
+    """Select views by final boxes with true ids."""
     people = sorted({row.id for found in rows.values() for row in found})
-    messages = {camera: _said(config, camera, found, people, frames) for camera, found in rows.items()}
+    messages = {camera: _messages_of(config, camera, found, people, frames) for camera, found in rows.items()}
     return decide(config, messages, people)
 
 
-def _said(
+def _messages_of(
     config: Config, camera: str, rows: Sequence[MotRow], people: Sequence[int], frames: int
 ) -> list[CameraTracks]:
-    """Put boxes into messages; everybody is in each of them, so that local numbers are places in `people`."""
+    """Build track messages with all people in each, so that local track ids are places in `people`."""
     stride = config.track.window.stride
     boxes: dict[tuple[int, int], Box] = {(row.id, row.frame - 1): row.box for row in rows}
     spans = [(end - stride + 1, end) for end in range(stride - 1, frames, stride)]
@@ -115,7 +115,7 @@ def _said(
 
 
 def largest(rows: Rows, sizes: Mapping[str, tuple[int, int]], frames: int) -> list[Choice]:
-    """Choose frame by frame the camera in which somebody's box is largest; of equals the first."""
+    """Select frame by frame the camera with the largest box of a person; of equals the first."""
     cameras = list(rows)
     people = sorted({row.id for found in rows.values() for row in found})
     place = {person: index for index, person in enumerate(people)}

@@ -1,4 +1,4 @@
-"""Homographies from the cameras' own tracks, by `myview calibrate`."""
+"""Calibration of a scene from its cameras' own tracks, by `myview calibrate`."""
 
 from __future__ import annotations
 
@@ -16,26 +16,33 @@ _PATIENCE_S = 600.0
 
 
 class CannotCalibrateError(Exception):
-    """There are no homographies; the text says why."""
+    """Calibration failed; the text says why."""
 
 
-def calibrated(case: BenchmarkScene, own: Rows, folder: Path) -> BenchmarkScene:
-    """Return the scene with the homographies that its cameras' own tracks give, in place of any it has.
+def calibrated(scene: BenchmarkScene, own: Rows, folder: Path) -> BenchmarkScene:
+    """Return the scene with homographies from its cameras' own tracks, in place of any it has.
 
     Raises:
-        CannotCalibrateError: the command found none.
+        CannotCalibrateError: the command failed.
     """
-    work = folder / f"{case.name}-calibrated"
+    work = folder / f"{scene.name}-calibrated"
     work.mkdir()
     for camera, rows in own.items():
         write_rows(work / f"{camera}.txt", rows)
     out = work / "ground.json"
-    width, height = next(iter(case.sizes.values()))
-    words = ["calibrate", *(str(work / f"{camera}.txt") for camera in own), "--out", str(out), "--shift", "0"]
-    words += ["--size", f"{width}x{height}", "--fps", str(case.content["site"]["fps"])]
+    width, height = next(iter(scene.sizes.values()))
+    command = [
+        "calibrate",
+        *(str(work / f"{camera}.txt") for camera in own),
+        "--out",
+        str(out),
+        "--shift",
+        "0",
+    ]
+    command += ["--size", f"{width}x{height}", "--fps", str(scene.content["site"]["fps"])]
     try:
-        done = subprocess.run(
-            [sys.executable, "-m", "server.cli.main", *words],
+        process = subprocess.run(
+            [sys.executable, "-m", "server.cli.main", *command],
             cwd=ROOT,
             env=one_thread_environment(),
             capture_output=True,
@@ -45,7 +52,9 @@ def calibrated(case: BenchmarkScene, own: Rows, folder: Path) -> BenchmarkScene:
         )
     except subprocess.TimeoutExpired as error:
         raise CannotCalibrateError(f"not done in {_PATIENCE_S:g} s") from error
-    if done.returncode != 0 or not out.exists():
-        said = [line for line in done.stderr.splitlines() if line.strip()]
-        raise CannotCalibrateError(said[-1].strip() if said else f"exit code {done.returncode}")
-    return replace(case, content={**case.content, "ground": str(out)})
+    if process.returncode != 0 or not out.exists():
+        stderr_lines = [line for line in process.stderr.splitlines() if line.strip()]
+        raise CannotCalibrateError(
+            stderr_lines[-1].strip() if stderr_lines else f"exit code {process.returncode}"
+        )
+    return replace(scene, content={**scene.content, "ground": str(out)})

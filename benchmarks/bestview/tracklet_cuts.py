@@ -1,4 +1,4 @@
-"""The parts of tracks that identity joins: cut where a camera's tracker may have confused people."""
+"""Tracklets as the service splits them: tracks cut where a camera's tracker may have swapped people."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from server.service.view_selection.decider import camera_homographies
 from tracking.motchallenge import MotRow
 
 
-def own_parts(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
-    """Return each camera's final boxes, numbered by part of track as the service cuts them."""
+def own_tracklets(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
+    """Return each camera's final boxes, numbered by tracklet as the service splits tracks."""
     settings = config.view.identity
     tracklets, reader = TrackletSplitter(settings), WindowReader((config.site.width, config.site.height))
     ground, error = camera_homographies(config), FootPointError(settings.foot_sideways, settings.foot_upwards)
@@ -32,7 +32,7 @@ def own_parts(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
         for epoch in aligner.ready(now=-1):
             tracks = [it for window in reader.read(epoch) for it in window.local_tracks()]
             seen = align_tracks(tracks, ground, error, config.overhead)
-            # None is ever settled here, so that a row is one part for good.
+            # No tracklet is ever settled here, so that a row stays the same tracklet.
             rows, _ = tracklets.update(seen, {it.key: it.appearance for it in tracks})
             for track, column in zip(*np.nonzero(rows >= 0), strict=True):
                 camera = seen.keys[track].camera

@@ -1,4 +1,4 @@
-"""Why somebody is not visible in the view that was chosen for them: who of the stages lost them."""
+"""Why people are not visible in the view selected for them: the stage that lost them."""
 
 from __future__ import annotations
 
@@ -20,47 +20,49 @@ Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 @dataclass(frozen=True, slots=True)
 class VisibilityLosses:
-    """Shares of the frames in which somebody is visible in some camera.
+    """Shares of the frames in which a person is visible in some camera.
 
     Attributes:
-        visible: they are so in the chosen one.
-        choice: their number was at them in a camera that shows them, yet another was chosen, or none.
-        number: only other numbers were at them.
-        missed: no box was at them, in any camera that shows them.
+        visible: visible in the selected view.
+        selection: a camera that shows them had a box with their id, but another was selected, or none.
+        identity: only boxes with other ids were on them.
+        detection: no box was on them in any camera that shows them.
     """
 
     visible: float
-    choice: float
-    number: float
-    missed: float
+    selection: float
+    identity: float
+    detection: float
 
 
-def losses(case: BenchmarkScene, truth: SceneTruth, way: MethodResult) -> VisibilityLosses:
-    """Classify what keeps people from being visible in the chosen view.
+def losses(scene: BenchmarkScene, truth: SceneTruth, result: MethodResult) -> VisibilityLosses:
+    """Classify why people are not visible in the selected view.
 
     Raises:
-        ValueError: the way has no boxes of its own.
+        ValueError: the method's tracks are the ground truth's.
     """
-    if way.given:
-        raise ValueError(f"{way.name}: its boxes are the truth's")
-    recordings = {camera: TruthAndTracks(case.gt[camera], way.rendering.tracks[camera]) for camera in case.gt}
+    if result.ground_truth:
+        raise ValueError(f"{result.name}: its tracks are the ground truth")
+    recordings = {
+        camera: TruthAndTracks(scene.gt[camera], result.rendering.tracks[camera]) for camera in scene.gt
+    }
     person_of = people_of_objects(truth.people, recordings, LEAST_IOU)
     visible = truth.views.visible
-    views = views_of(way.rendering.choices, person_of, truth.people, truth.cameras, visible.shape[1])
+    views = views_of(result.rendering.choices, person_of, truth.people, truth.cameras, visible.shape[1])
     shown = (np.take_along_axis(visible, np.maximum(views, 0)[:, :, None], axis=2)[:, :, 0]) & (views >= 0)
-    own, others = _met(truth, way.rendering.tracks, person_of)
+    own, others = _matched(truth, result.rendering.tracks, person_of)
     lost = truth.views.evaluated & ~shown
-    mine = lost & own
-    wrong = lost & ~own & others
+    by_selection = lost & own
+    by_identity = lost & ~own & others
     frames = max(int(np.count_nonzero(truth.views.evaluated)), 1)
-    counts = (truth.views.evaluated & shown, mine, wrong, lost & ~own & ~others)
+    counts = (truth.views.evaluated & shown, by_selection, by_identity, lost & ~own & ~others)
     return VisibilityLosses(*(np.count_nonzero(it) / frames for it in counts))
 
 
-def _met(
+def _matched(
     truth: SceneTruth, tracks: Mapping[str, list[MotRow]], person_of: Mapping[int, int]
 ) -> tuple[Mask, Mask]:
-    """Return (K, N) whether visible people had their own number, and whether they had another."""
+    """Return (K, N) whether a visible person had a box with their own id, and with another."""
     own: Mask = np.zeros(truth.views.evaluated.shape, dtype=bool)
     others = own.copy()
     frames = own.shape[1]
@@ -70,8 +72,8 @@ def _met(
                 continue
             there = truth.views.visible[:, row.frame - 1, column]
             overlap = iou(truth.boxes[:, row.frame - 1, column], np.array(row.box)[None])
-            met = there & (np.nan_to_num(overlap) >= LEAST_IOU)
-            for person in np.flatnonzero(met):
-                mine = person_of.get(row.id) == truth.people[person]
-                (own if mine else others)[person, row.frame - 1] = True
+            matched = there & (np.nan_to_num(overlap) >= LEAST_IOU)
+            for person in np.flatnonzero(matched):
+                by_selection = person_of.get(row.id) == truth.people[person]
+                (own if by_selection else others)[person, row.frame - 1] = True
     return own, others

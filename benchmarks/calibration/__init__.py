@@ -1,1 +1,1 @@
-"""Cameras placed from people who walk."""
+"""Camera calibration from walking people."""

@@ -1,9 +1,9 @@
-"""Calibration from walks: how exactly cameras are placed from nothing but tracks, and what it is worth.
+"""Accuracy of calibration from walking people, and what it is worth for identities.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.calibration --data ../shared/data --out out/bench
 
-The room is drawn, and its cameras are known. In the recordings, feet of people who have one number in the
-ground truth are compared.
+The cameras of the synthetic room are known. In the recordings, foot points of the same person are compared
+by the ground truth.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ _PERSON = 1.75
 _SHIFT_S = 3.0
 _ROOM_S, _ROOM_SIZE, _ROOM_FPS = 60.0, (640, 360), 25.0
 _MOVED = {"c1": 7, "c2": -4}
-"""Frames by which the room's cameras are put out of step."""
+"""Frames by which the room's cameras are desynchronized."""
 _AUDITORIUM = ("HC3", "HC4", "IP2", "IP5")
 
 
 @dataclass(frozen=True, slots=True)
 class RoomWalk:
-    """A walk of some people in the drawn room, and where its cameras really are."""
+    """A recorded walk in the synthetic room, and the true homographies of its cameras."""
 
     people: int
     truth: dict[str, np.ndarray]
@@ -52,7 +52,7 @@ class RoomWalk:
 
 
 def draw(folder: Path, people: int) -> RoomWalk:
-    """Draw a minute, and track it."""
+    """Render a minute of the synthetic room, and track it."""
     scene = Scene("room", 3, people, 1, *_ROOM_SIZE, _ROOM_FPS)
     write_recording(scene, folder, _ROOM_S, lambda _done, _total: None)
     tracks = _tracked(find_views(folder.parent, folder.name), folder / "tracked", None)
@@ -74,13 +74,13 @@ def _tracked(views: RecordedViews, out: Path, config: Path | None) -> Path:
 
 
 def out_of_step(walk: Walk) -> Walk:
-    """Let a camera's recording begin later."""
+    """Shift a camera's walk by its time offset."""
     late = _MOVED.get(walk.camera, 0)
     return replace(walk, tracks=tuple(WalkTrack(it.first_frame - late, it.boxes) for it in walk.tracks))
 
 
 def room_rows(report: Report, folder: Path, out: Path) -> None:
-    """Compare with what is known of the drawn room."""
+    """Compare the calibration with the true cameras of the synthetic room."""
     rows = []
     for people in (1, 4):
         room = draw(folder / f"room{people}", people)
@@ -99,12 +99,19 @@ def room_rows(report: Report, folder: Path, out: Path) -> None:
                 ]
             )
             _plot(found, out / f"calibration_room{people}_{name.split()[0]}.png")
-    heading = ["room, 60 s", "feet apart, heights", "error, m, median", "90 %", "offset c1 (+7)", "c2 (-4)"]
-    report.table("Against the drawn room's own cameras (up to a turn and a shift)", heading, rows)
+    heading = [
+        "room, 60 s",
+        "feet distance, heights",
+        "error, m, median",
+        "90 %",
+        "offset c1 (+7)",
+        "c2 (-4)",
+    ]
+    report.table("Against the room's true cameras (up to a rotation and a shift)", heading, rows)
 
 
 def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
-    """Compare with the published calibration, by the people's own numbers."""
+    """Compare with the published calibration, by people with known identities."""
     views = find_views(data, "terrace")
     truth, settings = data / "terrace" / "gt", folder / "terrace.yaml"
     settings.write_text(yaml.safe_dump({"site": views.site, "cameras": views.cameras}), encoding="utf-8")
@@ -127,8 +134,8 @@ def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
         render(config, done, lambda _: None)
         joint = evaluate_recordings(read_recordings([done], [truth]), 0.5).joint
         rows.append([name, *_cells(seen), f"{100 * joint.idf1:.1f}"])
-    heading = ["terrace, two views", "feet apart, heights", "90 %", "nearest is right, %", "joint IDF1"]
-    report.table("Beside the published calibration, at the true boxes", heading, rows)
+    heading = ["terrace, two views", "feet distance, heights", "90 %", "nearest correct, %", "joint IDF1"]
+    report.table("Against the published calibration, at the true boxes", heading, rows)
     moved = ", ".join(f"{it.camera} {it.offset:+.1f} ± {2 * it.offset_error:.1f}" for it in found.cameras)
     report.say(f"terrace: offsets in frames: {moved}")
 
@@ -141,8 +148,8 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
     size = (1920, 1080)
     common = in_common(source / "gt", _AUDITORIUM, size)
     report.table(
-        "auditorium, true boxes that two cameras have at once: without any there is no link to be found",
-        ["cameras", "people", "boxes", "off a fitted plane, box heights"],
+        "auditorium, true boxes of one person in two cameras at once",
+        ["cameras", "people", "boxes", "distance from a fitted plane, box heights"],
         [
             [f"{one}, {other}", str(it.people), str(it.boxes), f"{it.off:.2f}" if it.boxes else "-"]
             for (one, other), it in common.items()
@@ -163,7 +170,7 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
     ]
     report.table(
         "auditorium, at the true boxes",
-        ["cameras", "feet apart, heights", "90 %", "nearest is right, %"],
+        ["cameras", "feet distance, heights", "90 %", "nearest correct, %"],
         rows,
     )
     for it in found.uncalibrated:
@@ -180,7 +187,7 @@ def _plot(found: WalkCalibration, path: Path) -> None:
 
 
 def main() -> None:
-    """Run it with the command line's options."""
+    """Run the benchmark."""
     chosen = parser(__doc__, "calibration").parse_args()
     report = Report()
     with tempfile.TemporaryDirectory() as work:

@@ -1,4 +1,4 @@
-"""How far off a calibration is: beside cameras that were drawn, or by people whose numbers are known."""
+"""Errors of a calibration: against known cameras, or by people with known identities."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _EDGE = 3.0
 
 @dataclass(frozen=True, slots=True)
 class GroundAgreement:
-    """How far apart two cameras have people who are known to be the same.
+    """Distance on the ground between two cameras' foot points of the same person.
 
     Attributes:
         median: in person heights.
         most: the ninth decile.
-        right: the share whose nearest in the other camera is the same person.
+        right: share of people whose nearest neighbor in the other camera is the same person.
     """
 
     median: float
@@ -39,13 +39,13 @@ class GroundAgreement:
 
 @dataclass(frozen=True, slots=True)
 class CameraOverlap:
-    """What two cameras have in common, whoever looks for it.
+    """The people that two cameras show at the same time, by the ground truth.
 
     Attributes:
-        people: how many are in both at once, at some time.
-        boxes: how many whole boxes they have there.
-        off: how far their feet are from where a plane has them that fits the nearer half of them, in
-            heights of the other camera's boxes (median); NaN where there are too few, or all on a line.
+        people: that are in both at once at some time.
+        boxes: whole boxes of them.
+        off: median distance of their foot points from a plane fitted to the nearer half of them, in heights
+            of the other camera's boxes; NaN where there are too few, or all on a line.
     """
 
     people: int
@@ -54,7 +54,7 @@ class CameraOverlap:
 
 
 def error_of_known(found: WalkCalibration, truth: Mapping[str, Floats], walks: Sequence[Walk]) -> Floats:
-    """How far off all feet are, metres, after the best turn and shift of the whole floor."""
+    """Return the errors of all foot points, meters, after the best rotation and shift of the floor."""
     ours, theirs = [], []
     matrices = {it.camera: it.homography for it in found.cameras}
     for walk in walks:
@@ -69,7 +69,7 @@ def error_of_known(found: WalkCalibration, truth: Mapping[str, Floats], walks: S
 
 
 def agreement(ground: Path, truth: Path, size: tuple[int, int]) -> dict[tuple[str, str], GroundAgreement]:
-    """Compare every two cameras of a file at the boxes of people who have one number in both."""
+    """Compare every two cameras of a file of homographies at the boxes of people whom both show."""
     matrices = json.loads(ground.read_text(encoding="utf-8"))["homography"]
     people = {name: _people(path, size) for name in matrices if (path := _file(truth, name)) is not None}
     found = {}
@@ -85,7 +85,7 @@ def agreement(ground: Path, truth: Path, size: tuple[int, int]) -> dict[tuple[st
 def in_common(
     truth: Path, cameras: Sequence[str], size: tuple[int, int]
 ) -> dict[tuple[str, str], CameraOverlap]:
-    """Return for every pair of cameras whether they have anything in common to be aligned by."""
+    """Return for every pair of cameras the people by whom they could be aligned."""
     people = {name: _people(path, size) for name in cameras if (path := _file(truth, name)) is not None}
     found = {}
     for one, other in combinations(people, 2):
@@ -97,7 +97,7 @@ def in_common(
 
 
 def _off_plane(here: Floats, there: Floats) -> float:
-    """Fit a plane to the nearer half again and again (least trimmed squares), from all of them on."""
+    """Fit a plane to the nearer half repeatedly (least trimmed squares), starting with all points."""
     source, target, tall = foot_points(here), foot_points(there), there[:, 3] - there[:, 1]
     kept = np.ones(len(here), dtype=bool)
     median = float("nan")
@@ -137,7 +137,7 @@ def _of_two(
 
 
 def _people(path: Path, size: tuple[int, int]) -> _Boxes:
-    """Return the whole boxes of a file."""
+    """Return the boxes of a file that are not cut by the picture's edges."""
     return {
         (row.frame, row.id): row.box
         for row in read_rows(path)

@@ -1,1 +1,1 @@
-"""Processes, sources, messages, disk and clock fail while viewers watch: what each promise is worth."""
+"""Fault injection: processes, sources, messages, disk and clock fail while viewers watch."""

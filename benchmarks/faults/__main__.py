@@ -1,35 +1,33 @@
-"""Faults, injected into real processes while viewers watch: against each promise, what was measured.
+"""Fault injection into real processes while viewers watch, measured against the promises.
 
     python -m benchmarks.faults --out out/bench
     python -m benchmarks.faults --fault "kill camera" --fault "freeze camera"
 
-The site is `myview up` on three views of the synthetic room. On every picture stands which camera it is of
-and which frame, and in every box in which frame it was found, so that a picture of the wrong camera or
-moment and a box on another picture than its own are counted, not assumed. Columns:
+The site is `myview up` on three views of the synthetic room. Every picture carries the number of its camera
+and frame, and every box the frame in which it was detected. So pictures of the wrong camera or moment, and
+boxes on the wrong picture, are counted. Columns:
 
-* *opened again*: how often the viewers' streams broke and were opened again;
-* *fresh*: the longest time in which a viewer got no fresh picture, less the rhythm of GOPs (a GOP comes in
-  one piece), and in brackets the same over the seconds before the fault; the look-ahead is in neither, since
-  all that viewers see is later by it. Where the viewers' own server dies: from when it says that it is ready
-  to the next picture, and in brackets all the time without;
-* *wrong pictures*: of another camera than the events named, of another frame than the pulse, or not legible;
-  *unnamed* are those of which no event was heard, so that their camera may be the wrong one: only where the
-  server dies, and the events with it, is that let pass;
-* *wrong boxes*: drawn on a picture of another frame than they were found in; *means* of several boxes, which
-  trackers make where they saw nothing, do not say where they were found, and are not judged;
-* *recorded*: GOPs that were shown and are not on the disk; files that do not play;
-* *ended*: of processes that were told to end, the slowest and its exit code.
+* *reconnects*: how often the viewers' streams broke and were opened again;
+* *gap, s*: the longest time without a fresh picture, minus the length of a GOP (a GOP arrives in one piece),
+  and in brackets the same over the seconds before the fault. Where the viewers' own server is killed: from
+  its readiness to the next picture, and in brackets the whole gap;
+* *wrong pictures*: of another camera than the events named, of another frame than the pulse, or illegible;
+  *unnamed* are those without an event, so that their camera is unchecked: allowed only where the server is
+  killed, and the events with it;
+* *wrong boxes*: drawn on a picture of another frame than they were detected in; *means* of several boxes,
+  which trackers interpolate, carry no frame number and are not checked;
+* *recorded*: GOPs that were shown but are not on the disk; files that do not play;
+* *exit*: of terminated processes, the slowest and its exit code.
 
-Which picture a network camera has at a pulse nobody knows beforehand. In the faults of a source, wrong is one
-of its pictures that is older than the one before, is more than 2 s behind its pulse or half a second ahead,
-or is not the one that was recorded of this pulse; how far behind they were stands below the table. Its boxes
-are judged as all are: its detector reads in which picture it finds them.
+The picture of a network camera at a pulse is not known beforehand. In the faults of a source, a picture is
+wrong if it is older than the previous one, more than 2 s behind its pulse or half a second ahead, or not the
+one that was recorded at this pulse; the lag is printed below the table. Boxes are checked as for all cameras:
+the detector reads the number of the picture in which it detects them.
 
-Processes fail one by one, and any two of them at once; *camera* is the one that most viewers are shown, and
-*camera+camera* the next one, too. Messages are all that cameras say and hear, but pictures: tracks, states,
-small pictures of people, what they find (for the other cameras), and where an operator points. A camera that
-comes back after an hour was away for 20 s, in which it comes to be tried as seldom as ever, and is an hour
-ahead by its time stamps; the hour itself is not waited for.
+Processes fail one by one, and in pairs; *camera* is the one that most viewers are shown, and *camera+camera*
+that and the next one. Messages are all that cameras send and receive, except pictures: tracks, states,
+thumbnails, detections (for the other cameras), and an operator's corrections. The camera that returns after
+an hour is away for 20 s only, until its retry interval is the longest, and its timestamps are an hour ahead.
 """
 
 from __future__ import annotations

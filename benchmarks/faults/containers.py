@@ -1,11 +1,11 @@
-"""The same kinds of faults in containers: killed, paused, restarted, cut off from each other.
+"""Fault injection in containers: killed, paused, restarted, disconnected.
 
     python -m benchmarks.faults.containers
     python -m benchmarks.faults.containers --fault "cut off camera"
 
-The site is docker-compose.yml on the films of :mod:`benchmarks.faults`, whose columns these are too. The
-engine starts again what dies, and the network between two containers is cut as `docker network disconnect`
-does it: the container's interface is gone, nobody is told. It needs a Docker Engine with Compose.
+The site is docker-compose.yml on the films of :mod:`benchmarks.faults`; the columns are the same. The engine
+restarts killed containers; `docker network disconnect` removes a container's network interface without
+notice. It needs a Docker Engine with Compose.
 """
 
 from __future__ import annotations
@@ -26,7 +26,13 @@ from benchmarks.common.report import Report
 from benchmarks.faults.injection.process_pairs import SHOWN
 from benchmarks.faults.outcomes.measurement import measure
 from benchmarks.faults.outcomes.promise_table import describe
-from benchmarks.faults.site.compose_site import PLAIN, ComposeError, ComposeSite, composed, missing
+from benchmarks.faults.site.compose_site import (
+    PLAIN,
+    ComposeError,
+    ComposeSite,
+    missing_requirement,
+    run_compose_site,
+)
 from benchmarks.faults.site.fault_site import (
     LEASE_S,
     SETTINGS,
@@ -34,7 +40,7 @@ from benchmarks.faults.site.fault_site import (
     FaultSite,
     Inject,
     ProcessExit,
-    listening,
+    follow_events,
 )
 from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews
 
@@ -46,11 +52,11 @@ _GRACE_S = 10
 
 @contextlib.asynccontextmanager
 async def with_containers(views: StampedViews, folder: Path) -> AsyncIterator[FaultSite]:
-    """Run the films in containers; in the end tell all of them to end.
+    """Run the site in containers; stop them in the end.
 
     Raises:
-        CannotRunError: there is no engine here.
-        RuntimeError: the site does not come up, or not to what it should be.
+        CannotRunError: there is no Docker Engine.
+        RuntimeError: the site does not start, or not into the expected state.
     """
     assert views.ground is not None  # noqa: S101 — the films have one
     films, kept = views.ground.parent, folder / "kept"
@@ -64,16 +70,16 @@ async def with_containers(views: StampedViews, folder: Path) -> AsyncIterator[Fa
     over = folder / "compose.yml"
     over.write_text(yaml.safe_dump({"services": services}), encoding="utf-8")
     with contextlib.ExitStack() as stack:
-        opened = composed((*PLAIN, over), MYVIEW_CONFIG="../faults.yaml")
+        opened = run_compose_site((*PLAIN, over), MYVIEW_CONFIG="../faults.yaml")
         site = await asyncio.to_thread(stack.enter_context, opened)
         url = f"http://{await asyncio.to_thread(site.address)}/"
-        stand = FaultSite(url, folder, 0, control=site, recorded=kept)
-        async with listening(stand):
-            yield stand
+        fault_site = FaultSite(url, folder, 0, control=site, recorded=kept)
+        async with follow_events(fault_site):
+            yield fault_site
 
 
 def _site(views: StampedViews) -> dict[str, Any]:
-    """Return the configuration, with the films where containers find them."""
+    """Return the configuration, with the paths of the films inside the containers."""
     cameras = [
         {**it, **{key: f"{_FILMS}/{Path(it[key]).name}" for key in ("source", "detections")}}
         for it in views.cameras
@@ -86,33 +92,33 @@ def _site(views: StampedViews) -> dict[str, Any]:
     }
 
 
-def _named(stand: FaultSite, name: str) -> tuple[ComposeSite, str, str]:
-    """Return the site, the service and its container."""
-    site: ComposeSite = stand.control
-    service = stand.shown()[0] if name == SHOWN else name
+def _target(fault_site: FaultSite, name: str) -> tuple[ComposeSite, str, str]:
+    """Return the site, the service called `name` and its container."""
+    site: ComposeSite = fault_site.control
+    service = fault_site.shown()[0] if name == SHOWN else name
     return site, service, site.container(service)
 
 
-def killed(*names: str) -> Inject:
-    """Kill all in containers but their init, which ends with them.
+def kill_container(*names: str) -> Inject:
+    """Kill all processes in containers except init, which exits with them.
 
-    `docker kill` would tell the engine that the container was meant to end.
+    After `docker kill` the engine would not restart the container.
     """
 
-    async def inject(stand: FaultSite) -> None:
+    async def inject(fault_site: FaultSite) -> None:
         for name in names:
-            site, _, container = _named(stand, name)
-            with contextlib.suppress(ComposeError):  # the shell that does it dies, too
+            site, _, container = _target(fault_site, name)
+            with contextlib.suppress(ComposeError):  # the shell that sends the signal dies, too
                 await site.docker("exec", container, "sh", "-c", "kill -KILL -1")
 
     return inject
 
 
-def paused(name: str, seconds: float = _AWAY_S) -> Inject:
-    """Stop all processes of a container for a while."""
+def pause_container(name: str, seconds: float = _AWAY_S) -> Inject:
+    """Pause a container for a while."""
 
-    async def inject(stand: FaultSite) -> None:
-        site, _, container = _named(stand, name)
+    async def inject(fault_site: FaultSite) -> None:
+        site, _, container = _target(fault_site, name)
         await site.docker("pause", container)
         try:
             await asyncio.sleep(seconds)
@@ -122,26 +128,26 @@ def paused(name: str, seconds: float = _AWAY_S) -> Inject:
     return inject
 
 
-def restarted(name: str) -> Inject:
-    """Stop a container, measure how it stops, and start it again."""
+def restart_container(name: str) -> Inject:
+    """Stop a container, record how it exits, and start it again."""
 
-    async def inject(stand: FaultSite) -> None:
-        site, service, container = _named(stand, name)
+    async def inject(fault_site: FaultSite) -> None:
+        site, service, container = _target(fault_site, name)
         begun = time.time()
         await site.docker("stop", "--time", f"{_GRACE_S}", container)
         state = await asyncio.to_thread(site.state, service)
-        ended = datetime.fromisoformat(state["FinishedAt"]).timestamp()
-        stand.ended.append(ProcessExit(service, ended - begun, state["ExitCode"]))
+        finished = datetime.fromisoformat(state["FinishedAt"]).timestamp()
+        fault_site.exits.append(ProcessExit(service, finished - begun, state["ExitCode"]))
         await site.docker("start", container)
 
     return inject
 
 
-def cut_off(name: str, seconds: float = _AWAY_S) -> Inject:
-    """Take a container off the site's network for a while."""
+def disconnect_container(name: str, seconds: float = _AWAY_S) -> Inject:
+    """Disconnect a container from the site's network for a while."""
 
-    async def inject(stand: FaultSite) -> None:
-        site, service, container = _named(stand, name)
+    async def inject(fault_site: FaultSite) -> None:
+        site, service, container = _target(fault_site, name)
         await site.docker("network", "disconnect", site.network, container)
         try:
             await asyncio.sleep(seconds)
@@ -152,19 +158,21 @@ def cut_off(name: str, seconds: float = _AWAY_S) -> Inject:
 
 
 FAULTS = (
-    Fault("kill camera", with_containers, killed(SHOWN), 10.0),
-    Fault("kill sync", with_containers, killed("sync"), 10.0),
-    Fault("kill sync+camera", with_containers, killed("sync", SHOWN), 10.0),
-    Fault("pause camera", with_containers, paused(SHOWN), 10.0, LEASE_S + 1.0),
-    Fault("pause sync", with_containers, paused("sync"), 10.0),
-    Fault("pause bestview", with_containers, paused("bestview"), 10.0, None),
-    Fault("restart camera", with_containers, restarted(SHOWN), 12.0),
-    Fault("restart sync", with_containers, restarted("sync"), 12.0),
-    Fault("cut off camera", with_containers, cut_off(SHOWN), 12.0, LEASE_S + 1.0),
-    Fault("cut off sync", with_containers, cut_off("sync"), 12.0),
-    Fault("cut off bestview 30 s", with_containers, cut_off("bestview", _ROUTER_AWAY_S), 45.0, None),
-    Fault("kill bestview", with_containers, killed("bestview"), 30.0, None, breaks=True),
-    Fault("restart bestview", with_containers, restarted("bestview"), 30.0, None, breaks=True),
+    Fault("kill camera", with_containers, kill_container(SHOWN), 10.0),
+    Fault("kill sync", with_containers, kill_container("sync"), 10.0),
+    Fault("kill sync+camera", with_containers, kill_container("sync", SHOWN), 10.0),
+    Fault("pause camera", with_containers, pause_container(SHOWN), 10.0, LEASE_S + 1.0),
+    Fault("pause sync", with_containers, pause_container("sync"), 10.0),
+    Fault("pause bestview", with_containers, pause_container("bestview"), 10.0, None),
+    Fault("restart camera", with_containers, restart_container(SHOWN), 12.0),
+    Fault("restart sync", with_containers, restart_container("sync"), 12.0),
+    Fault("cut off camera", with_containers, disconnect_container(SHOWN), 12.0, LEASE_S + 1.0),
+    Fault("cut off sync", with_containers, disconnect_container("sync"), 12.0),
+    Fault(
+        "cut off bestview 30 s", with_containers, disconnect_container("bestview", _ROUTER_AWAY_S), 45.0, None
+    ),
+    Fault("kill bestview", with_containers, kill_container("bestview"), 30.0, None, kills_server=True),
+    Fault("restart bestview", with_containers, restart_container("bestview"), 30.0, None, kills_server=True),
 )
 
 
@@ -178,9 +186,9 @@ def main() -> None:
     if chosen.list:
         print("\n".join(names))
         return
-    lacking = missing()
-    if lacking is not None:
-        finish(CannotRunError(lacking), "faults.containers")
+    missing = missing_requirement()
+    if missing is not None:
+        finish(CannotRunError(missing), "faults.containers")
     report = Report()
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # recordings are another user's
         faults = [fault for fault in FAULTS if not chosen.fault or fault.name in chosen.fault]

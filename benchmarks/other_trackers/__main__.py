@@ -140,7 +140,7 @@ def run(options_data: Path, out: Path, folder: Path, names: list[str] | None, *,
 
 
 def main() -> None:
-    """Run it with the command line's options."""
+    """Run the benchmark."""
     options = parser(__doc__, "other_trackers")
     options.add_argument(
         "--environment", type=Path, default=default_folder(), help="folder that the peers are installed in"

@@ -1,1 +1,1 @@
-"""More cameras than the machine carries: what is left out, and the way back."""
+"""Overload: more cameras than the machine carries, what is shed, and the recovery."""

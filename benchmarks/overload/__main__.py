@@ -1,9 +1,10 @@
-"""More cameras than the machine carries: what is left out, what viewers see of it, and the way back; a plot.
+"""Overload: more cameras than the machine carries, load shedding, viewers and recovery; a plot.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.overload --out out/bench
 
-A site of 1, 2, 3, … cameras of 352x288 at 25 a second, real processes, up to twice what the machine carries
-without leaving anything out, or `--most`. Two viewers watch all the time. In the end all but one are killed.
+A site of 1, 2, 3, … cameras of 352x288 at 25 frames a second, real processes, up to twice what the machine
+carries without load shedding, or `--most`. Two viewers watch all the time. In the end all cameras but one are
+killed.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import numpy as np
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from benchmarks.overload.growing_site import FPS, LOG, GrowingSite, running
+from benchmarks.overload.growing_site import FPS, LOG, GrowingSite, run_growing_site
 from benchmarks.overload.overload_report import describe, plot
 from benchmarks.overload.samples import RECOVERED_S, LoadStep, OverloadResult, SiteSample
 from benchmarks.soak.visitors import Visitors
@@ -30,18 +31,18 @@ _STRIDE = 5
 """Frames between two windows, by default."""
 _EVERY_S = 1.0
 _FIRST_S = 120.0
-"""A camera has so long to start, on a machine with other work."""
+"""Seconds in which the first camera must start."""
 _CALM = 5
-"""Samples in a row at which nothing is left out, for the way back to be over."""
+"""Consecutive samples without load shedding that end the recovery."""
 
 
 class SiteSampler:
-    """Samples a site."""
+    """Samples a site periodically while viewers watch."""
 
     def __init__(
-        self, site: GrowingSite, visitors: Visitors, watching: asyncio.Task[None], found: OverloadResult
+        self, site: GrowingSite, visitors: Visitors, viewers_task: asyncio.Task[None], result: OverloadResult
     ) -> None:
-        self._site, self._visitors, self._watching, self._found = site, visitors, watching, found
+        self._site, self._visitors, self._viewers_task, self._result = site, visitors, viewers_task, result
         self._began = time.monotonic()
 
     @property
@@ -53,20 +54,20 @@ class SiteSampler:
         """Take samples for a while.
 
         Raises:
-            RuntimeError: nobody watches any more: delays and holes would be those of nobody.
+            RuntimeError: the viewers ended, so that there are no delays.
         """
-        until, taken = self.now + seconds, []
+        until, samples = self.now + seconds, []
         while self.now < until:
-            await asyncio.wait({self._watching}, timeout=_EVERY_S)
-            if self._watching.done():
-                raise RuntimeError(f"the viewers ended: {self._watching.exception()!r}")
+            await asyncio.wait({self._viewers_task}, timeout=_EVERY_S)
+            if self._viewers_task.done():
+                raise RuntimeError(f"the viewers ended: {self._viewers_task.exception()!r}")
             async with session.get(f"{self._site.url}api/cameras") as answer:
                 cameras = [
                     it for it in (await answer.json())["cameras"] if it["camera"] in self._site.cameras
                 ]
-            taken.append(self._sample(cameras))
-        self._found.samples += taken
-        return taken
+            samples.append(self._sample(cameras))
+        self._result.samples += samples
+        return samples
 
     def _sample(self, cameras: Sequence[dict[str, Any]]) -> SiteSample:
         person, camera = self._visitors.person, self._visitors.camera
@@ -82,12 +83,12 @@ class SiteSampler:
             missed=sums["missed"],
             late=sums["late"],
             delays=delays,
-            holes=person.holes + camera.holes,
+            missing_frames=person.missing_frames + camera.missing_frames,
         )
 
 
-def step_of(cameras: int, before: Sequence[SiteSample], samples: Sequence[SiteSample]) -> LoadStep:
-    """Sum up the samples of so many cameras; ``before`` are those while they settled."""
+def summarize_step(cameras: int, before: Sequence[SiteSample], samples: Sequence[SiteSample]) -> LoadStep:
+    """Summarize the samples of a number of cameras; ``before`` are those of the settling time."""
     first, last = samples[0], samples[-1]
     frames = max(last.pulses - first.pulses, 1)
     delays = [it for sample in samples[1:] for it in sample.delays] or [np.nan]
@@ -99,43 +100,46 @@ def step_of(cameras: int, before: Sequence[SiteSample], samples: Sequence[SiteSa
         missed=(last.missed - first.missed) / frames,
         late=(last.late - first.late) / (frames / _STRIDE),
         delays=(float(np.median(delays)), float(np.percentile(delays, 95))),
-        holes=last.holes - before[0].holes,
+        missing_frames=last.missing_frames - before[0].missing_frames,
     )
 
 
 async def load(site: GrowingSite, most: int, settle: float, seconds: float) -> OverloadResult:
-    """Add cameras until there are too many by half; kill them, and wait until the rest is well."""
-    found = OverloadResult()
+    """Add cameras up to twice what is carried; kill all but one, and wait for the recovery."""
+    result = OverloadResult()
     site.add()
     async with aiohttp.ClientSession() as session:
-        await _first(session, site)
-        visitors = Visitors(site.url, FPS, seed=1, coming=0)
-        watching = asyncio.create_task(visitors.watch())
+        await _wait_for_first_camera(session, site)
+        visitors = Visitors(site.url, FPS, seed=1, count=0)
+        viewers_task = asyncio.create_task(visitors.watch())
         try:
-            watch = SiteSampler(site, visitors, watching, found)
+            sampler = SiteSampler(site, visitors, viewers_task, result)
             while True:
-                found.started.append((watch.now, len(site.cameras)))
-                before = await watch.sample(session, settle)
-                samples = await watch.sample(session, seconds)
-                found.steps.append(step_of(len(site.cameras), before, samples))
-                enough = len(site.cameras) >= 2 * max(found.carried, 1) and len(found.steps) > found.carried
-                if len(site.cameras) >= most or enough:
+                result.started.append((sampler.now, len(site.cameras)))
+                before = await sampler.sample(session, settle)
+                samples = await sampler.sample(session, seconds)
+                result.steps.append(summarize_step(len(site.cameras), before, samples))
+                is_enough = (
+                    len(site.cameras) >= 2 * max(result.cameras_carried, 1)
+                    and len(result.steps) > result.cameras_carried
+                )
+                if len(site.cameras) >= most or is_enough:
                     break
                 site.add()
-            await asyncio.to_thread(site.leave, 1)
-            found.started.append((watch.now, 1))
-            found.back = await _way_back(watch, session)
+            await asyncio.to_thread(site.kill_all_but, 1)
+            result.started.append((sampler.now, 1))
+            result.recovery_s = await _wait_for_recovery(sampler, session)
         finally:
-            watching.cancel()
-            await asyncio.gather(watching, return_exceptions=True)
-    return found
+            viewers_task.cancel()
+            await asyncio.gather(viewers_task, return_exceptions=True)
+    return result
 
 
-async def _first(session: aiohttp.ClientSession, site: GrowingSite) -> None:
+async def _wait_for_first_camera(session: aiohttp.ClientSession, site: GrowingSite) -> None:
     """Wait until the first camera is live.
 
     Raises:
-        RuntimeError: it does not come to that.
+        RuntimeError: the camera does not become live.
     """
     give_up = time.monotonic() + _FIRST_S
     while time.monotonic() < give_up:
@@ -146,13 +150,13 @@ async def _first(session: aiohttp.ClientSession, site: GrowingSite) -> None:
     raise RuntimeError(f"the first camera was not live after {_FIRST_S:.0f} s")
 
 
-async def _way_back(watch: SiteSampler, session: aiohttp.ClientSession) -> float | None:
-    began = watch.now
-    calm = 0
-    while watch.now < began + RECOVERED_S:
-        (*_, sample) = await watch.sample(session, _EVERY_S)
-        calm = calm + 1 if max(sample.levels, default=0) == 0 else 0
-        if calm == _CALM:
+async def _wait_for_recovery(sampler: SiteSampler, session: aiohttp.ClientSession) -> float | None:
+    began = sampler.now
+    calm_samples = 0
+    while sampler.now < began + RECOVERED_S:
+        (*_, sample) = await sampler.sample(session, _EVERY_S)
+        calm_samples = calm_samples + 1 if max(sample.levels, default=0) == 0 else 0
+        if calm_samples == _CALM:
             return sample.at - began - (_CALM - 1) * _EVERY_S
     return None
 
@@ -163,11 +167,11 @@ def run(options: argparse.Namespace) -> None:
     report = Report()
     with tempfile.TemporaryDirectory(prefix="myview-load-") as temporary:
         folder = Path(temporary)
-        with running(options.most, folder) as site:
-            found = asyncio.run(load(site, options.most, options.settle, options.seconds))
+        with run_growing_site(options.most, folder) as site:
+            result = asyncio.run(load(site, options.most, options.settle, options.seconds))
         (options.out / "overload.log").write_bytes((folder / LOG).read_bytes())
-    describe(report, found)
-    plot(found, options.out / "overload.png")
+    describe(report, result)
+    plot(result, options.out / "overload.png")
     report.save(options.out / "overload.txt")
 
 

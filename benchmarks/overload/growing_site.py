@@ -22,7 +22,7 @@ from synthetic import Scene, write_recording
 FPS = 25.0
 WIDTH, HEIGHT = 352, 288
 _FILMS = 4
-"""Views of the room; more cameras show the same again."""
+"""Views of the room; further cameras repeat them."""
 _PEOPLE, _SEED, _FILM_S = 4, 1, 40.0
 _PATIENCE_S = 60.0
 _POLL_S = 0.2
@@ -30,7 +30,7 @@ LOG = "site.log"
 
 
 class GrowingSite:
-    """A site that is running; its cameras are its caller's matter."""
+    """A running site whose cameras the caller adds and kills."""
 
     def __init__(self, config: Path, url: str, log: IO[bytes]) -> None:
         self.url = url
@@ -42,10 +42,10 @@ class GrowingSite:
         name = f"c{len(self.cameras)}"
         self.cameras[name] = _start(self._log, "camera", str(self._config), name)
 
-    def leave(self, count: int) -> None:
-        """Kill all cameras but the first so many."""
-        gone = list(self.cameras)[count:]
-        processes = [self.cameras.pop(it) for it in gone]
+    def kill_all_but(self, count: int) -> None:
+        """Kill all cameras but the first `count`."""
+        removed = list(self.cameras)[count:]
+        processes = [self.cameras.pop(it) for it in removed]
         for process in processes:
             process.kill()
         for process in processes:
@@ -53,8 +53,8 @@ class GrowingSite:
 
 
 @contextlib.contextmanager
-def running(most: int, folder: Path) -> Iterator[GrowingSite]:
-    """Run a site for at most so many cameras, of which none is there yet."""
+def run_growing_site(most: int, folder: Path) -> Iterator[GrowingSite]:
+    """Run a site configured for `most` cameras, without starting any."""
     films = folder / "films"
     scene = Scene("room", _FILMS, _PEOPLE, _SEED, WIDTH, HEIGHT, FPS)
     write_recording(scene, films, _FILM_S)
@@ -76,7 +76,7 @@ def running(most: int, folder: Path) -> Iterator[GrowingSite]:
         started = [_start(log, it, str(config)) for it in ("bestview", "sync")]
         site = GrowingSite(config, f"http://127.0.0.1:{http}/", log)
         try:
-            _until_up(site.url)
+            _wait_until_up(site.url)
             yield site
         finally:
             end([*site.cameras.values(), *started])
@@ -88,7 +88,7 @@ def _start(log: IO[bytes], *words: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=log)
 
 
-def _until_up(url: str) -> None:
+def _wait_until_up(url: str) -> None:
     give_up = time.monotonic() + _PATIENCE_S
     while time.monotonic() < give_up:
         with contextlib.suppress(urllib.error.URLError, ConnectionError):

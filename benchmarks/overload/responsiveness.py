@@ -1,10 +1,10 @@
-"""Whether a site with too much to do still answers: `/healthz` and the loop's lag, cameras nicer and not.
+"""Responsiveness of an overloaded site: `/healthz` and event loop lag, with and without niceness of cameras.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.overload.responsiveness --cameras 40 --seconds 80
 
-Each site is `myview up` with small recorded pictures. From its start on it is asked twice a second, whether
-or not it has answered before: who is not answered at all counts with the time that they have waited. One row
-for each number of cameras and each niceness, one after the other.
+Each site is `myview up` on small recordings. From its start on a request is sent twice a second, whether or
+not the previous ones were answered; an unanswered request counts with the time it has waited. One row for
+each number of cameras and each niceness.
 """
 
 from __future__ import annotations
@@ -32,48 +32,52 @@ from synthetic import Scene, write_recording
 
 _FPS, _WIDTH, _HEIGHT = 25.0, 192, 108
 _FILMS, _PEOPLE, _SEED, _FILM_S = 4, 3, 1, 20.0
-"""Views of the room; more cameras show the same again."""
+"""Views of the room; further cameras repeat them."""
 _ASK_EVERY_S, _METRICS_EVERY_S = 0.5, 5.0
 _END_S = 20.0
 _SETTLED = 2 / 3
-"""Share of the time after which frames are counted: by then cameras have mostly started."""
+"""Share of the time after which frames are counted: most cameras have started by then."""
 
 
 @dataclass(slots=True)
 class Responsiveness:
-    """What came of asking one site.
+    """The measurements of one site.
 
     Attributes:
         seconds: for how long it ran.
-        waits: when it was asked, seconds from its start, and how long the answer took; None: none has come.
-        lags: how often its loop was later than by up to so many seconds, by its own metrics.
-        frames: when it had received how many frames of all cameras.
-        camera_mb: memory of a camera's process, in the median; what processes share is divided among them.
-        service_mb: the best-view service's.
-        own: how late this process's own loop was.
+        response_times: time of each request, seconds from the start, and of its response; None: unanswered.
+        lags: cumulative histogram of its event loop lag, from its metrics: bound in seconds, count.
+        frames: time, and frames received from all cameras so far.
+        camera_mb: median memory (PSS) of a camera process.
+        service_mb: memory (PSS) of the best-view service.
+        own_lag: the event loop lag of this process.
     """
 
     seconds: float
-    waits: list[tuple[float, float | None]] = field(default_factory=list)
+    response_times: list[tuple[float, float | None]] = field(default_factory=list)
     lags: list[tuple[float, float]] = field(default_factory=list)
     frames: list[tuple[float, float]] = field(default_factory=list)
     camera_mb: float = np.nan
     service_mb: float = np.nan
-    own: LoopLag = field(default_factory=LoopLag)
+    own_lag: LoopLag = field(default_factory=LoopLag)
 
     @property
-    def first(self) -> float:
-        """Seconds from the start to the first answer; infinite: none came."""
-        return min((at + took for at, took in self.waits if took is not None), default=np.inf)
+    def first_response_s(self) -> float:
+        """Seconds from the start to the first response; infinite: there was none."""
+        return min((at + took for at, took in self.response_times if took is not None), default=np.inf)
 
-    def wait(self, percent: float) -> float:
-        """Return a percentile of the seconds that an answer took, once the first one had come."""
-        took = [self.seconds - at if it is None else it for at, it in self.waits if at >= self.first]
+    def response_time(self, percent: float) -> float:
+        """Return a percentile of the response times, seconds, after the first response."""
+        took = [
+            self.seconds - at if it is None else it
+            for at, it in self.response_times
+            if at >= self.first_response_s
+        ]
         return float(np.percentile(took, percent)) if took else np.inf
 
     @property
     def rate(self) -> float:
-        """Frames a second, of all cameras together, in the last part of the time."""
+        """Frames per second of all cameras in the last part of the time."""
         late = [it for it in self.frames if it[0] >= _SETTLED * self.seconds]
         if not late or late[0] == late[-1]:
             return np.nan
@@ -81,34 +85,34 @@ class Responsiveness:
 
 
 def lag_below(share: float, lags: Sequence[tuple[float, float]]) -> float:
-    """Return the bound in seconds that so large a share of the lags does not pass."""
+    """Return the histogram bound in seconds below which this share of the lags is."""
     return next((bound for bound, count in lags if count >= share * lags[-1][1]), np.nan)
 
 
-async def ask(config: Path, port: int, niceness: int, seconds: float, log: Path) -> Responsiveness:
-    """Run a site for so long, and ask it from its start on."""
+async def measure_site(config: Path, port: int, niceness: int, seconds: float, log: Path) -> Responsiveness:
+    """Run a site for a while, and send requests from its start on."""
     environment = {**one_thread_environment(), "MYVIEW_SITE__NICENESS": str(niceness)}
-    url, asked = f"http://127.0.0.1:{port}/", Responsiveness(seconds)
-    with log.open("ab") as said:
+    url, measured = f"http://127.0.0.1:{port}/", Responsiveness(seconds)
+    with log.open("ab") as log_file:
         site = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "server.cli.main", "up", str(config)),
             cwd=ROOT,
             env=environment,
-            stdout=said,
-            stderr=said,
+            stdout=log_file,
+            stderr=log_file,
         )
     began = time.monotonic()
-    connector = aiohttp.TCPConnector(force_close=True, limit=0)  # as monitors come: each on its own
+    connector = aiohttp.TCPConnector(force_close=True, limit=0)  # one connection per request, as monitors do
     session = aiohttp.ClientSession(timeout=aiohttp.ClientTimeout(total=None), connector=connector)
     try:
         with contextlib.suppress(TimeoutError):
             async with session, asyncio.timeout(seconds), asyncio.TaskGroup() as asking:
-                asking.create_task(_metrics(session, url, asked, began))
-                asking.create_task(asked.own.run())
+                asking.create_task(_metrics(session, url, measured, began))
+                asking.create_task(measured.own_lag.run())
                 while True:
-                    asking.create_task(_ask(session, url, asked, began))
+                    asking.create_task(_request(session, url, measured, began))
                     await asyncio.sleep(_ASK_EVERY_S)
-        asked.camera_mb, asked.service_mb = memory(site.pid)
+        measured.camera_mb, measured.service_mb = memory(site.pid)
     finally:
         site.send_signal(signal.SIGTERM)
         try:
@@ -116,32 +120,32 @@ async def ask(config: Path, port: int, niceness: int, seconds: float, log: Path)
         except TimeoutError:
             site.kill()
             await site.wait()
-    return asked
+    return measured
 
 
-async def _ask(session: aiohttp.ClientSession, url: str, asked: Responsiveness, began: float) -> None:
+async def _request(session: aiohttp.ClientSession, url: str, measured: Responsiveness, began: float) -> None:
     at, took = time.monotonic() - began, None
-    with contextlib.suppress(aiohttp.ClientConnectorError):  # nobody listens yet
+    with contextlib.suppress(aiohttp.ClientConnectorError):  # the server is not up yet
         try:
             async with session.get(f"{url}healthz") as answer:
                 await answer.read()
             took = time.monotonic() - began - at
         finally:
-            asked.waits.append((at, took))
+            measured.response_times.append((at, took))
 
 
-async def _metrics(session: aiohttp.ClientSession, url: str, asked: Responsiveness, began: float) -> None:
+async def _metrics(session: aiohttp.ClientSession, url: str, measured: Responsiveness, began: float) -> None:
     while True:
         with contextlib.suppress(aiohttp.ClientError):
             async with session.get(f"{url}metrics") as answer:
                 lines = (await answer.text()).splitlines()
-            asked.lags = [
+            measured.lags = [
                 (float(it.partition('le="')[2].partition('"')[0]), _value(it))
                 for it in lines
                 if it.startswith("myview_loop_lag_seconds_bucket")
             ]
             frames = sum(_value(it) for it in lines if it.startswith("myview_camera_frames_total"))
-            asked.frames.append((time.monotonic() - began, frames))
+            measured.frames.append((time.monotonic() - began, frames))
         await asyncio.sleep(_METRICS_EVERY_S)
 
 
@@ -150,7 +154,7 @@ def _value(line: str) -> float:
 
 
 def memory(supervisor: int) -> tuple[float, float]:
-    """Return megabytes of a site's camera processes, in the median, and of its best-view service."""
+    """Return the median memory of a site's camera processes, and that of its best-view service, megabytes."""
     cameras, service = [], np.nan
     for folder in Path("/proc").iterdir():
         with contextlib.suppress(OSError, ValueError, IndexError):
@@ -167,7 +171,7 @@ def memory(supervisor: int) -> tuple[float, float]:
 
 
 def write_site(folder: Path, films: Path, cameras: int) -> tuple[Path, int]:
-    """Write the configuration of a site of so many cameras; give it and the port of its page."""
+    """Write the configuration of a site; return its path and the port of the page."""
     sync, bus, http = (free_port() for _ in range(3))
     address = f"tcp/127.0.0.1:{bus}"
     content = {
@@ -185,17 +189,17 @@ def write_site(folder: Path, films: Path, cameras: int) -> tuple[Path, int]:
     return path, http
 
 
-def row(cameras: int, niceness: int, asked: Responsiveness) -> list[str]:
+def row(cameras: int, niceness: int, measured: Responsiveness) -> list[str]:
     """Return a row of the table."""
-    [family] = asked.own.histogram.collect()
-    own = [(float(it.labels["le"]), it.value) for it in family.samples if it.name.endswith("_bucket")]
-    seconds = [asked.first, *(asked.wait(it) for it in (50, 95, 100))]
-    bounds = [lag_below(0.95, asked.lags), lag_below(1.0, asked.lags), lag_below(0.95, own)]
+    [family] = measured.own_lag.histogram.collect()
+    own_lag = [(float(it.labels["le"]), it.value) for it in family.samples if it.name.endswith("_bucket")]
+    seconds = [measured.first_response_s, *(measured.response_time(it) for it in (50, 95, 100))]
+    bounds = [lag_below(0.95, measured.lags), lag_below(1.0, measured.lags), lag_below(0.95, own_lag)]
     return [
         *(str(cameras), str(niceness)),
         *(f"{it:.2f}" for it in seconds),
         *(f"{it:g}" for it in bounds),
-        *(f"{it:.0f}" for it in (asked.rate, asked.camera_mb, asked.service_mb)),
+        *(f"{it:.0f}" for it in (measured.rate, measured.camera_mb, measured.service_mb)),
     ]
 
 
@@ -212,19 +216,21 @@ def run(options: argparse.Namespace) -> None:
         for cameras in options.cameras or (8, 20, 40):
             for niceness in options.niceness or (0, 10):
                 config, port = write_site(folder, folder / "films", cameras)
-                asked = asyncio.run(ask(config, port, niceness, options.seconds, log))
-                rows.append(row(cameras, niceness, asked))
+                measured = asyncio.run(measure_site(config, port, niceness, options.seconds, log))
+                rows.append(row(cameras, niceness, measured))
     report.table(
         f"cameras of {_WIDTH}x{_HEIGHT} at {_FPS:g} a second, {options.seconds:g} s from the start",
         [
-            *("cameras", "nicer by", "first, s", "p50, s", "p95, s", "most, s"),
-            *("lag p95, s", "most, s", "own p95, s", "frames/s", "camera, MB", "service, MB"),
+            *("cameras", "niceness", "first, s", "p50, s", "p95, s", "max., s"),
+            *("lag p95, s", "max., s", "own p95, s", "frames/s", "camera, MB", "service, MB"),
         ],
         rows,
     )
-    report.say("first: the first answer, from the start; p50, p95, most: how long answers took from then on")
-    report.say("lag: of the service's loop, at most; own: of who asks, which the machine's other work makes")
-    report.say(f"frames/s: of all cameras, in the last {1 - _SETTLED:.0%} of the time; some may still start")
+    report.say("first: time to the first response; p50, p95, max.: response times from then on")
+    report.say("lag: of the service's event loop, at most; own: of the measuring process, for comparison")
+    report.say(
+        f"frames/s: of all cameras, in the last {1 - _SETTLED:.0%} of the time; some may still be starting"
+    )
     report.save(options.out / "responsiveness.txt")
 
 

@@ -1,13 +1,13 @@
-"""What is found of a site to which cameras are added."""
+"""The samples and the result of the overload benchmark."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 RECOVERED_S = 180.0
-"""For how long the way back is watched at most."""
-_CARRIED = 0.99
-"""Share of the frames that are searched where the machine carries its cameras."""
+"""Longest recovery that is waited for, seconds."""
+_CARRIED_SHARE = 0.99
+"""Share of searched frames from which the machine carries its cameras."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class SiteSample:
         missed: pulses without a frame.
         late: windows that came too late.
         delays: milliseconds until pictures came to the viewer of a person, since the sample before.
-        holes: frames that viewers should have been shown and were not, so far.
+        missing_frames: frames that viewers should have been shown and were not, so far.
     """
 
     at: float
@@ -32,7 +32,7 @@ class SiteSample:
     missed: int
     late: int
     delays: tuple[float, ...]
-    holes: int
+    missing_frames: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class LoadStep:
         missed: share of the pulses.
         late: share of the windows.
         delays: milliseconds, p50 and p95.
-        holes: frames that viewers missed, the time of settling included.
+        missing_frames: frames that viewers missed, the time of settling included.
     """
 
     cameras: int
@@ -55,7 +55,7 @@ class LoadStep:
     missed: float
     late: float
     delays: tuple[float, float]
-    holes: int
+    missing_frames: int
 
 
 @dataclass(slots=True)
@@ -66,10 +66,10 @@ class OverloadResult:
     steps: list[LoadStep] = field(default_factory=list)
     started: list[tuple[float, int]] = field(default_factory=list)
     """When there were how many cameras."""
-    back: float | None = None
+    recovery_s: float | None = None
     """Seconds from the killing until nothing was left out any more; None: it took too long."""
 
     @property
-    def carried(self) -> int:
+    def cameras_carried(self) -> int:
         """How many cameras the machine carries; 0: not one."""
-        return max((it.cameras for it in self.steps if it.searched >= _CARRIED), default=0)
+        return max((it.cameras for it in self.steps if it.searched >= _CARRIED_SHARE), default=0)

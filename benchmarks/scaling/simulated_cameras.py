@@ -32,7 +32,7 @@ _THUMB = bytes(1500)
 
 
 async def serve(config: Config, hall: SimulatedHall, cameras: range) -> None:
-    """Publish until told to end."""
+    """Publish until terminated."""
     boot = time.time_ns() // 1_000_000
     trackers = {camera: SimulatedTracker(hall, camera, boot) for camera in cameras}
     keys, bus = ZenohKeys(config.site.name), Bus.client(config.zenoh)

@@ -1,1 +1,1 @@
-"""A day of a whole site: memory, descriptors, threads, delay."""
+"""Soak test: a day of a whole site, its memory, descriptors, threads and delay."""

@@ -1,4 +1,4 @@
-"""The site of a soak: two small cameras, faster than they were filmed; their people change all the time."""
+"""The accelerated site of the soak test: two small cameras with ever new people."""
 
 from __future__ import annotations
 
@@ -13,40 +13,40 @@ from synthetic import Scene, write_recording
 
 WIDTH, HEIGHT = 128, 72
 NOMINAL = 3.0
-"""Frames a second of the site's time."""
+"""Frames per second of the site's time."""
 CAMERAS = ("c0", "c1")
 _PEOPLE = 2
 _PARTS, _PART_S = 8, 40.0
-"""Groups of people who come one after the other, each for so many seconds."""
+"""Groups of people, one after the other, and seconds of each."""
 _FORGET = 800
-"""Frames after which people are forgotten: before their group comes again, so that it is new every time."""
+"""Frames after which people are forgotten: before their group returns, so that it is new each time."""
 _GOP, _LOOKAHEAD = 6, 20
 _VIEWER_S = 4.0
-"""Seconds of the world that a viewer may be behind before losing pictures."""
+"""Real seconds that a viewer may lag before losing pictures."""
 _TIME_BASE = Fraction(1, 90_000)
 
 
 @dataclass(frozen=True, slots=True)
 class TimeScale:
-    """How much faster than its own time the site runs."""
+    """Conversion between the site's time and real time."""
 
     speed: float
 
     @property
     def fps(self) -> float:
-        """Pulses for each second of the world."""
+        """Pulses per real second."""
         return NOMINAL * self.speed
 
-    def seconds(self, of_the_site: float) -> float:
-        """Return seconds of the world for seconds of the site."""
-        return of_the_site / self.speed
+    def seconds(self, site_seconds: float) -> float:
+        """Return the real seconds of seconds of the site's time."""
+        return site_seconds / self.speed
 
     def hours(self, pulse: int) -> float:
-        """Return the site's time at a pulse."""
+        """Return the hour of the site's time at a pulse."""
         return pulse / NOMINAL / 3600.0
 
     def pulse(self, hours: float) -> int:
-        """Return the pulse at a time of the site."""
+        """Return the pulse at an hour of the site's time."""
         return round(hours * 3600.0 * NOMINAL)
 
 
@@ -55,7 +55,7 @@ class LoopedRecordings:
     """Recordings that are played in a loop (see :class:`benchmarks.latency.running_site.PlayedViews`)."""
 
     folder: Path
-    tempo: TimeScale
+    time_scale: TimeScale
 
     @property
     def cameras(self) -> list[dict[str, Any]]:
@@ -65,7 +65,7 @@ class LoopedRecordings:
     @property
     def site(self) -> dict[str, Any]:
         """The configuration's site."""
-        return {"name": "soak", "fps": self.tempo.fps, "width": WIDTH, "height": HEIGHT}
+        return {"name": "soak", "fps": self.time_scale.fps, "width": WIDTH, "height": HEIGHT}
 
     @property
     def ground(self) -> Path | None:
@@ -73,14 +73,14 @@ class LoopedRecordings:
         return self.folder / "ground.json"
 
     def settings(self, recorded: Path, keep_hours: float) -> dict[str, dict[str, Any]]:
-        """Return what else is set: what is kept is counted in the site's time, patience in the world's.
+        """Return further settings: retention in the site's time, timeouts in real time.
 
-        ``keep_hours`` is how long the recording is kept.
+        ``keep_hours`` is the retention of the recording.
         """
-        seconds = self.tempo.seconds
+        seconds = self.time_scale.seconds
         return {
             "encode": {"gop": _GOP},
-            "http": {"viewer_queue_gops": round(_VIEWER_S * self.tempo.fps / _GOP)},
+            "http": {"viewer_queue_gops": round(_VIEWER_S * self.time_scale.fps / _GOP)},
             "detect": {"work_width": WIDTH, "prescan_every": 10},
             "view": {
                 "lookahead": _LOOKAHEAD,
@@ -100,8 +100,8 @@ class LoopedRecordings:
         }
 
 
-def film(folder: Path, tempo: TimeScale) -> LoopedRecordings:
-    """Film the groups, one after the other, into one file for each camera."""
+def film(folder: Path, time_scale: TimeScale) -> LoopedRecordings:
+    """Render the groups, one after the other, into one file for each camera."""
     folder.mkdir(parents=True)
     parts = []
     for seed in range(1, _PARTS + 1):
@@ -109,13 +109,13 @@ def film(folder: Path, tempo: TimeScale) -> LoopedRecordings:
         scene = Scene("room", len(CAMERAS), _PEOPLE, seed, WIDTH, HEIGHT, NOMINAL)
         write_recording(scene, parts[-1], _PART_S)
     for camera in CAMERAS:
-        _join([it / f"{camera}.mp4" for it in parts], folder / f"{camera}.mp4", tempo.fps)
+        _join([it / f"{camera}.mp4" for it in parts], folder / f"{camera}.mp4", time_scale.fps)
     (folder / "ground.json").write_bytes((parts[0] / "ground.json").read_bytes())
-    return LoopedRecordings(folder, tempo)
+    return LoopedRecordings(folder, time_scale)
 
 
 def _join(parts: list[Path], path: Path, fps: float) -> None:
-    """Write the pictures of some films into one, one for each pulse of a site in a hurry."""
+    """Concatenate films into one at the site's accelerated frame rate."""
     with av.open(str(path), "w") as out:
         stream = out.add_stream(
             "libx264", rate=Fraction(fps).limit_denominator(1001), options={"crf": "18", "preset": "veryfast"}

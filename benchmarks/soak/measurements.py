@@ -25,7 +25,7 @@ class LatencyMedians:
 class SoakMeasurements:
     """What a soak test sampled: processes, delays, disk use, and the counters at its end."""
 
-    tempo: TimeScale
+    time_scale: TimeScale
     visitors: Visitors
     samples: dict[str, list[ProcessSample]] = field(default_factory=lambda: {it: [] for it in PROCESSES})
     delays: list[LatencyMedians] = field(default_factory=list)
@@ -33,4 +33,4 @@ class SoakMeasurements:
     """Megabytes on the disk."""
     counts: FrameCounts = field(default_factory=lambda: FrameCounts({}, 0))
     seconds: float = 0.0
-    broken: str = ""
+    failure: str = ""

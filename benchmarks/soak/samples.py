@@ -1,4 +1,4 @@
-"""What is sampled during a soak, and the judgement: is the last quarter of the time like the second?"""
+"""Samples of a soak test, and the check that the last quarter of the time is like the second."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class ProcessSample:
 
     Attributes:
         hours: of the site's time.
-        resident: megabytes.
-        descriptors: open.
+        resident: resident memory, megabytes.
+        descriptors: open file descriptors.
         threads: of the process.
         tasks: of its event loop.
-        blocks: Python's own memory blocks.
+        blocks: memory blocks of Python's allocator.
     """
 
     hours: float
@@ -40,20 +40,20 @@ class GrowthRule:
 
     Attributes:
         name: of the quantity.
-        share: of what it was.
-        besides: in its own unit.
-        quantile: of a quarter's samples, that stands for it.
+        share: allowed growth as a share.
+        extra: allowed growth besides, in the quantity's unit.
+        quantile: of a quarter's samples that is compared.
     """
 
     name: str
     share: float
-    besides: float
+    extra: float
     quantile: float = 0.5
 
     def judge(self, hours: Sequence[float], values: Sequence[float]) -> GrowthVerdict:
-        """Compare the two quarters of the time; the first one is warming up.
+        """Compare the second and the fourth quarter of the time; the first is the warm-up.
 
-        Of a quarter without a sample nothing is known: NaN, which is not flat.
+        A quarter without samples is NaN, which is not flat.
         """
         whole = max(hours, default=0.0) or 1.0
         quarters = np.minimum(3, (4 * np.asarray(hours) / whole).astype(int))
@@ -67,7 +67,7 @@ class GrowthRule:
 
 @dataclass(frozen=True, slots=True)
 class GrowthVerdict:
-    """One quantity, judged."""
+    """The values of a quantity in the second and the fourth quarter."""
 
     rule: GrowthRule
     second: float
@@ -75,21 +75,21 @@ class GrowthVerdict:
 
     @property
     def flat(self) -> bool:
-        """Whether it did not grow."""
-        return self.fourth <= self.second * (1.0 + self.rule.share) + self.rule.besides
+        """Whether the growth is within the rule."""
+        return self.fourth <= self.second * (1.0 + self.rule.share) + self.rule.extra
 
 
 RESIDENT = GrowthRule("memory, MB", 0.05, 0.0)
 DESCRIPTORS = GrowthRule("descriptors", 0.0, 2.0)
 THREADS = GrowthRule("threads", 0.0, 1.0)
-"""The bus has threads that come and go."""
+"""One more is allowed: the bus starts and ends threads."""
 TASKS = GrowthRule("tasks", 0.0, 2.0)
 DELAY = GrowthRule("delay, ms", 0.10, 50.0, 0.1)
-"""Machines have other work, now more, now less: the delay is judged by the tenth of the time that is best."""
+"""Other load on the machine varies, so the best tenth of the delays is compared."""
 
 
 def resident_of(pid: int) -> float:
-    """Return how much memory of a process is resident, megabytes (Linux).
+    """Return the resident memory of a process, megabytes (Linux).
 
     Raises:
         OSError: there is no such process.
@@ -99,7 +99,7 @@ def resident_of(pid: int) -> float:
 
 
 def descriptors_of(pid: int) -> int:
-    """Return how many files and sockets a process has open.
+    """Return the number of open files and sockets of a process.
 
     Raises:
         OSError: there is no such process.
@@ -108,7 +108,7 @@ def descriptors_of(pid: int) -> int:
 
 
 def threads_of(pid: int) -> int:
-    """Return how many threads a process has.
+    """Return the number of threads of a process.
 
     Raises:
         OSError: there is no such process.
@@ -117,7 +117,7 @@ def threads_of(pid: int) -> int:
 
 
 def judge(samples: Sequence[ProcessSample]) -> list[GrowthVerdict]:
-    """Judge a process."""
+    """Check the growth of all quantities of a process."""
     hours = [it.hours for it in samples]
     return [
         RESIDENT.judge(hours, [it.resident for it in samples]),

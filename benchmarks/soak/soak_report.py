@@ -1,4 +1,4 @@
-"""What a soak found, as tables and curves."""
+"""The report of a soak test: tables and curves."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from benchmarks.soak.measurements import SoakMeasurements
 from benchmarks.soak.samples import DELAY, RESIDENT, GrowthRule, GrowthVerdict, ProcessSample, judge
 
 _DISK = GrowthRule("recorded, MB", 0.05, 1.0)
-_LEAST = 8
-"""Samples of which quarters can be told: two in each."""
+_MIN_SAMPLES = 8
+"""Samples at least: two in each quarter."""
 _NAMED = 5
 """Numbers of a table's row."""
 
@@ -27,33 +27,33 @@ _CURVES: tuple[tuple[str, Callable[[ProcessSample], float]], ...] = (
 )
 
 
-def verdicts(soaked: SoakMeasurements) -> list[tuple[str, GrowthVerdict]]:
-    """Judge everything that was sampled."""
-    found = [(name, it) for name, samples in soaked.samples.items() for it in judge(samples)]
-    hours = [it.hours for it in soaked.delays]
+def verdicts(measurements: SoakMeasurements) -> list[tuple[str, GrowthVerdict]]:
+    """Check the growth of all measurements."""
+    found = [(name, it) for name, samples in measurements.samples.items() for it in judge(samples)]
+    hours = [it.hours for it in measurements.delays]
     for name, values in (
-        ("viewer of a camera", [it.camera for it in soaked.delays]),
-        ("viewer of a person", [it.person for it in soaked.delays]),
+        ("viewer of a camera", [it.camera for it in measurements.delays]),
+        ("viewer of a person", [it.person for it in measurements.delays]),
     ):
         there = [place for place, value in enumerate(values) if np.isfinite(value)]
         found.append((name, DELAY.judge([hours[it] for it in there], [values[it] for it in there])))
-    return [*found, ("recording", _DISK.judge(hours, soaked.recorded))]
+    return [*found, ("recording", _DISK.judge(hours, measurements.recorded))]
 
 
-def describe(report: Report, soaked: SoakMeasurements) -> bool:
-    """Print the tables; say whether all is well."""
-    tempo, visitors = soaked.tempo, soaked.visitors
-    hours = soaked.delays[-1].hours if soaked.delays else 0.0
+def describe(report: Report, measurements: SoakMeasurements) -> bool:
+    """Print the tables; return whether everything stayed flat and no fault occurred."""
+    time_scale, visitors = measurements.time_scale, measurements.visitors
+    hours = measurements.delays[-1].hours if measurements.delays else 0.0
     report.say(
-        f"{hours:.2f} hours of the site in {soaked.seconds / 60:.1f} minutes:"
-        f" {tempo.fps:g} pulses a second, {visitors.camera.pulse} frames of each camera"
+        f"{hours:.2f} hours of the site in {measurements.seconds / 60:.1f} minutes:"
+        f" {time_scale.fps:g} pulses a second, {visitors.camera.pulse} frames of each camera"
     )
-    well = not soaked.broken
-    if len(soaked.delays) >= _LEAST:
-        judged = verdicts(soaked)
+    passed = not measurements.failure
+    if len(measurements.delays) >= _MIN_SAMPLES:
+        growth = verdicts(measurements)
         report.table(
-            "the second and the fourth quarter of the time: medians; of the delay, its best tenth",
-            ["what", "second", "fourth", "change", "of", "flat"],
+            "second and fourth quarter of the time: medians, for the delay the best tenth",
+            ["of", "second", "fourth", "change", "quantity", "flat"],
             [
                 [
                     who,
@@ -63,46 +63,51 @@ def describe(report: Report, soaked: SoakMeasurements) -> bool:
                     it.rule.name,
                     "yes" if it.flat else "NO",
                 ]
-                for who, it in judged
+                for who, it in growth
             ],
         )
-        well &= all(it.flat for _, it in judged)
+        passed &= all(it.flat for _, it in growth)
     else:
-        well = False
-        report.say("too short to be judged: there are too few samples")
-    holes = {"of a camera": visitors.camera.holes, "of a person": visitors.person.holes}
-    counts = soaked.counts
+        passed = False
+        report.say("too few samples to compare the quarters")
+    missing_frames = {
+        "of a camera": visitors.camera.missing_frames,
+        "of a person": visitors.person.missing_frames,
+    }
+    counts = measurements.counts
     searched = {name: f"{it['shed'] + it['missed']} of {it['frames']}" for name, it in counts.cameras.items()}
-    report.say(f"visits: {_listed(dict(sorted(visitors.visits.items())))}")
-    report.say(f"events heard: {visitors.events}; frames missing in a stream: {_listed(holes)}")
-    report.say(f"frames missed or not searched: {_listed(searched)}")
+    report.say(f"visits: {_join_counts(dict(sorted(visitors.visits.items())))}")
+    report.say(
+        f"events received: {visitors.events}; frames missing in a stream: {_join_counts(missing_frames)}"
+    )
+    report.say(f"frames missed or not searched: {_join_counts(searched)}")
     report.say(f"windows late: {counts.late}")
     faults = ", ".join(f"{what} ({count})" for what, count in sorted(visitors.faults.items())) or "none"
-    report.say(f"faults that visitors met: {faults}")
-    if soaked.broken:
-        report.say(f"BROKEN: {soaked.broken}")
-    well &= not any(holes.values()) and not visitors.faults
-    report.say("flat: " + ("yes" if well else "NO"))
-    return well
+    report.say(f"faults of visitors: {faults}")
+    if measurements.failure:
+        report.say(f"BROKEN: {measurements.failure}")
+    passed &= not any(missing_frames.values()) and not visitors.faults
+    report.say("flat: " + ("yes" if passed else "NO"))
+    return passed
 
 
-def plot(soaked: SoakMeasurements, path: Path) -> None:
+def plot(measurements: SoakMeasurements, path: Path) -> None:
     """Draw the curves over the site's time."""
     figure = Figure(figsize=(10, 17))
     axes = figure.subplots(len(_CURVES) + 2, 1, sharex=True)
     for axis, (name, value) in zip(axes, _CURVES, strict=False):
-        for process, samples in soaked.samples.items():
+        for process, samples in measurements.samples.items():
             axis.plot([it.hours for it in samples], [value(it) for it in samples], label=process, linewidth=1)
         axis.set(ylabel=name, ylim=(0, None))
-    hours = [it.hours for it in soaked.delays]
-    axes[0].set_title(f"{hours[-1]:.1f} hours of a site, {soaked.tempo.speed:g} times as fast")
+    hours = [it.hours for it in measurements.delays]
+    axes[0].set_title(f"{hours[-1]:.1f} hours of a site, {measurements.time_scale.speed:g} times as fast")
     axes[0].legend(ncols=_NAMED, fontsize="small")
     delay = axes[len(_CURVES)]
-    _line(delay, hours, [it.camera for it in soaked.delays], "of a camera")
-    _line(delay, hours, [it.person for it in soaked.delays], "of a person")
+    _line(delay, hours, [it.camera for it in measurements.delays], "of a camera")
+    _line(delay, hours, [it.person for it in measurements.delays], "of a person")
     delay.set(ylabel="delay to a viewer, ms", yscale="log")
     delay.legend(fontsize="small")
-    axes[-1].plot(hours, soaked.recorded, linewidth=1)
+    axes[-1].plot(hours, measurements.recorded, linewidth=1)
     axes[-1].set(ylabel=_DISK.name, ylim=(0, None), xlabel=f"hours of the site; memory may grow {_share()}")
     for axis in axes:
         axis.grid(alpha=0.3)
@@ -111,7 +116,7 @@ def plot(soaked: SoakMeasurements, path: Path) -> None:
     figure.savefig(path, dpi=100)
 
 
-def _listed(counts: Mapping[str, object]) -> str:
+def _join_counts(counts: Mapping[str, object]) -> str:
     return ", ".join(f"{what} {count}" for what, count in counts.items())
 
 

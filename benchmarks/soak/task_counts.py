@@ -1,7 +1,7 @@
-"""How many asyncio tasks and Python objects a process holds, noted by the process itself.
+"""The numbers of asyncio tasks and memory blocks of a process, written by the process itself.
 
 `hook/sitecustomize.py` calls :func:`note_tasks` as a process of the site starts. Its event loop then
-writes two numbers into a file now and then; nothing else is changed.
+writes both numbers into a file periodically; nothing else is changed.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ _EVERY_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class ObjectCounts:
-    """What a process holds.
+    """Counts of a process.
 
     Attributes:
         tasks: of its event loop.
-        blocks: Python's own memory blocks in use, after what is in circles was let go of.
+        blocks: memory blocks of Python's allocator in use after a garbage collection.
     """
 
     tasks: int
@@ -37,13 +37,13 @@ class ObjectCounts:
 
 
 def hooked_environment(folder: Path) -> dict[str, str]:
-    """Return what the environment of `myview up` needs so that its processes note into a folder."""
+    """Return the environment variables that make the processes of `myview up` write counts into a folder."""
     path = [str(_HOOK), str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     return {"PYTHONPATH": os.pathsep.join(filter(None, path)), FOLDER_VARIABLE: str(folder)}
 
 
-def read_held(folder: Path) -> Mapping[int, ObjectCounts]:
-    """Read what the processes have noted last, by their numbers."""
+def read_object_counts(folder: Path) -> Mapping[int, ObjectCounts]:
+    """Read the last counts of each process, by process id."""
     return {
         int(file.stem): ObjectCounts(**json.loads(file.read_text(encoding="ascii")))
         for file in folder.glob("*.json")
@@ -51,15 +51,15 @@ def read_held(folder: Path) -> Mapping[int, ObjectCounts]:
 
 
 def note_tasks(folder: str) -> None:
-    """Let every event loop of this process note what it holds, from when it begins to run."""
+    """Let every event loop of this process write its counts periodically."""
     path = Path(folder) / f"{os.getpid()}.json"
     run_forever = asyncio.BaseEventLoop.run_forever
 
     def note(loop: asyncio.BaseEventLoop) -> None:
         gc.collect()
         part = path.with_suffix(".part")
-        held = {"tasks": len(asyncio.all_tasks(loop)), "blocks": sys.getallocatedblocks()}
-        part.write_text(json.dumps(held), encoding="ascii")
+        counts = {"tasks": len(asyncio.all_tasks(loop)), "blocks": sys.getallocatedblocks()}
+        part.write_text(json.dumps(counts), encoding="ascii")
         part.replace(path)
         loop.call_later(_EVERY_S, note, loop)
 

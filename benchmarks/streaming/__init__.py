@@ -1,1 +1,1 @@
-"""Splices, viewers and their delay, beside other servers."""
+"""Streaming: cost of splices and viewers and their delay, compared with other servers."""

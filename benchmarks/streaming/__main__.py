@@ -1,4 +1,4 @@
-"""The stream: what a splice and a viewer cost, beside re-encoding and nginx, and whether it is right; a plot.
+"""Streaming: cost of splices and viewers, compared with re-encoding and nginx, and frame correctness; a plot.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.streaming --out out/bench
 
@@ -36,12 +36,12 @@ from server.camera.encoding.encoder import AccessUnit
 PARTS = ("splice", "objects", "viewers", "first", "right", "drift", "hls", "stalled")
 _OBJECTS = 50
 _FILM = 50
-"""Frames of each camera; they go round."""
+"""Frames of each camera, looped."""
 _HOUR = 3600
 _COUNTS = (250, 500, 1000, 2000, 3000, 4000)
 _QUICK_COUNTS = (100, 250)
 _ALL, _QUICK_ALL = 1000, 100
-"""Viewers of whom a tenth stall."""
+"""Viewers, of whom a tenth stall."""
 _FREE = 200
 """Open files that a process needs besides its viewers."""
 
@@ -49,7 +49,7 @@ Films = Sequence[Sequence[AccessUnit]]
 
 
 def carry_out(options: argparse.Namespace, films: Films, folder: Path) -> StreamMeasurements:
-    """Measure the parts that are asked for."""
+    """Measure the selected parts."""
     parts, quick = options.part or PARTS, options.quick
     found = StreamMeasurements()
     if "splice" in parts:
@@ -80,7 +80,7 @@ def stall(options: argparse.Namespace, films: Films, folder: Path) -> StallCompa
 def _watch(
     options: argparse.Namespace, parts: Sequence[str], films: Films, folder: Path, found: StreamMeasurements
 ) -> None:
-    """Measure what needs a site that is running."""
+    """Measure the parts that need a running site."""
     quick, seconds = options.quick, options.seconds
     counts = options.viewers or (_QUICK_COUNTS if quick else _COUNTS)
     files = _open_files()
@@ -102,7 +102,7 @@ def _watch(
 
 
 def _open_files() -> int:
-    """Let this process and those below it open as many files as they may; give how many."""
+    """Raise the limit of open files of this process and its children; return it."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
     return most

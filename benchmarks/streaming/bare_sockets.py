@@ -1,4 +1,4 @@
-"""The least that viewers cost here: GOPs sent to sockets by a bare loop, with nothing in front of them."""
+"""The minimal cost of viewers: GOPs sent to sockets in a plain loop."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ _BACKLOG = 1000
 
 @dataclass(frozen=True, slots=True)
 class BareSocketCost:
-    """What a loop over the sockets of so many viewers takes."""
+    """Cost of a loop over the sockets of a number of viewers."""
 
     viewers: int
     each: float
-    """Microseconds of the processor for a viewer's GOP: a call of the system and hardly anything else."""
+    """Microseconds of processor time for a viewer's GOP: hardly more than a system call."""
     given: float
-    """Milliseconds until the last socket has accepted a GOP; the median."""
+    """Median milliseconds until the last socket has accepted a GOP."""
     delays: tuple[float, float, float]
     """Milliseconds from the start of the loop to when a GOP's end was read: p50, p95, p99."""
 
 
 def bare_sends(film: Sequence[AccessUnit], count: int, seconds: float) -> BareSocketCost:
-    """Send a film's GOPs to so many viewers, as often as they come."""
+    """Send a film's GOPs to `count` viewers in real time."""
     with (
         ExitStack() as open_ones,
         socket.create_server(("127.0.0.1", 0), backlog=_BACKLOG) as server,
@@ -69,7 +69,7 @@ class _Round:
 def _rounds(
     film: Sequence[AccessUnit], sockets: Sequence[socket.socket], hearing: Future[CrowdReading]
 ) -> Iterator[_Round]:
-    """Send GOP after GOP for as long as somebody listens."""
+    """Send GOP after GOP while the viewers read."""
     first = 0
     while not hearing.done():
         gop = _gop(film, first)

@@ -1,4 +1,4 @@
-"""Whether the delay grows over an hour: pulses as fast as the service can take them."""
+"""Delay drift over an hour of pulses, fed as fast as the service can take them."""
 
 from __future__ import annotations
 
@@ -21,33 +21,33 @@ from server.service.streaming.media_chunk import MediaChunk
 from server.service.streaming.subscriber_queue import Chunk
 
 _PER_CAMERA = 2
-"""People in a camera's view, on average: few, so that an hour passes in minutes."""
+"""People per camera on average: few, so that an hour takes minutes."""
 _BOOT = 1
 _PARTS = 10
 _VIDEO = b"\x00\x00\x01\xe0"
 _PTS_AT = 9
-"""Where the time stands in a packet of video (ISO/IEC 13818-1, 2.4.3.6)."""
+"""Offset of the PTS in a video PES packet (ISO/IEC 13818-1, 2.4.3.6)."""
 
 
 @dataclass(frozen=True, slots=True)
 class DelayDrift:
-    """What changed from the beginning to the end."""
+    """The change of delay and cost from the beginning to the end."""
 
     pulses: int
     gops: int
-    """That were sent."""
+    """GOPs sent."""
     least: int
-    """Pulses from a GOP's first picture to the pulse with which it was sent."""
+    """Smallest delay: pulses from a GOP's first picture to the pulse with which it was sent."""
     most: int
-    """Likewise."""
+    """Largest delay, likewise."""
     off: int
-    """1/90000 s by which any GOP's time in the MP4 or the transport stream differs from its pulse's."""
+    """Largest difference of a GOP's timestamps in MP4 and transport stream from its pulse, 1/90000 s."""
     costs: tuple[float, ...]
-    """Processor milliseconds a pulse, in each tenth."""
+    """Processor milliseconds per pulse, in each tenth of the time."""
 
 
 class PacedCameras:
-    """Cameras that send at whatever pace they are asked."""
+    """Simulated cameras that send one pulse at a time, at the caller's pace."""
 
     def __init__(
         self, service: BestViewPipeline, films: Sequence[Sequence[AccessUnit]], hall: SimulatedHall
@@ -59,7 +59,7 @@ class PacedCameras:
             service.ingest.alive(self._keys.camera(name, "alive"), is_present=True)
 
     def pulse(self, number: int) -> None:
-        """Send what comes with a pulse, and let the service decide."""
+        """Feed the messages of a pulse, and let the service decide."""
         service = self._service
         for name, film in zip(self._hall.ids, self._films, strict=True):
             unit = film[number % len(film)]
@@ -79,7 +79,7 @@ class PacedCameras:
 
 
 async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> DelayDrift:
-    """Let so many pulses pass through the service, without a bus, and watch a camera as it is decided."""
+    """Feed pulses to the service without a bus, and watch a decided camera's stream."""
     hall = SimulatedHall(CAMERAS, _PER_CAMERA)
     cameras = [
         CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
@@ -107,7 +107,7 @@ async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> DelayDrif
 
 
 def times(piece: Chunk) -> tuple[int, int]:
-    """Read when a piece is shown, 1/90000 s: as MP4 says it, and as the transport stream does."""
+    """Parse the presentation time of a chunk, 1/90000 s: in the MP4, and in the transport stream."""
     assert isinstance(piece, MediaChunk)  # noqa: S101 — streams are made of nothing else
     at = piece.data.index(b"tfdt") + len(b"tfdt") + 4
     stamp = piece.mpegts.index(_VIDEO) + _PTS_AT

@@ -1,4 +1,4 @@
-"""What people use instead: ffmpeg that switches inputs and encodes, nginx that serves the segments."""
+"""The alternatives: ffmpeg that switches inputs and re-encodes, nginx that serves the segments."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ http {{
 
 
 def ffmpeg_switching(films: Sequence[Sequence[AccessUnit]], frames: int, folder: Path) -> float | None:
-    """Let ffmpeg cut between all cameras every two seconds and encode: processor microseconds a frame.
+    """Return the processor microseconds per frame of ffmpeg that cuts between all cameras every two seconds.
 
-    It decodes every camera for every object. None: there is no ffmpeg.
+    It decodes every camera and re-encodes the result. None: ffmpeg is missing.
     """
     program = shutil.which("ffmpeg")
     if program is None:
@@ -62,30 +62,30 @@ def ffmpeg_switching(films: Sequence[Sequence[AccessUnit]], frames: int, folder:
 
 @dataclass(frozen=True, slots=True)
 class HlsServingCost:
-    """What serving HLS costs, to players that stay connected."""
+    """Cost of serving HLS over persistent connections."""
 
     requests: int
-    """Pairs of a playlist and a segment: what a viewer wants every second."""
+    """Pairs of a playlist and a segment, which a viewer fetches every second."""
     microseconds: float
-    """Of processor time for a pair."""
+    """Processor time of a pair."""
     kilobytes: float
-    """A segment."""
+    """Size of a segment."""
 
     @property
     def per_core(self) -> float:
-        """Viewers of one segment a second."""
+        """Viewers per core at one segment a second."""
         return 1e6 / self.microseconds
 
 
 def hls_here(site: StreamSite, number: int, seconds: float) -> HlsServingCost:
-    """Fetch an object's playlist and its newest segment from the best-view process, again and again."""
+    """Fetch an object's playlist and newest segment from the best-view process repeatedly."""
     before = site.used
     pairs, size = _fetch(site.http, f"/objects/{number}/hls/", seconds)
     return HlsServingCost(pairs, 1e6 * (site.used - before) / pairs, size / 1e3)
 
 
 def hls_of_nginx(site: StreamSite, number: int, seconds: float, folder: Path) -> HlsServingCost | None:
-    """Fetch the same from nginx, which has been given the files. None: there is no nginx."""
+    """Fetch copies of the same files from nginx. None: nginx is missing."""
     program = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
     if program is None:
         return None
@@ -105,7 +105,7 @@ def hls_of_nginx(site: StreamSite, number: int, seconds: float, folder: Path) ->
 
 @contextlib.contextmanager
 def _nginx(program: str, folder: Path, port: int) -> Iterator[int]:
-    """Run nginx; give the process that serves."""
+    """Run nginx; yield the id of its worker process."""
     user = "user root;" if os.geteuid() == 0 else ""
     config = folder / "nginx.conf"
     config.write_text(_NGINX.format(folder=folder, port=port, user=user), encoding="utf-8")
@@ -127,7 +127,7 @@ def _worker(parent: int) -> int:
 
 
 def _fetch(port: int, folder: str, seconds: float) -> tuple[int, int]:
-    """Fetch pairs over one connection; give how many, and the bytes of the last segment."""
+    """Fetch pairs over one connection; return their number and the bytes of the last segment."""
     connection = http.client.HTTPConnection("127.0.0.1", port)
     pairs, size, until = 0, 0, time.monotonic() + seconds
     while time.monotonic() < until:
@@ -139,7 +139,7 @@ def _fetch(port: int, folder: str, seconds: float) -> tuple[int, int]:
 
 
 def _newest(playlist: bytes) -> str:
-    """Return the newest whole segment: what is listed of the growing one comes behind it, in tags."""
+    """Return the newest complete segment: parts of the growing one follow it, in tags."""
     return next(line for line in reversed(playlist.decode().splitlines()) if not line.startswith("#"))
 
 

@@ -1,4 +1,4 @@
-"""Whether every frame of a stream is the chosen camera's, to the pixel, in every form that is sent."""
+"""Check that every frame of a stream is the selected camera's, to the pixel, in every container format."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ _SITE = SiteSettings(name="right", width=64, height=48, fps=25)
 _ENCODE = EncodeSettings()
 _CAMERAS = 4
 _BLOCK = 8
-"""Pixels of one colour: large enough to be seen after encoding."""
+"""Pixels of one color: large enough to survive encoding."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameCorrectness:
-    """How many frames were what they should be."""
+    """The numbers of correct frames."""
 
     frames: int
     cuts: int
     contained: int
-    """Frames of the MP4, or of VP8's WebM, that are the chosen camera's own."""
+    """Correct frames in the MP4, or in VP8's WebM."""
     ts: int | None
-    """Of the transport stream; VP8 has none."""
+    """Correct frames in the transport stream; VP8 has none."""
     alike: int
-    """Frames of one pulse that two cameras share: of these nobody could tell whose they are."""
+    """Pulses at which two cameras have equal frames, so that a wrong one would go unnoticed."""
 
     @property
     def all_right(self) -> bool:
-        """Whether every frame is, and could have been wrong."""
+        """Whether every frame is correct, and a wrong one would have been noticed."""
         ts = self.frames if self.ts is None else self.ts
         return self.contained == ts == self.frames and not self.alike
 
 
 def films(frames: int, seed: int, encode: EncodeSettings = _ENCODE) -> list[list[AccessUnit]]:
-    """Encode pictures of random colours for each camera, no two alike."""
+    """Encode pictures of random colors for each camera, all different."""
     rng, made = np.random.default_rng(seed), []
     for _ in range(_CAMERAS):
         encoder = Encoder(_SITE, encode)
@@ -60,7 +60,7 @@ def films(frames: int, seed: int, encode: EncodeSettings = _ENCODE) -> list[list
 
 
 def schedule(gops: int, cuts: int, seed: int) -> list[int]:
-    """Choose a camera for every GOP, with exactly so many cuts."""
+    """Choose a camera for every GOP, with exactly `cuts` cuts."""
     rng = np.random.default_rng(seed)
     at = set(rng.choice(np.arange(1, gops), cuts, replace=False).tolist())
     chosen = [0]
@@ -73,13 +73,13 @@ def schedule(gops: int, cuts: int, seed: int) -> list[int]:
 async def judge(
     frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings = _ENCODE
 ) -> FrameCorrectness:
-    """Splice so many frames, decode what a viewer is sent, and compare with each camera's own decode."""
+    """Splice frames, decode a viewer's stream, and compare with each camera's own decode."""
     made = films(frames, seed, encode)
     chosen = schedule(frames // encode.gop, cuts, seed)
     pieces, cut = await _watch(made, chosen, encode)
     own = [_own(film, encode.codec) for film in made]
     head = cut.stream_format.init_segment(_SITE.size, _SITE.fps)
-    assert head is not None  # noqa: S101 — key pictures have come
+    assert head is not None  # noqa: S101 — keyframes have been spliced
     contained = head + b"".join(piece.data for piece in pieces)
     has_ts = cut.stream_format.container == "mp4"
     ts = b"".join(piece.mpegts for piece in pieces if isinstance(piece, MediaChunk)) if has_ts else b""
@@ -98,7 +98,7 @@ async def judge(
 async def _watch(
     made: Sequence[Sequence[AccessUnit]], chosen: Sequence[int], encode: EncodeSettings
 ) -> tuple[list[Chunk], SplicerFixture]:
-    """Return what one viewer of one object is sent, from the first GOP to the last."""
+    """Return the stream of one viewer of one object, from the first GOP to the last."""
     names = [f"c{number}" for number in range(_CAMERAS)]
     cameras = [CameraSettings(id=name, source="rtsp://nowhere/") for name in names]
     cut = SplicerFixture(made, Config(site=_SITE, encode=encode, cameras=cameras))
@@ -114,7 +114,7 @@ async def _watch(
 
 
 def _own(film: Sequence[AccessUnit], codec: str) -> list[bytes]:
-    """Decode a camera alone: a digest of every picture's pixels."""
+    """Decode a camera's own stream; return a digest of each frame's pixels."""
     decoder = av.CodecContext.create(codec, "r")
     assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — tells mypy what it is
     packets = [*(av.Packet(unit.data) for unit in film), None]
@@ -122,7 +122,7 @@ def _own(film: Sequence[AccessUnit], codec: str) -> list[bytes]:
 
 
 def _equal(data: bytes, form: str, expected: Sequence[bytes]) -> int:
-    """Count the frames of a stream that are the expected ones of their own pulses."""
+    """Count the frames of a stream that equal the expected ones of their pulses."""
     right = 0
     with av.open(io.BytesIO(data), "r", format=form) as container:
         for frame in container.decode(video=0):

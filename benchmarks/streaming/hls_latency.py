@@ -1,4 +1,4 @@
-"""How late HLS is: a player by the rules of RFC 8216, one that knows parts, and the same service for both."""
+"""HLS latency of two players on the same service: one by RFC 8216, and a low-latency one that plays parts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from server.service.service import BestViewService
 
 _PER_CAMERA = 2
 _BEFORE_S = 8.0
-"""What has been shown when the players come."""
+"""Seconds of video that exist when the players start."""
 _PART = r'#EXT-X-PART:DURATION=([\d.]+),URI="([^"]+)".*'
 _SEGMENT = r"#EXTINF:([\d.]+),\n(\S+)"
 _LINE = re.compile(rf"^(?:{_PART}|{_SEGMENT})$", re.MULTILINE)
@@ -31,7 +31,7 @@ _LINE = re.compile(rf"^(?:{_PART}|{_SEGMENT})$", re.MULTILINE)
 
 @dataclass(frozen=True, slots=True)
 class HlsLatency:
-    """Seconds from when a frame was decided to when a player has it, and to when it shows it; medians."""
+    """Median seconds from a frame's decision to when a player has fetched it, and to when it shows it."""
 
     fetched: float
     shown: float
@@ -40,19 +40,19 @@ class HlsLatency:
 
 @dataclass
 class _Player:
-    """Plays from as far behind the end as it is told to stay; it stops where what comes next is not there."""
+    """A simulated player that starts at a distance from the live edge and stalls where media are missing."""
 
     clock: Callable[[], float]
     decided: dict[int, float]
-    """When each GOP was, by its first pulse."""
+    """When each GOP was decided, by its first pulse."""
     begun: float = 0.0
-    """The clock at which media time 0 would be shown."""
+    """The clock time at which media time 0 is shown."""
     fetched: list[float] = field(default_factory=list)
     shown: list[float] = field(default_factory=list)
     stalls: int = 0
 
     def take(self, first: int, pulses: int) -> None:
-        """Take what was fetched just now."""
+        """Add pulses that were fetched just now."""
         now = self.clock()
         due = self.begun + first / SITE.fps
         if not self.fetched:
@@ -67,12 +67,12 @@ class _Player:
 
     @property
     def late(self) -> HlsLatency:
-        """What it saw."""
+        """The median latencies so far."""
         return HlsLatency(float(np.median(self.fetched)), float(np.median(self.shown)), self.stalls)
 
 
 async def hls_delays(films: Sequence[Sequence[AccessUnit]], seconds: float) -> tuple[HlsLatency, HlsLatency]:
-    """Serve a camera as late as a best view, in real time; give what is seen without parts, and with them."""
+    """Serve a decided camera in real time; return the latency without parts, and with them."""
     hall = SimulatedHall(CAMERAS, _PER_CAMERA)
     cameras = [
         CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
@@ -105,7 +105,7 @@ async def hls_delays(films: Sequence[Sequence[AccessUnit]], seconds: float) -> t
         aiohttp.ClientSession(f"http://127.0.0.1:{port}/cameras/{hall.ids[0]}/hls/") as session,
     ):
         going = asyncio.create_task(go_on())
-        await asyncio.sleep(1.0)  # what was shown before came at once
+        await asyncio.sleep(1.0)  # the video before was published at once
         async with asyncio.TaskGroup() as group:
             group.create_task(_segments(session, players[0], seconds - 1))
             group.create_task(_parts(session, players[1], seconds - 1))
@@ -115,7 +115,7 @@ async def hls_delays(films: Sequence[Sequence[AccessUnit]], seconds: float) -> t
 
 
 async def _segments(session: aiohttp.ClientSession, player: _Player, seconds: float) -> None:
-    """Play whole segments, begun three target durations before the end (RFC 8216, 6.3.3 and 6.3.4)."""
+    """Play whole segments, starting three target durations before the end (RFC 8216, 6.3.3 and 6.3.4)."""
     end, at = player.clock() + seconds, -1
     while player.clock() < end:
         text = await _text(session, "index.m3u8")
@@ -135,7 +135,7 @@ async def _segments(session: aiohttp.ClientSession, player: _Player, seconds: fl
 
 
 async def _parts(session: aiohttp.ClientSession, player: _Player, seconds: float) -> None:
-    """Play parts, begun as far before the end as the playlist says, each asked for before it is there."""
+    """Play parts, starting PART-HOLD-BACK before the end, with blocking playlist reloads."""
     end = player.clock() + seconds
     text = await _text(session, "index.m3u8")
     each = round(float(_tag(text, "#EXT-X-PART-INF:PART-TARGET=")) * SITE.fps)

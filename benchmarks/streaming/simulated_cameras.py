@@ -1,9 +1,9 @@
-"""Cameras for the stream's measurements: real H.264 of the synthetic room, and simulated trackers of a hall.
+"""Simulated cameras of the streaming benchmark: H.264 of the synthetic room, simulated trackers of a hall.
 
     python -m benchmarks.streaming.simulated_cameras SITE.yaml PICTURES PER_CAMERA
 
-publishes on the pulses what all cameras of a site would, through the real bus. The pictures are encoded
-once, by the site's encoder, and sent again and again: the best-view service never looks into them.
+publishes the messages of all cameras of a site on each pulse, through the real bus. The pictures are encoded
+once, by the site's encoder, and sent in a loop: the best-view service never decodes them.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _START = 200
 
 
 def draw_room(frames: int) -> list[list[AccessUnit]]:
-    """Encode so many frames of the room for each camera: about 500 kbit/s."""
+    """Encode frames of the room for each camera, at about 500 kbit/s."""
     scene = Scene("room", CAMERAS, 4, 1, SITE.width, SITE.height, SITE.fps)
     films = []
     for camera in range(CAMERAS):
@@ -45,17 +45,17 @@ def draw_room(frames: int) -> list[list[AccessUnit]]:
 
 
 def save(films: list[list[AccessUnit]], path: Path) -> None:
-    """Keep what was encoded."""
+    """Save encoded films."""
     path.write_bytes(msgspec.msgpack.encode(films))
 
 
 def load(path: Path) -> list[list[AccessUnit]]:
-    """Read what was kept."""
+    """Load encoded films."""
     return msgspec.msgpack.decode(path.read_bytes(), type=list[list[AccessUnit]])
 
 
 async def serve(config: Config, films: list[list[AccessUnit]], hall: SimulatedHall) -> None:
-    """Publish until told to end."""
+    """Publish until terminated."""
     boot = time.time_ns() // 1_000_000
     trackers = [SimulatedTracker(hall, camera, boot) for camera in range(hall.cameras)]
     keys, bus = ZenohKeys(config.site.name), Bus.client(config.zenoh)
@@ -80,7 +80,7 @@ async def serve(config: Config, films: list[list[AccessUnit]], hall: SimulatedHa
                     for name, tracker in zip(hall.ids, trackers, strict=True):
                         message = tracker.message(pulse.number // STRIDE, places)
                         bus.publish(keys.camera(name, "tracks"), msgspec.json.encode(message))
-                        await asyncio.sleep(0)  # the bus's threads and the next pulse want their turn
+                        await asyncio.sleep(0)  # lets the bus's threads and the next pulse run
     finally:
         bus.close()
 

@@ -1,4 +1,4 @@
-"""What a splice costs: the splicer's work for an object and a frame, against decoding and encoding them."""
+"""Cost of a splice per object and frame, compared with decoding and encoding."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _US = 1e6
 
 
 class SplicerFixture:
-    """A splicer over shelves that are filled from films, and decisions that are made up."""
+    """A splicer with frame buffers that are filled from films, and made-up decisions."""
 
     def __init__(self, films: Sequence[Sequence[AccessUnit]], config: Config) -> None:
         self._films, self.gop = films, config.encode.gop
@@ -42,43 +42,43 @@ class SplicerFixture:
         self.splicer = Splicer(self._shelves, stream_format, config)
 
     def shelve(self, gop: int) -> None:
-        """Put a GOP of every camera on the shelves; films go round."""
+        """Put a GOP of every camera into the frame buffers; films are looped."""
         for frame_buffer, film in zip(self._shelves.values(), self._films, strict=True):
             for pulse in range(gop * self.gop, (gop + 1) * self.gop):
                 unit = film[pulse % len(film)]
                 frame_buffer.put(pulse, 1, unit.data, key=unit.key)
 
     def decide(self, gop: int, cameras: Sequence[int]) -> GopDecision:
-        """Show each object, by place, a camera."""
+        """Return a decision with a camera for each object."""
         names = list(self._shelves)
         choices = tuple(ObjectChoice(n, names[it], None, away=False) for n, it in enumerate(cameras, start=1))
         return GopDecision(gop * self.gop, self.gop, choices, {}, {}, (), _NO_REASON)
 
 
 def cif_config() -> Config:
-    """Return the site of the films."""
+    """Return the configuration of the films' site."""
     cameras = [CameraSettings(id=name, source="rtsp://nowhere/") for name in _NAMES]
     return Config(site=SITE, encode=ENCODE, cameras=cameras)
 
 
 @dataclass(frozen=True, slots=True)
 class SpliceCost:
-    """Processor microseconds; the median of the GOPs."""
+    """Cost of splicing, processor microseconds; medians over GOPs."""
 
     objects: int
     shelved: float
-    """To put a frame of a camera on its shelf: once, whoever watches."""
+    """To buffer a frame of a camera, once for all viewers."""
     spliced: float
-    """For an object and a frame."""
+    """To splice a frame of an object."""
 
     @property
     def shelved_share(self) -> float:
-        """What shelving all cameras adds to an object's frame."""
+        """The share of buffering all cameras in an object's frame."""
         return CAMERAS * self.shelved / self.objects
 
 
 async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int) -> SpliceCost:
-    """Splice with a viewer for every object, who takes the bytes as they come."""
+    """Measure splicing with one viewer for every object."""
     cut, rng = SplicerFixture(films, cif_config()), np.random.default_rng(0)
     shelved, decided = [], []
     viewers: list[AsyncIterator[Chunk]] = []
@@ -90,8 +90,8 @@ async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int)
         cut.splicer.publish_decision(decision)
         sizes = [len((await anext(viewer)).data) for viewer in viewers]
         end = time.process_time()
-        if gop:  # the first one makes the streams
-            assert len(sizes) == objects  # noqa: S101 — everybody has got something
+        if gop:  # the first GOP creates the streams
+            assert len(sizes) == objects  # noqa: S101 — every viewer received a chunk
             shelved.append(_US * (between - began) / (CAMERAS * cut.gop))
             decided.append(_US * (end - between) / (objects * cut.gop))
         else:
@@ -103,15 +103,15 @@ async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int)
 
 @dataclass(frozen=True, slots=True)
 class TranscodeCost:
-    """Processor microseconds a frame; the median of the GOPs."""
+    """Cost of re-encoding, processor microseconds per frame; medians over GOPs."""
 
     decoded: float
     encoded: float
-    """With the conversion to the encoder's colours and back, as where boxes are burnt in."""
+    """With the conversion to the encoder's color space and back, as where boxes are burnt in."""
 
     @property
     def whole(self) -> float:
-        """Of a frame."""
+        """The total of a frame."""
         return self.decoded + self.encoded
 
 

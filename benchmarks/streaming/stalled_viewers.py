@@ -1,4 +1,4 @@
-"""Viewers who never read: whether the others notice, measured by turns with and without them."""
+"""Stalled viewers, who never read: their effect on others, measured with and without them in turn."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from server.media.rendering_messages import TIMESCALE
 STALLED_SHARE = 0.1
 """Of all viewers."""
 _FILL_S = 4.0
-"""Until nothing more fits into the system's buffers: from then on the server must lose what waits."""
+"""Seconds until the system's buffers are full, so that the server must drop GOPs."""
 _LEAVE_S = 1.0
 _TRIES, _LEAST_GOPS = 10, 3
 _BUFFER = 4096
-"""Bytes that the system keeps for a stalled viewer, about."""
+"""Receive buffer of a stalled viewer, bytes."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReadingRound:
-    """One turn: the others' delays, and how much of what was sent has come to them.
+    """The delays of the reading viewers in one round.
 
     Attributes:
-        p50: milliseconds from when a GOP was given to the streams to when its end was read.
+        p50: milliseconds from when a GOP was sent to when its end was read.
         p99: likewise.
-        arrived: share of the GOPs that anybody was sent.
-        cores: that the best-view process has used: work for who stalls would be seen here, too.
+        arrived: share of the GOPs that were received.
+        cores: used by the best-view process, including work for stalled viewers.
     """
 
     p50: float
@@ -46,11 +46,11 @@ class ReadingRound:
 
 @dataclass(frozen=True, slots=True)
 class StallComparison:
-    """The others alone, and beside those who stall; round by round.
+    """The reading viewers without and with stalled ones; round by round.
 
     Attributes:
-        good: how many read.
-        stalled: how many do not.
+        good: reading viewers.
+        stalled: stalled viewers.
     """
 
     good: int
@@ -60,7 +60,7 @@ class StallComparison:
 
     @property
     def ratio(self) -> float:
-        """The p99 beside stalled viewers against that alone: the medians of the rounds."""
+        """The p99 with stalled viewers divided by that without: medians over rounds."""
         alone, beside = (statistics.median(it.p99 for it in turns) for turns in (self.alone, self.beside))
         return beside / alone
 
@@ -68,7 +68,7 @@ class StallComparison:
 def beside_stalled(
     site: StreamSite, crowd: ViewerProcess, numbers: Sequence[int], viewers: int, seconds: float, rounds: int
 ) -> StallComparison:
-    """Let most read and, every other turn, a tenth besides never; the order of the turns changes, too."""
+    """Measure reading viewers with and without stalled ones; the order alternates."""
     stalled = round(STALLED_SHARE * viewers)
     good = viewers - stalled
     paths = [f"/objects/{numbers[place % len(numbers)]}/best.mp4" for place in range(good)]
@@ -88,10 +88,10 @@ def beside_stalled(
 
 
 def _turn(site: StreamSite, crowd: ViewerProcess, good: int, seconds: float) -> ReadingRound:
-    """Read for so long; longer where the machine is so busy that hardly a GOP comes.
+    """Read for a while; longer where the machine is so busy that hardly a GOP arrives.
 
     Raises:
-        RuntimeError: next to nothing comes.
+        RuntimeError: too few GOPs arrive.
     """
     before, passed = site.used, 0.0
     ticks: list[int] = []
@@ -103,7 +103,7 @@ def _turn(site: StreamSite, crowd: ViewerProcess, good: int, seconds: float) -> 
         passed += heard.seconds
         times, counts = np.unique(ticks, return_counts=True)
         ends = np.rint(times * SITE.fps / TIMESCALE).astype(int) % ENCODE.gop == ENCODE.gop - 1
-        whole = counts[ends][1:-1]  # those at both ends had come, or have yet to come, to some
+        whole = counts[ends][1:-1]  # the first and the last are incomplete
         if len(whole) >= _LEAST_GOPS:
             p50, p99 = np.percentile(np.concatenate(delays), [50, 99]).tolist()
             return ReadingRound(p50, p99, float(whole.mean()) / good, (site.used - before) / passed)
@@ -112,7 +112,7 @@ def _turn(site: StreamSite, crowd: ViewerProcess, good: int, seconds: float) -> 
 
 @contextlib.contextmanager
 def stalling(port: int, paths: Sequence[str]) -> Iterator[list[socket.socket]]:
-    """Have viewers who ask for a stream each, and read nothing of it."""
+    """Open stalled viewers, which request a stream each and never read."""
     with contextlib.ExitStack() as stack:
         found = []
         for path in paths:
@@ -131,17 +131,17 @@ def describe_stalled(report: Report, found: StallComparison) -> None:
         for number, (alone, beside) in enumerate(zip(found.alone, found.beside, strict=True), 1)
     ]
     report.table(
-        f"{found.good} viewers alone / beside {found.stalled} who never read: ms until a GOP has come",
+        f"{found.good} viewers alone / with {found.stalled} stalled ones: ms until a GOP has arrived",
         ["round", "p50", "p99", "arrived", "cores of the service"],
         rows,
     )
-    report.say(f"p99 beside stalled viewers, against alone: {found.ratio:.2f} (medians of the rounds)")
+    report.say(f"p99 with stalled viewers / without: {found.ratio:.2f} (medians over rounds)")
     alone, beside = (statistics.median(it.cores for it in turns) for turns in (found.alone, found.beside))
-    report.say(f"cores of the service: {beside:.3f} against {alone:.3f} (likewise)")
+    report.say(f"cores of the service: {beside:.3f} with, {alone:.3f} without (likewise)")
 
 
 _COLUMNS = {"p50": 1, "p99": 1, "arrived": 3, "cores": 2}
-"""With so many digits."""
+"""Columns with their number of digits."""
 
 
 def _cell(name: str, alone: ReadingRound, beside: ReadingRound) -> str:

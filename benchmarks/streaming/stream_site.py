@@ -1,4 +1,4 @@
-"""A site for the stream's measurements: pulses, simulated cameras, the real best-view process, viewers."""
+"""The site of the streaming benchmark: pulses, simulated cameras, the real best-view process, viewers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from server.camera.encoding.encoder import AccessUnit
 from server.cli.generated_config import free_port
 
 PER_CAMERA = 20
-"""People in a camera's view, on average: some sixty in the hall."""
+"""People per camera on average: some sixty in the hall."""
 _PATIENCE_S = 90.0
 _POLL_S = 0.2
 _LOG = "site.log"
@@ -41,7 +41,7 @@ class ViewerProcess:
         self.process = process
 
     def watch(self, paths: Sequence[str], seconds: float = 0.0) -> CrowdReading:
-        """Let these be watched instead, and read for a while."""
+        """Watch these paths instead, and read for a while."""
         return self._ask({"watch": list(paths), "for": seconds})
 
     def read(self, seconds: float) -> CrowdReading:
@@ -71,14 +71,14 @@ class StreamSite:
 
     @property
     def sent(self) -> dict[int, stream_service.SendTimes]:
-        """When each GOP was given to the streams."""
+        """When each GOP was sent to the viewers."""
         return stream_service.read(self.folder / "sent")
 
     def objects(self, at_least: int) -> list[int]:
-        """Wait until so many can be watched, and list them.
+        """Wait until there are so many objects, and return their numbers.
 
         Raises:
-            RuntimeError: they do not come; what the processes said is in the text.
+            RuntimeError: they do not appear in time; the text has the logs.
         """
         give_up = time.monotonic() + _PATIENCE_S
         while time.monotonic() < give_up:
@@ -90,12 +90,12 @@ class StreamSite:
                     return numbers
             time.sleep(_POLL_S)
         said = (self.folder / _LOG).read_text(encoding="utf-8", errors="replace")
-        raise RuntimeError(f"{at_least} people did not come; the site's processes said:\n{said[-2000:]}")
+        raise RuntimeError(f"{at_least} people did not appear; the site's log:\n{said[-2000:]}")
 
 
 @contextlib.contextmanager
 def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[StreamSite]:
-    """Run a site of such pictures."""
+    """Run a site on these films."""
     folder.mkdir(parents=True)
     save([list(film) for film in films], folder / "films")
     sync, bus, http = (free_port() for _ in range(3))
@@ -128,7 +128,7 @@ def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[Str
 
 @contextlib.contextmanager
 def viewers(port: int) -> Iterator[ViewerProcess]:
-    """Run a process of viewers of a server on this machine."""
+    """Run a process of viewers of a local server."""
     pipe = subprocess.PIPE
     words = [sys.executable, "-m", "benchmarks.streaming.viewer_crowd", f"{port}"]
     process = subprocess.Popen(words, cwd=ROOT, env=one_thread_environment(), stdin=pipe, stdout=pipe)
@@ -142,7 +142,7 @@ def viewers(port: int) -> Iterator[ViewerProcess]:
 
 
 def end(processes: Sequence[subprocess.Popen[bytes]]) -> None:
-    """End processes, kindly first."""
+    """Terminate processes; kill those that do not exit."""
     for process in processes:
         process.terminate()
     for process in processes:

@@ -1,4 +1,4 @@
-"""What was found about the stream: tables and the plot."""
+"""The tables and the plot of the streaming benchmark."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from benchmarks.streaming.splice_cost import SpliceCost, TranscodeCost
 from benchmarks.streaming.viewing_cost import ViewerStep, WatchingCost
 
 _SOON_MS = 40.0
-"""A frame: later than that and more than one picture may be missing."""
+"""A frame's duration."""
 _WHOLE = 0.9
-"""Where less than this share of the GOPs came, viewers cost less than they should."""
+"""Share of received GOPs below which viewers appear too cheap."""
 
 
 @dataclass
 class StreamMeasurements:
-    """What has been measured so far."""
+    """All measurements of the benchmark."""
 
     encoded: TranscodeCost | None = None
     spliced: list[SpliceCost] = field(default_factory=list)
@@ -38,7 +38,7 @@ class StreamMeasurements:
     steps: list[ViewerStep] = field(default_factory=list)
     bare: BareSocketCost | None = None
     too_many: list[int] = field(default_factory=list)
-    """Viewers that a process here may not have."""
+    """Numbers of viewers beyond the limit of open files."""
     here: HlsServingCost | None = None
     nginx: HlsServingCost | None = None
     first: NDArray[np.float64] | None = None
@@ -57,7 +57,7 @@ def describe(report: Report, found: StreamMeasurements) -> None:
         _steps(report, found)
     rows = summary(found)
     if rows:
-        report.table("The stream", ["what", "measured", "to reach", "how"], rows)
+        report.table("Streaming", ["quantity", "measured", "target", "how"], rows)
 
 
 def _splices(report: Report, found: StreamMeasurements, encoded: TranscodeCost) -> None:
@@ -67,7 +67,7 @@ def _splices(report: Report, found: StreamMeasurements, encoded: TranscodeCost) 
             f"{it.spliced:.2f}",
             f"{encoded.whole / it.spliced:.0f}",
             f"{encoded.whole / (it.spliced + it.shelved_share):.0f}",
-            "with a viewer each, who takes it",
+            "with one viewer each",
         ]
         for it in found.spliced
     ]
@@ -77,8 +77,8 @@ def _splices(report: Report, found: StreamMeasurements, encoded: TranscodeCost) 
         report.say("ffmpeg: left out: needs ffmpeg; on Debian: apt install ffmpeg")
     else:
         rows.append(["ffmpeg", f"{found.ffmpeg:.0f}", "", "", "switches all four cameras, and encodes"])
-    columns = ["", "µs a frame", "times cheaper", "with shelving", "how"]
-    report.table("An object's frame, processor time; decoding and encoding it against", columns, rows)
+    columns = ["", "µs a frame", "times cheaper", "with buffering", "how"]
+    report.table("Processor time per object and frame, compared with decoding and encoding", columns, rows)
 
 
 def _steps(report: Report, found: StreamMeasurements) -> None:
@@ -97,7 +97,7 @@ def _steps(report: Report, found: StreamMeasurements) -> None:
     ]
     columns = ["viewers", "cores", "reader's", "kbit/s each", "arrived"]
     columns += ["sent ms", "p50 ms", "p95 ms", "p99 ms", "load"]
-    report.table("Viewers of 50 objects: from when a GOP is given out to when its end is read", columns, rows)
+    report.table("Viewers of 50 objects: ms from when a GOP is sent to when its end is read", columns, rows)
     if found.bare:
         report.say(_bare(found.bare))
     for count in found.too_many:
@@ -126,7 +126,7 @@ def _served(served: HlsServingCost) -> str:
 
 
 def summary(found: StreamMeasurements) -> list[list[str]]:
-    """Return the rows of the table of all that was measured."""
+    """Return the rows of the summary table."""
     rows = []
     if found.spliced and found.encoded:
         last = found.spliced[-1]
@@ -174,20 +174,27 @@ def _hls_rows(segments: HlsLatency, parts: HlsLatency) -> list[list[str]]:
 def _watched_rows(watched: WatchingCost) -> list[list[str]]:
     how = f"cores: {watched.all:.3f}, {watched.one:.3f}, nobody {watched.nobody:.3f}; {watched.rounds} rounds"
     rows = [[f"watching {watched.objects} objects against 1", f"{watched.ratio:.2f}x", "1.10x", how]]
-    how = f"worked out: {watched.nobody + watched.encoded:.2f} cores with an encoder for each"
+    how = f"computed: {watched.nobody + watched.encoded:.2f} cores with an encoder for each"
     rows.append(["re-encoding each against that", f"{watched.against_encoding:.1f}x", "14x", how])
     return rows
 
 
 def per_core(steps: Sequence[ViewerStep]) -> tuple[float, float]:
-    """Fit a line to the cores: give what the service uses without viewers, and how many fill a core."""
+    """Fit a line to the cores; return the cores without viewers, and the viewers that fill a core."""
     slope, alone = np.polyfit([it.viewers for it in steps], [it.cores for it in steps], 1)
     return float(alone), float((1.0 - alone) / slope)
 
 
 def _viewer_rows(found: StreamMeasurements) -> list[list[str]]:
     soon = max((it.viewers for it in found.steps if it.delays[2] < _SOON_MS), default=0)
-    rows = [["viewers with p99 below 40 ms", f"{soon}", "4000", "of the counts tried; all get a GOP at once"]]
+    rows = [
+        [
+            "viewers with p99 below 40 ms",
+            f"{soon}",
+            "4000",
+            "of the tried counts; all receive each GOP at once",
+        ]
+    ]
     whole = [it for it in found.steps if it.arrived > _WHOLE]
     if len(whole) > 1:
         alone, count = per_core(whole)
@@ -217,7 +224,7 @@ def _drift_rows(it: DelayDrift) -> list[list[str]]:
 
 
 def plot(found: StreamMeasurements, path: Path) -> None:
-    """Draw what viewers cost, and how late they are served."""
+    """Draw the cost and the delay of viewers."""
     figure = Figure(figsize=(9, 4), layout="constrained")
     left, right = figure.subplots(1, 2)
     viewers = [it.viewers for it in found.steps]
@@ -226,6 +233,6 @@ def plot(found: StreamMeasurements, path: Path) -> None:
     for place, name in enumerate(("p50", "p95", "p99")):
         right.plot(viewers, [it.delays[place] for it in found.steps], marker="o", label=name)
     right.axhline(_SOON_MS, color="black", linestyle="--", linewidth=1, label="40 ms")
-    right.set(xlabel="viewers", ylabel="ms until a GOP has come", xlim=(0, None), ylim=(0, None))
+    right.set(xlabel="viewers", ylabel="ms until a GOP has arrived", xlim=(0, None), ylim=(0, None))
     right.legend()
     figure.savefig(path, dpi=110)

@@ -1,4 +1,4 @@
-"""The real best-view process, which notes when each GOP was given to the streams, and how long that took.
+"""The real best-view process, wrapped so that it records when each GOP was sent, and how long that took.
 
     python -m benchmarks.streaming.timed_service NOTES bestview SITE.yaml
 
@@ -19,7 +19,7 @@ from server.service.view_selection.decider import GopDecision
 
 
 def note(path: Path) -> None:
-    """Write a line for each GOP: its first pulse, when it was given out, when all sockets had been tried."""
+    """Write a line for each GOP: its first pulse, and when sending it began and ended."""
     original = Splicer.publish_decision
     notes = path.open("a", encoding="ascii", buffering=1)
 
@@ -34,7 +34,7 @@ def note(path: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class SendTimes:
-    """When a GOP was given out, and when every viewer's socket had accepted it or was found full."""
+    """When sending a GOP began, and when every viewer's socket had accepted it or was full."""
 
     began: float
     ended: float

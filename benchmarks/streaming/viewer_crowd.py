@@ -1,9 +1,9 @@
-"""A process that is many viewers: raw sockets that read streams, and note when each GOP has come.
+"""A process of many viewers: raw sockets that read streams and record when each GOP has arrived.
 
     python -m benchmarks.streaming.viewer_crowd PORT
 
 Commands are lines of JSON on standard input, each answered by a line. `{"watch": ["/objects/1/best.mp4", …]}`
-lets a viewer watch each, instead of those before; `{"for": 5.0}` reads for so long and tells what came.
+lets a viewer watch each, instead of those before; `{"for": 5.0}` reads for so long and returns what arrived.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ import msgspec
 
 _RECEIVED = 262_144
 _TOGETHER = 100
-"""Connections that are opened before what comes is read: a server's backlog is no longer."""
+"""Connections that are opened between two reads: not more than a server's backlog."""
 _TFDT = b"tfdt"
 _TIME_AT = 8
-"""Where the time stands behind that word: version and flags lie between."""
+"""Offset of the time from the box type: version and flags are between."""
 
 
 @dataclass(frozen=True, slots=True)
 class CrowdReading:
-    """What all viewers were sent in a while."""
+    """What all viewers received in a while."""
 
     megabytes: float
     seconds: float
     busy: float
     """Processor seconds of this process."""
     gone: int
-    """Viewers whose connection has ended."""
+    """Viewers whose connection was closed."""
     ticks: list[int] = field(default_factory=list)
-    """Of every piece received: the time in its last fragment."""
+    """Media time of the last fragment in each received chunk."""
     at: list[float] = field(default_factory=list)
-    """When it came, seconds by a clock that never steps and all processes share."""
+    """Time of arrival of each chunk, seconds of the monotonic clock, which all processes share."""
 
 
 class ViewerCrowd:
@@ -66,7 +66,7 @@ class ViewerCrowd:
                 self.read(0.02)
 
     def leave(self) -> None:
-        """Let nobody watch."""
+        """Disconnect all viewers."""
         for viewer in self._viewers:
             with contextlib.suppress(KeyError):
                 self._selector.unregister(viewer)
@@ -74,14 +74,14 @@ class ViewerCrowd:
         self._viewers, self._gone = [], 0
 
     def read(self, seconds: float) -> CrowdReading:
-        """Read whatever comes."""
+        """Read all streams for a while."""
         ticks, at = array.array("q"), array.array("d")
         buffer, total = self._buffer, 0
         began, busy = time.monotonic(), time.process_time()
         while (left := began + seconds - time.monotonic()) > 0:
             for key, _ in self._selector.select(left):
                 viewer = key.fileobj
-                assert isinstance(viewer, socket.socket)  # noqa: S101 — nothing else was registered
+                assert isinstance(viewer, socket.socket)  # noqa: S101 — only sockets are registered
                 size = self._receive(viewer)
                 total += size
                 found = buffer.rfind(_TFDT, 0, size)
@@ -111,14 +111,14 @@ class ViewerCrowd:
 
 
 class CrowdCommand(msgspec.Struct, forbid_unknown_fields=True):
-    """One of the two."""
+    """A command: new paths to watch, and how long to read."""
 
     watch: list[str] | None = None
     seconds: float = msgspec.field(default=0.0, name="for")
 
 
 def main() -> None:
-    """Do as told until the input ends."""
+    """Execute commands until the input ends."""
     crowd = ViewerCrowd(int(sys.argv[1]))
     for line in sys.stdin.buffer:
         command = msgspec.json.decode(line, type=CrowdCommand)

@@ -1,4 +1,4 @@
-"""What watching costs the real best-view process: many objects, many viewers, the first picture."""
+"""Cost of watching for the real best-view process: many objects, many viewers, and the first picture."""
 
 from __future__ import annotations
 
@@ -24,31 +24,31 @@ from server.media.rendering_messages import TIMESCALE
 
 _SETTLE_S = 2.0
 _PAUSE_S = 0.037
-"""Between requests: they come at every place within a GOP."""
+"""Seconds between requests, so that they fall on all phases of a GOP."""
 _ENCODED_GOPS = 20
 _RECEIVED = 65_536
 
 
 @dataclass(frozen=True, slots=True)
 class WatchingCost:
-    """Cores that the best-view process uses, by how many objects are watched; medians of the rounds."""
+    """Cores of the best-view process by number of watched objects; medians over rounds."""
 
     objects: int
     nobody: float
     one: float
     all: float
     encoded: float
-    """That an encoder of its own for each object would use instead, worked out."""
+    """Computed cores of one encoder for each object instead."""
     rounds: int
 
     @property
     def ratio(self) -> float:
-        """What all cost against one."""
+        """Cores with all objects watched divided by those with one."""
         return self.all / self.one
 
     @property
     def against_encoding(self) -> float:
-        """What encoding for each costs against all."""
+        """Computed cores with an encoder for each object divided by the measured ones."""
         return (self.nobody + self.encoded) / self.all
 
 
@@ -60,9 +60,9 @@ def watch_objects(
     seconds: float,
     rounds: int,
 ) -> WatchingCost:
-    """Let nobody, one and all of the objects be watched by turns, one viewer each; encode between them.
+    """Measure with no, one and all objects watched, one viewer each, and re-encoding, in turn.
 
-    A busy machine makes all of them dearer: hence by turns.
+    Other load on the machine affects all of them alike, hence in turn.
     """
     cores: dict[int, list[float]] = {0: [], 1: [], len(numbers): []}
     again = []
@@ -78,29 +78,29 @@ def watch_objects(
 
 @dataclass(frozen=True, slots=True)
 class ViewerStep:
-    """So many viewers at once."""
+    """The measurement of a number of viewers."""
 
     viewers: int
     cores: float
-    """Of the best-view process, with all that it does besides."""
+    """Cores of the best-view process, including its other work."""
     crowd: float
-    """Of the process that reads."""
+    """Cores of the reading process."""
     kbits: float
-    """A viewer's stream, a second."""
+    """Bit rate of a viewer's stream, kbit/s."""
     arrived: float
-    """Share of what was sent meanwhile; what is lost is whole GOPs."""
+    """Share of the sent GOPs that arrived."""
     delays: tuple[float, float, float]
-    """Milliseconds from when a GOP was given to the streams to when its end was read: p50, p95, p99."""
+    """Milliseconds from when a GOP was sent to when its end was read: p50, p95, p99."""
     given: float
-    """Milliseconds until the last viewer's socket has accepted a GOP; the median."""
+    """Median milliseconds until the last viewer's socket has accepted a GOP."""
     load: float
-    """Of the machine, over the last minute."""
+    """Load average of the machine."""
 
 
 def step_up(
     site: StreamSite, viewers: ViewerProcess, numbers: Sequence[int], counts: Sequence[int], seconds: float
 ) -> list[ViewerStep]:
-    """Let ever more watch, spread over the objects."""
+    """Measure increasing numbers of viewers, spread over the objects."""
     steps = []
     for count in counts:
         viewers.watch([_path(numbers[place % len(numbers)]) for place in range(count)], _SETTLE_S)
@@ -124,7 +124,7 @@ def step_up(
 
 
 def _given(heard: CrowdReading, sent: dict[int, SendTimes]) -> list[float]:
-    """Return the milliseconds that giving out took, of the GOPs that have come."""
+    """Return the milliseconds that sending took, of the received GOPs."""
     gops = {round(tick * SITE.fps / TIMESCALE) // ENCODE.gop * ENCODE.gop for tick in heard.ticks}
     return [1e3 * (it.ended - it.began) for first, it in sent.items() if first in gops]
 
@@ -143,7 +143,7 @@ def send_delays(heard: CrowdReading, sent: dict[int, float]) -> NDArray[np.float
 
 
 def first_pictures(site: StreamSite, numbers: Sequence[int], count: int) -> NDArray[np.float64]:
-    """Ask for streams one after the other: milliseconds until a picture of each is decoded."""
+    """Return the milliseconds from requesting a stream to its first decoded picture, for each request."""
     return np.array([_first_picture(site.http, numbers[place % len(numbers)]) for place in range(count)])
 
 
@@ -164,7 +164,7 @@ def _first_picture(port: int, number: int) -> float:
 
 
 def end_of_first_fragment(data: bytes) -> int:
-    """Return where the first media data end; 0: they are not whole yet."""
+    """Return the end of the first `mdat` box; 0: it is incomplete."""
     at = 0
     while at + 8 <= len(data):
         size, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]

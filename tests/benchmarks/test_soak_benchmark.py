@@ -22,8 +22,8 @@ from benchmarks.soak.samples import (
     resident_of,
     threads_of,
 )
-from benchmarks.soak.task_counts import FOLDER_VARIABLE, hooked_environment, note_tasks, read_held
-from benchmarks.soak.visitors import StreamDelays, Visitors, shown_by
+from benchmarks.soak.task_counts import FOLDER_VARIABLE, hooked_environment, note_tasks, read_object_counts
+from benchmarks.soak.visitors import StreamDelays, Visitors, fragment_span
 from fakes.timeouts import PATIENCE
 from server.config.loader import build_config
 from server.media.containers import fmp4
@@ -79,7 +79,7 @@ def test_a_process_counts_its_own_tasks(tmp_path: Path, monkeypatch: pytest.Monk
         async with asyncio.TaskGroup() as tasks:
             for _ in range(2):
                 tasks.create_task(_until(tmp_path))
-        return read_held(tmp_path)[os.getpid()].tasks
+        return read_object_counts(tmp_path)[os.getpid()].tasks
 
     assert asyncio.run(three()) == 3
     assert hooked_environment(tmp_path)[FOLDER_VARIABLE] == str(tmp_path)
@@ -88,29 +88,29 @@ def test_a_process_counts_its_own_tasks(tmp_path: Path, monkeypatch: pytest.Monk
 async def _until(folder: Path) -> None:
     """Wait until the process has noted all tasks; a slow machine notes once before they are there."""
     async with asyncio.timeout(PATIENCE):
-        while not any(held.tasks >= 3 for held in read_held(folder).values()):  # noqa: ASYNC110 — a file: no event
+        while not any(counts.tasks >= 3 for counts in read_object_counts(folder).values()):  # noqa: ASYNC110 — a file: no event
             await asyncio.sleep(0.005)
 
 
 def test_what_is_kept_is_counted_in_the_time_of_the_site(tmp_path: Path) -> None:
-    tempo = TimeScale(20.0)
-    filmed = LoopedRecordings(tmp_path, tempo)
+    time_scale = TimeScale(20.0)
+    recordings = LoopedRecordings(tmp_path, time_scale)
     for camera in CAMERAS:
         (tmp_path / f"{camera}.mp4").touch()
     content = {
-        "site": filmed.site,
-        "cameras": [{**it, "source": "scene:room"} for it in filmed.cameras],
-        **filmed.settings(tmp_path / "recorded", 3.0),
+        "site": recordings.site,
+        "cameras": [{**it, "source": "scene:room"} for it in recordings.cameras],
+        **recordings.settings(tmp_path / "recorded", 3.0),
     }
     config = build_config(content, where="soak", folder=tmp_path)
     assert (config.site.width, config.site.height) == (WIDTH, HEIGHT)
-    assert config.record.keep_s * tempo.speed == pytest.approx(3.0 * 3600.0)
+    assert config.record.keep_s * time_scale.speed == pytest.approx(3.0 * 3600.0)
     assert config.view.buffer_s * config.site.fps == pytest.approx(60.0 * 3.0)
-    assert tempo.hours(tempo.pulse(24.0)) == pytest.approx(24.0)
+    assert time_scale.hours(time_scale.pulse(24.0)) == pytest.approx(24.0)
 
 
 def test_a_stream_has_a_hole_where_there_is_nothing_to_show_and_not_where_a_picture_lasts() -> None:
-    seen = StreamDelays()
+    delays = StreamDelays()
     pictures = [
         fmp4.fragment([fmp4.FragmentSample(b"a", key=True)], 10, 25.0),
         fmp4.fragment([fmp4.FragmentSample(b"b", key=False), fmp4.FragmentSample(b"c", key=False)], 11, 25.0),
@@ -119,12 +119,12 @@ def test_a_stream_has_a_hole_where_there_is_nothing_to_show_and_not_where_a_pict
         fmp4.fragment([fmp4.FragmentSample(b"f", key=True)], 94, 25.0),
     ]
     for place, data in enumerate(pictures):
-        shown = shown_by(data[4:], 25.0)
-        assert shown is not None
-        seen.take(shown, 400.0)
-        assert seen.holes == (3 if place == 4 else 0)
-    assert (seen.pulse, seen.until) == (94, 95)
-    assert shown_by(b"mdat" + pictures[0], 25.0) is None
+        span = fragment_span(data[4:], 25.0)
+        assert span is not None
+        delays.add(span, 400.0)
+        assert delays.missing_frames == (3 if place == 4 else 0)
+    assert (delays.pulse, delays.until) == (94, 95)
+    assert fragment_span(b"mdat" + pictures[0], 25.0) is None
 
 
 async def test_a_person_may_be_forgotten_and_a_camera_may_not() -> None:
@@ -143,7 +143,7 @@ async def test_a_person_may_be_forgotten_and_a_camera_may_not() -> None:
     app.router.add_get("/objects/1/best.mp4", best)
     app.router.add_get("/cameras/c0/live.mp4", best)
     async with TestServer(app) as server:
-        visitors = Visitors(str(server.make_url("/")), 25.0, seed=1, coming=0)
+        visitors = Visitors(str(server.make_url("/")), 25.0, seed=1, count=0)
         watching = asyncio.create_task(visitors.watch())
         async with asyncio.timeout(PATIENCE):
             while len(visitors.person.delays) < 2 or not visitors.faults:  # noqa: ASYNC110 — nobody tells
@@ -152,7 +152,7 @@ async def test_a_person_may_be_forgotten_and_a_camera_may_not() -> None:
         await asyncio.gather(watching, return_exceptions=True)
     assert "the stream of a camera ended" in visitors.faults
     assert not [it for it in visitors.faults if "person" in it or "people" in it]
-    assert visitors.camera.holes == visitors.person.holes == 0
+    assert visitors.camera.missing_frames == visitors.person.missing_frames == 0
 
 
 FILM = [fmp4.fragment([fmp4.FragmentSample(b"a", key=not it)], it, 25.0) for it in range(3)]

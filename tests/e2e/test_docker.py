@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 import client
-from benchmarks.faults.site.compose_site import PLAIN, ComposeSite, composed, missing
+from benchmarks.faults.site.compose_site import PLAIN, ComposeSite, missing_requirement, run_compose_site
 
 pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(1200)]
 
@@ -26,13 +26,13 @@ FPS = 12.5  # two processors show the demo at half the rate, and do other things
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ComposeSite]:
     """Build, start and await a whole site; nothing of it is left."""
-    lacking = missing()
+    lacking = missing_requirement()
     if lacking is not None:
         pytest.skip(lacking)
     slower = tmp_path_factory.mktemp("compose") / "slower.yml"
     environment = {"environment": {"MYVIEW_SITE__FPS": str(FPS)}}
     slower.write_text(yaml.safe_dump({"services": dict.fromkeys(sorted(SERVICES), environment)}))
-    with composed((*PLAIN, slower), MYVIEW_CONFIG="demo.yaml") as running:
+    with run_compose_site((*PLAIN, slower), MYVIEW_CONFIG="demo.yaml") as running:
         yield running
 
 

@@ -19,7 +19,7 @@ import av
 import pytest
 
 from benchmarks.common.environment import ROOT
-from benchmarks.faults.site.compose_site import PLAIN, ComposeSite, composed, missing
+from benchmarks.faults.site.compose_site import PLAIN, ComposeSite, missing_requirement, run_compose_site
 
 pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(1200)]
 
@@ -80,7 +80,7 @@ class Secure:
 
 @pytest.fixture(scope="module")
 def secure(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secure]:
-    lacking = missing() or ("needs openssl" if shutil.which("openssl") is None else None)
+    lacking = missing_requirement() or ("needs openssl" if shutil.which("openssl") is None else None)
     if lacking is not None:
         pytest.skip(lacking)
     secrets = tmp_path_factory.mktemp("made") / "secrets"
@@ -94,7 +94,7 @@ def secure(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secure]:
     token = re.search(r": (\S+)$", made.stdout.strip())
     assert token
     files = (*PLAIN, ROOT / "docker-compose.secure.yml")
-    with composed(files, MYVIEW_CONFIG="demo.yaml", MYVIEW_SECRETS=str(secrets)) as site:
+    with run_compose_site(files, MYVIEW_CONFIG="demo.yaml", MYVIEW_SECRETS=str(secrets)) as site:
         port = site.address().rpartition(":")[2]
         yield Secure(site, secrets, token[1], f"https://localhost:{port}")
 

@@ -1,8 +1,8 @@
-"""Who is who after a meeting: paths keep to nobody's colours, so they are told apart by these afterwards.
+"""Identity assignment after people met: paths ignore appearance, so ids are reassigned by color.
 
-The map says that somebody is there, not who. Where paths meet, the shortest ones go straight on or swap by
-chance. As in Fleuret et al. (section 4) everybody has colours in each camera, learned where they stand apart;
-after a meeting the numbers go to the paths that look most like them.
+The occupancy map says that a person is there, not who. Where paths meet, the shortest ones go straight on or
+swap by chance. As in Fleuret et al. (section 4) each person has a color model in each camera, learned where
+they stand apart; after a meeting ids go to the paths with the most similar appearance.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class MeetingSettings:
-    """When people meet, and what it takes to say that paths swapped them.
+    """When people meet, and when their ids are swapped afterwards.
 
     Attributes:
-        near: how close, in person heights, is a meeting.
-        margin: by how much less alike the paths' own ends have to look, in Bhattacharyya distances.
-        least_pixels: foreground that nobody else covers, in one camera, before a look counts.
-        most_frames: of how many frames after a meeting looks are taken.
+        near: distance of a meeting, in person heights.
+        margin: Bhattacharyya distance by which a swap must be better than keeping the ids.
+        least_pixels: unoccluded foreground in one camera from which its histogram counts.
+        most_frames: frames after a meeting over which appearance is accumulated.
     """
 
     near: float = 0.4
@@ -38,18 +38,18 @@ class MeetingSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathAppearance:
-    """One path and what it looks like.
+    """A path on the ground and its appearance.
 
     Attributes:
         first: its first frame.
         places: (F, 2) on the ground.
-        looks: (F, C, B) the histograms in each camera, rows summing to 1.
-        pixels: (F, C) how many pixels they are of; 0: nothing is known.
+        histograms: (F, C, B) color histograms in each camera, rows summing to 1.
+        pixels: (F, C) pixels in each histogram; 0: unknown.
     """
 
     first: int
     places: Floats
-    looks: NDArray[np.float32]
+    histograms: NDArray[np.float32]
     pixels: NDArray[np.float32]
 
     @property
@@ -57,87 +57,86 @@ class PathAppearance:
         """The frame after its last."""
         return self.first + len(self.places)
 
-    def look(self, begin: int, end: int) -> _AppearanceSums:
-        """Return what it looks like over some frames."""
+    def sum_over(self, begin: int, end: int) -> _AppearanceSums:
+        """Sum the histograms over a span of frames."""
         span = slice(max(begin - self.first, 0), max(end - self.first, 0))
         pixels = self.pixels[span].astype(np.float64)
-        return _AppearanceSums((self.looks[span] * pixels[..., None]).sum(axis=0), pixels.sum(axis=0))
+        return _AppearanceSums((self.histograms[span] * pixels[..., None]).sum(axis=0), pixels.sum(axis=0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _AppearanceSums:
-    """Sums over frames: (C, B) histograms by pixels, (C,) pixels."""
+    """Sums over frames: (C, B) histograms weighted by pixels, (C,) pixels."""
 
     rows: Floats
     pixels: Floats
 
-    def and_also(self, other: _AppearanceSums) -> _AppearanceSums:
+    def plus(self, other: _AppearanceSums) -> _AppearanceSums:
         return _AppearanceSums(self.rows + other.rows, self.pixels + other.pixels)
 
-    def apart(self, other: _AppearanceSums, least: float) -> float:
-        """Return the mean Bhattacharyya distance over the cameras that know both; NaN: none does."""
+    def distance(self, other: _AppearanceSums, least: float) -> float:
+        """Return the mean Bhattacharyya distance over the cameras that saw both; NaN: none did."""
         known = (self.pixels >= least) & (other.pixels >= least)
         if not known.any():
             return float("nan")
         one = self.rows[known] / self.pixels[known][:, None]
         two = other.rows[known] / other.pixels[known][:, None]
-        alike = np.sqrt(one * two).sum(axis=1)
-        return float(np.sqrt(np.maximum(1.0 - alike, 0.0)).mean())
+        similarity = np.sqrt(one * two).sum(axis=1)
+        return float(np.sqrt(np.maximum(1.0 - similarity, 0.0)).mean())
 
 
 @dataclass(frozen=True, slots=True)
 class _Meeting:
-    """Frames `begin` to `end`, the latter not in it, and who met."""
+    """The paths that met, and the frames from `begin` up to, not including, `end`."""
 
     begin: int
     end: int
     members: frozenset[int]
 
 
-def numbers_of(walkers: Sequence[PathAppearance], person: float, settings: MeetingSettings) -> list[Ints]:
-    """Return every path's number (F,) in each of its frames.
+def assign_ids(paths: Sequence[PathAppearance], person: float, settings: MeetingSettings) -> list[Ints]:
+    """Return each path's id (F,) in each of its frames.
 
     Args:
-        walkers: the paths.
-        person: how long a person's height is in units of the ground.
-        settings: what tells people apart.
+        paths: the paths with their appearance.
+        person: a person's height in ground units.
+        settings: of meetings.
     """
-    numbers = [np.full(len(it.places), place + 1, dtype=np.int64) for place, it in enumerate(walkers)]
-    known = [_AppearanceSums(np.zeros(it.looks.shape[1:]), np.zeros(it.pixels.shape[1:])) for it in walkers]
-    since = [it.first for it in walkers]
-    meetings = _meetings(walkers, settings.near * person)
+    numbers = [np.full(len(it.places), place + 1, dtype=np.int64) for place, it in enumerate(paths)]
+    known = [
+        _AppearanceSums(np.zeros(it.histograms.shape[1:]), np.zeros(it.pixels.shape[1:])) for it in paths
+    ]
+    last_seen = [it.first for it in paths]
+    meetings = _meetings(paths, settings.near * person)
     for place, meeting in enumerate(meetings):
-        through = sorted(
-            it
-            for it in meeting.members
-            if walkers[it].first < meeting.begin and walkers[it].end > meeting.end
+        continuing = sorted(
+            it for it in meeting.members if paths[it].first < meeting.begin and paths[it].end > meeting.end
         )
-        who = [int(numbers[it][meeting.begin - 1 - walkers[it].first]) - 1 for it in through]
-        for path, number in zip(through, who, strict=True):
-            known[number] = known[number].and_also(walkers[path].look(since[path], meeting.begin))
-        apart = np.full((len(through), len(through)), np.nan)
+        ids = [int(numbers[it][meeting.begin - 1 - paths[it].first]) - 1 for it in continuing]
+        for path, number in zip(continuing, ids, strict=True):
+            known[number] = known[number].plus(paths[path].sum_over(last_seen[path], meeting.begin))
+        distance = np.full((len(continuing), len(continuing)), np.nan)
         for path in meeting.members:
-            since[path] = meeting.end
-        for column, path in enumerate(through):
+            last_seen[path] = meeting.end
+        for column, path in enumerate(continuing):
             later = (it.begin for it in meetings[place + 1 :] if path in it.members)
-            end = min(next(later, walkers[path].end), meeting.end + settings.most_frames)
-            after = walkers[path].look(meeting.end, end)
-            apart[:, column] = [known[it].apart(after, settings.least_pixels) for it in who]
-        if len(through) < 2 or np.isnan(apart).any():
+            end = min(next(later, paths[path].end), meeting.end + settings.most_frames)
+            after = paths[path].sum_over(meeting.end, end)
+            distance[:, column] = [known[it].distance(after, settings.least_pixels) for it in ids]
+        if len(continuing) < 2 or np.isnan(distance).any():
             continue
-        goes, to = linear_sum_assignment(apart - settings.margin * np.eye(len(through)))
-        for one, other in zip(goes.tolist(), to.tolist(), strict=True):
-            walker = walkers[through[other]]
-            middle = (meeting.begin + meeting.end) // 2 - walker.first
-            numbers[through[other]][middle:] = who[one] + 1
+        rows, columns = linear_sum_assignment(distance - settings.margin * np.eye(len(continuing)))
+        for one, other in zip(rows.tolist(), columns.tolist(), strict=True):
+            middle = (meeting.begin + meeting.end) // 2 - paths[continuing[other]].first
+            numbers[continuing[other]][middle:] = ids[one] + 1
     return numbers
 
 
-def _meetings(walkers: Sequence[PathAppearance], near: float) -> list[_Meeting]:
-    """Return the meetings in order: frames in which paths are near each other, overlapping ones as one."""
+def _meetings(paths: Sequence[PathAppearance], near: float) -> list[_Meeting]:
+    """Return the meetings in order: spans of frames with paths near each other, overlapping ones merged."""
     found: list[_Meeting] = []
-    for one, first in enumerate(walkers):
-        for other, second in enumerate(walkers[:one]):
+    for one, first in enumerate(paths):
+        for other, second in enumerate(paths[:one]):
             begin, end = max(first.first, second.first), min(first.end, second.end)
             if begin >= end:
                 continue

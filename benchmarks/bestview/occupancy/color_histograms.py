@@ -1,4 +1,4 @@
-"""What everybody on a path looks like, in every frame of a camera, where nobody else covers them."""
+"""Color histograms of the people on paths, in every frame of a camera, where they are not occluded."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from tracking.boxes import Floats
 from tracking.detectors.color_histogram import AppearanceSettings, color_histograms
 
 _EVERY = 2
-"""Of so many frames one is looked at."""
+"""Every so many frames one is used."""
 _BINS = AppearanceSettings().color_bins
 
 
-def looks_of(
+def path_histograms(
     config: Config, camera: str, masks: ForegroundMasks, firsts: Sequence[int], boxes: Sequence[Floats]
 ) -> tuple[list[NDArray[np.float32]], list[NDArray[np.float32]]]:
-    """Look at a recording again; give each path's looks (F, B), and of how many pixels they are (F,).
+    """Compute each path's histograms (F, B) and their pixel counts (F,) from a recording.
 
     Args:
         config: the site.
-        camera: whose recording it is.
-        masks: the foreground in it.
+        camera: of the recording.
+        masks: its foreground.
         firsts: each path's first frame.
         boxes: each path's boxes (F, 4) in pixels of the camera's picture, NaN where it has none.
     """
-    looks = [np.zeros((len(it), AppearanceSettings().length), dtype=np.float32) for it in boxes]
+    histograms = [np.zeros((len(it), AppearanceSettings().length), dtype=np.float32) for it in boxes]
     pixels = [np.zeros(len(it), dtype=np.float32) for it in boxes]
     pipeline = CameraPipeline(config, camera)
     for frame in range(len(masks.foreground)):
@@ -43,17 +43,20 @@ def looks_of(
         foreground = masks.foreground[frame]
         if image is None or foreground is None or frame % _EVERY:
             continue
-        there = [it for it, first in enumerate(firsts) if 0 <= frame - first < len(boxes[it])]
-        there = [it for it in there if np.isfinite(boxes[it][frame - firsts[it]]).all()]
-        here = np.array([boxes[it][frame - firsts[it]] for it in there]).reshape(-1, 4)
-        mask = _alone(foreground, image.shape[:2], here)
+        present = [it for it, first in enumerate(firsts) if 0 <= frame - first < len(boxes[it])]
+        present = [it for it in present if np.isfinite(boxes[it][frame - firsts[it]]).all()]
+        present_boxes = np.array([boxes[it][frame - firsts[it]] for it in present]).reshape(-1, 4)
+        mask = _unoccluded(foreground, image.shape[:2], present_boxes)
         for it, row, count in zip(
-            there, color_histograms(image, here, _BINS, mask), _sums(mask, here), strict=True
+            present,
+            color_histograms(image, present_boxes, _BINS, mask),
+            _sums(mask, present_boxes),
+            strict=True,
         ):
-            looks[it][frame - firsts[it]] = row
+            histograms[it][frame - firsts[it]] = row
             pixels[it][frame - firsts[it]] = count
     pipeline.close()
-    return looks, pixels
+    return histograms, pixels
 
 
 def _slices(box: Floats, shape: tuple[int, ...]) -> tuple[slice, slice]:
@@ -61,8 +64,8 @@ def _slices(box: Floats, shape: tuple[int, ...]) -> tuple[slice, slice]:
     return slice(top, bottom), slice(left, right)
 
 
-def _alone(foreground: NDArray[np.uint8], shape: tuple[int, ...], boxes: Floats) -> NDArray[np.uint8]:
-    """Return the foreground in the picture (H, W), 255 or 0, where no more than one box is."""
+def _unoccluded(foreground: NDArray[np.uint8], shape: tuple[int, ...], boxes: Floats) -> NDArray[np.uint8]:
+    """Return the foreground (H, W), 255 or 0, of the pixels in at most one box."""
     size = (shape[1], shape[0])
     whole = cv2.resize(foreground, size, interpolation=cv2.INTER_NEAREST)
     covered = np.zeros(shape, dtype=np.uint8)

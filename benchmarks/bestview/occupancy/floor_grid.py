@@ -1,4 +1,4 @@
-"""The places where somebody may stand, and how somebody there looks in every camera."""
+"""The grid of ground places where a person may stand, and the box of a person there in every camera."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from tracking.detectors.background.height_model import HeightModel
 Ints = NDArray[np.int64]
 _BEYOND = 0.25
 """Share of the picture's height by which people may stand below it, as MyView's detector has it."""
-_ASKED = 40
-"""Points along each side of a picture by which the ground that it shows is found."""
+_SAMPLES = 40
+"""Points along each side of a picture that are projected to find the ground in view."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +28,9 @@ class GridSettings:
     Attributes:
         step: between neighbouring places; 0.15 is a quarter of a metre, the paper's.
         aspect: width of a person over their height in the picture.
-        least_seen: the share of somebody that has to be in some picture, and not where it is ignored.
-        gate: how far from the border of what is seen somebody may come and go.
-        most_places: the step is made longer where there would be more.
+        least_seen: share of a person that must be inside some picture and not ignored.
+        gate: distance from the border of the visible ground within which people enter and leave.
+        most_places: limit; the step grows where there would be more.
     """
 
     step: float = 0.15
@@ -42,39 +42,39 @@ class GridSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraView:
-    """A camera.
+    """A camera's geometry.
 
     Attributes:
         homography: (3, 3) from its picture, pixels, to the ground.
         size: width and height of its picture.
-        line: how tall people are where, in its pixels.
+        height_model: heights of people by foot point, in its pixels.
         weight: (H, W), 1 where its picture counts, in cells of equal size.
     """
 
     homography: Floats
     size: tuple[int, int]
-    line: HeightModel
+    height_model: HeightModel
     weight: Floats
 
     def boxes(self, ground: Floats, aspect: float) -> Floats:
-        """Return the boxes (..., 4) in pixels of people at places (..., 2), NaN where nobody can be seen."""
+        """Return the boxes (..., 4) in pixels of people at places (..., 2); NaN: out of view."""
         foot = from_ground(self.homography, ground)
         x, y = foot[..., 0], foot[..., 1]
-        tall = self.line.expected_height(y)
-        tall = np.where((tall >= self.line.min_height) & (tall > 0.0), tall, np.nan)
-        half = aspect * tall / 2.0
-        return np.stack([x - half, y - tall, x + half, y], axis=-1)
+        expected = self.height_model.expected_height(y)
+        expected = np.where((expected >= self.height_model.min_height) & (expected > 0.0), expected, np.nan)
+        half = aspect * expected / 2.0
+        return np.stack([x - half, y - expected, x + half, y], axis=-1)
 
     def cells(self, boxes: Floats) -> Ints:
-        """Return the cells (..., 4) that boxes cover, inside the picture; none where there is no box."""
+        """Return the cells (..., 4) that boxes cover, clipped to the picture; an empty range for no box."""
         rows, columns = self.weight.shape
         scale = np.array([columns / self.size[0], rows / self.size[1]] * 2)
         limits = np.array([columns, rows, columns, rows], dtype=np.float64)
         known = np.clip(np.nan_to_num(boxes * scale, nan=0.0), 0.0, limits)
         return np.asarray(np.rint(known), dtype=np.int64)
 
-    def seen(self, boxes: Floats) -> Floats:
-        """Return the share of each box (K, 4) that is in the picture and counts, (K,)."""
+    def visible_share(self, boxes: Floats) -> Floats:
+        """Return the share (K,) of each box (K, 4) that is in the picture and not ignored."""
         sums = cv2.integral(self.weight, sdepth=cv2.CV_64F)
         left, top, right, bottom = self.cells(boxes).T
         inside = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
@@ -83,21 +83,21 @@ class CameraView:
         return np.asarray(np.nan_to_num(inside / area, nan=0.0))
 
     def ground(self) -> Floats:
-        """Return points (K, 2) all over the ground that it shows people on."""
+        """Return points (K, 2) over the ground on which it shows people."""
         width, height = self.size
-        x, y = np.meshgrid(np.linspace(0, width, _ASKED), np.linspace(0, height * (1 + _BEYOND), _ASKED))
-        tall = self.line.expected_height(y)
-        feet = np.stack([x, y], axis=-1)[(tall >= self.line.min_height) & (tall > 0.0)]
-        there = to_ground(self.homography, feet)
-        return np.asarray(there[np.isfinite(there).all(axis=1)])
+        x, y = np.meshgrid(np.linspace(0, width, _SAMPLES), np.linspace(0, height * (1 + _BEYOND), _SAMPLES))
+        expected = self.height_model.expected_height(y)
+        feet = np.stack([x, y], axis=-1)[(expected >= self.height_model.min_height) & (expected > 0.0)]
+        places = to_ground(self.homography, feet)
+        return np.asarray(places[np.isfinite(places).all(axis=1)])
 
     def person(self) -> float:
-        """Return how long a person's height is in units of the ground: the median over the picture."""
+        """Return a person's height in ground units: the median over the picture."""
         width, height = self.size
         x, y = np.meshgrid(np.linspace(0.2, 0.8, 7) * width, np.linspace(0.2, 1.0, 17) * height)
-        tall = self.line.expected_height(y)
-        known = (tall >= self.line.min_height) & (tall > 0.0)
-        boxes = np.stack([x, y - tall, x, y], axis=-1)[known]
+        expected = self.height_model.expected_height(y)
+        known = (expected >= self.height_model.min_height) & (expected > 0.0)
+        boxes = np.stack([x, y - expected, x, y], axis=-1)[known]
         return float(np.nanmedian(person_heights(self.homography, boxes)))
 
 
@@ -110,7 +110,7 @@ class FloorGrid:
         moves: (L, 9) each place and those around it; L where there is none.
         gates: (L,) whether people may come and go there.
         rectangles: of each camera, (L, 4) in cells of its picture.
-        person: how long a person's height is in units of the ground.
+        person: a person's height in ground units.
     """
 
     places: Floats
@@ -120,13 +120,13 @@ class FloorGrid:
     person: float
 
 
-def lay_out(views: Sequence[CameraView], settings: GridSettings) -> FloorGrid:
-    """Put a grid over all the ground on which some camera shows people."""
+def build_grid(views: Sequence[CameraView], settings: GridSettings) -> FloorGrid:
+    """Build the grid over all ground on which some camera shows people."""
     person = float(np.median([view.person() for view in views]))
-    shown = np.concatenate([view.ground() for view in views])
+    ground_points = np.concatenate([view.ground() for view in views])
     step = settings.step * person
     while True:
-        mesh, inside = _mesh(views, shown, step, settings)
+        mesh, inside = _mesh(views, ground_points, step, settings)
         if np.count_nonzero(inside) <= settings.most_places:
             break
         step *= 1.1
@@ -142,12 +142,12 @@ def lay_out(views: Sequence[CameraView], settings: GridSettings) -> FloorGrid:
 
 
 def _mesh(
-    views: Sequence[CameraView], shown: Floats, step: float, settings: GridSettings
+    views: Sequence[CameraView], ground_points: Floats, step: float, settings: GridSettings
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return the places (R, C, 2) of a grid around what is shown, and which of them are."""
-    (left, top), (right, bottom) = shown.min(axis=0), shown.max(axis=0)
+    """Return the places (R, C, 2) of a grid around the visible ground, and which of them are visible."""
+    (left, top), (right, bottom) = ground_points.min(axis=0), ground_points.max(axis=0)
     x, y = np.meshgrid(np.arange(left, right + step, step), np.arange(top, bottom + step, step))
     mesh = np.stack([x, y], axis=-1)
     flat = mesh.reshape(-1, 2)
-    seen = np.max([view.seen(view.boxes(flat, settings.aspect)) for view in views], axis=0)
-    return mesh, (seen >= settings.least_seen).reshape(x.shape)
+    visible_share = np.max([view.visible_share(view.boxes(flat, settings.aspect)) for view in views], axis=0)
+    return mesh, (visible_share >= settings.least_seen).reshape(x.shape)

@@ -1,4 +1,4 @@
-"""The foreground that MyView's own detector sees in every frame of a camera."""
+"""The foreground masks of MyView's own detector, frame by frame."""
 
 from __future__ import annotations
 
@@ -25,39 +25,39 @@ CELL = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForegroundMasks:
-    """What one camera's detector sees, frame by frame, in cells.
+    """The masks of one camera's detector, frame by frame, in cells.
 
     Attributes:
         size: of the camera's picture.
-        foreground: of each frame (H, W), the share of foreground, in 255ths; None: it could not tell.
-        shadow: the same of what looks like a shadow, which tells nothing.
-        weight: (H, W), 1 where the picture counts.
-        line: how tall people are where, in pixels of the camera's picture, as it was known at last.
+        foreground: of each frame (H, W), the share of foreground, in 255ths; None: unknown.
+        shadow: the same of shadows, which are ignored.
+        weight: (H, W), 1 where the picture is not ignored.
+        height_model: the final height model, in pixels of the camera's picture.
     """
 
     size: tuple[int, int]
     foreground: list[Mask | None]
     shadow: list[Mask | None]
     weight: Floats
-    line: HeightModel
+    height_model: HeightModel
 
 
 class CannotMapError(Exception):
-    """There is no occupancy map; the text says why."""
+    """No occupancy map can be made; the text says why."""
 
 
-def masks_of(config: Config, camera: str) -> ForegroundMasks:
-    """Search a recording as a camera's process does, and keep the foreground.
+def compute_masks(config: Config, camera: str) -> ForegroundMasks:
+    """Detect people in a recording as a camera process does, and keep the foreground.
 
     Raises:
-        CannotMapError: it is not searched by its background, or how tall people are is never known.
+        CannotMapError: the detector is no background detector, or never learns the heights of people.
     """
     pipeline = CameraPipeline(config, camera)
-    detector = pipeline._detector  # noqa: SLF001 — the very masks that its boxes come from
+    detector = pipeline._detector  # noqa: SLF001 — its boxes come from these masks
     if not isinstance(detector, BackgroundDetector):
-        raise CannotMapError(f"camera {camera} is not searched by its background")
-    heard = _MaskRecorder(detector)
-    detector._fit = heard  # type: ignore[method-assign]  # noqa: SLF001
+        raise CannotMapError(f"camera {camera} has no background detector")
+    recorder = _MaskRecorder(detector)
+    detector._fit = recorder  # type: ignore[method-assign]  # noqa: SLF001
     foreground: list[Mask | None] = []
     shadow: list[Mask | None] = []
     for pulse in count():
@@ -65,19 +65,21 @@ def masks_of(config: Config, camera: str) -> ForegroundMasks:
             pipeline.detect(pulse, pipeline.take(pulse))
         except SourceEndedError:
             break
-        one, other = heard.last()
-        foreground.append(one)
-        shadow.append(other)
+        foreground_mask, shadow_mask = recorder.last()
+        foreground.append(foreground_mask)
+        shadow.append(shadow_mask)
     pipeline.close()
-    line, grid = detector.height_model, heard.grid
-    if line is None or grid is None:
-        raise CannotMapError(f"how tall people are in camera {camera} is never known")
+    height_model, grid = detector.height_model, recorder.grid
+    if height_model is None or grid is None:
+        raise CannotMapError(f"camera {camera}: the heights of people were never learned")
     weight = np.asarray(_cells(grid.visible) > 127, dtype=np.float64)
-    return ForegroundMasks(pipeline.source.size, foreground, shadow, weight, line.in_cells(grid.scale, 0.0))
+    return ForegroundMasks(
+        pipeline.source.size, foreground, shadow, weight, height_model.in_cells(grid.scale, 0.0)
+    )
 
 
 class _MaskRecorder:
-    """Stands before a detector's search for people, and keeps what that is given."""
+    """Wraps a detector's fit of people to the foreground, and keeps its masks."""
 
     def __init__(self, detector: BackgroundDetector) -> None:
         self._search = detector._fit  # noqa: SLF001
@@ -85,13 +87,13 @@ class _MaskRecorder:
         self.grid: CellGrid | None = None
 
     def __call__(self, mask: Mask, shadow: Mask, grid: CellGrid) -> ForegroundFit:
-        """Search."""
+        """Fit people to the foreground."""
         self.grid = grid
         self._last = _cells(mask), _cells(shadow)
         return self._search(mask, shadow, grid)
 
     def last(self) -> tuple[Mask | None, Mask | None]:
-        """Return the frame's foreground and shadow, once."""
+        """Return and forget the frame's foreground and shadow."""
         last, self._last = self._last, (None, None)
         return last
 

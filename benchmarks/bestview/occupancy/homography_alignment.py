@@ -1,4 +1,4 @@
-"""Homographies that are a little off beside each other, moved until the cameras' feet agree."""
+"""Alignment of inexact homographies: the ground is shifted until the cameras' foot points agree."""
 
 from __future__ import annotations
 
@@ -14,33 +14,38 @@ from tracking.boxes import Floats
 from tracking.motchallenge import MotRow
 
 _GATE = 0.5
-"""How far apart, in person heights, feet of two cameras may be one person's."""
+"""Largest distance, in person heights, of two cameras' foot points of one person."""
 _ROUNDS = 5
 _LEAST_PAIRS = 20
 
 
-def levelled(
+def align_homographies(
     boxes: Rows, ground: Mapping[str, Floats], heights: Mapping[str, int], person: float
 ) -> dict[str, Floats]:
-    """Return the homographies, each with its ground shifted, the shifts adding up to nothing.
+    """Return the homographies, each with its ground shifted; the shifts sum to zero.
 
-    The feet of two cameras that are each other's nearest in a frame are taken for one person's. The median of
-    their distances, pair of cameras by pair of cameras, is what the shifts explain, by least squares.
+    Foot points of two cameras that are each other's nearest in a frame are taken as one person's. The shifts
+    fit the median difference of each pair of cameras, by least squares.
 
     Args:
         boxes: each camera's detections.
         ground: each camera's homography (3, 3) from its picture to the ground.
         heights: of each camera's picture, pixels.
-        person: how long a person's height is in units of the ground.
+        person: a person's height in ground units.
     """
     cameras = list(ground)
-    there = {camera: _standing(boxes[camera], ground[camera], heights[camera]) for camera in cameras}
+    foot_points_by_camera = {
+        camera: _foot_points(boxes[camera], ground[camera], heights[camera]) for camera in cameras
+    }
     shifts: Floats = np.zeros((len(cameras), 2))
     for _ in range(_ROUNDS):
-        rows, wanted = [], []
+        rows, targets = [], []
         for one, other in combinations(range(len(cameras)), 2):
             pairs = _pairs(
-                there[cameras[one]], there[cameras[other]], shifts[one] - shifts[other], _GATE * person
+                foot_points_by_camera[cameras[one]],
+                foot_points_by_camera[cameras[other]],
+                shifts[one] - shifts[other],
+                _GATE * person,
             )
             if len(pairs) < _LEAST_PAIRS:
                 continue
@@ -48,18 +53,18 @@ def levelled(
             row = np.zeros(len(cameras))
             row[one], row[other] = root, -root
             rows.append(row)
-            wanted.append(-root * np.median(pairs, axis=0))
+            targets.append(-root * np.median(pairs, axis=0))
         if rows:
-            # The shortest of all answers: of cameras that share ground the shifts add up to nothing.
-            shifts = np.linalg.lstsq(np.array(rows), np.array(wanted), rcond=None)[0]
+            # The minimum-norm solution: shifts of cameras that share ground sum to zero.
+            shifts = np.linalg.lstsq(np.array(rows), np.array(targets), rcond=None)[0]
     moved = {}
     for camera, (x, y) in zip(cameras, shifts, strict=True):
         moved[camera] = np.array([[1.0, 0.0, x], [0.0, 1.0, y], [0.0, 0.0, 1.0]]) @ ground[camera]
     return moved
 
 
-def _standing(rows: list[MotRow], homography: Floats, height: int) -> dict[int, Floats]:
-    """Return the feet (K, 2) on the ground that are seen in each frame."""
+def _foot_points(rows: list[MotRow], homography: Floats, height: int) -> dict[int, Floats]:
+    """Return the foot points (K, 2) on the ground by frame."""
     if not rows:
         return {}
     boxes = np.array([row.box for row in rows])
@@ -71,15 +76,15 @@ def _standing(rows: list[MotRow], homography: Floats, height: int) -> dict[int, 
 
 
 def _pairs(one: Mapping[int, Floats], other: Mapping[int, Floats], shift: Floats, gate: float) -> Floats:
-    """Return the differences (P, 2) of feet that are each other's nearest, and near, after a shift."""
-    found = [np.empty((0, 2))]
+    """Return the differences (P, 2) of mutually nearest foot points within the gate, after a shift."""
+    pairs = [np.empty((0, 2))]
     for frame in sorted(one.keys() & other.keys()):
-        apart = one[frame][:, None] - other[frame][None]
-        if not apart.size:
+        differences = one[frame][:, None] - other[frame][None]
+        if not differences.size:
             continue
-        distance = np.linalg.norm(apart + shift, axis=2)
+        distance = np.linalg.norm(differences + shift, axis=2)
         first, second = distance.argmin(axis=1), distance.argmin(axis=0)
         mutual = [row for row, column in enumerate(first) if second[column] == row]
         near = [row for row in mutual if distance[row, first[row]] <= gate]
-        found.append(apart[near, first[near]])
-    return np.concatenate(found)
+        pairs.append(differences[near, first[near]])
+    return np.concatenate(pairs)

@@ -1,4 +1,4 @@
-"""Who stands where in one frame: a probabilistic occupancy map of the ground from all cameras' foreground.
+"""A probabilistic occupancy map of the ground in one frame, from all cameras' foreground.
 
 Fleuret, Berclaz, Lengagne and Fua, "Multicamera people tracking with a probabilistic occupancy map", IEEE
 PAMI 2008, section 5 and appendix. The symbols are theirs.
@@ -17,7 +17,7 @@ from tracking.boxes import Floats
 
 Plane = NDArray[np.float64]
 _SUREST = 1e-6
-"""No probability is nearer to 0 or 1: what is certain could not be taken back."""
+"""No probability gets nearer to 0 or 1, so that the iteration can still change it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,13 +25,13 @@ class OccupancySettings:
     """The model of the pictures, and the iteration.
 
     Attributes:
-        prior: epsilon, how likely somebody is at a place before anything was seen.
-        sigma: how far the foreground is from rectangles, as a share of these.
-        least_area: what the area of all rectangles is never counted less than, in mean rectangles. The paper
-            has no such bound; without it a little noise in an empty picture is as far from nobody as can be.
-        step: the share of each iteration's answer that is taken over.
+        prior: epsilon, the prior probability of a person at a place.
+        sigma: typical distance of the foreground from the rectangles, as a share of their area.
+        least_area: lower bound of the area of all rectangles, in mean rectangles. The paper has no such
+            bound; without it a little noise in an empty picture has the largest distance possible.
+        step: damping: the share of each iteration's answer that is applied.
         iterations: at most.
-        settled: the largest change of a probability with which it ends before.
+        settled: largest change of a probability at which the iteration stops.
     """
 
     prior: float = 0.01
@@ -44,11 +44,11 @@ class OccupancySettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForegroundObservation:
-    """What one camera sees in one frame.
+    """The foreground of one camera in one frame.
 
     Attributes:
         foreground: B, (H, W), the share of foreground in each cell.
-        weight: (H, W), how much each cell counts.
+        weight: (H, W) of each cell.
     """
 
     foreground: Plane
@@ -56,10 +56,10 @@ class ForegroundObservation:
 
 
 class OccupancyMap:
-    """Finds the probabilities that somebody stands at each of L places."""
+    """Computes the probability of a person at each of L places."""
 
     def __init__(self, rectangles: Sequence[NDArray[np.int64]], settings: OccupancySettings) -> None:
-        """Keep the rectangles.
+        """Build a map for fixed rectangles.
 
         Args:
             rectangles: of each camera, (L, 4) left, top, right, bottom in cells of its picture, inside of it;
@@ -69,7 +69,7 @@ class OccupancyMap:
         self._settings = settings
         self._rectangles = rectangles
 
-    def occupied(self, sights: Sequence[ForegroundObservation]) -> Floats:
+    def compute(self, observations: Sequence[ForegroundObservation]) -> Floats:
         """Return the probabilities (L,), the fixed point of the paper's mean field (its equation 15).
 
         With A_c the picture of all rectangles where somebody is, expected under q, and B_c the foreground,
@@ -78,14 +78,14 @@ class OccupancyMap:
         """
         settings = self._settings
         cameras = [
-            _Camera(rectangles, sight, settings.least_area)
-            for rectangles, sight in zip(self._rectangles, sights, strict=True)
+            _Camera(rectangles, observation, settings.least_area)
+            for rectangles, observation in zip(self._rectangles, observations, strict=True)
         ]
         before = np.log((1.0 - settings.prior) / settings.prior)
         q = np.full(len(self._rectangles[0]), settings.prior)
         for _ in range(settings.iterations):
-            farther = sum(camera.farther(q) for camera in cameras) / settings.sigma
-            answer = 1.0 / (1.0 + np.exp(np.clip(before + farther, -500.0, 500.0)))
+            energy_difference = sum(camera.energy_difference(q) for camera in cameras) / settings.sigma
+            answer = 1.0 / (1.0 + np.exp(np.clip(before + energy_difference, -500.0, 500.0)))
             change = settings.step * (np.clip(answer, _SUREST, 1.0 - _SUREST) - q)
             q = q + change
             if np.abs(change).max(initial=0.0) < settings.settled:
@@ -94,45 +94,47 @@ class OccupancyMap:
 
 
 class _Camera:
-    """One camera's foreground beside its rectangles."""
+    """One camera's foreground and rectangles."""
 
     def __init__(
-        self, rectangles: NDArray[np.int64], sight: ForegroundObservation, least_area: float
+        self, rectangles: NDArray[np.int64], observation: ForegroundObservation, least_area: float
     ) -> None:
-        self._shape = sight.weight.shape
+        self._shape = observation.weight.shape
         left, top, right, bottom = rectangles.T
         wide = self._shape[1] + 1
         corners = np.stack(
             [top * wide + left, top * wide + right, bottom * wide + left, bottom * wide + right]
         )
-        self._seen = np.flatnonzero((right > left) & (bottom > top))
-        self._corners = corners[:, self._seen]
+        self._visible = np.flatnonzero((right > left) & (bottom > top))
+        self._corners = corners[:, self._visible]
         self._places = len(rectangles)
-        self._weight = sight.weight
-        self._missed = sight.weight * sight.foreground
-        areas = self._inside(sight.weight)
+        self._weight = observation.weight
+        self._foreground = observation.weight * observation.foreground
+        areas = self._inside(observation.weight)
         self._least = max(least_area * float(areas.mean()) if areas.size else 0.0, 1.0)
-        self._all = float(sight.weight.sum())
-        self._found = float(self._missed.sum())
+        self._all = float(observation.weight.sum())
+        self._foreground_area = float(self._foreground.sum())
 
-    def farther(self, q: Floats) -> Floats:
+    def energy_difference(self, q: Floats) -> Floats:
         """Return `sigma (Psi(B, E[A | X_i = 1]) - Psi(B, E[A | X_i = 0]))` for every place, (L,)."""
-        q = q[self._seen]
-        # 1 - E[A], the probability that nobody covers a cell, and how much of B it leaves unexplained.
-        nobody = self._nobody(q)
-        empty, missed = nobody * self._weight, nobody * self._missed
+        q = q[self._visible]
+        # 1 - E[A], the probability that no person covers a cell, and the share of B left unexplained.
+        uncovered = self._uncovered(q)
+        empty, unexplained = uncovered * self._weight, uncovered * self._foreground
         area = self._all - float(empty.sum())
-        distance = self._found + area - 2.0 * (self._found - float(missed.sum()))
-        # What a cell adds to the area, and to the distance, when it is surely covered instead.
-        more, off = self._inside(empty), self._inside(empty - 2.0 * missed)
+        distance = self._foreground_area + area - 2.0 * (self._foreground_area - float(unexplained.sum()))
+        # What a rectangle adds to the area and the distance when it is surely covered instead.
+        added_area, added_distance = self._inside(empty), self._inside(empty - 2.0 * unexplained)
         odds = q / (1.0 - q)
-        there = (distance + off) / np.maximum(area + more, self._least)
-        away = (distance - odds * off) / np.maximum(area - odds * more, self._least)
+        occupied_distance = (distance + added_distance) / np.maximum(area + added_area, self._least)
+        empty_distance = (distance - odds * added_distance) / np.maximum(
+            area - odds * added_area, self._least
+        )
         result = np.zeros(self._places)
-        result[self._seen] = there - away
+        result[self._visible] = occupied_distance - empty_distance
         return result
 
-    def _nobody(self, q: Floats) -> Plane:
+    def _uncovered(self, q: Floats) -> Plane:
         """Return the product of `1 - q_k` over the rectangles on each cell, by sums of logarithms."""
         value = np.log1p(-q)
         height, width = self._shape
@@ -143,7 +145,7 @@ class _Camera:
         return np.asarray(np.exp(np.minimum(sums[1:, 1:], 0.0)))
 
     def _inside(self, plane: Plane) -> Floats:
-        """Return the plane's sum in each rectangle that is seen."""
+        """Return the plane's sum over each visible rectangle."""
         sums = cv2.integral(plane, sdepth=cv2.CV_64F).ravel()
         one, two, three, four = self._corners
         return np.asarray(sums[one] - sums[two] - sums[three] + sums[four])

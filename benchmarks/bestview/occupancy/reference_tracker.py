@@ -1,8 +1,8 @@
-"""A reference for several cameras: an occupancy map of the ground in each frame, and shortest paths over it.
+"""Multi-camera reference tracker: an occupancy map of the ground in each frame, and shortest paths over it.
 
-Beside MyView, which tracks in each camera and joins, everybody is found on the ground at once, from the same
-foreground: `occupancy_map`, then `occupancy_paths`, then `occupancy_colours`. Nothing of it is live: heights
-and all frames are known before the first path is found.
+MyView tracks in each camera and associates the tracks; here people are detected on the ground directly, from
+the same foreground: `occupancy_map`, then `shortest_paths`, then `appearance_association`. It is offline:
+heights and all frames are known before the first path is computed.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from benchmarks.bestview.camera_tracks import Rows
-from benchmarks.bestview.occupancy.appearance_association import MeetingSettings, PathAppearance, numbers_of
-from benchmarks.bestview.occupancy.color_histograms import looks_of
-from benchmarks.bestview.occupancy.floor_grid import CameraView, FloorGrid, GridSettings, Ints, lay_out
-from benchmarks.bestview.occupancy.foreground_masks import ForegroundMasks, masks_of
+from benchmarks.bestview.occupancy.appearance_association import MeetingSettings, PathAppearance, assign_ids
+from benchmarks.bestview.occupancy.color_histograms import path_histograms
+from benchmarks.bestview.occupancy.floor_grid import CameraView, FloorGrid, GridSettings, Ints, build_grid
+from benchmarks.bestview.occupancy.foreground_masks import ForegroundMasks, compute_masks
 from benchmarks.bestview.occupancy.ground_trajectories import (
     GroundTrajectory,
     TrajectorySettings,
-    rows_of_walks,
-    walk_of,
+    rows_of,
+    trajectory_of,
 )
-from benchmarks.bestview.occupancy.homography_alignment import levelled
+from benchmarks.bestview.occupancy.homography_alignment import align_homographies
 from benchmarks.bestview.occupancy.occupancy_map import ForegroundObservation, OccupancyMap, OccupancySettings
 from benchmarks.bestview.occupancy.shortest_paths import Lattice, shortest_paths
 from benchmarks.bestview.scenes import BenchmarkScene
@@ -33,17 +33,17 @@ from tracking.boxes import Floats
 from tracking.motchallenge import MotRow
 
 _UNIT = 1000.0
-"""Costs are whole numbers of thousandths."""
+"""Costs are integers, in thousandths."""
 
 
 @dataclass(frozen=True, slots=True)
 class PathSettings:
-    """What paths cost.
+    """The costs of paths.
 
     Attributes:
-        doubt: no probability is taken to be nearer to 0 or 1: it is what a frame can say at most.
-        gate_cost: of coming, and of going, where what is seen ends.
-        inside_cost: the same anywhere else; the paper allows it nowhere.
+        doubt: probabilities are clipped to this distance from 0 and 1, which bounds the weight of one frame.
+        gate_cost: of entering, and of leaving, at the border of the visible ground.
+        inside_cost: the same anywhere else, which the paper does not allow.
     """
 
     doubt: float = 0.001
@@ -53,101 +53,106 @@ class PathSettings:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceSettings:
-    """All of it."""
+    """The settings of all stages."""
 
     floor: GridSettings = field(default_factory=GridSettings)
     map: OccupancySettings = field(default_factory=OccupancySettings)
     paths: PathSettings = field(default_factory=PathSettings)
-    colours: MeetingSettings = field(default_factory=MeetingSettings)
-    walks: TrajectorySettings = field(default_factory=TrajectorySettings)
+    meetings: MeetingSettings = field(default_factory=MeetingSettings)
+    trajectories: TrajectorySettings = field(default_factory=TrajectorySettings)
 
 
-def occupancy_rows(
-    case: BenchmarkScene, boxes: Rows, settings: ReferenceSettings | None = None
+def track_by_occupancy(
+    scene: BenchmarkScene, boxes: Rows, settings: ReferenceSettings | None = None
 ) -> dict[str, list[MotRow]]:
-    """Return everybody's boxes in every camera by their number.
+    """Track people with the occupancy map; return their boxes in every camera by id.
 
     Args:
-        case: a scene with pictures and homographies.
-        boxes: the cameras' sure detections, by which the homographies are made to agree.
+        scene: with pictures and homographies.
+        boxes: the cameras' confident detections, by which the homographies are aligned.
         settings: of all stages.
 
     Raises:
-        CannotMapError: there is no foreground to explain.
+        CannotMapError: a camera has no foreground masks.
     """
-    settings, config = settings or ReferenceSettings(), case.config()
-    masks = {camera: masks_of(config, camera) for camera in case.gt}
+    settings, config = settings or ReferenceSettings(), scene.config()
+    masks = {camera: compute_masks(config, camera) for camera in scene.gt}
     ground = {camera: it for camera, it in camera_homographies(config).items() if it is not None}
-    views = views_of(masks, ground, boxes)
-    floor = lay_out(list(views.values()), settings.floor)
+    views = aligned_views(masks, ground, boxes)
+    floor = build_grid(list(views.values()), settings.floor)
     q = occupancy(floor, list(masks.values()), settings.map)
-    reach = round(settings.walks.smooth_s * config.site.fps)
+    reach = round(settings.trajectories.smooth_s * config.site.fps)
     paths = shortest_paths(lattice_of(floor, q, settings.paths))
-    walks = [walk_of(floor, q, path, reach) for path in paths]
-    walkers = walkers_of(config, masks, views, walks, settings.floor.aspect)
-    numbers = numbers_of(walkers, floor.person, settings.colours)
-    return {camera: rows_of_walks(view, walks, numbers, settings.walks) for camera, view in views.items()}
+    trajectories = [trajectory_of(floor, q, path, reach) for path in paths]
+    appearances = appearances_of(config, masks, views, trajectories, settings.floor.aspect)
+    numbers = assign_ids(appearances, floor.person, settings.meetings)
+    return {
+        camera: rows_of(view, trajectories, numbers, settings.trajectories) for camera, view in views.items()
+    }
 
 
-def views_of(
+def aligned_views(
     masks: Mapping[str, ForegroundMasks], ground: Mapping[str, Floats], boxes: Rows
 ) -> dict[str, CameraView]:
-    """Return the cameras, their homographies shifted until their feet agree."""
-    views = {camera: CameraView(ground[camera], it.size, it.line, it.weight) for camera, it in masks.items()}
+    """Return the cameras' geometry, with aligned homographies."""
+    views = {
+        camera: CameraView(ground[camera], it.size, it.height_model, it.weight)
+        for camera, it in masks.items()
+    }
     person = float(np.median([view.person() for view in views.values()]))
-    level = levelled(boxes, ground, {camera: it.size[1] for camera, it in views.items()}, person)
-    return {camera: replace(view, homography=level[camera]) for camera, view in views.items()}
+    aligned = align_homographies(boxes, ground, {camera: it.size[1] for camera, it in views.items()}, person)
+    return {camera: replace(view, homography=aligned[camera]) for camera, view in views.items()}
 
 
 def occupancy(floor: FloorGrid, masks: Sequence[ForegroundMasks], settings: OccupancySettings) -> Floats:
-    """Return the probabilities (T, L) that somebody stands at each place in each frame."""
+    """Return the probability (T, L) of a person at each place in each frame."""
     mapping = OccupancyMap(floor.rectangles, settings)
     frames = max(len(it.foreground) for it in masks)
     q = np.empty((frames, len(floor.places)))
     for frame in range(frames):
-        q[frame] = mapping.occupied([_sight(it, frame) for it in masks])
+        q[frame] = mapping.compute([_observation(it, frame) for it in masks])
     return q
 
 
 def lattice_of(floor: FloorGrid, q: Floats, settings: PathSettings) -> Lattice:
-    """Return the paper's network: being at a place costs `-log(q / (1 - q))`."""
-    sure = np.clip(q, settings.doubt, 1.0 - settings.doubt)
+    """Build the paper's network: being at a place costs `-log(q / (1 - q))`."""
+    clipped = np.clip(q, settings.doubt, 1.0 - settings.doubt)
     gates = np.where(floor.gates, settings.gate_cost, settings.inside_cost)
-    return Lattice(_whole(-np.log(sure / (1.0 - sure))), floor.moves, _whole(gates))
+    return Lattice(_as_integers(-np.log(clipped / (1.0 - clipped))), floor.moves, _as_integers(gates))
 
 
-def walkers_of(
+def appearances_of(
     config: Config,
     masks: Mapping[str, ForegroundMasks],
     views: Mapping[str, CameraView],
-    walks: Sequence[GroundTrajectory],
+    trajectories: Sequence[GroundTrajectory],
     aspect: float,
 ) -> list[PathAppearance]:
-    """Return what everybody looks like in all cameras, along their walks."""
-    firsts = [walk.first for walk in walks]
-    seen = []
+    """Return the appearance in all cameras along each trajectory."""
+    firsts = [trajectory.first for trajectory in trajectories]
+    by_camera = []
     for camera, view in views.items():
-        boxes = [view.boxes(walk.places, aspect) for walk in walks]
-        seen.append(looks_of(config, camera, masks[camera], firsts, boxes))
+        boxes = [view.boxes(trajectory.places, aspect) for trajectory in trajectories]
+        by_camera.append(path_histograms(config, camera, masks[camera], firsts, boxes))
     return [
         PathAppearance(
-            walk.first,
-            walk.places,
-            np.stack([looks[place] for looks, _ in seen], axis=1),
-            np.stack([pixels[place] for _, pixels in seen], axis=1),
+            trajectory.first,
+            trajectory.places,
+            np.stack([histograms[place] for histograms, _ in by_camera], axis=1),
+            np.stack([pixels[place] for _, pixels in by_camera], axis=1),
         )
-        for place, walk in enumerate(walks)
+        for place, trajectory in enumerate(trajectories)
     ]
 
 
-def _sight(masks: ForegroundMasks, frame: int) -> ForegroundObservation:
-    """Return a frame's foreground; shadows tell nothing, and neither does a frame that is not there."""
-    one = masks.foreground[frame] if frame < len(masks.foreground) else None
-    other = masks.shadow[frame] if frame < len(masks.shadow) else None
-    if one is None or other is None:
+def _observation(masks: ForegroundMasks, frame: int) -> ForegroundObservation:
+    """Return a frame's foreground; shadows and missing frames have weight zero."""
+    foreground = masks.foreground[frame] if frame < len(masks.foreground) else None
+    shadow = masks.shadow[frame] if frame < len(masks.shadow) else None
+    if foreground is None or shadow is None:
         return ForegroundObservation(np.zeros_like(masks.weight), np.zeros_like(masks.weight))
-    return ForegroundObservation(one / 255.0, masks.weight * (1.0 - other / 255.0))
+    return ForegroundObservation(foreground / 255.0, masks.weight * (1.0 - shadow / 255.0))
 
 
-def _whole(costs: Floats) -> Ints:
+def _as_integers(costs: Floats) -> Ints:
     return np.asarray(np.rint(_UNIT * costs), dtype=np.int64)

@@ -1,8 +1,8 @@
-"""The likeliest paths of any number of people over a grid, no two at one place at once.
+"""The most likely disjoint paths of any number of people over a grid (k shortest paths).
 
 Berclaz, Fleuret, Turetken and Fua, "Multiple object tracking using k-shortest paths optimization", IEEE
-PAMI 2011. The flow of least cost is found path by path, each the shortest in what the others leave
-(Suurballe), until no further path has a negative cost. Costs are whole numbers, so that it is exact.
+PAMI 2011. The min-cost flow is computed path by path, each the shortest in the residual network of the
+others (Suurballe), until no further path has a negative cost. Costs are integers, so the result is exact.
 """
 
 from __future__ import annotations
@@ -15,22 +15,20 @@ from numpy.typing import NDArray
 
 Ints: TypeAlias = NDArray[np.int64]
 
-NOWHERE = np.int64(2**60)
-"""A cost that nobody pays."""
+INFINITE = np.int64(2**60)
+"""An infinite cost."""
 _NONE, _END = -1, -2
 _SOURCE, _BACK = -1, -2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lattice:
-    """Places over time.
+    """The places over time, as a network.
 
     Attributes:
-        costs: (T, L) of being at a place: the logarithm of how unlikely that is; negative where likely.
-        moves: (L, K) the places that can be reached from each in one frame, itself among them; L is none.
-            Whoever can go somewhere can come back.
-        gates: (L,) what entering costs at each place, and what leaving does. Before the first frame and
-            after the last it costs nothing.
+        costs: (T, L) of being at a place: negative where that is likely.
+        moves: (L, K) the places reachable from each in one frame, itself included; L: none. Symmetric.
+        gates: (L,) the cost of entering, and of leaving, at each place; free in the first and the last frame.
     """
 
     costs: Ints
@@ -40,7 +38,7 @@ class Lattice:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GridPath:
-    """Where one person is: the frame `first` and the `places` (F,) from there on."""
+    """The path of one person: `places` (F,) from the frame `first` on."""
 
     first: int
     places: Ints
@@ -55,10 +53,10 @@ def shortest_paths(lattice: Lattice) -> list[GridPath]:
 
 
 class _Flow:
-    """Paths so far, and the network that they leave.
+    """The current paths and their residual network.
 
-    Every place at every frame is two nodes, *in* and *out*, joined by an arc that costs what it costs to be
-    there and can be used once. An arc in use can be taken back: it leads the other way at minus its cost.
+    Every place in every frame is two nodes, *in* and *out*, joined by an arc of capacity one with the cost of
+    being there. An arc in use can be reversed, at minus its cost.
     """
 
     def __init__(self, lattice: Lattice) -> None:
@@ -70,54 +68,54 @@ class _Flow:
         self._after = np.full(shape, _NONE, dtype=np.int64)
         self._before = np.full(shape, _NONE, dtype=np.int64)
         self._in = np.empty(shape, dtype=np.int64)
-        # One column more, which is nowhere, for moves that lead there.
+        # One more column for moves that lead nowhere.
         self._out = np.empty((self._frames, self._places + 1), dtype=np.int64)
         self._from = np.empty(shape, dtype=np.int64)
 
     def augment(self) -> bool:
-        """Add the shortest path, if that lowers the cost."""
-        self._measure()
+        """Add the shortest path if that lowers the cost; return whether it does."""
+        self._compute_distances()
         ends = self._out[:, :-1] + self._gates
         ends[-1] = self._out[-1, :-1]
         frame, place = divmod(int(ends.argmin()), self._places)
         if ends[frame, place] >= 0:
             return False
-        self._take(frame, place)
+        self._add_path(frame, place)
         return True
 
     def paths(self) -> list[GridPath]:
-        """Return the paths that are in use."""
-        found = []
+        """Return the current paths."""
+        result = []
         for first, place in zip(*np.nonzero(self._used & (self._before == _END)), strict=True):
-            frame, here, places = int(first), int(place), []
-            while here != _END:
-                places.append(here)
-                here = int(self._after[frame, here])
+            frame, current, places = int(first), int(place), []
+            while current != _END:
+                places.append(current)
+                current = int(self._after[frame, current])
                 frame += 1
-            found.append(GridPath(int(first), np.array(places, dtype=np.int64)))
-        return found
+            result.append(GridPath(int(first), np.array(places, dtype=np.int64)))
+        return result
 
-    def _measure(self) -> None:
-        """Find how far every node is from the source (Bellman and Ford).
+    def _compute_distances(self) -> None:
+        """Compute the distance of every node from the source (Bellman-Ford).
 
-        All arcs lead to the next frame, but those that take something back, which are on the paths in use.
-        So frame after frame is looked at forwards, then the paths backwards, until nothing is nearer.
+        All arcs lead to the next frame, except the reversed ones on the current paths. So frames are relaxed
+        forwards, then the paths backwards, until no distance changes.
         """
         self._in[:] = self._gates
         self._in[0] = 0
         self._from[:] = _SOURCE
-        self._out[:] = NOWHERE
-        nearer = np.ones(self._frames, dtype=np.bool_)
-        while nearer.any():
-            self._forwards(nearer)
-            nearer = self._backwards()
+        self._out[:] = INFINITE
+        changed = np.ones(self._frames, dtype=np.bool_)
+        while changed.any():
+            self._relax_forwards(changed)
+            changed = self._relax_backwards()
 
-    def _forwards(self, nearer: NDArray[np.bool_]) -> None:
-        """Go on from the frames whose *out* nodes are `nearer`, and from all that are so by that."""
+    def _relax_forwards(self, changed: NDArray[np.bool_]) -> None:
+        """Relax forwards from the frames whose *out* nodes got `changed`, which marks more of them."""
         rows = np.arange(self._places)
         for frame in range(self._frames):
-            again = bool(nearer[frame])
-            if frame and nearer[frame - 1]:
+            again = bool(changed[frame])
+            if frame and changed[frame - 1]:
                 reached = self._out[frame - 1][self._moves]
                 choice = reached.argmin(axis=1)
                 value = reached[rows, choice]
@@ -130,11 +128,11 @@ class _Flow:
                 free = ~self._used[frame]
                 there = self._in[frame] + self._costs[frame]
                 self._out[frame, :-1][free] = there[free]
-                nearer[frame] = True
+                changed[frame] = True
 
-    def _backwards(self) -> NDArray[np.bool_]:
-        """Take paths in use back; give the frames (T,) whose *out* nodes are nearer by that."""
-        nearer = np.zeros(self._frames, dtype=np.bool_)
+    def _relax_backwards(self) -> NDArray[np.bool_]:
+        """Relax reversed arcs; return the frames (T,) whose *out* nodes got nearer."""
+        changed = np.zeros(self._frames, dtype=np.bool_)
         for frame in range(self._frames - 2, -1, -1):
             places = np.flatnonzero(self._after[frame] >= 0)
             value = self._in[frame + 1][self._after[frame][places]]
@@ -143,50 +141,50 @@ class _Flow:
                 continue
             places, value = places[better], value[better]
             self._out[frame][places] = value
-            nearer[frame] = True
+            changed[frame] = True
             value = value - self._costs[frame][places]
             better = value < self._in[frame][places]
             self._in[frame][places[better]] = value[better]
             self._from[frame][places[better]] = _BACK
-        return nearer
+        return changed
 
-    def _take(self, frame: int, place: int) -> None:
-        """Put the shortest path to leaving at a place into use; what it takes back goes first."""
+    def _add_path(self, frame: int, place: int) -> None:
+        """Add the shortest path that ends at a place; arcs that it reverses are removed first."""
         links: list[tuple[int, int, int]] = []
-        taken: list[tuple[int, int, int]] = []
+        removed: list[tuple[int, int, int]] = []
         nodes: list[tuple[int, int]] = []
-        emptied: list[tuple[int, int]] = []
+        removed_nodes: list[tuple[int, int]] = []
         last = (frame, place)
         while True:
-            # At the out node: it was come to from its own in node, or by taking back the arc after it.
+            # At the out node: reached from its own in node, or by reversing the arc after it.
             while self._used[frame, place]:
                 after = int(self._after[frame, place])
-                taken.append((frame, place, after))
+                removed.append((frame, place, after))
                 frame, place = frame + 1, after
                 if self._from[frame, place] != _BACK:
                     break
-                emptied.append((frame, place))
+                removed_nodes.append((frame, place))
             else:
                 nodes.append((frame, place))
-            came = int(self._from[frame, place])
-            if came == _SOURCE:
+            previous = int(self._from[frame, place])
+            if previous == _SOURCE:
                 break
-            links.append((frame - 1, came, place))
-            frame, place = frame - 1, came
-        self._put(taken, emptied, nodes, links)
+            links.append((frame - 1, previous, place))
+            frame, place = frame - 1, previous
+        self._apply(removed, removed_nodes, nodes, links)
         self._before[frame, place] = _END
         self._after[last] = _END
 
-    def _put(
+    def _apply(
         self,
-        taken: list[tuple[int, int, int]],
-        emptied: list[tuple[int, int]],
+        removed: list[tuple[int, int, int]],
+        removed_nodes: list[tuple[int, int]],
         nodes: list[tuple[int, int]],
         links: list[tuple[int, int, int]],
     ) -> None:
-        for frame, one, other in taken:
+        for frame, one, other in removed:
             self._after[frame, one] = self._before[frame + 1, other] = _NONE
-        for node in emptied:
+        for node in removed_nodes:
             self._used[node] = False
         for node in nodes:
             self._used[node] = True

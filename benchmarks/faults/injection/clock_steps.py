@@ -1,4 +1,4 @@
-"""The machine's clock, stepped by an hour: in front of the C library, for all processes of a site at once."""
+"""Clock steps of an hour, by a preloaded library that shifts the clock of all processes of a site."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ time_t time(time_t *now) {
 
 
 class ClockOffset:
-    """Seconds by which the site's clock is ahead."""
+    """The shared offset of the site's clock, seconds."""
 
     def __init__(self, path: Path) -> None:
         path.write_bytes(struct.pack("q", 0))
@@ -72,17 +72,17 @@ class ClockOffset:
             self._shared = mmap.mmap(file.fileno(), struct.calcsize("q"))
 
     def step(self, seconds: int) -> None:
-        """Step the clock."""
+        """Step the clock by so many seconds."""
         (ahead,) = struct.unpack("q", self._shared[:])
         self._shared[:] = struct.pack("q", ahead + seconds)
 
 
 @contextlib.asynccontextmanager
 async def with_clock(views: StampedViews, folder: Path) -> AsyncIterator[FaultSite]:
-    """Run a site with a clock that can be stepped.
+    """Run a site whose clock can be stepped.
 
     Raises:
-        CannotRunError: there is no C compiler.
+        CannotRunError: gcc is missing, or fails.
     """
     gcc = shutil.which("gcc")
     if gcc is None:
@@ -96,18 +96,18 @@ async def with_clock(views: StampedViews, folder: Path) -> AsyncIterator[FaultSi
         raise CannotRunError("gcc could not compile what steps the clock")
     clock = await asyncio.to_thread(ClockOffset, shared)
     environment = {"LD_PRELOAD": str(shim), "FAULTS_CLOCK": str(shared)}
-    async with with_up(views, folder, environment=environment) as stand:
-        stand.control = clock
-        yield stand
+    async with with_up(views, folder, environment=environment) as fault_site:
+        fault_site.control = clock
+        yield fault_site
 
 
-def stepped(seconds: int) -> Inject:
+def step_clock(seconds: int) -> Inject:
     """Step the clock of all processes."""
 
-    async def inject(stand: FaultSite) -> None:
-        before = (await site(stand.url)).now - time.time()
-        stand.control.step(seconds)
-        after = (await site(stand.url)).now - time.time()
+    async def inject(fault_site: FaultSite) -> None:
+        before = (await site(fault_site.url)).now - time.time()
+        fault_site.control.step(seconds)
+        after = (await site(fault_site.url)).now - time.time()
         if abs(after - before - seconds) > _EXACT_S:
             raise RuntimeError("the server's clock did not step")
 
@@ -115,6 +115,6 @@ def stepped(seconds: int) -> Inject:
 
 
 FAULTS = (
-    Fault("clock an hour ahead", with_clock, stepped(_HOUR_S), 8.0),
-    Fault("clock an hour back", with_clock, stepped(-_HOUR_S), 8.0),
+    Fault("clock an hour ahead", with_clock, step_clock(_HOUR_S), 8.0),
+    Fault("clock an hour back", with_clock, step_clock(-_HOUR_S), 8.0),
 )

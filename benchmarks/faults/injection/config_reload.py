@@ -1,4 +1,4 @@
-"""A configuration with a mistake, read again by a running site: the old one stays, and the log says why."""
+"""Reload of an invalid configuration by a running site: the old one stays, and the log says why."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ from benchmarks.faults.site.fault_site import Fault, FaultSite, with_up
 from benchmarks.latency.running_site import CONFIG, LOG
 
 _MISTAKE = {"view": {"switch_cost_s": "banana"}}
-_SAID = "view.switch_cost_s: Input should be a valid number"
+_ERROR = "view.switch_cost_s: Input should be a valid number"
 _WITHIN_S = 5.0
 _POLL_S = 0.05
 
 
-async def mistaken(stand: FaultSite) -> None:
-    """Write a mistake into the file, have it read again, and wait until the error is told; then mend it.
+async def reload_with_mistake(fault_site: FaultSite) -> None:
+    """Write an invalid value, reload, wait until the error is logged, then restore the file.
 
     Raises:
-        RuntimeError: nobody says what is wrong, and where.
+        RuntimeError: the error is not logged.
     """
-    path, log = stand.folder / CONFIG, stand.folder / LOG
+    path, log = fault_site.folder / CONFIG, fault_site.folder / LOG
     good = await asyncio.to_thread(path.read_text, encoding="utf-8")
-    already = await asyncio.to_thread(_times, log)
+    errors_before = await asyncio.to_thread(_count_errors, log)
     bad = yaml.safe_dump({**yaml.safe_load(good), **_MISTAKE}, sort_keys=False)
     await asyncio.to_thread(path.write_text, bad, encoding="utf-8")
     try:
-        os.kill(stand.main, signal.SIGHUP)
+        os.kill(fault_site.supervisor_pid, signal.SIGHUP)
         async with asyncio.timeout(_WITHIN_S):
-            while await asyncio.to_thread(_times, log) == already:  # noqa: ASYNC110 — a file of another process
+            while await asyncio.to_thread(_count_errors, log) == errors_before:  # noqa: ASYNC110 — a file of another process
                 await asyncio.sleep(_POLL_S)
     except TimeoutError:
-        raise RuntimeError(f"nobody said: {_SAID}") from None
+        raise RuntimeError(f"not logged: {_ERROR}") from None
     finally:
         await asyncio.to_thread(path.write_text, good, encoding="utf-8")
-    os.kill(stand.main, signal.SIGHUP)
+    os.kill(fault_site.supervisor_pid, signal.SIGHUP)
 
 
-def _times(log: Path) -> int:
-    return log.read_text(encoding="utf-8", errors="replace").count(_SAID)
+def _count_errors(log: Path) -> int:
+    return log.read_text(encoding="utf-8", errors="replace").count(_ERROR)
 
 
-FAULTS = (Fault("reload, one value wrong", with_up, mistaken),)
+FAULTS = (Fault("reload, one value wrong", with_up, reload_with_mistake),)

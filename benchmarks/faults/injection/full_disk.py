@@ -1,4 +1,4 @@
-"""A disk that is full while a site records and writes decisions: in memory, seen by its processes only."""
+"""A full disk while a site records and writes decisions: a small tmpfs in its own mount namespace."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 from benchmarks.common.environment import CannotRunError, one_thread_environment
-from benchmarks.faults.injection.separate_processes import configured
-from benchmarks.faults.site.fault_site import Fault, FaultSite, listening, told_to_end
+from benchmarks.faults.injection.separate_processes import write_config
+from benchmarks.faults.site.fault_site import Fault, FaultSite, follow_events, terminate_process
 from benchmarks.faults.video.stamped_views import StampedViews
 
 _MB = 48
 _FULL_S = 6.0
 _MOUNTED = 'mount -t tmpfs -o size="$1" none "$2" && shift 2 && exec "$@"'
 _CHUNK = 1 << 20
-_DECIDED = "decided"
+_DECISIONS = "decided"
 
 
 @contextlib.asynccontextmanager
-async def on_small_disk(views: StampedViews, folder: Path) -> AsyncIterator[FaultSite]:
-    """Run `myview up`, which records onto a small disk, and writes what it decides there, too.
+async def with_small_disk(views: StampedViews, folder: Path) -> AsyncIterator[FaultSite]:
+    """Run `myview up` with recordings and decision files on a small disk.
 
     Raises:
         CannotRunError: such a disk cannot be mounted here.
@@ -32,34 +32,42 @@ async def on_small_disk(views: StampedViews, folder: Path) -> AsyncIterator[Faul
     unshare = shutil.which("unshare")
     if unshare is None or os.geteuid():
         raise CannotRunError("a small disk needs unshare (util-linux), and the right to mount")
-    config, url = await asyncio.to_thread(configured, views, folder)
-    kept = folder / "kept"
-    await asyncio.to_thread(kept.mkdir)
-    command = [sys.executable, "-m", "server.cli.main", "up", str(config), "--out", str(kept / _DECIDED)]
+    config, url = await asyncio.to_thread(write_config, views, folder)
+    recordings = folder / "kept"
+    await asyncio.to_thread(recordings.mkdir)
+    command = [
+        sys.executable,
+        "-m",
+        "server.cli.main",
+        "up",
+        str(config),
+        "--out",
+        str(recordings / _DECISIONS),
+    ]
     with (folder / "up.log").open("w", encoding="utf-8") as log:
         process = await asyncio.create_subprocess_exec(
-            *(unshare, "-m", "sh", "-c", _MOUNTED, "sh", f"{_MB}m", str(kept), *command),
+            *(unshare, "-m", "sh", "-c", _MOUNTED, "sh", f"{_MB}m", str(recordings), *command),
             env=one_thread_environment(),
             stdout=log,
             stderr=log,
         )
     disk: int | None = None
     try:
-        stand = FaultSite(url, folder, process.pid)
-        async with listening(stand):
-            disk = os.open(f"/proc/{process.pid}/root{kept}", os.O_RDONLY | os.O_DIRECTORY)
-            stand.recorded = Path(f"/proc/self/fd/{disk}")  # it is there as long as this is open
-            yield stand
-            stand.ended.append(await told_to_end("up", process))
+        fault_site = FaultSite(url, folder, process.pid)
+        async with follow_events(fault_site):
+            disk = os.open(f"/proc/{process.pid}/root{recordings}", os.O_RDONLY | os.O_DIRECTORY)
+            fault_site.recorded = Path(f"/proc/self/fd/{disk}")  # valid as long as this is open
+            yield fault_site
+            fault_site.exits.append(await terminate_process("up", process))
     finally:
         if process.returncode is None:
             process.kill()
             await process.wait()
 
 
-async def full(stand: FaultSite) -> None:
-    """Fill the disk, and make room again after a while."""
-    filler = stand.recorded / "filler"
+async def fill_disk(fault_site: FaultSite) -> None:
+    """Fill the disk, and free it again after a while."""
+    filler = fault_site.recorded / "filler"
     await asyncio.to_thread(_fill, filler)
     await asyncio.sleep(_FULL_S)
     await asyncio.to_thread(filler.unlink)
@@ -71,4 +79,4 @@ def _fill(path: Path) -> None:
             file.write(bytes(_CHUNK))
 
 
-FAULTS = (Fault("disk full", on_small_disk, full, 20.0, unrecorded=True),)
+FAULTS = (Fault("disk full", with_small_disk, fill_disk, 20.0, stops_recording=True),)

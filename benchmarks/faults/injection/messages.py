@@ -1,8 +1,8 @@
-"""Messages that are lost, doubled or in another order, and a router that is gone.
+"""Lost, duplicated and reordered messages, and a router that is killed.
 
-The process :mod:`benchmarks.faults.site.lossy_bus` stands between the cameras and all other processes. All
-kinds of messages pass it: the cameras look at the same ground, and an operator keeps pointing at the people
-whom viewers watch.
+The process :mod:`benchmarks.faults.site.lossy_bus` forwards all messages between the cameras and the other
+processes. All kinds of messages occur: the cameras share the ground, and an operator keeps pointing at the
+watched people.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 import aiohttp
 
 from benchmarks.common.environment import one_thread_environment
-from benchmarks.faults.injection.separate_processes import apart
+from benchmarks.faults.injection.separate_processes import run_separately
 from benchmarks.faults.site.fault_site import Fault, FaultSite, Inject
 from benchmarks.faults.site.lossy_bus import FOUND, POINTING
 from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews
@@ -29,12 +29,12 @@ from server.http.access.csrf import CSRF_HEADER
 _GONE_S = 30.0
 _FAULTY_S = 8.0
 _KINDS = ("tracks", "status", FOUND, POINTING)
-"""Of each of these some must have been lost, doubled or disordered; small pictures are seldom."""
+"""Kinds of which some messages must have been altered; thumbnails are too rare."""
 _POLL_S = 0.05
 
 
 class _LossyBusProcess:
-    """The process in the middle."""
+    """The process that forwards messages between the cameras and the best view."""
 
     def __init__(self, connect: str, listen: Mapping[str, str]) -> None:
         listens = [f"{camera}={address}" for camera, address in listen.items()]
@@ -47,14 +47,14 @@ class _LossyBusProcess:
             sys.executable, *self._words, stdin=pipe, stdout=pipe, env=environment
         )
 
-    async def say(self, word: str) -> Mapping[str, int]:
-        """Return how messages pass from now on; give how many have not passed plainly so far, by kind."""
+    async def set_mode(self, mode: str) -> Mapping[str, int]:
+        """Set how messages are forwarded; return how many were altered so far, by kind."""
         process = self._process
         if process is None or process.stdin is None or process.stdout is None:
             return {}
-        process.stdin.write(f"{word}\n".encode())
-        said: Mapping[str, int] = json.loads(await process.stdout.readline() or b"{}")
-        return said
+        process.stdin.write(f"{mode}\n".encode())
+        altered: Mapping[str, int] = json.loads(await process.stdout.readline() or b"{}")
+        return altered
 
     async def kill(self) -> None:
         if self._process is not None and self._process.returncode is None:
@@ -63,48 +63,48 @@ class _LossyBusProcess:
 
 
 @contextlib.asynccontextmanager
-async def with_middle(views: StampedViews, folder: Path) -> AsyncIterator[FaultSite]:
-    """Run a site whose cameras reach each other and the best view by a process in the middle only."""
+async def with_lossy_bus(views: StampedViews, folder: Path) -> AsyncIterator[FaultSite]:
+    """Run a site whose cameras reach each other and the best view through the lossy bus only."""
     near = {camera: f"tcp/127.0.0.1:{free_port()}" for camera in CAMERAS}
     far = f"tcp/127.0.0.1:{free_port()}"
-    middle = _LossyBusProcess(far, near)
-    await middle.start()
+    bus_process = _LossyBusProcess(far, near)
+    await bus_process.start()
     settings: Mapping[str, Mapping[str, Any]] = {
         "zenoh": {"connect": far, "listen": far},
         "track": {"assist": {"enabled": True}},
     }
     own = {camera: {"MYVIEW_ZENOH__CONNECT": address} for camera, address in near.items()}
     try:
-        async with apart(views, folder, settings, own) as stand:
-            stand.control = middle
-            operator = asyncio.create_task(_operate(stand))
+        async with run_separately(views, folder, settings, own) as fault_site:
+            fault_site.control = bus_process
+            operator = asyncio.create_task(_operate(fault_site))
             try:
-                yield stand
+                yield fault_site
             finally:
                 operator.cancel()
                 await asyncio.gather(operator, return_exceptions=True)
     finally:
-        await middle.kill()
+        await bus_process.kill()
 
 
-async def _operate(stand: FaultSite) -> None:
-    """Point at whom viewers watch, once a GOP, where they really are: until cancelled."""
+async def _operate(fault_site: FaultSite) -> None:
+    """Send an operator correction for each watched person, once a GOP, until cancelled."""
     pointed = 0
-    async with aiohttp.ClientSession(stand.url, headers={CSRF_HEADER: "1"}) as session:
+    async with aiohttp.ClientSession(fault_site.url, headers={CSRF_HEADER: "1"}) as session:
         while True:
-            told = stand.told.gops
-            if len(told) > pointed:
-                pointed, gop = len(told), told[-1][1]
-                for viewer in stand.viewers:
-                    said = _pointing(gop, viewer.number)
-                    if said is not None:
+            gops = fault_site.events.gops
+            if len(gops) > pointed:
+                pointed, gop = len(gops), gops[-1][1]
+                for viewer in fault_site.viewers:
+                    request = _pointing(gop, viewer.number)
+                    if request is not None:
                         with contextlib.suppress(aiohttp.ClientError):
-                            await (await session.post("/api/operator/pointing", json=said)).read()
+                            await (await session.post("/api/operator/pointing", json=request)).read()
             await asyncio.sleep(_POLL_S)
 
 
 def _pointing(gop: Gop, number: int) -> dict[str, Any] | None:
-    """Return where somebody is in the last frame of a GOP; None: they are in no box."""
+    """Return the correction at a person's box in the last frame of a GOP; None: they have no box."""
     camera = gop.choices.get(number)
     boxes = gop.boxes.get(camera, ()) if camera else ()
     for box in boxes[-1] if boxes else ():
@@ -115,30 +115,30 @@ def _pointing(gop: Gop, number: int) -> dict[str, Any] | None:
     return None
 
 
-def passed(how: str) -> Inject:
-    """Let messages pass in some way for a while."""
+def distort_messages(mode: str) -> Inject:
+    """Alter messages in this mode for a while."""
 
-    async def inject(stand: FaultSite) -> None:
-        before = await stand.control.say(how)
+    async def inject(fault_site: FaultSite) -> None:
+        before = await fault_site.control.set_mode(mode)
         await asyncio.sleep(_FAULTY_S)
-        after = await stand.control.say("plain")
+        after = await fault_site.control.set_mode("plain")
         plain = [kind for kind in _KINDS if after.get(kind, 0) <= before.get(kind, 0)]
         if plain:
-            raise RuntimeError(f"nothing has befallen any message of: {', '.join(plain)}")
+            raise RuntimeError(f"no message was altered of: {', '.join(plain)}")
 
     return inject
 
 
-async def router_gone(stand: FaultSite) -> None:
-    """Kill the router, and start it again after a while."""
-    await stand.control.kill()
+async def kill_router(fault_site: FaultSite) -> None:
+    """Kill the router, and restart it after a while."""
+    await fault_site.control.kill()
     await asyncio.sleep(_GONE_S)
-    await stand.control.start()
+    await fault_site.control.start()
 
 
 FAULTS = (
-    Fault("messages: 30 % lost", with_middle, passed("lost"), 10.0),
-    Fault("messages: 30 % doubled", with_middle, passed("doubled"), 10.0),
-    Fault("messages: 30 % disordered", with_middle, passed("disordered"), 10.0),
-    Fault("router gone 30 s", with_middle, router_gone, 40.0, None),
+    Fault("messages: 30 % lost", with_lossy_bus, distort_messages("lost"), 10.0),
+    Fault("messages: 30 % doubled", with_lossy_bus, distort_messages("doubled"), 10.0),
+    Fault("messages: 30 % disordered", with_lossy_bus, distort_messages("disordered"), 10.0),
+    Fault("router gone 30 s", with_lossy_bus, kill_router, 40.0, None),
 )

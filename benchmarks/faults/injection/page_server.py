@@ -1,4 +1,4 @@
-"""The page while its server dies: when it is back."""
+"""The page while its server is killed: how soon it plays again."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ _END = """() => {
 }"""
 
 
-async def killed(stand: FaultSite) -> None:
-    """Kill the best view while a browser shows the page; note when more video than before has come.
+async def kill_server_behind_page(fault_site: FaultSite) -> None:
+    """Kill the best view while a browser shows the page; record when new video arrives.
 
     Raises:
-        RuntimeError: there is no browser, or the page does not come back.
+        RuntimeError: there is no browser, or the page does not recover.
     """
     if chromium_path() is None:
-        raise RuntimeError("there is no browser: it needs Chromium")
+        raise RuntimeError("Chromium is missing")
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)  # the page's policy forbids eval, which asks it here
-        await open_when_there(page, f"{stand.url}?object={stand.viewers[0].number}")
+        await open_when_there(page, f"{fault_site.url}?object={fault_site.viewers[0].number}")
         await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
-        stand.returned.clear()  # a browser that starts may have kept a busy machine from being ready
-        stand.send(signal.SIGKILL, "bestview")
+        fault_site.ready_times.clear()  # the start of the browser may have interrupted it
+        fault_site.send(signal.SIGKILL, "bestview")
         await asyncio.sleep(_POLL_S)
         before = await page.evaluate(_END)
         give_up = time.monotonic() + _PATIENCE_S
         while await page.evaluate(_END) <= before:
             if time.monotonic() > give_up:
-                raise RuntimeError("the page did not come back")
+                raise RuntimeError("the page did not recover")
             await asyncio.sleep(_POLL_S)
-        stand.page_at = time.monotonic()
+        fault_site.page_resumed_at = time.monotonic()
 
 
-FAULTS = (Fault("kill bestview, page", with_up, killed, 15.0, None, breaks=True),)
+FAULTS = (Fault("kill bestview, page", with_up, kill_server_behind_page, 15.0, None, kills_server=True),)

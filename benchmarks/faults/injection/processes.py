@@ -1,4 +1,4 @@
-"""Processes that die or freeze: each in turn, and any two of them at once."""
+"""Processes that are killed or frozen, one by one and in pairs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator
 
 import aiohttp
 
-from benchmarks.faults.injection.process_pairs import BESTVIEW, DRAWING, SHOWN, names, title, turns
+from benchmarks.faults.injection.process_pairs import BESTVIEW, DRAWING, SHOWN, names, process_sets, title
 from benchmarks.faults.site.fault_site import LEASE_S, Fault, FaultSite, Inject, with_up
 
 _FROZEN_S = 4.0
@@ -17,42 +17,42 @@ _SOME_BYTES, _MORE_BYTES = 10_000, 100_000
 _AGAIN_S = 0.2
 
 
-def killed(*processes: str) -> Inject:
-    """Kill processes at once."""
+def kill_processes(*processes: str) -> Inject:
+    """Kill processes (SIGKILL)."""
 
-    async def inject(stand: FaultSite) -> None:
-        stand.send(signal.SIGKILL, *names(stand, processes))
+    async def inject(fault_site: FaultSite) -> None:
+        fault_site.send(signal.SIGKILL, *names(fault_site, processes))
 
     return inject
 
 
-def frozen(*processes: str, seconds: float = _FROZEN_S) -> Inject:
-    """Stop processes for a while."""
+def freeze_processes(*processes: str, seconds: float = _FROZEN_S) -> Inject:
+    """Freeze processes for a while (SIGSTOP)."""
 
-    async def inject(stand: FaultSite) -> None:
-        chosen = names(stand, processes)
-        stand.send(signal.SIGSTOP, *chosen)
+    async def inject(fault_site: FaultSite) -> None:
+        chosen = names(fault_site, processes)
+        fault_site.send(signal.SIGSTOP, *chosen)
         try:
             await asyncio.sleep(seconds)
         finally:
-            stand.send(signal.SIGCONT, *chosen)
+            fault_site.send(signal.SIGCONT, *chosen)
 
     return inject
 
 
-def while_drawing(inject: Inject, *, breaks: bool) -> Inject:
-    """Have a viewer of JPEG, so that there is a drawing process.
+def while_drawing(inject: Inject, *, kills_server: bool) -> Inject:
+    """Watch MJPEG meanwhile, so that there is a render worker.
 
-    Their stream goes on; where it breaks with its server, it is opened again, and pictures come.
+    The stream must continue; where its server is killed, it is opened again.
     """
 
-    async def injected(stand: FaultSite) -> None:
-        path = f"/objects/{stand.viewers[0].number}/best.mjpeg"
-        async with aiohttp.ClientSession(stand.url, raise_for_status=True) as session:
+    async def injected(fault_site: FaultSite) -> None:
+        path = f"/objects/{fault_site.viewers[0].number}/best.mjpeg"
+        async with aiohttp.ClientSession(fault_site.url, raise_for_status=True) as session:
             async with _pictures(session, path) as content:
                 await content.readexactly(_SOME_BYTES)
-                await inject(stand)
-                if not breaks:
+                await inject(fault_site)
+                if not kills_server:
                     await content.readexactly(_MORE_BYTES)
                     return
             async with _pictures(session, path) as content:
@@ -63,7 +63,7 @@ def while_drawing(inject: Inject, *, breaks: bool) -> Inject:
 
 @contextlib.asynccontextmanager
 async def _pictures(session: aiohttp.ClientSession, path: str) -> AsyncIterator[aiohttp.StreamReader]:
-    """Open a stream of JPEG; a busy server, or one that is not there yet, is asked again."""
+    """Open an MJPEG stream; retry while the server is busy or not up yet."""
     while True:
         try:
             answer = await session.get(path)
@@ -75,23 +75,27 @@ async def _pictures(session: aiohttp.ClientSession, path: str) -> AsyncIterator[
 
 
 def _kill(processes: tuple[str, ...]) -> Fault:
-    name, inject, breaks = f"kill {title(processes)}", killed(*processes), BESTVIEW in processes
+    name, inject, kills_server = f"kill {title(processes)}", kill_processes(*processes), BESTVIEW in processes
     if DRAWING in processes:
-        inject = while_drawing(inject, breaks=breaks)
-    return Fault(name, with_up, inject, 15.0, None, breaks=True) if breaks else Fault(name, with_up, inject)
+        inject = while_drawing(inject, kills_server=kills_server)
+    return (
+        Fault(name, with_up, inject, 15.0, None, kills_server=True)
+        if kills_server
+        else Fault(name, with_up, inject)
+    )
 
 
 def _freeze(processes: tuple[str, ...]) -> Fault:
-    inject = frozen(*processes)
+    inject = freeze_processes(*processes)
     if DRAWING in processes:
-        inject = while_drawing(inject, breaks=False)
-    within = None if BESTVIEW in processes else LEASE_S + 1.0 if SHOWN in processes else 1.0
-    return Fault(f"freeze {title(processes)}", with_up, inject, 9.0, within)
+        inject = while_drawing(inject, kills_server=False)
+    max_gap_s = None if BESTVIEW in processes else LEASE_S + 1.0 if SHOWN in processes else 1.0
+    return Fault(f"freeze {title(processes)}", with_up, inject, 9.0, max_gap_s)
 
 
 FAULTS = (
-    *map(_kill, turns(BESTVIEW)),
-    *map(_freeze, turns(BESTVIEW)),
-    *map(_freeze, (it for it in turns() if BESTVIEW in it)),
-    *map(_kill, (it for it in turns() if BESTVIEW in it)),
+    *map(_kill, process_sets(BESTVIEW)),
+    *map(_freeze, process_sets(BESTVIEW)),
+    *map(_freeze, (it for it in process_sets() if BESTVIEW in it)),
+    *map(_kill, (it for it in process_sets() if BESTVIEW in it)),
 )

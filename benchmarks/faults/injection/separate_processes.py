@@ -1,4 +1,4 @@
-"""The site as containers are run: each process for itself, told to end and started again."""
+"""Sites whose processes run separately, as in containers, and are restarted one by one."""
 
 from __future__ import annotations
 
@@ -12,8 +12,15 @@ from typing import IO, Any
 import yaml
 
 from benchmarks.common.environment import one_thread_environment
-from benchmarks.faults.injection.process_pairs import BESTVIEW, DRAWING, names, title, turns
-from benchmarks.faults.site.fault_site import SETTINGS, Fault, FaultSite, Inject, listening, told_to_end
+from benchmarks.faults.injection.process_pairs import BESTVIEW, DRAWING, names, process_sets, title
+from benchmarks.faults.site.fault_site import (
+    SETTINGS,
+    Fault,
+    FaultSite,
+    Inject,
+    follow_events,
+    terminate_process,
+)
 from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews
 from server.cli.generated_config import free_port
 
@@ -21,7 +28,7 @@ NAMES = ("bestview", "sync", *CAMERAS)
 
 
 class SeparateProcesses:
-    """Processes that are started one by one; ``own`` is what the environment of each says besides."""
+    """Processes that are started one by one; ``own`` adds variables to the environment of each."""
 
     def __init__(
         self, config: Path, log: IO[str], own: Mapping[str, Mapping[str, str]] | None = None
@@ -40,12 +47,12 @@ class SeparateProcesses:
         )
 
 
-def configured(
+def write_config(
     views: StampedViews, folder: Path, settings: Mapping[str, Mapping[str, Any]] | None = None
 ) -> tuple[Path, str]:
-    """Write the configuration of a site on free ports; give it, and the site's address.
+    """Write the configuration of a site on free ports; return its path and the site's address.
 
-    `settings`, by section, are set besides.
+    `settings`, by section, override the defaults.
     """
     bus, http = f"tcp/127.0.0.1:{free_port()}", free_port()
     content: dict[str, Any] = {
@@ -65,50 +72,54 @@ def configured(
 
 
 @contextlib.asynccontextmanager
-async def apart(
+async def run_separately(
     views: StampedViews,
     folder: Path,
     settings: Mapping[str, Mapping[str, Any]] | None = None,
     own: Mapping[str, Mapping[str, str]] | None = None,
 ) -> AsyncIterator[FaultSite]:
-    """Run a site's processes one by one, each with an environment of its own; in the end tell them to end."""
-    config, url = configured(views, folder, settings)
+    """Run a site's processes separately, each with its own environment; terminate them in the end."""
+    config, url = write_config(views, folder, settings)
     with (folder / "site.log").open("w", encoding="utf-8") as log:
         control = SeparateProcesses(config, log, own)
-        stand = FaultSite(url, folder, 0, control=control, recorded=folder / "kept")
+        fault_site = FaultSite(url, folder, 0, control=control, recorded=folder / "kept")
         try:
             for name in NAMES:
                 await control.start(name)
-            async with listening(stand):
-                yield stand
+            async with follow_events(fault_site):
+                yield fault_site
         finally:
-            stand.ended += await asyncio.gather(
-                *(told_to_end(name, it) for name, it in control.processes.items() if it.returncode is None)
+            fault_site.exits += await asyncio.gather(
+                *(
+                    terminate_process(name, it)
+                    for name, it in control.processes.items()
+                    if it.returncode is None
+                )
             )
 
 
-def restarted(*processes: str) -> Inject:
-    """Stop processes, and restart each as soon as it has exited."""
+def restart_processes(*processes: str) -> Inject:
+    """Terminate processes, and restart each as soon as it has exited."""
 
-    async def restart(stand: FaultSite, name: str) -> None:
-        stand.ended.append(await told_to_end(name, stand.control.processes[name]))
-        await stand.control.start(name)
+    async def restart(fault_site: FaultSite, name: str) -> None:
+        fault_site.exits.append(await terminate_process(name, fault_site.control.processes[name]))
+        await fault_site.control.start(name)
 
-    async def inject(stand: FaultSite) -> None:
-        await asyncio.gather(*(restart(stand, name) for name in names(stand, processes)))
+    async def inject(fault_site: FaultSite) -> None:
+        await asyncio.gather(*(restart(fault_site, name) for name in names(fault_site, processes)))
 
     return inject
 
 
 def _restart(processes: tuple[str, ...]) -> Fault:
-    name, inject = f"restart {title(processes)}", restarted(*processes)
+    name, inject = f"restart {title(processes)}", restart_processes(*processes)
     if BESTVIEW in processes:
-        return Fault(name, apart, inject, 15.0, None, breaks=True)
-    return Fault(name, apart, inject)
+        return Fault(name, run_separately, inject, 15.0, None, kills_server=True)
+    return Fault(name, run_separately, inject)
 
 
-# A drawing process is told to end by nobody but the best view, whose child it is.
+# A render worker is terminated only by the best view, its parent.
 FAULTS = (
-    *map(_restart, turns(BESTVIEW, DRAWING)),
-    *map(_restart, (it for it in turns(DRAWING) if BESTVIEW in it)),
+    *map(_restart, process_sets(BESTVIEW, DRAWING)),
+    *map(_restart, (it for it in process_sets(DRAWING) if BESTVIEW in it)),
 )

@@ -1,4 +1,4 @@
-"""Sites and processes that are told to end at awkward moments."""
+"""Shutdown at awkward moments: right after the start, and while clients are connected."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from pathlib import Path
 import aiohttp
 
 from benchmarks.common.environment import one_thread_environment
-from benchmarks.faults.injection.separate_processes import NAMES, SeparateProcesses, configured
-from benchmarks.faults.site.fault_site import Fault, FaultSite, ProcessExit, told_to_end, with_up
+from benchmarks.faults.injection.separate_processes import NAMES, SeparateProcesses, write_config
+from benchmarks.faults.site.fault_site import Fault, FaultSite, ProcessExit, terminate_process, with_up
 from benchmarks.faults.video.stamped_views import StampedViews
 from benchmarks.faults.viewing.viewers import Viewer
 
 _MOMENTS_S = (0.0, 1.0, 3.0)
-"""After the first line of ours: before it the interpreter itself starts, and ends as any does."""
+"""Seconds after the process handles SIGTERM itself."""
 _POLL_S = 0.005
 _WATCHED_S = 4.0
-_MOMENT_S = 2.0
+_LINGER_S = 2.0
 
 
-async def right_after_start(views: StampedViews, folder: Path) -> list[ProcessExit]:
-    """Start a site, and each process for itself, and tell them to end soon after."""
-    config, _ = await asyncio.to_thread(configured, views, folder)
-    ended = []
+async def shut_down_right_after_start(views: StampedViews, folder: Path) -> list[ProcessExit]:
+    """Start a site, and each process separately, and terminate them soon after."""
+    config, _ = await asyncio.to_thread(write_config, views, folder)
+    exits = []
     with (folder / "site.log").open("w", encoding="utf-8") as log:
         for moment in _MOMENTS_S:
             site = await asyncio.create_subprocess_exec(
@@ -36,23 +36,26 @@ async def right_after_start(views: StampedViews, folder: Path) -> list[ProcessEx
                 stdout=log,
                 stderr=log,
             )
-            await _begun(site)
+            await _wait_for_sigterm_handler(site)
             await asyncio.sleep(moment)
-            ended.append(await told_to_end(f"up after {moment:g} s", site))
+            exits.append(await terminate_process(f"up after {moment:g} s", site))
         for moment in _MOMENTS_S:
             single = SeparateProcesses(config, log)
             for name in NAMES:
                 await single.start(name)
-            await asyncio.gather(*(_begun(it) for it in single.processes.values()))
+            await asyncio.gather(*(_wait_for_sigterm_handler(it) for it in single.processes.values()))
             await asyncio.sleep(moment)
-            ended += await asyncio.gather(
-                *(told_to_end(f"{name} after {moment:g} s", it) for name, it in single.processes.items())
+            exits += await asyncio.gather(
+                *(
+                    terminate_process(f"{name} after {moment:g} s", it)
+                    for name, it in single.processes.items()
+                )
             )
-    return ended
+    return exits
 
 
-async def _begun(process: asyncio.subprocess.Process) -> None:
-    """Wait until a process looks after SIGTERM itself (proc(5), SigCgt), or has ended."""
+async def _wait_for_sigterm_handler(process: asyncio.subprocess.Process) -> None:
+    """Wait until a process handles SIGTERM (proc(5), SigCgt), or has exited."""
     status = Path(f"/proc/{process.pid}/status")
     while process.returncode is None:
         lines = (await asyncio.to_thread(status.read_text, encoding="ascii")).splitlines()
@@ -62,38 +65,41 @@ async def _begun(process: asyncio.subprocess.Process) -> None:
         await asyncio.sleep(_POLL_S)
 
 
-async def while_watched(views: StampedViews, folder: Path) -> list[ProcessExit]:
+async def shut_down_while_watched(views: StampedViews, folder: Path) -> list[ProcessExit]:
     """Shut a site down while a client of every kind is connected.
 
     Raises:
-        RuntimeError: somebody does not.
+        RuntimeError: a stream ends before the shutdown.
     """
-    ways = ("objects/{0}/best.mp4", "objects/{0}/best.ts", "objects/{0}/best.mjpeg", "cameras/c0/live.mp4")
-    async with aiohttp.ClientSession() as session:  # open for longer than the site: nobody hangs up first
-        async with with_up(views, folder) as stand:
-            viewer = Viewer(stand.url, stand.people(1)[0])
+    paths = ("objects/{0}/best.mp4", "objects/{0}/best.ts", "objects/{0}/best.mjpeg", "cameras/c0/live.mp4")
+    async with (
+        aiohttp.ClientSession() as session
+    ):  # open for longer than the site: no client disconnects first
+        async with with_up(views, folder) as fault_site:
+            viewer = Viewer(fault_site.url, fault_site.people(1)[0])
             tasks = [asyncio.create_task(viewer.run())]
             tasks += [
-                asyncio.create_task(_read(session, stand.url + way.format(viewer.number))) for way in ways
+                asyncio.create_task(_read(session, fault_site.url + path.format(viewer.number)))
+                for path in paths
             ]
             await asyncio.sleep(_WATCHED_S)
             if any(task.done() for task in tasks):
-                raise RuntimeError("a stream has ended before the site was told to end")
-            before = _below(stand)
+                raise RuntimeError("a stream ended before the shutdown")
+            before = _site_processes(fault_site)
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-    left = await _left(before)
-    return [*stand.ended, *(ProcessExit(f"{name} is left behind", 0.0, None) for name in left)]
+    left = await _left_behind(before)
+    return [*fault_site.exits, *(ProcessExit(f"{name} is left behind", 0.0, None) for name in left)]
 
 
-def _below(stand: FaultSite) -> list[tuple[str, int]]:
-    return [(name, pid) for name in (*NAMES, "drawing") for pid in stand.pids(name)]
+def _site_processes(fault_site: FaultSite) -> list[tuple[str, int]]:
+    return [(name, pid) for name in (*NAMES, "drawing") for pid in fault_site.pids(name)]
 
 
-async def _left(before: list[tuple[str, int]]) -> list[str]:
-    """Return who is still there: whose supervisor has ended may end a moment after it."""
-    give_up = time.monotonic() + _MOMENT_S
+async def _left_behind(before: list[tuple[str, int]]) -> list[str]:
+    """Return the processes that are still running a moment after their supervisor exited."""
+    give_up = time.monotonic() + _LINGER_S
     while (left := [name for name, pid in before if pid in _running()]) and time.monotonic() < give_up:  # noqa: ASYNC110
         await asyncio.sleep(_POLL_S)
     return left
@@ -111,6 +117,6 @@ async def _read(session: aiohttp.ClientSession, address: str) -> None:
 
 
 FAULTS = (
-    Fault("end right after start", with_up, alone=right_after_start),
-    Fault("end while watched", with_up, alone=while_watched),
+    Fault("end right after start", with_up, standalone=shut_down_right_after_start),
+    Fault("end while watched", with_up, standalone=shut_down_while_watched),
 )

@@ -1,4 +1,4 @@
-"""One fault: a while before it, what it does, a while after it, and the sum of what viewers received."""
+"""The run of one fault: the time before it, the fault, the time after it, and the outcome for viewers."""
 
 from __future__ import annotations
 
@@ -17,120 +17,127 @@ _BEFORE_S = 4.0
 _JOIN_S = 20.0
 _BACK_S = 40.0
 _LONGEST_S = 150.0
-"""A fault may take so much longer than it should: a browser starts, a process is slow to load."""
+"""Seconds that a fault may take beyond its time: a browser starts, a process is slow to load."""
 _POLL_S = 0.05
 
 
 @dataclass(slots=True)
 class FaultOutcome:
-    """What came of a fault.
+    """The outcome of a fault.
 
-    ``ordinary`` and ``without`` are the longest seconds without a fresh picture, less the rhythm of GOPs,
-    before and after the fault began; the worst viewer's. The look-ahead is the same before and after, so it
-    is in neither. ``back`` is from when the server said that it was ready to the last viewer's next picture.
+    ``gap_before`` and ``gap_after`` are the longest times without a fresh picture, minus the length of a GOP,
+    before and after the fault began; of the worst viewer. ``recovery_s`` is the time from the server's
+    readiness to the last viewer's next picture.
     """
 
     fault: Fault
     began: float = 0.0
     until: float = 0.0
-    ordinary: float = 0.0
-    without: float = 0.0
-    back: float | None = None
-    page: float | None = None
-    """The same of the page, where there is one."""
+    gap_before: float = 0.0
+    gap_after: float = 0.0
+    recovery_s: float | None = None
+    page_recovery_s: float | None = None
+    """The same of the page, where it is open."""
     reconnections: int = 0
     received: list[PictureVerdict] = field(default_factory=list)
     gops: tuple[int, int] = (0, 0)
-    """The GOPs decided meanwhile, by their place in what was told."""
+    """The GOPs decided meanwhile, as a range of the event log."""
     lost: int | None = None
-    """GOPs that were shown but are not recorded; None: not known."""
+    """GOPs that were shown but not recorded; None: unknown."""
     broken_files: int | None = None
-    unlike: list[str] = field(default_factory=list)
-    """What was recorded of a network camera as another picture than viewers were shown, in words."""
-    ended: list[ProcessExit] = field(default_factory=list)
+    differing: list[str] = field(default_factory=list)
+    """Pictures of a network camera that were recorded differently from how they were shown, as text."""
+    exits: list[ProcessExit] = field(default_factory=list)
     failed: str = ""
-    """What kept it from being measured."""
+    """Why it could not be measured; empty: it was."""
 
 
-async def run(fault: Fault, stand: FaultSite, views: StampedViews) -> FaultOutcome:
-    """Let viewers watch, inject the fault, and judge what they received."""
+async def run(fault: Fault, fault_site: FaultSite, views: StampedViews) -> FaultOutcome:
+    """Let viewers watch, inject the fault, and check what they received."""
     outcome = FaultOutcome(fault)
-    ended_before = len(stand.ended)
+    exits_before = len(fault_site.exits)
     try:
-        await stand.settle()
+        await fault_site.settle()
     except RuntimeError as error:
         outcome.failed = str(error)
         return outcome
-    stand.viewers = [Viewer(stand.url, number) for number in stand.people(_VIEWERS)]
-    tasks = [asyncio.create_task(viewer.run()) for viewer in stand.viewers]
-    first = len(stand.told.gops)
+    fault_site.viewers = [Viewer(fault_site.url, number) for number in fault_site.people(_VIEWERS)]
+    tasks = [asyncio.create_task(viewer.run()) for viewer in fault_site.viewers]
+    first = len(fault_site.events.gops)
     try:
-        await _all_watch(stand)
+        await _all_watch(fault_site)
         await asyncio.sleep(_BEFORE_S)
-        before = [viewer.reconnections for viewer in stand.viewers]
-        stand.returned.clear()
-        stand.page_at = None
+        before = [viewer.reconnections for viewer in fault_site.viewers]
+        fault_site.ready_times.clear()
+        fault_site.page_resumed_at = None
         outcome.began = time.monotonic()
-        await asyncio.gather(_injected(fault, stand, outcome), asyncio.sleep(fault.seconds))
-        if fault.breaks:
-            await _all_back(stand)
+        await asyncio.gather(_injected(fault, fault_site, outcome), asyncio.sleep(fault.seconds))
+        if fault.kills_server:
+            await _all_back(fault_site)
         outcome.until = time.monotonic()
-        outcome.reconnections = sum(viewer.reconnections for viewer in stand.viewers) - sum(before)
+        outcome.reconnections = sum(viewer.reconnections for viewer in fault_site.viewers) - sum(before)
     finally:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
     await asyncio.sleep(RHYTHM_S)  # events of the last pictures
-    outcome.gops = (first, len(stand.told.gops))
-    outcome.ended = stand.ended[ended_before:]
-    received = await asyncio.to_thread(_received, stand, views)
-    _sum_up(outcome, received, stand)
+    outcome.gops = (first, len(fault_site.events.gops))
+    outcome.exits = fault_site.exits[exits_before:]
+    received = await asyncio.to_thread(_received, fault_site, views)
+    _sum_up(outcome, received, fault_site)
     return outcome
 
 
-async def _injected(fault: Fault, stand: FaultSite, outcome: FaultOutcome) -> None:
+async def _injected(fault: Fault, fault_site: FaultSite, outcome: FaultOutcome) -> None:
     try:
         async with asyncio.timeout(fault.seconds + _LONGEST_S):
-            await fault.inject(stand)
-    except Exception as error:  # noqa: BLE001 — a browser, a stream, Docker: the faults after this one go on
+            await fault.inject(fault_site)
+    except Exception as error:  # noqa: BLE001 — a browser, a stream, Docker: the next faults still run
         outcome.failed = f"{type(error).__name__}: {error}"
 
 
-async def _all_watch(stand: FaultSite) -> None:
-    """Wait, not for ever, until something has come for all viewers, and one is shown what may break."""
+async def _all_watch(fault_site: FaultSite) -> None:
+    """Wait, up to a limit, until all viewers receive video and one is shown the network camera, if any."""
     give_up = time.monotonic() + _JOIN_S
     while time.monotonic() < give_up:
-        shown = {stand.told.shown(it.number) for it in stand.viewers}
-        if all(it.last_came for it in stand.viewers) and shown.issuperset(stand.live[:1]):
+        shown = {fault_site.events.shown(it.number) for it in fault_site.viewers}
+        if all(it.last_came for it in fault_site.viewers) and shown.issuperset(fault_site.live[:1]):
             return
         await asyncio.sleep(_POLL_S)
 
 
-async def _all_back(stand: FaultSite) -> None:
-    """Wait, not for ever, until the server is back and all viewers have some of it: machines may be busy."""
+async def _all_back(fault_site: FaultSite) -> None:
+    """Wait, up to a limit, until the server is ready again and all viewers receive video."""
     give_up = time.monotonic() + _BACK_S
     while time.monotonic() < give_up:
-        if stand.returned and all(it.last_came > stand.returned[0] + RHYTHM_S for it in stand.viewers):
+        if fault_site.ready_times and all(
+            it.last_came > fault_site.ready_times[0] + RHYTHM_S for it in fault_site.viewers
+        ):
             return
         await asyncio.sleep(_POLL_S)
 
 
-def _received(stand: FaultSite, views: StampedViews) -> list[PictureVerdict]:
-    told, live = stand.told, stand.live
+def _received(fault_site: FaultSite, views: StampedViews) -> list[PictureVerdict]:
+    events, live = fault_site.events, fault_site.live
     return [
-        judge(viewer.pictures(), told, viewer.number, stand.views or views, live) for viewer in stand.viewers
+        judge(viewer.pictures(), events, viewer.number, fault_site.views or views, live)
+        for viewer in fault_site.viewers
     ]
 
 
-def _sum_up(outcome: FaultOutcome, received: Sequence[PictureVerdict], stand: FaultSite) -> None:
+def _sum_up(outcome: FaultOutcome, received: Sequence[PictureVerdict], fault_site: FaultSite) -> None:
     outcome.received = list(received)
     begun, until = outcome.began, outcome.until
-    spans = [it.without(begun - _BEFORE_S, begun) for it in received]
-    outcome.ordinary = max(0.0, max(spans, default=0.0) - RHYTHM_S)
-    outcome.without = max(0.0, max((it.without(begun, until) for it in received), default=0.0) - RHYTHM_S)
-    if outcome.fault.breaks and stand.returned:
-        ready = stand.returned[0]
+    spans = [it.longest_gap(begun - _BEFORE_S, begun) for it in received]
+    outcome.gap_before = max(0.0, max(spans, default=0.0) - RHYTHM_S)
+    outcome.gap_after = max(
+        0.0, max((it.longest_gap(begun, until) for it in received), default=0.0) - RHYTHM_S
+    )
+    if outcome.fault.kills_server and fault_site.ready_times:
+        ready = fault_site.ready_times[0]
         first = [min((at for at, _ in it.fresh if at > ready - RHYTHM_S), default=None) for it in received]
         if all(at is not None for at in first):
-            outcome.page = None if stand.page_at is None else max(0.0, stand.page_at - ready)
-            outcome.back = max(0.0, *(at - ready for at in first if at is not None))
+            outcome.page_recovery_s = (
+                None if fault_site.page_resumed_at is None else max(0.0, fault_site.page_resumed_at - ready)
+            )
+            outcome.recovery_s = max(0.0, *(at - ready for at in first if at is not None))

@@ -1,4 +1,4 @@
-"""Injects faults one after the other, each into the site that it asks for."""
+"""Runs faults one after the other, each in its own kind of site."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from client import ClientError
 
 _LINES = 20
 _PULSES = 15_000
-"""Detections for so many: ten minutes."""
+"""Pulses with detections: ten minutes."""
 
 
 async def measure(faults: list[Fault], folder: Path, report: Report) -> list[FaultOutcome]:
-    """Inject these faults one after the other."""
+    """Run the faults one after the other."""
     views = await asyncio.to_thread(make, folder, _PULSES)
     outcomes: list[FaultOutcome] = []
-    groups = itertools.groupby(faults, key=lambda fault: fault.alone or fault.setup)
+    groups = itertools.groupby(faults, key=lambda fault: fault.standalone or fault.setup)
     for number, (_, some) in enumerate(groups):
         outcomes += await _group(list(some), views, folder / f"site-{number}", report)
     return outcomes
@@ -36,28 +36,26 @@ async def _group(
     await asyncio.to_thread(folder.mkdir)
     outcomes: list[FaultOutcome] = []
     try:
-        if faults[0].alone is not None:
-            return [FaultOutcome(faults[0], ended=await faults[0].alone(views, folder))]
-        async with faults[0].setup(views, folder) as stand:
+        if faults[0].standalone is not None:
+            return [FaultOutcome(faults[0], exits=await faults[0].standalone(views, folder))]
+        async with faults[0].setup(views, folder) as fault_site:
             for fault in faults:
-                outcomes.append(await run(fault, stand, views))
+                outcomes.append(await run(fault, fault_site, views))
                 print(f"{fault.name}: done", file=sys.stderr, flush=True)
-            ended = len(stand.ended)
-        outcomes[-1].ended += stand.ended[ended:]  # with the site
-        files = await asyncio.to_thread(recording_check.read, stand.recorded, stand.live)
-        recording_check.note(outcomes, stand.told, files)
+            exits = len(fault_site.exits)
+        outcomes[-1].exits += fault_site.exits[exits:]  # with the site
+        files = await asyncio.to_thread(recording_check.read, fault_site.recorded, fault_site.live)
+        recording_check.note(outcomes, fault_site.events, files)
     except CannotRunError as error:
         report.say(f"{faults[0].name}: left out: {error}")
     except (ClientError, RuntimeError) as error:
         report.say(f"{faults[0].name} and what follows it: {error}")
         report.say(await asyncio.to_thread(_log_of, folder))
-        outcomes += [
-            FaultOutcome(it, failed="there was no site to try it on") for it in faults[len(outcomes) :]
-        ]
+        outcomes += [FaultOutcome(it, failed="the site did not run") for it in faults[len(outcomes) :]]
     return outcomes
 
 
 def _log_of(folder: Path) -> str:
-    """Return the end of what a site's processes said."""
+    """Return the last lines of the logs of a site's processes."""
     said = [path.read_text(encoding="utf-8", errors="replace") for path in sorted(folder.glob("*.log"))]
     return "\n".join("".join(said).splitlines()[-_LINES:])

@@ -1,4 +1,4 @@
-"""What a viewer received around each fault: every picture when it came, coloured by the camera it is of."""
+"""A plot of when pictures arrived around each fault, colored by camera."""
 
 from __future__ import annotations
 
@@ -31,6 +31,6 @@ def draw(outcomes: Sequence[FaultOutcome], path: Path) -> None:
     axes.axvline(0.0, color="red", linewidth=1)
     axes.set_yticks(range(len(lines)), [outcome.fault.name for outcome, _ in lines])
     axes.invert_yaxis()
-    axes.set_xlabel("seconds since the fault began; a mark is a GOP that a viewer received")
+    axes.set_xlabel("seconds since the fault began; each mark is a GOP that a viewer received")
     axes.legend(loc="lower right", title="camera")
     figure.savefig(path, dpi=100)

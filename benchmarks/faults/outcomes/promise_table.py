@@ -1,4 +1,4 @@
-"""The table of faults and promises."""
+"""The table of faults, measured against the promises."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from benchmarks.common.report import Report
 from benchmarks.faults.outcomes.fault_run import FaultOutcome
 
 _BACK_S = 2.0
-"""Promised: from the server's return to the next picture."""
+"""Promised seconds from the server's readiness to the next picture."""
 _NOTES = 3
 
 
@@ -17,57 +17,63 @@ def describe(report: Report, outcomes: Sequence[FaultOutcome]) -> None:
     """Print what was measured."""
     columns = [
         "fault",
-        "opened again",
-        "fresh, s",
+        "reconnects",
+        "gap, s",
         "promised",
         "wrong pictures",
         "wrong boxes",
         "recorded",
-        "ended",
+        "exit",
     ]
     report.table("faults", [*columns, "kept"], [_row(it) for it in outcomes])
     for outcome in outcomes:
-        notes = [outcome.failed, *(note for it in outcome.received for note in it.notes), *outcome.unlike]
-        notes += [f"{it.name}: {it.seconds:.2f} s, {it.code}" for it in outcome.ended if not it.well]
+        notes = [outcome.failed, *(note for it in outcome.received for note in it.notes), *outcome.differing]
+        notes += [f"{it.name}: {it.seconds:.2f} s, {it.code}" for it in outcome.exits if not it.clean]
         for note in [note for note in notes if note][:_NOTES]:
             report.say(f"{outcome.fault.name}: {note}")
     for outcome in outcomes:
-        late = [late for it in outcome.received for course in it.courses.values() for late in course.behind]
+        late = [late for it in outcome.received for order in it.live_orders.values() for late in order.behind]
         if late:
             said = f"{min(late)} to {max(late)} frames behind their pulses, half of them {median_low(late)}"
             report.say(f"{outcome.fault.name}: pictures of the network camera are {said} at most")
-    broken = [it.fault.name for it in outcomes if not kept(it)]
+    broken = [it.fault.name for it in outcomes if not keeps_promises(it)]
     report.say(f"{len(outcomes) - len(broken)} of {len(outcomes)} keep all promises" + _list(broken))
 
 
-def kept(outcome: FaultOutcome) -> bool:
-    """Whether every promise was kept."""
+def keeps_promises(outcome: FaultOutcome) -> bool:
+    """Return whether every promise was kept."""
     fault = outcome.fault
-    if fault.breaks and (outcome.back is None or max(outcome.back, outcome.page or 0.0) > _BACK_S):
+    if fault.kills_server and (
+        outcome.recovery_s is None or max(outcome.recovery_s, outcome.page_recovery_s or 0.0) > _BACK_S
+    ):
         return False
-    if not fault.breaks and outcome.reconnections:
+    if not fault.kills_server and outcome.reconnections:
         return False
-    if fault.within is not None and outcome.without > fault.within:
+    if fault.max_gap_s is not None and outcome.gap_after > fault.max_gap_s:
         return False
-    if outcome.lost is not None and not fault.unrecorded and outcome.lost > (1 if fault.breaks else 0):
+    if (
+        outcome.lost is not None
+        and not fault.stops_recording
+        and outcome.lost > (1 if fault.kills_server else 0)
+    ):
         return False
     return not (
-        outcome.failed or _wrong(outcome) or outcome.broken_files or any(not it.well for it in outcome.ended)
+        outcome.failed or _wrong(outcome) or outcome.broken_files or any(not it.clean for it in outcome.exits)
     )
 
 
 def _wrong(outcome: FaultOutcome) -> bool:
-    """Whether any picture or box was wrong, or may have been: nothing said of which camera it should be."""
-    unnamed = not outcome.fault.breaks and any(it.unnamed for it in outcome.received)
-    return unnamed or bool(outcome.unlike) or any(it.wrong or it.wrong_boxes for it in outcome.received)
+    """Return whether any picture or box was wrong, or unnamed without a killed server."""
+    unnamed = not outcome.fault.kills_server and any(it.unnamed for it in outcome.received)
+    return unnamed or bool(outcome.differing) or any(it.wrong or it.wrong_boxes for it in outcome.received)
 
 
 def _row(it: FaultOutcome) -> list[str]:
     frames, boxes = sum(r.frames for r in it.received), sum(r.boxes for r in it.received)
     wrong, wrong_boxes = sum(r.wrong for r in it.received), sum(r.wrong_boxes for r in it.received)
-    means = sum(r.blurred for r in it.received)
-    wrong, unnamed = wrong + len(it.unlike), sum(r.unnamed for r in it.received)
-    slowest = max(it.ended, key=lambda one: one.seconds, default=None)
+    means = sum(r.averaged for r in it.received)
+    wrong, unnamed = wrong + len(it.differing), sum(r.unnamed for r in it.received)
+    slowest = max(it.exits, key=lambda one: one.seconds, default=None)
     return [
         it.fault.name,
         str(it.reconnections) if it.received else "",
@@ -77,23 +83,23 @@ def _row(it: FaultOutcome) -> list[str]:
         f"{wrong_boxes} of {boxes - means}{f', {means} means' if means else ''}" if it.received else "",
         "" if it.lost is None else f"{it.lost} lost, {it.broken_files} broken",
         "" if slowest is None else f"{slowest.seconds:.2f} s, {slowest.code}",
-        "yes" if kept(it) else "NO",
+        "yes" if keeps_promises(it) else "NO",
     ]
 
 
 def _fresh(it: FaultOutcome) -> str:
     if not it.received:
         return ""
-    if not it.fault.breaks:
-        return f"{it.without:.2f} ({it.ordinary:.2f})"
-    page = "" if it.page is None else f", page {it.page:.2f}"
-    return f"{'never' if it.back is None else f'{it.back:.2f}'}{page} ({it.without:.2f})"
+    if not it.fault.kills_server:
+        return f"{it.gap_after:.2f} ({it.gap_before:.2f})"
+    page = "" if it.page_recovery_s is None else f", page {it.page_recovery_s:.2f}"
+    return f"{'never' if it.recovery_s is None else f'{it.recovery_s:.2f}'}{page} ({it.gap_after:.2f})"
 
 
 def _promised(it: FaultOutcome) -> str:
-    if it.fault.breaks:
+    if it.fault.kills_server:
         return f"{_BACK_S:g}"
-    return "" if it.fault.within is None or not it.received else f"{it.fault.within:g}"
+    return "" if it.fault.max_gap_s is None or not it.received else f"{it.fault.max_gap_s:g}"
 
 
 def _list(names: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""What a site under fault has recorded: whether all of it plays, and whether all that was shown is there."""
+"""Check of the recordings of a site under fault: all files play, and all shown pictures are recorded."""
 
 from __future__ import annotations
 
@@ -15,17 +15,18 @@ from benchmarks.faults.viewing.live_pictures import LiveFrameOrder, differ
 from benchmarks.faults.viewing.viewers import EventLog
 
 _GOES_ON = 5
-"""So many of the last GOPs of a fault must be there, whatever it was."""
+"""GOPs at the end of a fault that must be recorded in any case."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedFile:
-    """One file of a camera.
+    """A recorded file of a camera.
 
     Attributes:
-        first: its first pulse, by its name.
-        frames: which frame each picture says it is, by its pulse.
-        plays: to its end, and every picture is what it should be.
+        camera: of the file.
+        first: its first pulse, from its name.
+        frames: the stamped frame number of each picture, by pulse.
+        plays: it decodes to its end, and every picture is the expected one.
     """
 
     camera: str
@@ -35,14 +36,14 @@ class RecordedFile:
 
 
 def read(folder: Path, live: Collection[str] = ()) -> list[RecordedFile]:
-    """Decode everything that was recorded, in all runs."""
+    """Decode all recorded files of all recording sessions."""
     return [_read(path, live) for path in sorted(folder.glob("*/cameras/*/*.mp4"))]
 
 
 def _read(path: Path, live: Collection[str]) -> RecordedFile:
     camera, plays = path.parent.name, True
     frames: dict[int, int] = {}
-    course = LiveFrameOrder() if camera in live else None
+    order = LiveFrameOrder() if camera in live else None
     try:
         with av.open(str(path)) as container:
             for picture in container.decode(video=0):
@@ -51,32 +52,32 @@ def _read(path: Path, live: Collection[str]) -> RecordedFile:
                 frames[pulse] = -1 if stamp is None else stamp.frame
                 if stamp is None or stamp.camera != camera:
                     plays = False
-                elif course is None:
+                elif order is None:
                     plays &= stamp.frame == pulse % FRAMES
                 else:
-                    plays &= not course.wrong(pulse, stamp.frame)
+                    plays &= not order.wrong(pulse, stamp.frame)
     except (av.error.FFmpegError, OSError):
         plays = False
     return RecordedFile(camera, int(path.stem), frames, plays)
 
 
-def note(outcomes: Sequence[FaultOutcome], told: EventLog, files: Sequence[RecordedFile]) -> None:
-    """Note with each fault what is not on the disk of what was shown meanwhile, and what does not play.
+def note(outcomes: Sequence[FaultOutcome], events: EventLog, files: Sequence[RecordedFile]) -> None:
+    """Add to each outcome the lost GOPs and the broken files of its time.
 
-    Of a network camera also what is there as another picture than the one that was shown.
+    Of a network camera also the pictures that were recorded differently from how they were shown.
     """
     there: dict[str, dict[int, int]] = {}
     for file in files:
         there.setdefault(file.camera, {}).update(file.frames)
     for number, outcome in enumerate(outcomes):
-        outcome.unlike = [
+        outcome.differing = [
             note
             for received in outcome.received
-            for camera, course in received.courses.items()
-            for note in differ(course.frames, there.get(camera, {}))
+            for camera, order in received.live_orders.items()
+            for note in differ(order.frames, there.get(camera, {}))
         ]
         first, end = outcome.gops
-        shown = [gop for _, gop in told.gops[first:end]]
+        shown = [gop for _, gop in events.gops[first:end]]
         if not shown:
             continue
         missing = [
@@ -86,9 +87,13 @@ def note(outcomes: Sequence[FaultOutcome], told: EventLog, files: Sequence[Recor
             if not there.get(camera, {}).keys() >= set(range(gop.first, gop.first + gop.frames))
         ]
         outcome.lost = len(missing)
-        if outcome.fault.unrecorded and missing and missing[-1] >= shown[-min(_GOES_ON, len(shown))].first:
-            outcome.failed = "the recording did not go on"
+        if (
+            outcome.fault.stops_recording
+            and missing
+            and missing[-1] >= shown[-min(_GOES_ON, len(shown))].first
+        ):
+            outcome.failed = "the recording did not resume"
         last = number == len(outcomes) - 1
         until = shown[-1].first + shown[-1].frames
-        mine = [it for it in files if shown[0].first <= it.first < until or (last and it.first >= until)]
-        outcome.broken_files = sum(not file.plays for file in mine)
+        own_files = [it for it in files if shown[0].first <= it.first < until or (last and it.first >= until)]
+        outcome.broken_files = sum(not file.plays for file in own_files)

@@ -1,1 +1,1 @@
-"""The sites that faults are injected into."""
+"""The sites that faults are injected into: local processes, containers, and a lossy bus."""

@@ -1,4 +1,4 @@
-"""A site in containers, as docker-compose.yml runs it: built, started, looked at, and taken away."""
+"""A site in containers by docker-compose.yml: build, start, inspect, remove."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from server.cli.generated_config import free_port
 
 PLAIN = (ROOT / "docker-compose.yml",)
 _BUILD_S = 900.0
-"""An image without any cache downloads some 250 MB."""
+"""Seconds: a build without cache downloads some 250 MB."""
 _UP_S = 300.0
 _COMMAND_S = 120.0
 
 
 class ComposeError(RuntimeError):
-    """What Docker said instead of doing it."""
+    """A Docker command failed; the text is its output."""
 
 
 @dataclass(frozen=True, slots=True)
 class ComposeSite:
-    """One compose project."""
+    """A running Compose project."""
 
     project: str
     files: tuple[Path, ...]
     environment: Mapping[str, str]
 
     def run(self, *words: str, seconds: float = _COMMAND_S, check: bool = True) -> str:
-        """Run a command of Docker; give what it says.
+        """Run a command; return its output.
 
         Raises:
-            ComposeError: it fails, or does not end.
+            ComposeError: the command fails or times out.
         """
         try:
             done = subprocess.run(
@@ -66,14 +66,14 @@ class ComposeSite:
         return self.run("docker", "compose", *named, *words, seconds=seconds, check=check)
 
     async def docker(self, *words: str) -> str:
-        """Run ``docker`` beside whatever else goes on."""
+        """Run ``docker`` in a thread."""
         return await asyncio.to_thread(self.run, "docker", *words)
 
     def up(self) -> None:
-        """Start all, and wait for their health.
+        """Start all services, and wait until they are healthy.
 
         Raises:
-            ComposeError: they do not become healthy; with what they said.
+            ComposeError: a service does not become healthy; the text has the logs.
         """
         words = ("up", "--detach", "--no-build", "--wait", "--wait-timeout", f"{_UP_S:.0f}")
         try:
@@ -82,34 +82,34 @@ class ComposeSite:
             raise ComposeError(f"{error}\n{self.compose('logs', check=False)}") from None
 
     def containers(self) -> dict[str, dict[str, Any]]:
-        """Inspect every container by its service, those included that have ended."""
+        """Return `docker inspect` of every container by service, stopped ones included."""
         ids = self.compose("ps", "--all", "--quiet").split()
         found = json.loads(self.run("docker", "inspect", *ids)) if ids else []
         return {it["Config"]["Labels"]["com.docker.compose.service"]: it for it in found}
 
     def state(self, service: str) -> dict[str, Any]:
-        """Return one container's state as the engine knows it: when it started, how it ended."""
+        """Return the engine's state of a service's container: when it started, how it exited."""
         found: dict[str, Any] = json.loads(
             self.run("docker", "inspect", "--format", "{{json .State}}", self.container(service))
         )
         return found
 
     def container(self, service: str) -> str:
-        """Return the name that compose gives to a service's container."""
+        """Return the name of a service's container."""
         return f"{self.project}-{service}-1"
 
     @property
     def network(self) -> str:
-        """The network of pulses, frames and tracks."""
+        """The name of the site's network."""
         return f"{self.project}_site"
 
     def address(self) -> str:
-        """Return where the best view is published, as host:port."""
+        """Return the published address of the best view, as host:port."""
         return self.compose("port", "bestview", "8080")
 
 
-def missing() -> str | None:
-    """Return what is missing to run containers here; None: nothing."""
+def missing_requirement() -> str | None:
+    """Return which requirement of running containers is missing here; None: none is."""
     if shutil.which("docker") is None:
         return "needs Docker: there is no `docker` here"
     for words in (["docker", "info"], ["docker", "compose", "version"]):
@@ -123,16 +123,16 @@ def missing() -> str | None:
 
 
 @contextlib.contextmanager
-def composed(files: Sequence[Path] = PLAIN, **variables: str) -> Iterator[ComposeSite]:
-    """Build, start and await a whole site; nothing of it is left in the end.
+def run_compose_site(files: Sequence[Path] = PLAIN, **variables: str) -> Iterator[ComposeSite]:
+    """Build and start a site, and remove it in the end.
 
     Raises:
-        CannotRunError: there is no engine here.
-        ComposeError: it does not come up.
+        CannotRunError: there is no Docker Engine.
+        ComposeError: the site does not start.
     """
-    lacking = missing()
-    if lacking is not None:
-        raise CannotRunError(lacking)
+    missing = missing_requirement()
+    if missing is not None:
+        raise CannotRunError(missing)
     project = f"myview-test-{uuid.uuid4().hex[:8]}"
     plain = {name: it for name, it in os.environ.items() if not name.startswith(("MYVIEW_", "COMPOSE_"))}
     environment = {

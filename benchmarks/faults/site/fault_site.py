@@ -1,4 +1,4 @@
-"""The site that faults are injected into: real processes, viewers at real sockets, and what is heard."""
+"""The site that faults are injected into: its processes, viewers and events."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LEASE_S = 1.0
 _SETTLE_S = 90.0
 _POLL_S = 0.05
 _SEEN_S = 1.5
-"""So long all must be well before a fault."""
+"""Seconds for which the site must be healthy before a fault."""
 SETTINGS: Mapping[str, Mapping[str, Any]] = {
     "sync": {"start_timeout_s": 30.0},
     "record": {"segment_s": 5.0},
@@ -34,98 +34,98 @@ SETTINGS: Mapping[str, Mapping[str, Any]] = {
 
 @dataclass(frozen=True, slots=True)
 class ProcessExit:
-    """A process that was told to end."""
+    """How a process exited after SIGTERM."""
 
     name: str
     seconds: float
     code: int | None
-    """None where it did not end by itself."""
+    """The exit code; None: it had to be killed."""
 
     @property
-    def well(self) -> bool:
-        """Within 2 s and with 0."""
+    def clean(self) -> bool:
+        """Whether it exited within 2 s with code 0."""
         return self.code == 0 and self.seconds <= 2.0
 
 
 @dataclass(slots=True)
 class FaultSite:
-    """A site that runs, and what is heard of it."""
+    """A running site with its viewers and the log of its events."""
 
     url: str
     folder: Path
-    main: int
-    """The process that all others are children of; 0: they were started one by one."""
-    told: EventLog = field(default_factory=EventLog)
+    supervisor_pid: int
+    """The supervisor's process; 0: the processes run separately."""
+    events: EventLog = field(default_factory=EventLog)
     viewers: list[Viewer] = field(default_factory=list)
-    ended: list[ProcessExit] = field(default_factory=list)
-    returned: list[float] = field(default_factory=list)
-    """When the server answered again after it had not."""
+    exits: list[ProcessExit] = field(default_factory=list)
+    ready_times: list[float] = field(default_factory=list)
+    """When the server became ready again, by the monotonic clock."""
     live: tuple[str, ...] = ()
-    """Cameras that are no recordings."""
+    """Network cameras."""
     control: Any = None
-    """What the faults of this site are injected by, if not signals."""
+    """The handle for injecting faults other than signals."""
     recorded: Path = Path()
-    page_at: float | None = None
-    """When the page had new pictures again."""
+    page_resumed_at: float | None = None
+    """When the page showed new video again."""
     views: StampedViews | None = None
-    """What it plays, where that is not what all sites play."""
+    """Its views, where they differ from those of other sites."""
 
     def pids(self, name: str) -> list[int]:
-        """Return processes of a name: sync, bestview, drawing, or a camera's id; none where it is down."""
+        """Return the pids of a process: sync, bestview, drawing, or a camera's id; empty: it is down."""
         return running_pids(f"camera {name}" if name in CAMERAS else name)
 
     def send(self, number: signal.Signals, *names: str) -> None:
-        """Send a signal to the processes of these names, as nearly at once as can be.
+        """Send a signal to the processes of these names, as simultaneously as possible.
 
         Raises:
-            RuntimeError: there is none of a name.
+            RuntimeError: a process is not running.
         """
         pids = {name: self.pids(name) for name in names}
         for name in names:
             if not pids[name]:
                 raise RuntimeError(f"there is no process {name}")
         for pid in chain.from_iterable(pids.values()):
-            with contextlib.suppress(ProcessLookupError):  # it has ended since, with the one before it
+            with contextlib.suppress(ProcessLookupError):  # it exited together with the one before it
                 os.kill(pid, number)
 
     def shown(self) -> list[str]:
-        """Return the cameras, first the one that most viewers are shown; of several the first by its name."""
-        cameras = [self.told.shown(viewer.number) for viewer in self.viewers]
+        """Return the cameras by the number of viewers that are shown them, then by name."""
+        cameras = [self.events.shown(viewer.number) for viewer in self.viewers]
         return sorted(CAMERAS, key=lambda name: (-cameras.count(name), name))
 
     async def settle(self) -> None:
-        """Wait until all cameras are live, and decisions come one after the other, of people who are shown.
+        """Wait until the site is healthy: all cameras live, and decisions arriving that show people.
 
         Raises:
-            RuntimeError: that does not happen.
+            RuntimeError: the site does not become healthy in time.
         """
         give_up = time.monotonic() + _SETTLE_S
         well_since = None
         while time.monotonic() < give_up:
             now = time.monotonic()
-            if not self._is_well(now):
+            if not self._is_healthy(now):
                 well_since = None
             elif well_since is None:
                 well_since = now
             elif now - well_since > _SEEN_S:
                 return
             await asyncio.sleep(_POLL_S)
-        states = {name: self.told.state(name) for name in CAMERAS}
+        states = {name: self.events.state(name) for name in CAMERAS}
         raise RuntimeError(f"the site did not recover within {_SETTLE_S:g} s: {states}")
 
-    def _is_well(self, now: float) -> bool:
-        if not self.told.gops or any(self.told.state(name) != "live" for name in CAMERAS):
+    def _is_healthy(self, now: float) -> bool:
+        if not self.events.gops or any(self.events.state(name) != "live" for name in CAMERAS):
             return False
-        at, gop = self.told.gops[-1]
+        at, gop = self.events.gops[-1]
         return now - at < _SEEN_S and any(gop.choices.values())
 
     def people(self, most: int) -> list[int]:
-        """Return the numbers of people who are shown now."""
-        choices = self.told.gops[-1][1].choices
+        """Return the numbers of at most `most` people who are shown now."""
+        choices = self.events.gops[-1][1].choices
         return sorted(number for number, camera in choices.items() if camera)[:most]
 
     async def watch_server(self) -> None:
-        """Note when the server is ready again after it was not, until cancelled."""
+        """Record when the server becomes ready again, until cancelled."""
         answered = True
         timeout = aiohttp.ClientTimeout(total=1.0)
         while True:
@@ -138,18 +138,21 @@ class FaultSite:
             except (aiohttp.ClientError, TimeoutError):
                 ready = False
             if ready and not answered:
-                self.returned.append(time.monotonic())
+                self.ready_times.append(time.monotonic())
             answered = ready
             await asyncio.sleep(_POLL_S)
 
 
 @contextlib.asynccontextmanager
-async def listening(stand: FaultSite) -> AsyncIterator[FaultSite]:
-    """Follow the events of a site, and wait until it is well."""
-    tasks = [asyncio.create_task(stand.told.listen(stand.url)), asyncio.create_task(stand.watch_server())]
+async def follow_events(fault_site: FaultSite) -> AsyncIterator[FaultSite]:
+    """Follow the events of a site, and wait until it is healthy."""
+    tasks = [
+        asyncio.create_task(fault_site.events.listen(fault_site.url)),
+        asyncio.create_task(fault_site.watch_server()),
+    ]
     try:
-        await stand.settle()
-        yield stand
+        await fault_site.settle()
+        yield fault_site
     finally:
         for task in tasks:
             task.cancel()
@@ -163,21 +166,21 @@ async def with_up(
     settings: Mapping[str, Mapping[str, Any]] | None = None,
     environment: Mapping[str, str] | None = None,
 ) -> AsyncIterator[FaultSite]:
-    """Run `myview up`, which starts again what dies; in the end tell it to end."""
+    """Run `myview up`, which restarts killed processes; terminate it in the end."""
     recorded = folder / "kept"
     content = {name: dict(values) for name, values in SETTINGS.items()}
     content["record"]["folder"] = str(recorded)
     for name, values in (settings or {}).items():
         content[name] = {**content.get(name, {}), **values}
     async with delay_site.running_site(views, folder, environment, content) as site:
-        stand = FaultSite(site.url, folder, site.process.pid, recorded=recorded)
-        async with listening(stand):
-            yield stand
-            stand.ended.append(await told_to_end("up", site.process))
+        fault_site = FaultSite(site.url, folder, site.process.pid, recorded=recorded)
+        async with follow_events(fault_site):
+            yield fault_site
+            fault_site.exits.append(await terminate_process("up", site.process))
 
 
-async def told_to_end(name: str, process: asyncio.subprocess.Process) -> ProcessExit:
-    """Send a process SIGTERM; return when and how it exits."""
+async def terminate_process(name: str, process: asyncio.subprocess.Process) -> ProcessExit:
+    """Send a process SIGTERM; return how it exits."""
     begun = time.monotonic()
     process.terminate()
     try:
@@ -190,35 +193,35 @@ async def told_to_end(name: str, process: asyncio.subprocess.Process) -> Process
 
 
 Inject = Callable[[FaultSite], Awaitable[None]]
-Alone = Callable[[StampedViews, Path], Awaitable[list[ProcessExit]]]
+Standalone = Callable[[StampedViews, Path], Awaitable[list[ProcessExit]]]
 Setup = Callable[[StampedViews, Path], contextlib.AbstractAsyncContextManager[FaultSite]]
 
 
-async def _nothing(stand: FaultSite) -> None:
-    """Leave it as it is."""
-    del stand
+async def _nothing(fault_site: FaultSite) -> None:
+    """Inject nothing."""
+    del fault_site
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that goes wrong.
+    """A fault that is injected.
 
     Attributes:
-        name: for the command line and the table.
-        setup: the site that it happens to; faults of one site follow each other.
-        inject: makes it happen, and takes as long as it lasts.
-        seconds: for how long viewers are watched from when it begins.
-        within: promised: so many seconds at most without a fresh picture; None: nobody is there to take over.
-        breaks: it is the viewers' own server that dies.
-        alone: does all by itself, with sites of its own, and gives what was told to end.
-        unrecorded: meanwhile nothing can be recorded.
+        name: on the command line and in the table.
+        setup: the site that it is injected into; consecutive faults of one setup share a site.
+        inject: injects the fault, and returns when it is over.
+        seconds: for how long viewers are observed from its beginning.
+        max_gap_s: promised: seconds at most without a fresh picture; None: no promise.
+        kills_server: the viewers' own server is killed.
+        standalone: runs with sites of its own, and returns the exits of its processes.
+        stops_recording: nothing can be recorded meanwhile.
     """
 
     name: str
     setup: Setup
     inject: Inject = _nothing
     seconds: float = 6.0
-    within: float | None = 1.0
-    breaks: bool = False
-    alone: Alone | None = None
-    unrecorded: bool = False
+    max_gap_s: float | None = 1.0
+    kills_server: bool = False
+    standalone: Standalone | None = None
+    stops_recording: bool = False

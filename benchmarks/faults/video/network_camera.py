@@ -1,4 +1,4 @@
-"""A network camera of our own: MPEG-TS over HTTP, as many cameras send it, which can be broken on purpose."""
+"""A fake network camera that can be broken on purpose: MPEG-TS over HTTP."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ANSWER = b"HTTP/1.0 200 OK\r\nContent-Type: video/mp2t\r\n\r\n"
 
 @dataclass(frozen=True, slots=True)
 class EncodedFilm:
-    """What it sends: encoded pictures, over and over again."""
+    """Encoded pictures that the camera sends in a loop."""
 
     path: Path
     pictures: tuple[bytes, ...]
@@ -39,7 +39,7 @@ class EncodedFilm:
 
 
 class _Muxer:
-    """Packs pictures of one film into a transport stream."""
+    """Muxes pictures of a film into a transport stream."""
 
     def __init__(self, film: EncodedFilm) -> None:
         self._film, self._out = film, io.BytesIO()
@@ -48,7 +48,7 @@ class _Muxer:
             self._stream: VideoStream = self._container.add_stream_from_template(template.streams.video[0])
 
     def pack(self, number: int, shift_s: int) -> bytes:
-        """Return the packets of the picture of a frame."""
+        """Return the transport stream packets of a frame."""
         packet = av.Packet(self._film.pictures[number % FRAMES])
         packet.stream, packet.time_base = self._stream, _TIME_BASE
         packet.pts = packet.dts = round((number / FPS + shift_s) / _TIME_BASE)
@@ -61,13 +61,13 @@ class _Muxer:
 
 
 class NetworkCamera:
-    """Serves a film at its rate, to anybody who connects. What is set holds from the next frame on."""
+    """Serves a film in real time to every client. Changed attributes apply from the next frame on."""
 
     def __init__(self, film: EncodedFilm, port: int) -> None:
         self.film = film
         self.frozen = self.garbage = False
         self.shift_s = 0
-        """Seconds by which its time stamps are ahead."""
+        """Seconds by which its timestamps are ahead."""
         self.began = time.time()
         """When its frame 0 was, unix seconds."""
         self.url = f"http://127.0.0.1:{port}/live.ts"
@@ -76,18 +76,18 @@ class NetworkCamera:
         self._connections: set[asyncio.StreamWriter] = set()
 
     async def open(self) -> None:
-        """Let cameras' users in."""
+        """Accept connections."""
         self._server = await asyncio.start_server(self._serve, "127.0.0.1", self._port)
 
     async def close(self) -> None:
-        """Be away: nobody is there, and nobody comes in."""
+        """Drop all connections, and accept no more."""
         if self._server is not None:
             self._server.close()
         for writer in self._connections:
             writer.transport.abort()
 
     def jump(self) -> None:
-        """Let its time stamps jump by an hour."""
+        """Let its timestamps jump by an hour."""
         self.shift_s += _HOUR_S
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -113,17 +113,17 @@ class NetworkCamera:
                 await asyncio.sleep(0.5 / FPS)
                 continue
             if self.frozen or self.garbage:
-                muxer = None  # what follows begins with a key picture, as an encoder does that starts anew
+                muxer = None  # afterwards it starts with a keyframe, as a restarted encoder does
             if self.garbage:
                 writer.write(noise.randbytes(_GARBAGE_BYTES))
             elif not self.frozen and (muxer is not None or number % _GOP == 0):
                 muxer = muxer or _Muxer(self.film)
                 writer.write(muxer.pack(number, self.shift_s))
                 await writer.drain()
-            number += 1  # none is left out: the next ones are decoded by it
+            number += 1  # no frame is skipped: the next ones depend on it
 
     def _sent(self) -> tuple[EncodedFilm, int, float]:
-        """Return what all that is sent at a stretch has in common."""
+        """Return the state of an uninterrupted stream: where it changes, a new stream begins."""
         return self.film, self.shift_s, self.began
 
     def _now(self) -> int:

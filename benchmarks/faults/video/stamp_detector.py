@@ -1,8 +1,7 @@
-"""A detector that reads the strip of a picture, so that its boxes say in which picture they were found.
+"""A perfect detector for stamped pictures, as an ONNX network.
 
-It is a network in an ONNX file, for `detect.kind: onnx`, and looks up what is in the frame that the picture
-says it is. So it finds people as a perfect detector would, in the very picture that a camera gave it. A
-network camera needs it, since nobody knows beforehand which of its pictures a pulse gets.
+For `detect.kind: onnx`: it reads the frame number from the strip in the picture and looks up the boxes of
+that frame. A network camera needs it, since the picture at a pulse is not known beforehand.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from benchmarks.faults.video.stamped_views import (
 )
 
 _ROW = 6
-"""Left, top, right, bottom, score, class: what networks with an end of their own write."""
+"""Left, top, right, bottom, score, class: the output of end-to-end networks."""
 _SCORE = 4
 _HALF = 0.5
 _OPSET, _IR = 17, 8
@@ -36,7 +35,7 @@ def write_reader(views: StampedViews, camera: str, path: Path) -> Path:
     """Write the network for a camera's film.
 
     Raises:
-        CannotRunError: there is no onnx to make it with, or no onnxruntime to run it.
+        CannotRunError: onnx or onnxruntime is missing.
     """
     try:
         import onnx  # noqa: PLC0415 — only this needs it
@@ -45,7 +44,7 @@ def write_reader(views: StampedViews, camera: str, path: Path) -> Path:
         raise CannotRunError(f"{error}: pip install 'myview[dev]'") from error
     helper, real = onnx.helper, onnx.TensorProto.FLOAT
     table = _table(views, camera)
-    # The strip, a number for each column, the middle of each block, and whether it is bright.
+    # The strip, the mean of each column, the middle of each block, and whether it is bright.
     steps: list[tuple[str, list[str], str, dict[str, Any]]] = [
         ("Slice", ["picture", "strip_from", "strip_to", "strip_axes"], "strip", {}),
         ("ReduceMean", ["strip"], "columns", {"axes": [0, 1, 2], "keepdims": 0}),
@@ -54,7 +53,7 @@ def write_reader(views: StampedViews, camera: str, path: Path) -> Path:
         ("ReduceMean", ["middles"], "greys", {"axes": [1], "keepdims": 0}),
         ("Greater", ["greys", "half"], "bright", {}),
         ("Cast", ["bright"], "bits", {"to": real}),
-        # A strip can be read where each bit differs from its inverse, in which the second half of it is.
+        # A strip is legible where each bit differs from its inverse in the second half.
         ("Split", ["bits"], "straight inverse", {"axis": 0}),
         ("Sub", ["straight", "inverse"], "difference", {}),
         ("Abs", ["difference"], "differs", {}),
@@ -68,7 +67,10 @@ def write_reader(views: StampedViews, camera: str, path: Path) -> Path:
         ("Unsqueeze", ["seen", "first"], "output", {}),
     ]
     graph = helper.make_graph(
-        [helper.make_node(kind, given, made.split(), **how) for kind, given, made, how in steps],
+        [
+            helper.make_node(kind, given, made.split(), **attributes)
+            for kind, given, made, attributes in steps
+        ],
         "reader",
         [helper.make_tensor_value_info("picture", real, (1, 3, HEIGHT, WIDTH))],
         [helper.make_tensor_value_info("output", real, (1, *table.shape[1:]))],

@@ -1,9 +1,8 @@
-"""Views of the synthetic room that say on every picture, and in every box, whose they are and of which frame.
+"""Views of the synthetic room whose pictures and boxes carry their camera and frame number.
 
-A strip at the bottom of each picture has its camera and its number in black and white blocks, which survive
-encoding. Detections are the scene's truth, and the thousandths of a box's left, top and width tell the frame
-it was found in. So a viewer can tell a picture of the wrong camera or moment from the right one, and a
-box that belongs to another picture from one that belongs to this.
+A strip at the bottom of each picture encodes its camera and frame number in black and white blocks, which
+survive encoding. Detections are the ground truth; the thousandths of a box's left, top and width encode the
+frame of the detection. So pictures of the wrong camera or moment and boxes of another picture are recognized.
 """
 
 from __future__ import annotations
@@ -27,25 +26,25 @@ FPS = 25
 WIDTH, HEIGHT = 256, 144
 CAMERAS = ("c0", "c1", "c2")
 FRAMES = 1000
-"""Of a film, which then begins again; numbers of frames have three digits."""
+"""Frames of a film, which is looped; frame numbers have three digits."""
 _PEOPLE, _SEED = 3, 1
 _START, _DRAWN = 300, 50
-"""All are in sight. What is drawn is played forwards and backwards, so that nobody jumps."""
+"""All people are in view. The frames are played forwards and backwards, so that nobody jumps."""
 BLOCK, EDGE = 8, 2
-"""Pixels of one bit, and how many at its sides are not read."""
+"""Pixels of one bit, and pixels at its edges that are not read."""
 BITS, NUMBER_BITS = 16, 12
-"""Of a strip, which has them twice, then inverted; of the number in it: the others are the camera's."""
+"""Bits of a strip, which repeats them inverted, and of the frame number in it; the rest is the camera."""
 _TOPS, _WIDTHS = np.random.default_rng(1).permuted(np.tile(np.arange(FRAMES), (2, 1)), axis=1).tolist()
-"""The thousandths of a box's top and width, by its frame; means of boxes, which trackers make, fit none."""
+"""The thousandths of a box's top and width, by frame; interpolated boxes match no frame."""
 _DARK, _BRIGHT, _MIDDLE = 40, 215, 128
 _SHOWS = 0.3
-"""Share of a person that must show to be found."""
+"""Visible share of a person from which they are detected."""
 _TIME_BASE = Fraction(1, 90_000)
 
 
 @dataclass(frozen=True, slots=True)
 class FrameStamp:
-    """What a picture says of itself."""
+    """The camera and frame number in a picture."""
 
     camera: str
     frame: int
@@ -54,22 +53,22 @@ class FrameStamp:
 
 @dataclass(frozen=True, slots=True)
 class StampedViews:
-    """What is played: `benchmarks.latency.running_site.PlayedViews`."""
+    """The views of a site (see `benchmarks.latency.running_site.PlayedViews`)."""
 
     cameras: list[dict[str, Any]]
     site: dict[str, Any]
     ground: Path | None
     found: Mapping[tuple[str, int, int, int, int], int]
-    """In which frame of a camera a box was found: left, top, right, bottom in thousandths."""
+    """The frame in which a box was detected, by camera and left, top, right, bottom in thousandths."""
 
     def frame_of(self, camera: str, box: Box) -> int | None:
-        """Return in which frame a box was found; None where it is a mean of several and says nothing."""
+        """Return the frame in which a box was detected; None: it is interpolated."""
         sides = (round(1000 * side) for side in (box.left, box.top, box.right, box.bottom))
         return self.found.get((camera, *sides))  # type: ignore[arg-type]
 
 
-def stamped(image: NDArray[np.uint8], camera: int, frame: int) -> NDArray[np.uint8]:
-    """Return a picture ``(H, W, 3)`` with its strip: a copy."""
+def stamp_picture(image: NDArray[np.uint8], camera: int, frame: int) -> NDArray[np.uint8]:
+    """Return a copy of a picture ``(H, W, 3)`` with its strip."""
     value = camera << NUMBER_BITS | frame
     bits = [value >> place & 1 for place in range(BITS)]
     bits += [1 - bit for bit in bits]
@@ -80,7 +79,7 @@ def stamped(image: NDArray[np.uint8], camera: int, frame: int) -> NDArray[np.uin
 
 
 def read_stamp(grey: NDArray[np.uint8]) -> FrameStamp | None:
-    """Read the strip of a picture ``(H, W)``; None where it cannot be read."""
+    """Read the strip of a picture ``(H, W)``; None: it is illegible."""
     rows = grey[-BLOCK + EDGE : grey.shape[0] - EDGE, : 2 * BITS * BLOCK].astype(np.float64)
     blocks = rows.reshape(len(rows), 2 * BITS, BLOCK)[:, :, EDGE:-EDGE].mean(axis=(0, 2)) > _MIDDLE
     bits, inverse = blocks[:BITS], blocks[BITS:]
@@ -99,7 +98,7 @@ def make(folder: Path, pulses: int) -> StampedViews:
     cameras, found = [], {}
     for number, name in enumerate(CAMERAS):
         drawn = {place: scene.image(number, place) for place in truths}
-        pictures = [stamped(drawn[place], number, frame) for frame, place in enumerate(places)]
+        pictures = [stamp_picture(drawn[place], number, frame) for frame, place in enumerate(places)]
         write_film(pictures, folder / f"{name}.mp4")
         boxes = [_boxes(truths[place][number]) for place in places]
         _write_detections(boxes, pulses, folder / f"{name}.txt")
@@ -115,7 +114,7 @@ def make(folder: Path, pulses: int) -> StampedViews:
 
 
 def make_unattractive(views: StampedViews, folder: Path, best: str, pulses: int) -> StampedViews:
-    """Let people be smaller in all cameras but one, so that this one is shown: by other detections."""
+    """Return views with smaller detections in all cameras but one, so that this one is selected."""
     cameras, found = [], dict(views.found)
     for camera in views.cameras:
         name = camera["id"]
@@ -138,7 +137,7 @@ def make_unattractive(views: StampedViews, folder: Path, best: str, pulses: int)
 
 
 def make_smaller(path: Path, out: Path) -> Path:
-    """Write a film again, in three quarters of its size."""
+    """Write a film again, at three quarters of its size."""
     with av.open(str(path)) as container:
         pictures = [
             np.asarray(
@@ -151,7 +150,7 @@ def make_smaller(path: Path, out: Path) -> Path:
 
 
 def write_film(pictures: Sequence[NDArray[np.uint8]], path: Path, fps: int = FPS) -> None:
-    """Encode pictures, so many a second, with a key picture every ten."""
+    """Encode pictures at a frame rate, with GOPs of ten frames."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=fps, options={"crf": "18", "preset": "ultrafast"})
         stream.height, stream.width = pictures[0].shape[:2]
@@ -172,7 +171,7 @@ def _places() -> list[int]:
 
 
 def _boxes(truth: Any) -> NDArray[np.float64]:
-    """Return the boxes ``(N, 4)`` that are whole and to be seen, left, top, width, height in whole pixels."""
+    """Return the whole and visible boxes ``(N, 4)``: left, top, width, height in whole pixels."""
     boxes = np.floor(truth.boxes[truth.visibility >= _SHOWS]).reshape(-1, 4)
     inside = (boxes[:, :2] >= 1).all(axis=1) & (boxes[:, 2] < WIDTH - 1) & (boxes[:, 3] < HEIGHT - 1)
     kept = boxes[inside]

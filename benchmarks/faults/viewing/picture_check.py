@@ -1,4 +1,4 @@
-"""What a viewer received, held against what the events said of it and what the pictures say of themselves."""
+"""Check of a viewer's pictures against the events and the stamps in the pictures."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from client import Box, Gop
 
 @dataclass(frozen=True, slots=True)
 class PictureVerdict:
-    """One viewer's pictures in the time of a fault.
+    """The check of one viewer's pictures during a fault.
 
     Attributes:
-        frames: how many came.
-        wrong: of another camera than the events named, of another moment, or not to be read.
-        unnamed: of pulses of which no event was heard, so that any camera may be right.
-        repeated: the picture before, shown again because there was none.
+        frames: received pictures.
+        wrong: of another camera than the events named, of another moment, or illegible.
+        unnamed: of pulses without an event, so that the camera is unchecked.
+        repeated: the previous picture again, for lack of a new one.
         boxes: drawn on these pictures.
-        wrong_boxes: found in another frame than the picture shows.
-        blurred: means of several boxes, which do not say what they were found in.
-        fresh: when each fresh picture came, and which camera it is of.
+        wrong_boxes: detected in another frame than the picture's.
+        averaged: interpolated boxes, which carry no frame number.
+        fresh: the time of arrival and the camera of each fresh picture.
     """
 
     frames: int
@@ -33,17 +33,17 @@ class PictureVerdict:
     repeated: int
     boxes: int
     wrong_boxes: int
-    blurred: int
+    averaged: int
     fresh: tuple[tuple[float, str], ...]
     notes: tuple[str, ...]
-    """What was wrong, in words."""
-    courses: Mapping[str, LiveFrameOrder]
-    """What was shown of each network camera."""
+    """What was wrong, as text."""
+    live_orders: Mapping[str, LiveFrameOrder]
+    """The pictures of each network camera."""
 
-    def without(self, since: float, until: float) -> float:
+    def longest_gap(self, since: float, until: float) -> float:
         """Return the longest time without a fresh picture, seconds, that ends or begins within a span.
 
-        A GOP comes in one piece, so the rhythm of GOPs is in it.
+        It includes the length of a GOP, which arrives in one piece.
         """
         moments = [at for at, _ in self.fresh]
         before = max((at for at in moments if at <= since), default=since)
@@ -53,30 +53,30 @@ class PictureVerdict:
 
 def judge(
     pictures: Sequence[ReceivedPicture],
-    told: EventLog,
+    events: EventLog,
     number: int,
     views: StampedViews,
     live: Iterable[str] = (),
 ) -> PictureVerdict:
-    """Judge every picture; of the cameras of ``live`` it is known within bounds only which comes when."""
-    said = dict(_said(told, number))
-    courses = {camera: LiveFrameOrder() for camera in live}
+    """Check every picture; the frames of ``live`` cameras are known within bounds only."""
+    expected = dict(_expected_pictures(events, number))
+    live_orders = {camera: LiveFrameOrder() for camera in live}
     fresh, notes = [], []
-    wrong = unnamed = repeated = boxes = wrong_boxes = blurred = 0
+    wrong = unnamed = repeated = boxes = wrong_boxes = averaged = 0
     before: ReceivedPicture | None = None
     for picture in pictures:
         stamp, last, before = picture.stamp, before, picture
-        named = picture.pulse in said
+        named = picture.pulse in expected
         unnamed += not named
-        camera, found = said.get(picture.pulse, (None, ()))
+        camera, found = expected.get(picture.pulse, (None, ()))
         if last is not None and stamp is not None and stamp == last.stamp:
             repeated += 1
         elif stamp is None or (named and stamp.camera != camera):
             wrong += 1
             notes.append(f"pulse {picture.pulse}: {stamp}, not {camera}")
-        elif trouble := _of_another_moment(picture.pulse, stamp, courses):
+        elif error := _moment_error(picture.pulse, stamp, live_orders):
             wrong += 1
-            notes.append(f"pulse {picture.pulse}: {stamp}{trouble}")
+            notes.append(f"pulse {picture.pulse}: {stamp}{error}")
         else:
             fresh.append((picture.at, stamp.camera))
         if camera is None or stamp is None:
@@ -84,30 +84,32 @@ def judge(
         for box in found:
             frame = views.frame_of(camera, box)
             boxes += 1
-            blurred += frame is None
+            averaged += frame is None
             if frame is not None and frame != stamp.frame:
                 wrong_boxes += 1
                 notes.append(f"pulse {picture.pulse} of {camera}: a box of frame {frame} on {stamp}")
-    counts = len(pictures), wrong, unnamed, repeated, boxes, wrong_boxes, blurred
-    return PictureVerdict(*counts, tuple(fresh), tuple(notes), courses)
+    counts = len(pictures), wrong, unnamed, repeated, boxes, wrong_boxes, averaged
+    return PictureVerdict(*counts, tuple(fresh), tuple(notes), live_orders)
 
 
-def _of_another_moment(pulse: int, stamp: FrameStamp, courses: Mapping[str, LiveFrameOrder]) -> str:
-    """Return in what way a picture is not the one of its pulse; empty: it is."""
-    course = courses.get(stamp.camera)
-    if course is not None:
-        return course.wrong(pulse, stamp.frame)
+def _moment_error(pulse: int, stamp: FrameStamp, live_orders: Mapping[str, LiveFrameOrder]) -> str:
+    """Return how a picture differs from the one of its pulse; empty: it is the right one."""
+    order = live_orders.get(stamp.camera)
+    if order is not None:
+        return order.wrong(pulse, stamp.frame)
     return "" if stamp.frame == pulse % FRAMES else ", another frame"
 
 
-def _said(told: EventLog, number: int) -> Iterator[tuple[int, tuple[str | None, tuple[Box, ...]]]]:
-    """Yield for every pulse the camera to be shown and the boxes in its picture.
+def _expected_pictures(
+    events: EventLog, number: int
+) -> Iterator[tuple[int, tuple[str | None, tuple[Box, ...]]]]:
+    """Yield for every pulse the selected camera and the boxes in its picture.
 
-    Where none is chosen, since nobody sees the person, a stream stays with the last one.
+    Where no camera sees the person, a stream stays with the last one.
     """
     shown: str | None = None
-    for _, gop in told.gops:
-        camera = told.choice(gop, number)
+    for _, gop in events.gops:
+        camera = events.choice(gop, number)
         shown = camera or shown
         for place in range(gop.frames):
             yield gop.first + place, (shown, _boxes(gop, camera, place))
@@ -119,4 +121,4 @@ def _boxes(gop: Gop, camera: str | None, place: int) -> tuple[Box, ...]:
 
 
 RHYTHM_S = 10 / FPS
-"""A GOP comes in one piece; so long nothing comes in between."""
+"""Seconds of a GOP, which arrives in one piece."""

@@ -1,4 +1,4 @@
-"""Viewers of a site under fault: the Python client's own player, and when every picture came."""
+"""Viewers of a site under fault: the Python client's own player, with the arrival time of each picture."""
 
 from __future__ import annotations
 
@@ -27,31 +27,31 @@ _SETTINGS = HttpSettings()
 
 @dataclass(frozen=True, slots=True)
 class ReceivedPicture:
-    """One picture as a viewer got it."""
+    """A picture that a viewer received."""
 
     pulse: int
     at: float
-    """When it came, seconds of the monotonic clock."""
+    """Time of arrival, seconds of the monotonic clock."""
     stamp: FrameStamp | None
-    """What it says of itself; None where it cannot be read."""
+    """Its camera and frame number; None: illegible."""
 
 
 @dataclass(slots=True)
 class StreamRecorder:
-    """Takes what the player would write into a file, and notes when."""
+    """A file-like sink of the player that records the arrival time of each write."""
 
     data: bytearray = field(default_factory=bytearray)
     came: list[tuple[float, int]] = field(default_factory=list)
-    """When what ends at an offset had come."""
+    """Arrival time and end offset of each write."""
 
     def write(self, data: bytes) -> int:
-        """Take a header or a fragment."""
+        """Append a header or a fragment."""
         self.data += data
         self.came.append((time.monotonic(), len(self.data)))
         return len(data)
 
     def pictures(self) -> list[ReceivedPicture]:
-        """Decode everything."""
+        """Decode all pictures."""
         moments: dict[int, float] = {}
         at = 0
         for moment, end in self.came:
@@ -71,52 +71,52 @@ class StreamRecorder:
 
 
 class Viewer:
-    """Watches the best view of one object for as long as it is let."""
+    """Watches the best view of one object."""
 
     def __init__(self, url: str, number: int) -> None:
         self.number = number
-        self.tapes: list[StreamRecorder] = []
-        self.given_up = 0
-        """How often the player took the server for gone for good; it is then started again."""
+        self.recorders: list[StreamRecorder] = []
+        self.restarts = 0
+        """How often the player gave up and was started again."""
         self._sessions: list[Session] = []
         self._address = server_url(url) / f"objects/{number}/best.mp4"
 
     @property
     def reconnections(self) -> int:
-        """How often the stream had to be opened again."""
-        return self.given_up + sum(session.reconnections for session in self._sessions)
+        """How often the stream was opened again."""
+        return self.restarts + sum(session.reconnections for session in self._sessions)
 
     async def run(self) -> None:
         """Watch until cancelled."""
         while True:
-            self.tapes.append(StreamRecorder())
-            record = Recording(cast("io.BufferedWriter", self.tapes[-1]), None)
+            self.recorders.append(StreamRecorder())
+            record = Recording(cast("io.BufferedWriter", self.recorders[-1]), None)
             self._sessions.append(Session(record, ViewHistory(self.number), None, None, None))
             with contextlib.suppress(ClientError):
                 await self._sessions[-1].run(self._address, _SETTINGS)
-            self.given_up += 1
+            self.restarts += 1
             await asyncio.sleep(_AGAIN_S)
 
     @property
     def last_came(self) -> float:
-        """When something came last; 0 before."""
-        return max((tape.came[-1][0] for tape in self.tapes if tape.came), default=0.0)
+        """Time of the last arrival; 0: nothing has arrived."""
+        return max((recorder.came[-1][0] for recorder in self.recorders if recorder.came), default=0.0)
 
     def pictures(self) -> list[ReceivedPicture]:
-        """Decode what came, in the order in which it came."""
-        return [picture for tape in self.tapes for picture in tape.pictures()]
+        """Decode all received pictures, in order of arrival."""
+        return [picture for recorder in self.recorders for picture in recorder.pictures()]
 
 
 @dataclass(slots=True)
 class EventLog:
-    """What the server's events said, and when."""
+    """The server's events, with their time of arrival."""
 
     gops: list[tuple[float, Gop]] = field(default_factory=list)
     cameras: Cameras | None = None
     merged: dict[int, int] = field(default_factory=dict)
 
     def take(self, event: Event) -> None:
-        """Take an event; what the server says anew after a reconnection is passed over."""
+        """Add an event; GOPs that are repeated after a reconnection are skipped."""
         match event:
             case Gop() if not self.gops or event.first > self.gops[-1][1].first:
                 self.gops.append((time.monotonic(), event))
@@ -133,16 +133,16 @@ class EventLog:
             await asyncio.sleep(_AGAIN_S)
 
     def state(self, camera: str) -> str | None:
-        """Return a camera's state as it was told last."""
+        """Return a camera's last reported state."""
         known = self.cameras.cameras if self.cameras else ()
         return next((it.state for it in known if it.camera == camera), None)
 
     def shown(self, number: int) -> str | None:
-        """Return the camera that an object is shown by."""
+        """Return the camera that shows an object now."""
         return self.choice(self.gops[-1][1], number) if self.gops else None
 
     def choice(self, gop: Gop, number: int) -> str | None:
-        """Return the camera of an object in a GOP, by whichever number it has now."""
+        """Return the camera of an object in a GOP, under its number after merges."""
         while number not in gop.choices and number in self.merged:
             number = self.merged[number]
         return gop.choices.get(number)

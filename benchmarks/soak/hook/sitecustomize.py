@@ -1,4 +1,4 @@
-"""Python runs this at its start where the folder is on its path: the site's processes count their tasks."""
+"""Python imports this at its start where the folder is on its path: the process then counts its tasks."""
 
 import os
 import sys

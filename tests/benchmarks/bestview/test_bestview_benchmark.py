@@ -13,14 +13,14 @@ import pytest
 from benchmarks.bestview import __main__ as bestview
 from benchmarks.bestview.association_baselines import (
     boxes_by_truth,
-    bridged,
     by_nearest_feet,
-    not_joined,
+    interpolated_gaps,
     own_tracks,
     tracks_by_truth,
+    unassociated_tracks,
 )
 from benchmarks.bestview.camera_tracks import Rows
-from benchmarks.bestview.methods import MethodResult, outcome, visible_rows
+from benchmarks.bestview.methods import MethodResult, score_method, visible_rows
 from benchmarks.bestview.parameter_sweep import DEFAULT_SWITCH_COST_S, STRIDE, SweepSetting, sweep
 from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.bestview.service_decisions import Rendering, decide_given, largest
@@ -34,16 +34,16 @@ NEAR, FAR = (10.0, 10.0, 40.0, 60.0), (60.0, 20.0, 10.0, 20.0)
 GROUND = {"c0": np.eye(3), "c1": np.array([[1.0, 0.0, 100.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])}
 
 
-def rows(number: int, left: float, frames: Sequence[int], top: float = 0.0) -> list[MotRow]:
-    return [MotRow(frame, number, left, top, 10.0, 20.0) for frame in frames]
+def rows(identity: int, left: float, frames: Sequence[int], top: float = 0.0) -> list[MotRow]:
+    return [MotRow(frame, identity, left, top, 10.0, 20.0) for frame in frames]
 
 
-def hall(gt: Rows, least_shown: float = 0.25) -> BenchmarkScene:
+def hall(gt: Rows, min_visible: float = 0.25) -> BenchmarkScene:
     content = {
         "site": {"name": "hall", "fps": 10.0, "width": 100, "height": 100},
         "cameras": [{"id": camera, "source": "scene:none"} for camera in gt],
     }
-    return BenchmarkScene("hall", "two views", content, gt, least_shown)
+    return BenchmarkScene("hall", "two views", content, gt, min_visible)
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def test_on_true_boxes_myviews_choice_is_the_optimum_where_it_is_plain(passing: 
         decide_given(passing.config(), passing.gt, FRAMES),
         decide_given(passing.config(), visible_rows(passing, truth), FRAMES),
     ):
-        score = outcome(passing, truth, MethodResult("true", found, given=True)).views
+        score = score_method(passing, truth, MethodResult("true", found, ground_truth=True)).views
         assert (score.agreement, score.regret, score.visible, score.chosen) == (1.0, 0.0, 1.0, 1.0)
         assert score.cuts_per_minute == score.optimum_cuts_per_minute == 10.0
 
@@ -77,37 +77,37 @@ def test_the_largest_box_is_taken_frame_by_frame(passing: BenchmarkScene) -> Non
 
 
 def test_who_is_hidden_is_not_among_the_true_boxes() -> None:
-    case = hall({"c0": [MotRow(1, 1, *NEAR, visible=0.1), MotRow(2, 1, *NEAR, visible=0.9)], "c1": []})
-    assert [row.frame for row in visible_rows(case, case.truth())["c0"]] == [2]
+    scene = hall({"c0": [MotRow(1, 1, *NEAR, visible=0.1), MotRow(2, 1, *NEAR, visible=0.9)], "c1": []})
+    assert [row.frame for row in visible_rows(scene, scene.truth())["c0"]] == [2]
 
 
 def test_whole_tracks_are_joined_by_their_feet() -> None:
-    seen = {
+    tracks = {
         "c0": [*rows(1, 105.0, range(1, 20)), *rows(2, 150.0, range(1, 20))],
         "c1": [*rows(1, 52.0, range(1, 20)), *rows(2, 7.0, range(1, 20)), *rows(3, 7.0, range(1, 4))],
     }
-    joined = by_nearest_feet(seen, GROUND)
-    number = {camera: {row.left: row.id for row in reversed(found)} for camera, found in joined.items()}
-    assert number["c0"][105.0] == number["c1"][7.0]
-    assert number["c0"][150.0] == number["c1"][52.0]
+    joined = by_nearest_feet(tracks, GROUND)
+    identity = {camera: {row.left: row.id for row in reversed(found)} for camera, found in joined.items()}
+    assert identity["c0"][105.0] == identity["c1"][7.0]
+    assert identity["c0"][150.0] == identity["c1"][52.0]
     assert len({row.id for found in joined.values() for row in found}) == 3, "the short one stays alone"
 
 
 def test_two_tracks_of_one_camera_are_never_joined_while_both_are_there() -> None:
-    seen = {
+    tracks = {
         "c0": rows(1, 100.0, range(1, 20)),
         "c1": [*rows(1, 0.0, range(1, 20)), *rows(2, 1.0, range(10, 20)), *rows(3, 2.0, range(30, 40))],
     }
-    joined = by_nearest_feet(seen, GROUND)
+    joined = by_nearest_feet(tracks, GROUND)
     assert len({row.id for row in joined["c1"]}) == 3
     assert joined["c0"][0].id == joined["c1"][0].id
 
 
 def test_nobody_is_joined_where_nobody_shares_a_frame() -> None:
-    seen = {"c0": rows(1, 100.0, range(1, 20)), "c1": rows(1, 0.0, range(30, 40))}
-    joined = by_nearest_feet(seen, GROUND)
+    tracks = {"c0": rows(1, 100.0, range(1, 20)), "c1": rows(1, 0.0, range(30, 40))}
+    joined = by_nearest_feet(tracks, GROUND)
     assert joined["c0"][0].id != joined["c1"][0].id
-    assert joined == not_joined(seen)
+    assert joined == unassociated_tracks(tracks)
 
 
 def test_the_truth_may_name_boxes_or_whole_tracks() -> None:
@@ -121,8 +121,8 @@ def test_the_truth_may_name_boxes_or_whole_tracks() -> None:
 
 
 def test_moments_of_hiding_are_bridged_and_absences_are_not() -> None:
-    seen = {"c0": [*rows(1, 0.0, [1, 2]), *rows(1, 4.0, [6]), *rows(1, 9.0, [20]), *rows(2, 50.0, [1])]}
-    found = [(row.frame, row.left) for row in bridged(seen, 4)["c0"] if row.id == 1]
+    tracks = {"c0": [*rows(1, 0.0, [1, 2]), *rows(1, 4.0, [6]), *rows(1, 9.0, [20]), *rows(2, 50.0, [1])]}
+    found = [(row.frame, row.left) for row in interpolated_gaps(tracks, 4)["c0"] if row.id == 1]
     assert found == [(1, 0.0), (2, 0.0), (3, 1.0), (4, 2.0), (5, 3.0), (6, 4.0), (20, 9.0)]
 
 
@@ -133,7 +133,7 @@ def test_of_two_tracks_at_one_person_the_longer_stays() -> None:
 
 
 def test_a_cameras_own_tracks_are_what_was_final() -> None:
-    def said(first: int, last: int, final_to: int, left: float, *, ended: bool = False) -> CameraTracks:
+    def message(first: int, last: int, final_to: int, left: float, *, ended: bool = False) -> CameraTracks:
         boxes = [(left, 0.0, left + 10.0, 20.0)] * (last - first + 1)
         return CameraTracks(
             camera="c0",
@@ -149,7 +149,9 @@ def test_a_cameras_own_tracks_are_what_was_final() -> None:
             solve=None,
         )
 
-    found = own_tracks({"c0": [said(0, 9, 4, 1.0), said(5, 14, 9, 2.0), said(10, 16, 16, 3.0, ended=True)]})
+    found = own_tracks(
+        {"c0": [message(0, 9, 4, 1.0), message(5, 14, 9, 2.0), message(10, 16, 16, 3.0, ended=True)]}
+    )
     assert [row.frame for row in found["c0"]] == list(range(1, 18))
     assert [row.left for row in found["c0"]] == [1.0] * 5 + [2.0] * 5 + [3.0] * 7
 
@@ -161,8 +163,8 @@ def test_what_keeps_somebody_from_being_seen_is_told_apart(passing: BenchmarkSce
         "c1": [],
     }
     shown = [Choice(frame, 1, "c0") for frame in range(1, 11)]
-    told = losses(passing, truth, MethodResult("ours", Rendering(found, shown)))
-    assert told == VisibilityLosses(visible=10 / 60, choice=10 / 60, number=10 / 60, missed=30 / 60)
+    shares = losses(passing, truth, MethodResult("ours", Rendering(found, shown)))
+    assert shares == VisibilityLosses(visible=10 / 60, selection=10 / 60, identity=10 / 60, detection=30 / 60)
 
 
 def test_settings_are_swept_and_knowing_all_costs_nothing_but_the_gop(passing: BenchmarkScene) -> None:
@@ -181,7 +183,7 @@ def test_the_benchmark_prints_a_row_for_every_way(tmp_path: Path, monkeypatch: p
     printed = (out / "bestview.txt").read_text(encoding="utf-8")
     assert "terrace: left out: needs the recordings" in printed
     ours, others = ("own boxes, true ids", "MyView", "no homographies"), ("nearest feet", "occupancy map")
-    for way in ("true boxes, largest", *ours, *others):
-        assert way in printed
+    for method in ("true boxes, largest", *ours, *others):
+        assert method in printed
     assert (out / "bestview.png").stat().st_size > 1000
     assert (out / "bestview_sweeps.png").stat().st_size > 1000

@@ -15,7 +15,7 @@ from benchmarks.common.report import Report
 from benchmarks.faults.injection.processes import FAULTS
 from benchmarks.faults.outcomes.fault_run import FaultOutcome, _injected
 from benchmarks.faults.outcomes.measurement import _group
-from benchmarks.faults.outcomes.promise_table import kept
+from benchmarks.faults.outcomes.promise_table import keeps_promises
 from benchmarks.faults.outcomes.recording_check import RecordedFile, note
 from benchmarks.faults.site.fault_site import FaultSite
 from benchmarks.faults.video.stamp_detector import write_reader
@@ -26,7 +26,7 @@ from benchmarks.faults.video.stamped_views import (
     FrameStamp,
     StampedViews,
     read_stamp,
-    stamped,
+    stamp_picture,
 )
 from benchmarks.faults.viewing.live_pictures import MOST_AHEAD, MOST_BEHIND
 from benchmarks.faults.viewing.picture_check import judge
@@ -47,98 +47,102 @@ FOUND = {("c0", *(1000 * side + frame for side in SIDES)): frame for frame in ra
 VIEWS = StampedViews([], {}, None, FOUND)
 
 
-def told(gops: int) -> EventLog:
-    heard = EventLog()
+def events_of(gops: int) -> EventLog:
+    log = EventLog()
     for number in range(gops):
         first = number * GOP
         boxes = {"c0": tuple((box_of(frame % FRAMES),) for frame in range(first, first + GOP))}
-        heard.take(Gop(first=first, frames=GOP, choices={1: "c0"}, boxes=boxes, cuts=()))
-    return heard
+        log.take(Gop(first=first, frames=GOP, choices={1: "c0"}, boxes=boxes, cuts=()))
+    return log
 
 
-def watched(gops: int, behind: int = 0) -> list[ReceivedPicture]:
+def pictures_of(gops: int, behind: int = 0) -> list[ReceivedPicture]:
     return [
         ReceivedPicture(pulse, 100.0 + pulse // GOP * 0.4, FrameStamp("c0", (pulse - behind) % FRAMES))
         for pulse in range(gops * GOP)
     ]
 
 
-def kept_of(pulses: Iterable[int]) -> dict[int, int]:
+def recorded_frames(pulses: Iterable[int]) -> dict[int, int]:
     return {pulse: pulse % FRAMES for pulse in pulses}
 
 
 @pytest.mark.parametrize(("camera", "frame"), [(0, 0), (1, 517), (2, 999)])
 def test_a_picture_says_whose_it_is_and_which(camera: int, frame: int) -> None:
     noise = np.random.default_rng(1).integers(0, 255, (144, 256, 3), dtype=np.uint8)
-    grey = stamped(noise, camera, frame).mean(axis=2).astype(np.uint8)
+    grey = stamp_picture(noise, camera, frame).mean(axis=2).astype(np.uint8)
     assert read_stamp(grey) == FrameStamp(f"c{camera}", frame)
     assert read_stamp(noise.mean(axis=2).astype(np.uint8)) is None
 
 
 def test_what_is_right_is_right_over_the_end_of_the_film() -> None:
-    received = judge(watched(102), told(102), 1, VIEWS)
+    received = judge(pictures_of(102), events_of(102), 1, VIEWS)
     assert (received.frames, received.wrong, received.repeated) == (1020, 0, 0)
-    assert (received.boxes, received.wrong_boxes, received.blurred) == (1020, 0, 0)
-    assert received.without(100.0, 140.0) == pytest.approx(0.4)
+    assert (received.boxes, received.wrong_boxes, received.averaged) == (1020, 0, 0)
+    assert received.longest_gap(100.0, 140.0) == pytest.approx(0.4)
 
 
 def test_a_picture_of_another_camera_is_wrong() -> None:
-    pictures = watched(3)
+    pictures = pictures_of(3)
     pictures[14] = replace(pictures[14], stamp=FrameStamp("c1", 14))
-    assert judge(pictures, told(3), 1, VIEWS).wrong == 1
+    assert judge(pictures, events_of(3), 1, VIEWS).wrong == 1
 
 
 def test_a_picture_of_another_moment_is_wrong_and_so_is_the_box_on_it() -> None:
-    pictures = watched(3)
+    pictures = pictures_of(3)
     pictures[14] = replace(pictures[14], stamp=FrameStamp("c0", 12))
-    received = judge(pictures, told(3), 1, VIEWS)
+    received = judge(pictures, events_of(3), 1, VIEWS)
     assert (received.wrong, received.wrong_boxes) == (1, 1)
 
 
 def test_a_picture_that_is_shown_again_is_not_fresh_and_boxes_of_the_next_one_do_not_belong_on_it() -> None:
-    pictures = watched(3)
+    pictures = pictures_of(3)
     pictures[14] = replace(pictures[14], stamp=FrameStamp("c0", 13))
-    received = judge(pictures, told(3), 1, VIEWS)
+    received = judge(pictures, events_of(3), 1, VIEWS)
     assert (received.wrong, received.repeated, received.wrong_boxes, len(received.fresh)) == (0, 1, 1, 29)
 
 
 def test_a_picture_that_no_event_named_a_camera_of_may_be_of_the_wrong_one() -> None:
-    received = judge(watched(3), told(2), 1, VIEWS)
+    received = judge(pictures_of(3), events_of(2), 1, VIEWS)
     assert (received.wrong, received.unnamed) == (0, 10)
     unproven = FaultOutcome(FAULTS[0], received=[received])
-    assert not kept(unproven)
-    assert kept(replace(unproven, fault=replace(FAULTS[0], breaks=True), back=1.0)), "nobody is there to say"
+    assert not keeps_promises(unproven)
+    assert keeps_promises(replace(unproven, fault=replace(FAULTS[0], kills_server=True), recovery_s=1.0)), (
+        "nobody is there to say"
+    )
 
 
 def test_where_no_camera_is_chosen_the_last_one_stays() -> None:
-    heard = told(1)
-    heard.take(Gop(first=GOP, frames=GOP, choices={}, boxes={}, cuts=()))
-    pictures = watched(2)
-    assert judge(pictures, heard, 1, VIEWS).wrong == 0
+    log = events_of(1)
+    log.take(Gop(first=GOP, frames=GOP, choices={}, boxes={}, cuts=()))
+    pictures = pictures_of(2)
+    assert judge(pictures, log, 1, VIEWS).wrong == 0
     pictures[14] = replace(pictures[14], stamp=FrameStamp("c1", 14))
-    assert judge(pictures, heard, 1, VIEWS).wrong == 1
+    assert judge(pictures, log, 1, VIEWS).wrong == 1
 
 
 def test_of_a_network_camera_the_bounds_are_known_and_that_it_never_goes_back() -> None:
     for behind, wrong in ((0, 0), (3, 0), (MOST_BEHIND, 0), (MOST_BEHIND + 1, 30), (-MOST_AHEAD - 1, 30)):
-        assert judge(watched(3, behind), told(3), 1, VIEWS, ["c0"]).wrong == wrong
-    assert judge(watched(3, 3), told(3), 1, VIEWS).wrong == 30, "a recording's are known exactly"
-    pictures = watched(3, 3)
+        assert judge(pictures_of(3, behind), events_of(3), 1, VIEWS, ["c0"]).wrong == wrong
+    assert judge(pictures_of(3, 3), events_of(3), 1, VIEWS).wrong == 30, "a recording's are known exactly"
+    pictures = pictures_of(3, 3)
     pictures[14] = replace(pictures[14], stamp=FrameStamp("c0", 14 - 3 - 5))
-    assert judge(pictures, told(3), 1, VIEWS, ["c0"]).wrong == 1
+    assert judge(pictures, events_of(3), 1, VIEWS, ["c0"]).wrong == 1
 
 
 def test_of_a_network_camera_a_box_is_right_on_the_picture_it_was_found_in() -> None:
-    assert judge(watched(3), told(3), 1, VIEWS, ["c0"]).wrong_boxes == 0
-    assert judge(watched(3, 3), told(3), 1, VIEWS, ["c0"]).wrong_boxes == 30
+    assert judge(pictures_of(3), events_of(3), 1, VIEWS, ["c0"]).wrong_boxes == 0
+    assert judge(pictures_of(3, 3), events_of(3), 1, VIEWS, ["c0"]).wrong_boxes == 30
 
 
 def test_of_a_network_camera_what_is_recorded_is_what_was_shown() -> None:
-    outcome = FaultOutcome(FAULTS[0], received=[judge(watched(3), told(3), 1, VIEWS, ["c0"])], gops=(0, 3))
-    for there, unlike in ((kept_of(range(30)), 0), ({**kept_of(range(30)), 14: 13}, 1)):
-        note([outcome], told(3), [RecordedFile("c0", 0, there, plays=True)])
-        assert len(outcome.unlike) == unlike
-        assert kept(outcome) == (unlike == 0)
+    outcome = FaultOutcome(
+        FAULTS[0], received=[judge(pictures_of(3), events_of(3), 1, VIEWS, ["c0"])], gops=(0, 3)
+    )
+    for there, differing in ((recorded_frames(range(30)), 0), ({**recorded_frames(range(30)), 14: 13}, 1)):
+        note([outcome], events_of(3), [RecordedFile("c0", 0, there, plays=True)])
+        assert len(outcome.differing) == differing
+        assert keeps_promises(outcome) == (differing == 0)
 
 
 def test_the_reader_finds_people_where_they_are_in_the_picture_that_it_is_given(tmp_path: Path) -> None:
@@ -148,45 +152,50 @@ def test_the_reader_finds_people_where_they_are_in_the_picture_that_it_is_given(
     detector = OnnxDetector(OnnxSettings(model=model, nms_iou=1.0))
     noise = np.random.default_rng(1).integers(0, 255, (HEIGHT, WIDTH, 3), dtype=np.uint8)
     for frame in (0, 517, 999):
-        (box,) = detector.detect(stamped(noise, 2, frame)).boxes.tolist()
+        (box,) = detector.detect(stamp_picture(noise, 2, frame)).boxes.tolist()
         assert VIEWS.frame_of("c0", Box(1, *box)) == frame
     assert len(detector.detect(noise)) == 0
 
 
 def test_who_gets_nothing_waits() -> None:
-    pictures = [it for it in watched(10) if not 30 <= it.pulse < 70]
-    assert judge(pictures, told(10), 1, VIEWS).without(100.0, 104.0) == pytest.approx(2.0)
-    assert judge([], told(10), 1, VIEWS).without(100.0, 104.0) == pytest.approx(4.0)
+    pictures = [it for it in pictures_of(10) if not 30 <= it.pulse < 70]
+    assert judge(pictures, events_of(10), 1, VIEWS).longest_gap(100.0, 104.0) == pytest.approx(2.0)
+    assert judge([], events_of(10), 1, VIEWS).longest_gap(100.0, 104.0) == pytest.approx(4.0)
 
 
 def test_a_gop_that_was_shown_and_is_not_on_the_disk_is_lost() -> None:
     outcome = FaultOutcome(FAULTS[0], gops=(0, 3))
-    there = kept_of(range(25))
+    there = recorded_frames(range(25))
     note(
         [outcome],
-        told(3),
-        [RecordedFile("c0", 0, there, plays=True), RecordedFile("c1", 0, kept_of(range(30)), plays=False)],
+        events_of(3),
+        [
+            RecordedFile("c0", 0, there, plays=True),
+            RecordedFile("c1", 0, recorded_frames(range(30)), plays=False),
+        ],
     )
     assert (outcome.lost, outcome.broken_files) == (1, 1)
-    assert not kept(outcome)
+    assert not keeps_promises(outcome)
 
 
 def test_a_recording_that_does_not_go_on_after_the_disk_was_full_is_no_recording() -> None:
-    full = replace(FAULTS[0], unrecorded=True)
-    before, after = kept_of(range(50)), kept_of(range(100, 200))
+    full = replace(FAULTS[0], stops_recording=True)
+    before, after = recorded_frames(range(50)), recorded_frames(range(100, 200))
     for pulses, lost, goes_on in ((before, 15, False), (before | after, 5, True)):
         outcome = FaultOutcome(full, gops=(0, 20))
-        note([outcome], told(20), [RecordedFile("c0", 0, pulses, plays=True)])
+        note([outcome], events_of(20), [RecordedFile("c0", 0, pulses, plays=True)])
         assert outcome.lost == lost
-        assert kept(outcome) == goes_on
+        assert keeps_promises(outcome) == goes_on
 
 
 def test_promises_are_kept_or_not() -> None:
-    good = FaultOutcome(FAULTS[0], received=[judge(watched(3), told(3), 1, VIEWS)], without=0.9)
-    assert kept(good)
-    assert not kept(replace(good, without=1.1))
-    assert not kept(replace(good, reconnections=1))
-    assert not kept(replace(good, failed="there is no process c0"))
+    kept_promises = FaultOutcome(
+        FAULTS[0], received=[judge(pictures_of(3), events_of(3), 1, VIEWS)], gap_after=0.9
+    )
+    assert keeps_promises(kept_promises)
+    assert not keeps_promises(replace(kept_promises, gap_after=1.1))
+    assert not keeps_promises(replace(kept_promises, reconnections=1))
+    assert not keeps_promises(replace(kept_promises, failed="there is no process c0"))
 
 
 async def test_faults_of_a_site_that_does_not_start_are_broken_promises(tmp_path: Path) -> None:
@@ -196,14 +205,14 @@ async def test_faults_of_a_site_that_does_not_start_are_broken_promises(tmp_path
     faults = [replace(it, setup=not_started) for it in FAULTS[:2]]
     outcomes = await _group(faults, VIEWS, tmp_path / "site", Report())
     assert [it.fault for it in outcomes] == faults
-    assert not any(kept(it) for it in outcomes)
+    assert not any(keeps_promises(it) for it in outcomes)
 
 
 async def test_a_stream_that_ends_meanwhile_fails_its_fault_and_no_other() -> None:
-    async def broken_off(stand: FaultSite) -> None:
-        raise asyncio.IncompleteReadError(stand.url.encode(), 10)
+    async def broken_off(fault_site: FaultSite) -> None:
+        raise asyncio.IncompleteReadError(fault_site.url.encode(), 10)
 
     outcome = FaultOutcome(replace(FAULTS[0], inject=broken_off))
     await _injected(outcome.fault, FaultSite("here", Path(), 0), outcome)
     assert outcome.failed.startswith("IncompleteReadError: 4 bytes read")
-    assert not kept(outcome)
+    assert not keeps_promises(outcome)

@@ -5,28 +5,36 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks.faults.__main__ import FAULTS
-from benchmarks.faults.injection.process_pairs import BESTVIEW, DRAWING, OTHER, SHOWN, names, title, turns
+from benchmarks.faults.injection.process_pairs import (
+    BESTVIEW,
+    DRAWING,
+    OTHER,
+    SHOWN,
+    names,
+    process_sets,
+    title,
+)
 from benchmarks.faults.site.fault_site import FaultSite
 from benchmarks.faults.viewing.viewers import Viewer
 from client import Gop
 
 
 def test_each_process_fails_and_any_two_of_them() -> None:
-    assert [title(it) for it in turns()] == [
+    assert [title(it) for it in process_sets()] == [
         *("bestview", "sync", "camera", "drawing"),
         *("bestview+sync", "bestview+camera", "bestview+drawing"),
         *("sync+camera", "sync+drawing", "camera+camera", "camera+drawing"),
     ]
-    assert all(BESTVIEW not in it for it in turns(BESTVIEW))
+    assert all(BESTVIEW not in it for it in process_sets(BESTVIEW))
     named = [fault.name for fault in FAULTS]
     assert len(set(named)) == len(named)
-    for how, left_out in (("kill", ()), ("freeze", ()), ("restart", (DRAWING,))):
-        assert {f"{how} {title(it)}" for it in turns(*left_out)} <= set(named)
+    for mode, left_out in (("kill", ()), ("freeze", ()), ("restart", (DRAWING,))):
+        assert {f"{mode} {title(it)}" for it in process_sets(*left_out)} <= set(named)
 
 
 def test_the_cameras_that_fail_are_those_that_are_watched() -> None:
-    stand = FaultSite("here", Path(), 0)
-    stand.told.take(Gop(first=0, frames=10, choices={1: "c2", 2: "c1", 3: "c2"}, boxes={}, cuts=()))
-    assert names(stand, ("sync", SHOWN, OTHER)) == ["sync", "c0", "c1"]
-    stand.viewers = [Viewer("http://localhost/", number) for number in (1, 2, 3)]
-    assert names(stand, ("sync", SHOWN, OTHER)) == ["sync", "c2", "c1"]
+    fault_site = FaultSite("here", Path(), 0)
+    fault_site.events.take(Gop(first=0, frames=10, choices={1: "c2", 2: "c1", 3: "c2"}, boxes={}, cuts=()))
+    assert names(fault_site, ("sync", SHOWN, OTHER)) == ["sync", "c0", "c1"]
+    fault_site.viewers = [Viewer("http://localhost/", number) for number in (1, 2, 3)]
+    assert names(fault_site, ("sync", SHOWN, OTHER)) == ["sync", "c2", "c1"]

@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 from scipy.sparse import lil_matrix
 
 from benchmarks.bestview.occupancy.occupancy_map import ForegroundObservation, OccupancyMap, OccupancySettings
-from benchmarks.bestview.occupancy.shortest_paths import NOWHERE, GridPath, Lattice, shortest_paths
+from benchmarks.bestview.occupancy.shortest_paths import INFINITE, GridPath, Lattice, shortest_paths
 
 bounded = settings(max_examples=40)
 
@@ -28,7 +28,7 @@ def lattices(draw: st.DrawFn, most_frames: int, most_places: int) -> Lattice:
     frames, places = draw(st.integers(1, most_frames)), draw(st.integers(1, most_places))
     cost = st.integers(-9, 9)
     costs = draw(st.lists(cost, min_size=frames * places, max_size=frames * places))
-    gates = draw(st.lists(st.sampled_from([0, 2, 7, int(NOWHERE)]), min_size=places, max_size=places))
+    gates = draw(st.lists(st.sampled_from([0, 2, 7, int(INFINITE)]), min_size=places, max_size=places))
     return Lattice(np.array(costs).reshape(frames, places), corridor(places), np.array(gates))
 
 
@@ -92,7 +92,7 @@ def least_by_program(lattice: Lattice) -> float:
             for to in lattice.moves[place]
             if frame < frames - 1 and to < places
         ]
-    arcs = [arc for arc in arcs if arc[2] < NOWHERE]
+    arcs = [arc for arc in arcs if arc[2] < INFINITE]
     balance, entered = (lil_matrix((frames * places, len(arcs))) for _ in range(2))
     price = np.zeros(len(arcs))
     for column, (one, other, cost) in enumerate(arcs):
@@ -118,7 +118,7 @@ def test_paths_are_the_optimum_of_the_flow_program(lattice: Lattice) -> None:
 
 def test_a_later_path_may_take_a_part_of_an_earlier_one_over() -> None:
     costs = np.array([[-9, 20, -1], [-5, -9, 20], [-1, 20, -9]])
-    lattice = Lattice(costs, corridor(3), np.full(3, NOWHERE))
+    lattice = Lattice(costs, corridor(3), np.full(3, INFINITE))
     assert min(cost_of(lattice, it) for it in all_paths(lattice)) == -27, "alone: from 0 through 1 to 2"
     assert [path.places.tolist() for path in shortest_paths(lattice)] == [[0, 0, 0], [2, 1, 2]]
 
@@ -180,7 +180,7 @@ def test_one_person_and_two_apart_are_where_the_exact_posterior_has_them(people:
         for camera, it in enumerate(rectangles)
     ]
     exact = marginals_by_trying(rectangles, sights, model)
-    q = OccupancyMap(rectangles, model).occupied(sights)
+    q = OccupancyMap(rectangles, model).compute(sights)
     assert set(np.flatnonzero(exact > 0.5)) == people
     np.testing.assert_allclose(q, exact, atol=0.05)
 
@@ -190,7 +190,7 @@ def test_who_hides_behind_somebody_in_one_picture_is_found_by_the_other() -> Non
     first = np.array([[10, 1, 13, 8], [10, 2, 13, 9], [2, 2, 5, 9]])
     second = np.array([[4, 2, 7, 9], [14, 2, 17, 9], [19, 2, 22, 9]])
     sights = [ForegroundObservation(covered(it, (0, 1)), np.ones((HIGH, WIDE))) for it in (first, second)]
-    q = OccupancyMap([first, second], OccupancySettings()).occupied(sights)
+    q = OccupancyMap([first, second], OccupancySettings()).compute(sights)
     assert (q > 0.9).tolist() == [True, True, False]
 
 
@@ -200,9 +200,9 @@ def test_what_does_not_count_in_a_picture_changes_nothing() -> None:
     weight[:, 15:] = 0.0
     clear = covered(rectangles[0], (1,))
     dirty = np.where(weight > 0, clear, 1.0)
-    whole = ForegroundObservation(covered(rectangles[1], (1,)), np.ones((HIGH, WIDE)))
+    recall = ForegroundObservation(covered(rectangles[1], (1,)), np.ones((HIGH, WIDE)))
     occupancy = OccupancyMap(rectangles, OccupancySettings())
-    one, other = (occupancy.occupied([ForegroundObservation(it, weight), whole]) for it in (clear, dirty))
+    one, other = (occupancy.compute([ForegroundObservation(it, weight), recall]) for it in (clear, dirty))
     np.testing.assert_array_equal(one, other)
 
 
@@ -211,5 +211,5 @@ def test_nobody_is_found_in_nothing() -> None:
     unseen = ForegroundObservation(np.zeros((HIGH, WIDE)), np.zeros((HIGH, WIDE)))
     empty = ForegroundObservation(np.zeros((HIGH, WIDE)), np.ones((HIGH, WIDE)))
     occupancy = OccupancyMap(rectangles, OccupancySettings())
-    assert (occupancy.occupied([empty, empty]) < 0.05).all()
-    np.testing.assert_allclose(occupancy.occupied([unseen, unseen]), 0.01, atol=1e-3)
+    assert (occupancy.compute([empty, empty]) < 0.05).all()
+    np.testing.assert_allclose(occupancy.compute([unseen, unseen]), 0.01, atol=1e-3)

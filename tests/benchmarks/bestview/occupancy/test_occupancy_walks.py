@@ -8,16 +8,16 @@ import pytest
 from benchmarks.bestview.occupancy.appearance_association import (
     MeetingSettings,
     PathAppearance,
-    numbers_of,
+    assign_ids,
 )
-from benchmarks.bestview.occupancy.floor_grid import CameraView, GridSettings, lay_out
+from benchmarks.bestview.occupancy.floor_grid import CameraView, GridSettings, build_grid
 from benchmarks.bestview.occupancy.ground_trajectories import (
     TrajectorySettings,
-    rows_of_walks,
-    smoothed,
-    walk_of,
+    moving_average,
+    rows_of,
+    trajectory_of,
 )
-from benchmarks.bestview.occupancy.homography_alignment import levelled
+from benchmarks.bestview.occupancy.homography_alignment import align_homographies
 from benchmarks.bestview.occupancy.shortest_paths import GridPath
 from bestview import to_ground
 from tracking.detectors.background.height_model import HeightModel
@@ -35,8 +35,8 @@ def plan_view(left: float) -> CameraView:
 
 def test_the_grid_covers_what_is_seen_and_its_border_is_the_gate() -> None:
     view = plan_view(0.0)
-    floor = lay_out([view], GridSettings(step=0.2, gate=0.2, least_seen=0.5))
-    assert (view.seen(view.boxes(floor.places, 0.34)) >= 0.5).all()
+    floor = build_grid([view], GridSettings(step=0.2, gate=0.2, least_seen=0.5))
+    assert (view.visible_share(view.boxes(floor.places, 0.34)) >= 0.5).all()
     neighbours = (floor.moves < len(floor.places)).sum(axis=1)
     assert floor.gates[neighbours < 9].all()
     assert not floor.gates.all()
@@ -49,13 +49,13 @@ def test_the_grid_covers_what_is_seen_and_its_border_is_the_gate() -> None:
 
 def test_a_path_becomes_the_boxes_of_who_walks_it() -> None:
     view = plan_view(0.0)
-    floor = lay_out([view], GridSettings(step=0.2))
+    floor = build_grid([view], GridSettings(step=0.2))
     middle = int(np.abs(floor.places - floor.places.mean(axis=0)).sum(axis=1).argmin())
     q = np.zeros((5, len(floor.places)))
     q[:, middle] = 0.9
-    walk = walk_of(floor, q, GridPath(1, np.full(3, middle)), 2)
+    walk = trajectory_of(floor, q, GridPath(1, np.full(3, middle)), 2)
     np.testing.assert_allclose(walk.places, np.tile(floor.places[middle], (3, 1)), atol=1e-6)
-    rows = rows_of_walks(view, [walk], [np.array([4, 4, 9])], TrajectorySettings(aspect=0.4))
+    rows = rows_of(view, [walk], [np.array([4, 4, 9])], TrajectorySettings(aspect=0.4))
     assert [(row.frame, row.id) for row in rows] == [(2, 4), (3, 4), (4, 9)]
     x, y = floor.places[middle] * 10.0
     tall = 0.5 * y + 20.0
@@ -66,8 +66,8 @@ def test_a_path_becomes_the_boxes_of_who_walks_it() -> None:
 
 def test_places_are_smoothed_evenly_so_that_straight_walks_stay_straight() -> None:
     straight = np.stack([np.arange(9.0), 2.0 * np.arange(9.0)], axis=1)
-    np.testing.assert_allclose(smoothed(straight, 3), straight)
-    np.testing.assert_allclose(smoothed(np.eye(3)[:, :2], 1)[1], [1 / 3, 1 / 3])
+    np.testing.assert_allclose(moving_average(straight, 3), straight)
+    np.testing.assert_allclose(moving_average(np.eye(3)[:, :2], 1)[1], [1 / 3, 1 / 3])
 
 
 def test_homographies_that_disagree_are_shifted_until_feet_agree() -> None:
@@ -80,7 +80,7 @@ def test_homographies_that_disagree_are_shifted_until_feet_agree() -> None:
         boxes[camera] = [
             MotRow(at + 1, -1, foot[0] - 5, foot[1] - 30, 10, 30) for at, foot in enumerate(there)
         ]
-    moved = levelled(boxes, ground, dict.fromkeys(shifts, 100), 5.0)
+    moved = align_homographies(boxes, ground, dict.fromkeys(shifts, 100), 5.0)
     places = [to_ground(moved[camera], there) for camera in shifts]
     np.testing.assert_allclose(places[0], places[1], atol=1e-9)
     np.testing.assert_allclose(places[0], places[2], atol=1e-9)
@@ -98,15 +98,15 @@ def walker(look: np.ndarray, away: float, first: int = 0) -> PathAppearance:
     return PathAppearance(first, places[first:], look[first:], pixels[first:])
 
 
-def looks(before: int, after: int) -> np.ndarray:
+def histograms(before: int, after: int) -> np.ndarray:
     rows = np.zeros((FRAMES, 2, 3), dtype=np.float32)
     rows[:30, :, before] = rows[30:, :, after] = 1.0
     return rows
 
 
 def test_paths_that_swapped_two_people_give_their_numbers_back() -> None:
-    swapped = [walker(looks(0, 1), -5.0), walker(looks(1, 0), 5.0)]
-    one, other = numbers_of(swapped, 1.0, MeetingSettings())
+    swapped = [walker(histograms(0, 1), -5.0), walker(histograms(1, 0), 5.0)]
+    one, other = assign_ids(swapped, 1.0, MeetingSettings())
     assert one.tolist() == [1] * 30 + [2] * 30
     assert other.tolist() == [2] * 30 + [1] * 30
 
@@ -114,12 +114,12 @@ def test_paths_that_swapped_two_people_give_their_numbers_back() -> None:
 @pytest.mark.parametrize(
     "walkers",
     [
-        [walker(looks(0, 0), -5.0), walker(looks(1, 1), 5.0)],
-        [walker(looks(2, 2), -5.0), walker(looks(2, 2), 5.0)],
-        [walker(looks(0, 1), -5.0), walker(looks(1, 0), 5.0, first=28)],
+        [walker(histograms(0, 0), -5.0), walker(histograms(1, 1), 5.0)],
+        [walker(histograms(2, 2), -5.0), walker(histograms(2, 2), 5.0)],
+        [walker(histograms(0, 1), -5.0), walker(histograms(1, 0), 5.0, first=28)],
     ],
     ids=["told apart and right", "alike", "nothing known of one"],
 )
 def test_paths_keep_their_numbers_where_colours_say_nothing_else(walkers: list[PathAppearance]) -> None:
-    numbers = numbers_of(walkers, 1.0, MeetingSettings())
+    numbers = assign_ids(walkers, 1.0, MeetingSettings())
     assert [set(it.tolist()) for it in numbers] == [{1}, {2}]
