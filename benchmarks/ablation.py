@@ -11,7 +11,6 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
-from multiprocessing import get_context
 from pathlib import Path
 
 from benchmarks.common.environment import CannotRunError, finish, parser
@@ -26,12 +25,12 @@ class Ablation:
     """A part of the tracker that is switched off, and the settings that do it."""
 
     name: str
-    off: TrackSettings = field(default_factory=dict)
+    settings: TrackSettings = field(default_factory=dict)
 
 
 DEFAULT = Ablation("default")
 
-TERMS = (
+ABLATIONS = (
     Ablation("no confidence in the cost", {"costs": {"confidence": 0.0}}),
     Ablation("no cost of disappearing", {"costs": {"disappearance": 0.0}}),
     Ablation("no motion cost", {"costs": {"motion": 0.0}}),
@@ -75,15 +74,15 @@ class InputSequence:
         return f"{self.recording.name}, pictures" if self.pictures else self.recording.name
 
 
-def inputs(recordings: list[Recording]) -> list[InputSequence]:
+def input_sequences(recordings: list[Recording]) -> list[InputSequence]:
     """Return each sequence, and once more with its video (needed for appearance) where there is one."""
     alone = [InputSequence(it) for it in recordings]
     return alone + [InputSequence(it, pictures=True) for it in recordings if it.video and it.video.is_file()]
 
 
-def score(term: Ablation, given: InputSequence) -> Scores:
+def score(ablation: Ablation, sequence: InputSequence) -> Scores:
     """Track one sequence with the ablation's settings, and score the tracks."""
-    return given.recording.score(track(given.recording, term.off, pictures=given.pictures))
+    return sequence.recording.score(track(sequence.recording, ablation.settings, pictures=sequence.pictures))
 
 
 def cell(name: str, without: Scores, default: Scores | None) -> str:
@@ -95,45 +94,46 @@ def cell(name: str, without: Scores, default: Scores | None) -> str:
     return f"{value:{sign}d}" if isinstance(value, int) else f"{100 * value:{sign}.1f}"
 
 
-def tables(report: Report, names: list[str], found: dict[str, list[Scores]]) -> None:
+def tables(report: Report, names: list[str], scores_by_name: dict[str, list[Scores]]) -> None:
     """Print a table for each score: the default's, and its change by each ablation."""
     several = len(names) > 1
-    wide = {name: scores + [average_scores(scores)] * several for name, scores in found.items()}
+    with_total = {
+        name: scores + [average_scores(scores)] * several for name, scores in scores_by_name.items()
+    }
     for name in SCORES:
         rows = [
-            [term, *(cell(name, *pair) for pair in zip(scores, _beside(term, wide), strict=True))]
-            for term, scores in wide.items()
+            [
+                ablation,
+                *(
+                    cell(name, *pair)
+                    for pair in zip(scores, _reference_scores(ablation, with_total), strict=True)
+                ),
+            ]
+            for ablation, scores in with_total.items()
         ]
         last = ["total" if name == "switches" else "mean"] * several
         report.table(f"{_NAMES[name]}, and its change by each ablation", ["", *names, *last], rows)
 
 
-def _beside(term: str, wide: dict[str, list[Scores]]) -> Sequence[Scores | None]:
+def _reference_scores(ablation: str, with_total: dict[str, list[Scores]]) -> Sequence[Scores | None]:
     """Return the scores that a row is compared with; the default's row is compared with none."""
-    default = wide[DEFAULT.name]
-    return [None] * len(default) if term == DEFAULT.name else default
+    default = with_total[DEFAULT.name]
+    return [None] * len(default) if ablation == DEFAULT.name else default
 
 
 def run(recordings: list[Recording], out: Path, jobs: int) -> None:
     """Measure, print and save."""
-    given = inputs(recordings)
+    sequence = input_sequences(recordings)
     report = Report()
-    pairs = [(term, it) for term in (DEFAULT, *TERMS) for it in given]
+    pairs = [(ablation, it) for ablation in (DEFAULT, *ABLATIONS) for it in sequence]
     with ProcessPoolExecutor(jobs) as pool:
         scores = iter(list(pool.map(score, *zip(*pairs, strict=True))))
     tables(
         report,
-        [it.name for it in given],
-        {term.name: [next(scores) for _ in given] for term in (DEFAULT, *TERMS)},
+        [it.name for it in sequence],
+        {ablation.name: [next(scores) for _ in sequence] for ablation in (DEFAULT, *ABLATIONS)},
     )
     report.save(out / "ablation.txt")
-
-
-def _all_scores(pairs: list[tuple[Ablation, InputSequence]], jobs: int) -> list[Scores]:
-    if jobs == 1:
-        return [score(term, given) for term, given in pairs]
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        return list(pool.map(score, *zip(*pairs, strict=True)))
 
 
 def main() -> None:

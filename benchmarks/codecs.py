@@ -49,22 +49,22 @@ class StreamVariant:
 class StreamCost:
     """Cost and quality of a stream; milliseconds of processor time per frame."""
 
-    taken: float
+    capture_ms: float
     """To read and decode the picture."""
-    encoded: float
-    tracked: float
+    encode_ms: float
+    track_ms: float
     """To find and follow the people in it."""
     kbps: float
     quality: float
     """Decibels (PSNR) against the recording; infinite: the same."""
 
     @property
-    def whole(self) -> float:
+    def total_ms(self) -> float:
         """The total."""
-        return self.taken + self.encoded + self.tracked
+        return self.capture_ms + self.encode_ms + self.track_ms
 
 
-WAYS = (
+VARIANTS = (
     StreamVariant("H.264 (the default)", {}),
     StreamVariant("H.264, preset veryfast", {"preset": "veryfast"}),
     StreamVariant("H.264, max_kbps 500", {"max_kbps": 500}),
@@ -85,11 +85,11 @@ def record(path: Path, site: SiteSettings, frames: int) -> Path:
     return path
 
 
-def measure(way: StreamVariant, film: Path, site: SiteSettings, frames: int) -> StreamCost:
+def measure(variant: StreamVariant, recording: Path, site: SiteSettings, frames: int) -> StreamCost:
     """Run a camera pipeline over a recording, and measure it."""
-    pipeline = CameraPipeline(_config(way, film, site), "c0")
+    pipeline = CameraPipeline(_config(variant, recording, site), "c0")
     spent, sizes, error = np.zeros(3), 0, 0.0
-    decoder = av.CodecContext.create(way.encode.get("codec", "h264"), "r")
+    decoder = av.CodecContext.create(variant.encode.get("codec", "h264"), "r")
     assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — tells mypy what it is
     decoder.thread_count = 1
     for pulse in range(frames):
@@ -106,30 +106,30 @@ def measure(way: StreamVariant, film: Path, site: SiteSettings, frames: int) -> 
         (picture,) = decoder.decode(av.Packet(unit.data))
         error += _squared(picture.to_ndarray(format="bgr24"), image)
     pipeline.close()
-    taken, encoded, tracked = _MS * spent / frames
+    capture_ms, encode_ms, track_ms = _MS * spent / frames
     quality = 10 * np.log10(_PEAK**2 * frames / error) if error else float("inf")
-    return StreamCost(taken, encoded, tracked, sizes * 8 * site.fps / frames / 1e3, float(quality))
+    return StreamCost(capture_ms, encode_ms, track_ms, sizes * 8 * site.fps / frames / 1e3, float(quality))
 
 
 def _squared(one: NDArray[Any], other: NDArray[Any]) -> float:
     return float(np.mean((one.astype(np.float32) - other.astype(np.float32)) ** 2))
 
 
-def _config(way: StreamVariant, film: Path, site: SiteSettings) -> Config:
+def _config(variant: StreamVariant, recording: Path, site: SiteSettings) -> Config:
     content = {
         "site": site.model_dump(),
-        "encode": way.encode,
-        "cameras": [{"id": "c0", "source": str(film), "h264": way.h264}],
+        "encode": variant.encode,
+        "cameras": [{"id": "c0", "source": str(recording), "h264": variant.h264}],
     }
-    return build_config(content, where="codecs", folder=film.parent)
+    return build_config(content, where="codecs", folder=recording.parent)
 
 
-def middle(costs: Sequence[StreamCost]) -> StreamCost:
+def median_cost(costs: Sequence[StreamCost]) -> StreamCost:
     """Return the median of each number."""
     return StreamCost(
-        statistics.median(it.taken for it in costs),
-        statistics.median(it.encoded for it in costs),
-        statistics.median(it.tracked for it in costs),
+        statistics.median(it.capture_ms for it in costs),
+        statistics.median(it.encode_ms for it in costs),
+        statistics.median(it.track_ms for it in costs),
         costs[0].kbps,
         costs[0].quality,
     )
@@ -145,14 +145,17 @@ def main() -> None:
     width, height = map(int, chosen.size.split("x"))
     site, report = SiteSettings(width=width, height=height), Report()
     with tempfile.TemporaryDirectory() as folder:
-        film = record(Path(folder) / "room.h264", site, chosen.frames)
-        rounds = [[measure(way, film, site, chosen.frames) for way in WAYS] for _ in range(chosen.rounds)]
+        recording = record(Path(folder) / "room.h264", site, chosen.frames)
+        rounds = [
+            [measure(variant, recording, site, chosen.frames) for variant in VARIANTS]
+            for _ in range(chosen.rounds)
+        ]
     rows = []
-    for way, *costs in zip(WAYS, *rounds, strict=True):
-        it = middle(costs)
+    for variant, *costs in zip(VARIANTS, *rounds, strict=True):
+        it = median_cost(costs)
         quality = "the same" if np.isinf(it.quality) else f"{it.quality:.1f}"
-        times = [f"{it.taken:.2f}", f"{it.encoded:.2f}", f"{it.tracked:.2f}", f"{it.whole:.2f}"]
-        rows.append([way.name, *times, f"{it.kbps:.0f}", quality])
+        times = [f"{it.capture_ms:.2f}", f"{it.encode_ms:.2f}", f"{it.track_ms:.2f}", f"{it.total_ms:.2f}"]
+        rows.append([variant.name, *times, f"{it.kbps:.0f}", quality])
     report.table(
         f"One camera, {chosen.size} at {site.fps:g} a second; milliseconds of processor time a frame",
         ["stream", "capture", "encode", "track", "total", "kbit/s", "PSNR, dB"],

@@ -30,12 +30,12 @@ from server.service.streaming.subscriber_queue import BytesChunk, Subscriber
 from synthetic import Scene
 
 _MS = 1e3
-_DRAWN = 100
+_FRAMES = 100
 """Different frames of the scene; the stream repeats them."""
 _START = 200
 """The scene's first frame: people are in sight."""
 _MANY = 10
-_LOOK_S = 0.003
+_POLL_S = 0.003
 """Seconds between two checks for a rendered GOP: seldom enough to cost nothing."""
 
 
@@ -44,8 +44,8 @@ class ViewerLoad:
     """The viewers of one measurement."""
 
     name: str
-    films: int = 0
-    series: Sequence[MjpegVariant] = ()
+    video_viewers: int = 0
+    mjpeg_variants: Sequence[MjpegVariant] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class RenderingCost:
 
     start_s: float
     """Seconds until the first GOP is rendered."""
-    drawing: float
+    worker_ms: float
     service: float
     megabytes: float
     """Resident memory of the render worker."""
@@ -66,8 +66,8 @@ class RoomStream:
     def __init__(self, site: SiteSettings, encode: EncodeSettings) -> None:
         scene = Scene("room", 3, 4, 1, site.width, site.height, site.fps)
         self.site, self.gop = site, encode.gop
-        self._images = [scene.image(0, _START + place) for place in range(_DRAWN)]
-        truth = [scene.truth(_START + place)[0] for place in range(_DRAWN)]
+        self._images = [scene.image(0, _START + place) for place in range(_FRAMES)]
+        truth = [scene.truth(_START + place)[0] for place in range(_FRAMES)]
         self._boxes = [
             [
                 (int(who), float(x0), float(y0), float(x1), float(y1))
@@ -92,43 +92,45 @@ class RoomStream:
         """Encode the next GOP."""
         data = b""
         for pulse in range(self._pulse, self._pulse + self.gop):
-            unit = self._encoder.encode(pulse, self._images[pulse % _DRAWN])
+            unit = self._encoder.encode(pulse, self._images[pulse % _FRAMES])
             data += fragment(
                 [FragmentSample(join_sample(nal_units(unit.data)), unit.key)], pulse, self.site.fps
             )
         self._pulse += self.gop
         return BytesChunk(data, random_access=True)
 
-    def told(self, fragments: bytes) -> GopOverlay:
+    def overlay(self, fragments: bytes) -> GopOverlay:
         """Return the boxes of a GOP."""
         first = first_pulse(fragments, self.site.fps)
-        return GopOverlay(first, [self._boxes[pulse % _DRAWN] for pulse in range(first, first + self.gop)], 1)
+        return GopOverlay(
+            first, [self._boxes[pulse % _FRAMES] for pulse in range(first, first + self.gop)], 1
+        )
 
 
-async def measure(stage: RoomStream, wish: ViewerLoad, gops: int) -> RenderingCost:
+async def measure(room: RoomStream, load: ViewerLoad, gops: int) -> RenderingCost:
     """Have a worker render; every GOP is published when the previous one is done."""
     stream = Broadcaster()
-    source = RenderedStream("the room", stream, stage.told, stage.settings, live=True, queue_gops=8)
+    source = RenderedStream("the room", stream, room.overlay, room.settings, live=True, queue_gops=8)
     source.use()
-    source.video.users = wish.films
-    viewers = [source.video.broadcaster.subscribe() for _ in range(wish.films)]
-    viewers += [source.mjpeg.subscribe(series) for series in wish.series]
+    source.video.users = load.video_viewers
+    viewers = [source.video.broadcaster.subscribe() for _ in range(load.video_viewers)]
+    viewers += [source.mjpeg.subscribe(mjpeg_variants) for mjpeg_variants in load.mjpeg_variants]
     readers = [asyncio.create_task(_read(viewer)) for viewer in viewers]
-    chunks = [stage.next_gop() for _ in range(gops + 1)]
+    chunks = [room.next_gop() for _ in range(gops + 1)]
     run, began = asyncio.create_task(source.run()), time.perf_counter()
     stream.publish(chunks[0])
-    await source.still("plain", _last(stage, chunks[0]))
+    await source.still("plain", _last_pulse(room, chunks[0]))
     start, pid = time.perf_counter() - began, source.pid
     assert pid is not None  # noqa: S101 — it has just rendered
-    drawing, service = _processor_seconds(pid), time.process_time()
+    worker_ms, service = _processor_seconds(pid), time.process_time()
     for chunk in chunks[1:]:
         stream.publish(chunk)
-        while source.newest < _last(stage, chunk):  # noqa: ASYNC110 — a service does not wait for this
-            await asyncio.sleep(_LOOK_S)
-    frames = gops * stage.gop
+        while source.newest < _last_pulse(room, chunk):  # noqa: ASYNC110 — a service does not wait for this
+            await asyncio.sleep(_POLL_S)
+    frames = gops * room.gop
     cost = RenderingCost(
         start,
-        _MS * (_processor_seconds(pid) - drawing) / frames,
+        _MS * (_processor_seconds(pid) - worker_ms) / frames,
         _MS * (time.process_time() - service) / frames,
         _resident_megabytes(pid),
     )
@@ -143,8 +145,8 @@ async def _read(viewer: Subscriber) -> None:
         del data
 
 
-def _last(stage: RoomStream, chunk: BytesChunk) -> int:
-    return first_pulse(chunk.data, stage.site.fps) + stage.gop - 1
+def _last_pulse(room: RoomStream, chunk: BytesChunk) -> int:
+    return first_pulse(chunk.data, room.site.fps) + room.gop - 1
 
 
 def _processor_seconds(pid: int) -> float:
@@ -158,7 +160,7 @@ def _resident_megabytes(pid: int) -> float:
     return int(line.split()[1]) / 1024
 
 
-def wishes(fps: float) -> list[ViewerLoad]:
+def viewer_loads(fps: float) -> list[ViewerLoad]:
     """Return the viewers of each measurement."""
     plain, boxed = MjpegVariant(fps, boxed=False), MjpegVariant(fps, boxed=True)
     return [
@@ -182,23 +184,23 @@ def main() -> None:
     chosen = options.parse_args()
     width, height = map(int, chosen.size.split("x"))
     report = Report()
-    stage = RoomStream(SiteSettings(width=width, height=height), EncodeSettings())
+    room = RoomStream(SiteSettings(width=width, height=height), EncodeSettings())
     rows = []
-    for wish in wishes(stage.site.fps):
-        costs = [asyncio.run(measure(stage, wish, chosen.gops)) for _ in range(chosen.runs)]
-        drawing = statistics.median(cost.drawing for cost in costs)
+    for load in viewer_loads(room.site.fps):
+        costs = [asyncio.run(measure(room, load, chosen.gops)) for _ in range(chosen.runs)]
+        worker_ms = statistics.median(cost.worker_ms for cost in costs)
         rows.append(
             [
-                wish.name,
-                f"{drawing:.2f}",
+                load.name,
+                f"{worker_ms:.2f}",
                 f"{statistics.median(cost.service for cost in costs):.3f}",
-                f"{100 * drawing * stage.site.fps / _MS:.1f}",
+                f"{100 * worker_ms * room.site.fps / _MS:.1f}",
                 f"{statistics.median(cost.start_s for cost in costs):.2f}",
                 f"{max(cost.megabytes for cost in costs):.0f}",
             ]
         )
     report.table(
-        f"Pictures of one stream of {chosen.size} at {stage.site.fps:g} a second",
+        f"Pictures of one stream of {chosen.size} at {room.site.fps:g} a second",
         ["viewers", "worker, ms a frame", "service, ms a frame", "% of a core", "start, s", "MB"],
         rows,
     )

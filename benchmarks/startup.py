@@ -33,7 +33,7 @@ _ANSI = re.compile(r"\x1b\[[0-9;]*m")
 class Milestone:
     """A line of the output that ends a step."""
 
-    part: str
+    step: str
     line: re.Pattern[str]
     times: int = 1
     """How often the line must appear."""
@@ -56,7 +56,7 @@ class StartupStep:
 
     name: str
     seconds: float
-    over: float
+    done_after: float
 
 
 def measure(clone: Path) -> list[StartupStep]:
@@ -65,22 +65,22 @@ def measure(clone: Path) -> list[StartupStep]:
     Raises:
         RuntimeError: the demo ended before that.
     """
-    found: list[StartupStep] = []
-    said: list[str] = []
+    steps: list[StartupStep] = []
+    output: list[str] = []
     began = last = time.monotonic()
     with _demo(clone) as lines:
-        waiting = list(MILESTONES)
-        seen = 0
+        pending = list(MILESTONES)
+        matches = 0
         for line in lines:
-            said.append(_ANSI.sub("", line).rstrip())
-            seen += bool(waiting[0].line.search(said[-1]))
-            if seen >= waiting[0].times:
+            output.append(_ANSI.sub("", line).rstrip())
+            matches += bool(pending[0].line.search(output[-1]))
+            if matches >= pending[0].times:
                 now = time.monotonic()
-                found.append(StartupStep(waiting.pop(0).part, now - last, now - began))
-                last, seen = now, 0
-            if not waiting:
-                return found
-    raise RuntimeError("`make demo` ended before it was ready:\n" + "\n".join(said[-20:]))
+                steps.append(StartupStep(pending.pop(0).step, now - last, now - began))
+                last, matches = now, 0
+            if not pending:
+                return steps
+    raise RuntimeError("`make demo` ended before it was ready:\n" + "\n".join(output[-20:]))
 
 
 @contextlib.contextmanager
@@ -114,7 +114,7 @@ def plot(parts: Sequence[StartupStep], path: Path) -> None:
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     names = [it.name for it in parts]
-    axes.barh(names, [it.seconds for it in parts], left=[it.over - it.seconds for it in parts])
+    axes.barh(names, [it.seconds for it in parts], left=[it.done_after - it.seconds for it in parts])
     axes.invert_yaxis()
     axes.set_xlabel("seconds since `make demo`")
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -129,7 +129,7 @@ def main() -> None:
         clone = Path(folder) / "clone"
         subprocess.run(["git", "clone", "--quiet", "--local", str(ROOT), str(clone)], check=True)
         parts = measure(clone)
-    rows = [[it.name, f"{it.seconds:.1f}", f"{it.over:.1f}"] for it in parts]
+    rows = [[it.name, f"{it.seconds:.1f}", f"{it.done_after:.1f}"] for it in parts]
     report.table("From a fresh clone to the first picture, seconds", ["step", "took", "done after"], rows)
     plot(parts, chosen.out / "startup.png")
     report.save(chosen.out / "startup.txt")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.detectors.compared_detectors import SURE, rows_of
+from benchmarks.detectors.compared_detectors import CONFIDENT, rows_of
 from server.camera.peers.cross_view_scorer import CrossViewScorer
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEndedError
@@ -82,7 +82,7 @@ def in_file(config: Config, path: Path) -> CameraDetections:
 def sure_rows(frames: CameraDetections) -> list[MotRow]:
     """Return the confident detections."""
     rows = (row for pulse, detections in enumerate(frames.detections) for row in rows_of(pulse, detections))
-    return [row for row in rows if row.confidence >= SURE]
+    return [row for row in rows if row.confidence >= CONFIDENT]
 
 
 def followed(config: Config, frames: Mapping[str, CameraDetections]) -> dict[str, list[CameraTracks]]:

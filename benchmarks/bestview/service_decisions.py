@@ -40,7 +40,7 @@ class GroundTruthRegistry:
     def update(
         self, tracks: Sequence[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
-        """Return everybody their number."""
+        """Return the id of every tracklet."""
         del last_frame, pictures
         numbers = {TrackletKey(*it.key, 0): self._people[it.key.local_id - 1] for it in tracks}
         return IdentityUpdate(numbers, created=(), returned=(), departed=(), merged=(), split=())

@@ -1,1 +1,1 @@
-"""What several benchmarks share: options, reports, recordings, browsers, processor time."""
+"""Shared parts of the benchmarks: options, reports, recordings, browser, processor time."""

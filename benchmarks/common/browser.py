@@ -1,4 +1,4 @@
-"""Debian's Chromium without a screen."""
+"""Headless Chromium."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ FLAGS = (
 
 
 def chromium_path() -> Path | None:
-    """Return where the browser is, as Debian or another system names it; None: nowhere on the PATH."""
+    """Return the path of Chromium; None: it is not on the PATH."""
     found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
     return None if found is None else Path(found)
 
 
 def check_chromium() -> None:
-    """Make sure that there is a browser.
+    """Check that Chromium is installed.
 
     Raises:
-        CannotRunError: there is none.
+        CannotRunError: it is not.
     """
     if chromium_path() is None:
         raise CannotRunError("needs Chromium; on Debian: apt install chromium")
@@ -40,7 +40,7 @@ def check_chromium() -> None:
 
 @contextlib.asynccontextmanager
 async def chromium() -> AsyncIterator[Browser]:
-    """Run a browser."""
+    """Run headless Chromium."""
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
         try:

@@ -1,4 +1,4 @@
-"""The demo at another frame rate, for machines that have other work."""
+"""The demo at a chosen frame rate, for busy machines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _AGAIN_MS = 1000
 
 @contextlib.asynccontextmanager
 async def demo_at(fps: float) -> AsyncIterator[str]:
-    """Run the demo at a frame rate; give its address, where nothing may answer yet."""
+    """Run the demo at a frame rate; yield its address, which may not answer yet."""
     port = free_port()
     running = asyncio.create_task(run_demo(port, None, open_browser=False, fps=fps))
     try:
@@ -27,7 +27,7 @@ async def demo_at(fps: float) -> AsyncIterator[str]:
 
 
 async def open_when_there(page: Page, url: str) -> None:
-    """Open a page as soon as its server answers."""
+    """Open a page, retrying until its server answers."""
     while True:
         with contextlib.suppress(Error):
             await page.goto(url)

@@ -1,4 +1,4 @@
-"""What every benchmark shares: its options, where recordings are, one thread a process, the machine."""
+"""Environment of the benchmarks: options, data folder, one thread per process, machine description."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from typing import NoReturn
 
 ROOT = Path(__file__).resolve().parents[2]
 SKIPPED = 77
-"""The exit code of a benchmark that cannot run here (as in automake); what it lacks, it has said."""
+"""The exit code of a skipped benchmark (as in automake)."""
 
 ONE_THREAD = {
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
 }
-"""The matrices here are small: more threads only spin, and the cores belong to the other processes."""
+"""The matrices are small: more threads only spin, and take the cores of other processes."""
 
 
 class CannotRunError(Exception):
-    """A benchmark lacks something on this machine; the text says what."""
+    """A requirement of a benchmark is missing on this machine; the text says which."""
 
 
 def parser(about: str, name: str) -> argparse.ArgumentParser:
-    """Return a command line with the options that all benchmarks have."""
+    """Return a command line parser with the common options."""
     found = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=about.splitlines()[0])
     found.add_argument("--out", type=Path, default=ROOT / "out" / "bench", help="folder for plots and tables")
     found.add_argument(
@@ -41,7 +41,7 @@ def parser(about: str, name: str) -> argparse.ArgumentParser:
 
 
 def command_line() -> str:
-    """Return the command that runs this process's benchmark as it was run."""
+    """Return the command line of the running benchmark."""
     module = Path(sys.argv[0]).resolve().relative_to(ROOT).with_suffix("")
     name = ".".join(module.parts).removesuffix(".__main__")
     words = ["python", "-m", name, *sys.argv[1:]]
@@ -49,12 +49,12 @@ def command_line() -> str:
 
 
 def one_thread_environment() -> dict[str, str]:
-    """Return the environment for child processes."""
+    """Return the environment variables for child processes."""
     return {**os.environ, **ONE_THREAD}
 
 
 def machine() -> str:
-    """Describe the machine, the version, the date, and the load before the measurement."""
+    """Return a line with the machine, its load, the versions and the date."""
     load = os.getloadavg()[0]
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     return (
@@ -87,6 +87,6 @@ def _git(*words: str) -> str:
 
 
 def finish(problem: CannotRunError, name: str) -> NoReturn:
-    """Return why a benchmark is left out, and end."""
+    """Print why a benchmark is skipped, and exit."""
     print(f"{name}: left out: {problem}")
     sys.exit(SKIPPED)

@@ -1,4 +1,4 @@
-"""How busy each process below this one is, and the machine's other work (Linux)."""
+"""Processor use of the child processes, by name, and of the rest of the machine (Linux)."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from pathlib import Path
 _PROC = Path("/proc")
 _TICKS = os.sysconf("SC_CLK_TCK")
 _PARENT, _USER, _SYSTEM = 1, 11, 12
-"""Places in /proc/PID/stat after the command, which may contain anything (proc(5))."""
+"""Fields in /proc/PID/stat after the command name (proc(5))."""
 _IDLE = (3, 4)
-"""Places of idle and iowait in the first line of /proc/stat."""
+"""Fields of idle and iowait in the first line of /proc/stat."""
 _COUNTED = 8
-"""Numbers of that line before guest time, which is in user time already."""
+"""Fields of that line before guest time, which user time includes."""
 
 OTHER = "other work"
 
 
 @dataclass(frozen=True, slots=True)
 class ProcessorUsage:
-    """Processor seconds up to a moment."""
+    """Processor seconds used up to a moment."""
 
     at: float
     used: Mapping[str, float]
-    """By what a process is; :data:`OTHER` is everything else on the machine."""
+    """By process name; :data:`OTHER` is everything else on the machine."""
 
     def cores_since(self, earlier: ProcessorUsage) -> dict[str, float]:
-        """Return how many cores were in use since an earlier moment, by what used them."""
+        """Return the cores used since an earlier moment, by process name."""
         passed = self.at - earlier.at
         return {name: (used - earlier.used.get(name, 0.0)) / passed for name, used in self.used.items()}
 
 
 def busy_now() -> ProcessorUsage:
-    """Read how much this process and all below it have used, and the rest of the machine."""
+    """Read the processor time of this process, its descendants, and the rest of the machine."""
     found = {int(entry.name): _stat(entry) for entry in _PROC.iterdir() if entry.name.isdecimal()}
     running = {pid: stat for pid, stat in found.items() if stat}
     ours = _family(running)
@@ -52,12 +52,12 @@ def busy_now() -> ProcessorUsage:
 def _stat(entry: Path) -> list[str]:
     try:
         return (entry / "stat").read_text().rpartition(")")[2].split()
-    except OSError:  # it has ended meanwhile
+    except OSError:  # it has exited meanwhile
         return []
 
 
 def _family(running: Mapping[int, list[str]]) -> set[int]:
-    """Return this process and all that it has started, directly or not."""
+    """Return the ids of this process and all its descendants."""
     family = {os.getpid()}
     grown = True
     while grown:
@@ -68,7 +68,7 @@ def _family(running: Mapping[int, list[str]]) -> set[int]:
 
 
 def _name(pid: int) -> str:
-    """Return what a process is: a command of `myview`, the browser, or this measurement."""
+    """Return the name of a process: a command of `myview`, the browser, or this measurement."""
     if pid == os.getpid():
         return "measuring"
     try:
@@ -84,7 +84,7 @@ def _name(pid: int) -> str:
 
 
 def running_pids(name: str) -> list[int]:
-    """Return the processes below this one that are called so, such as ``camera c1``."""
+    """Return the ids of the descendants with this name, such as ``camera c1``."""
     running = {int(entry.name): _stat(entry) for entry in _PROC.iterdir() if entry.name.isdecimal()}
     family = _family({pid: stat for pid, stat in running.items() if stat})
     return [pid for pid in sorted(family) if _name(pid) == name]

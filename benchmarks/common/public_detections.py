@@ -16,12 +16,12 @@ from tracking.evaluation import Scores, evaluate
 from tracking.motchallenge import MotRow, read_rows
 
 TrackSettings = Mapping[str, Mapping[str, Any]]
-"""The section `track` of a configuration, or what of it differs from the defaults."""
+"""Keys of the configuration section `track` that differ from the defaults."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """One camera's detections and what is really there."""
+    """One camera's detections and ground truth."""
 
     name: str
     detections: Path
@@ -29,12 +29,12 @@ class Recording:
     video: Path | None = None
 
     def score(self, tracks: list[MotRow]) -> Scores:
-        """Score tracks of this sequence."""
+        """Score tracks of this recording."""
         return evaluate(read_rows(self.truth), tracks)
 
 
 def find_recordings(data: Path, names: list[str] | None = None) -> list[Recording]:
-    """Return the sequences that are in the folder of recordings, or those of them that are named.
+    """Return the recordings in the data folder, or the named ones of them.
 
     Raises:
         CannotRunError: there are none.
@@ -60,9 +60,9 @@ def find_recordings(data: Path, names: list[str] | None = None) -> list[Recordin
 def track(
     sequence: Recording, settings: TrackSettings | None = None, *, pictures: bool = False
 ) -> list[MotRow]:
-    """Return MyView's tracks: what `myview track --det` writes, by default with its defaults.
+    """Return MyView's tracks, as `myview track --det` writes them.
 
-    With `pictures` people's looks come from the video; without, only boxes and confidences are known.
+    With `pictures` appearance is computed from the video; without, only boxes and confidences are known.
     """
     with tempfile.TemporaryDirectory() as folder:
         out, config = Path(folder) / "tracks.txt", Path(folder) / "settings.yaml"

@@ -1,4 +1,4 @@
-"""Recorded views to measure with: real ones from the data folder, or the embedded scene drawn on the spot."""
+"""Recorded views: real ones from the data folder, or renderings of the synthetic room."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ _ROOM_CAMERAS, _ROOM_PEOPLE, _ROOM_SEED = 3, 4, 1
 _ROOM_WIDTH, _ROOM_HEIGHT, _ROOM_FPS = 640, 360, 25.0
 
 _WATERMARK = [[130, 232], [355, 232], [355, 283], [130, 283]]
-"""Half-transparent and in every frame: where it lies nobody can be told from the background."""
+"""The polygon of a translucent watermark, which hides the background."""
 _WATERMARKED = ("campus4", "terrace")
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedViews:
-    """Views of one scene, frame-synchronous."""
+    """Frame-synchronous recordings of one scene."""
 
     name: str
     videos: tuple[Path, ...]
     ground: Path | None
-    """Homographies to the ground plane."""
+    """The file of homographies to the ground plane."""
 
     @property
     def cameras(self) -> list[dict[str, Any]]:
-        """The configuration's cameras."""
+        """The section `cameras` of the configuration."""
         ignore = {"ignore": [_WATERMARK]} if self.name in _WATERMARKED else {}
         return [{"id": it.stem, "source": str(it.absolute()), **ignore} for it in self.videos]
 
     @property
     def site(self) -> dict[str, Any]:
-        """The configuration's site: rate and size of the first view."""
+        """The section `site` of the configuration, with rate and size of the first view."""
         first = read_video_info(self.videos[0])
         return {"name": "bench", "fps": first.fps, "width": first.size[0], "height": first.size[1]}
 
     @property
     def frames(self) -> int:
-        """How many pictures the views have, all together, as their files say it."""
+        """The total number of frames of all views, by their metadata."""
         total = 0
         for video in self.videos:
             opened = open_video(str(video))
@@ -53,10 +53,10 @@ class RecordedViews:
 
 
 def find_views(data: Path, name: str) -> RecordedViews:
-    """Find a scene's views in the folder of recordings.
+    """Find a scene's views in the data folder.
 
     Raises:
-        CannotRunError: they are not there.
+        CannotRunError: they are missing.
     """
     folder = data / name
     videos = tuple(sorted(folder.glob("c*.mp4")))
@@ -67,7 +67,7 @@ def find_views(data: Path, name: str) -> RecordedViews:
 
 
 def draw_room(folder: Path, seconds: float) -> RecordedViews:
-    """Record the demo's scene into a new folder."""
+    """Render the demo's scene into a new folder."""
     size = (_ROOM_WIDTH, _ROOM_HEIGHT, _ROOM_FPS)
     scene = Scene(ROOM, _ROOM_CAMERAS, _ROOM_PEOPLE, _ROOM_SEED, *size)
     write_recording(scene, folder, seconds, lambda _done, _total: None)

@@ -1,4 +1,4 @@
-"""Tables as they are printed, and as text files beside the plots."""
+"""Reports: tables that are printed, and saved as text."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from rich.table import Table
 from benchmarks.common.environment import command_line, machine
 
 _WIDTH, _WIDTH_SAVED = 110, 240
-"""Characters in a line on the screen, and in a file, where nothing is folded."""
+"""Characters of a line on the screen, and in a file, where lines are not wrapped."""
 
 
 class Report:
-    """Prints lines and tables, and keeps them to be saved."""
+    """Prints lines and tables, and records them for a text file."""
 
     def __init__(self) -> None:
         self._screen = Console(width=_WIDTH, highlight=False)
@@ -30,7 +30,7 @@ class Report:
             console.print(text, markup=False)
 
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Print a table: words to the left in the first and last column, numbers to the right between."""
+        """Print a table; only text in the first and the last column is left-aligned."""
         table = Table(title=title, title_justify="left", show_header=any(columns))
         for place, column in enumerate(columns):
             words = place in {0, len(columns) - 1} and not _is_number(rows[0][place])
@@ -41,7 +41,7 @@ class Report:
             console.print(table)
 
     def save(self, path: Path) -> None:
-        """Write all that was printed into a text file."""
+        """Write everything that was printed into a text file."""
         path.parent.mkdir(parents=True, exist_ok=True)
         self._saved.save_text(str(path))
 

@@ -10,23 +10,23 @@ from types import ModuleType
 from typing import Any
 
 Watched = tuple[type | ModuleType, str, str]
-"""A class or a module, the name of its function, and the stage that this is."""
+"""A class or module, the name of its function, and the name of the stage."""
 
 
 class Stopwatch:
-    """Adds up each stage's own seconds: what a stage calls that is a stage itself counts only there.
+    """Adds up the seconds of each stage, without the stages that it calls.
 
-    Time is the process's, all threads together, so that a library's own threads are not overlooked.
+    Time is the processor time of the process, which includes a library's own threads.
     """
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
         self._inner: list[float] = []
-        """For each stage that is running, outermost first: seconds of the stages inside it."""
+        """For each running stage, outermost first: seconds of the stages inside it."""
 
     @contextmanager
     def watching(self, *watched: Watched) -> Iterator[None]:
-        """Time the methods while inside."""
+        """Time these functions inside the context."""
         originals = [(owner, name, getattr(owner, name)) for owner, name, _ in watched]
         for owner, name, stage in watched:
             setattr(owner, name, self._timed(getattr(owner, name), stage))

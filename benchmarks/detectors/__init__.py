@@ -1,1 +1,1 @@
-"""What detectors find, and what the tracker makes of it."""
+"""Comparison of detectors, and of the tracks made of their detections."""

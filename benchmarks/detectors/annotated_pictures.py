@@ -1,4 +1,4 @@
-"""Pictures to judge by eye: what was found where nobody has said what is there."""
+"""Pictures with drawn boxes, to inspect detectors where there is no ground truth."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from benchmarks.detectors.compared_detectors import OBSERVERS, watch
+from benchmarks.detectors.compared_detectors import DETECTORS, run_detector
 from benchmarks.detectors.scored_views import ScoredView
 from tracking.detectors import Image
 from tracking.motchallenge import MotRow
@@ -20,18 +20,18 @@ _FAINT = (170, 170, 170)
 
 
 def save_pictures(views: list[ScoredView], folder: Path) -> Iterator[Path]:
-    """Write a sheet per view: each observer's hypotheses (grey) and tracks (a colour a person) over time."""
+    """Write a sheet per view: each detector's hypotheses (gray) and tracks (a color for each) over time."""
     folder.mkdir(parents=True, exist_ok=True)
     for view in views:
         images = [image for n, image in enumerate(view.images(_FRAMES)) if n % _EVERY == _EVERY - 1]
         rows = []
-        for observer in OBSERVERS[:3]:
-            seen = watch(observer, view, _FRAMES)
+        for detector_spec in DETECTORS[:3]:
+            runs = run_detector(detector_spec, view, _FRAMES)
             drawn = []
             for k, image in enumerate(images):
                 number = _EVERY * (k + 1)
-                hypotheses = [row for row in seen.hypotheses if row.frame == number]
-                drawn.append(_draw(image, hypotheses, [row for row in seen.tracks if row.frame == number]))
+                hypotheses = [row for row in runs.hypotheses if row.frame == number]
+                drawn.append(_draw(image, hypotheses, [row for row in runs.tracks if row.frame == number]))
             rows.append(np.concatenate(drawn, axis=1))
         path = folder / f"{view.name}.png"
         cv2.imwrite(str(path), np.concatenate(rows, axis=0))
@@ -47,6 +47,6 @@ def _draw(image: Image, hypotheses: list[MotRow], tracks: list[MotRow]) -> Image
     return canvas
 
 
-def _box(canvas: Image, row: MotRow, colour: tuple[int, int, int], thick: int) -> None:
+def _box(canvas: Image, row: MotRow, color: tuple[int, int, int], thick: int) -> None:
     left, top, right, bottom = (round(side) for side in row.box)
-    cv2.rectangle(canvas, (left, top), (right, bottom), colour, thick)
+    cv2.rectangle(canvas, (left, top), (right, bottom), color, thick)

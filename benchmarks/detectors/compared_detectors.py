@@ -1,4 +1,4 @@
-"""What is compared: detectors, and what the tracker makes of them."""
+"""The compared detectors, and the tracks made of their detections."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from tracking.detectors import (
 from tracking.detectors.ignore_mask import visible_mask
 from tracking.motchallenge import MotRow
 
-SURE = 0.4
-"""Score from which a hypothesis of the background detector is a person by itself."""
+CONFIDENT = 0.4
+"""Score from which a hypothesis of the background detector is confident."""
 
 
 class BlobDetector:
-    """The usual: MOG2, its shadows left out, opened and closed, and its connected components."""
+    """The standard approach: MOG2 without shadows, opening and closing, connected components."""
 
     LEAST_HEIGHT = 0.1  # of the picture's
 
@@ -38,7 +38,7 @@ class BlobDetector:
         self._visible: Image | None = None
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
-        """Return a box for every component that is large enough."""
+        """Return a box for every component that is tall enough."""
         rows, columns = image.shape[:2]
         if self._visible is None:
             self._visible = visible_mask(rows, columns, self._view.ignore)
@@ -54,47 +54,47 @@ class BlobDetector:
 
 @dataclass(frozen=True, slots=True)
 class ComparedDetector:
-    """A detector of the comparison."""
+    """A detector in the comparison."""
 
     name: str
     make: Callable[[ScoredView], Detector]
-    with_peers: bool = True
-    """Other trackers get its boxes, too."""
+    with_other_trackers: bool = True
+    """Whether other trackers get its boxes, too."""
 
 
 def _background(view: ScoredView) -> BackgroundSettings:
     return BackgroundSettings(ignore=view.ignore)
 
 
-OBSERVERS = (
+DETECTORS = (
     ComparedDetector("MyView", lambda view: BackgroundDetector(_background(view))),
     ComparedDetector(
         "the paper's box filters",
         lambda view: BackgroundDetector(paper_settings(_background(view))),
-        with_peers=False,
+        with_other_trackers=False,
     ),
     ComparedDetector("MOG2 + connected components", BlobDetector),
     ComparedDetector(
-        "OpenCV's HOG", lambda view: HogDetector(HogSettings(min_height=view.smallest), ignore=view.ignore)
+        "OpenCV's HOG", lambda view: HogDetector(HogSettings(min_height=view.min_height), ignore=view.ignore)
     ),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class DetectorRun:
-    """What an observer found in a view."""
+    """The detections and tracks of a detector in a view."""
 
     hypotheses: list[MotRow]
     tracks: list[MotRow]
     frames: int
     detect_s: float
-    """Processor time, all frames."""
+    """Processor time of all frames."""
     track_s: float
 
 
-def watch(observer: ComparedDetector, view: ScoredView, frames: int | None) -> DetectorRun:
-    """Show a view to an observer, and its boxes to the tracker."""
-    detector = observer.make(view)
+def run_detector(detector_spec: ComparedDetector, view: ScoredView, frames: int | None) -> DetectorRun:
+    """Run a detector on a view, and the tracker on its detections."""
+    detector = detector_spec.make(view)
     tracker = OnlineTracker(WindowSettings(), CostSettings(), create_solver("columns"))
     boxes: list[MotRow] = []
     tracks: list[MotRow] = []
@@ -113,7 +113,7 @@ def watch(observer: ComparedDetector, view: ScoredView, frames: int | None) -> D
 
 
 def rows_of(number: int, found: Detections) -> list[MotRow]:
-    """Return a frame's detections as rows of a file."""
+    """Return a frame's detections as MOTChallenge rows."""
     return [
         MotRow(number + 1, -1, left, top, right - left, bottom - top, score)
         for (left, top, right, bottom), score in zip(found.boxes.tolist(), found.scores.tolist(), strict=True)
@@ -121,7 +121,7 @@ def rows_of(number: int, found: Detections) -> list[MotRow]:
 
 
 def final_rows(result: WindowResult | None) -> Iterable[MotRow]:
-    """Yield the rows of the frames that are final now."""
+    """Yield the rows of the frames that become final with a window."""
     if result is None:
         return
     for track in result.tracks:

@@ -1,4 +1,4 @@
-"""The scenes that observations are measured on, and what was found in them."""
+"""The scenes of the detector benchmark, and the scores of boxes and tracks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tracking.evaluation import TruthAndTracks, evaluate, evaluate_cameras, orac
 from tracking.motchallenge import MotRow, read_rows
 
 WATERMARK = ((130.0, 232.0), (354.0, 232.0), (354.0, 282.0), (130.0, 282.0))
-"""Half-transparent and in every frame: where it lies nobody can be told from the background."""
+"""The polygon of a translucent watermark, which hides the background."""
 
 _SMALLEST = {"pets09": 0.12}
 
@@ -29,22 +29,22 @@ class ScoredView:
     video: Path
     truth: Path | None
     watermark: bool
-    smallest: float
-    """Height of the smallest people, in picture heights, which HOG has to be told: its time hangs on it."""
+    min_height: float
+    """Height of the smallest people, in picture heights, for HOG, whose time depends on it."""
 
     @property
     def ignore(self) -> tuple[tuple[tuple[float, float], ...], ...]:
-        """The polygons that nobody is looked for in."""
+        """The ignored polygons."""
         return (WATERMARK,) if self.watermark else ()
 
     def images(self, most: int | None = None) -> Iterator[Image]:
-        """Yield the frames, at most so many."""
+        """Yield the frames, at most `most`."""
         with av.open(str(self.video)) as film:
             for frame in islice(film.decode(video=0), most):
                 yield np.asarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8)
 
     def people(self, frames: int | None) -> list[MotRow]:
-        """Return the ground truth of the first frames."""
+        """Return the ground truth of the first `frames` frames."""
         if self.truth is None:
             return []
         return [row for row in read_rows(self.truth) if frames is None or row.frame <= frames]
@@ -54,14 +54,14 @@ def views_of(data: Path, scene: str) -> list[ScoredView]:
     """Return the views of a scene.
 
     Raises:
-        CannotRunError: there is none.
+        CannotRunError: its recordings are missing.
     """
     folder = data / scene
     views = []
     for video in sorted(folder.glob("*.mp4")):
         truth = folder / "gt" / f"{video.stem}.txt"
-        marked, smallest = scene in {"terrace", "campus4"}, _SMALLEST.get(scene, 0.25)
-        views.append(ScoredView(video.stem, video, truth if truth.exists() else None, marked, smallest))
+        marked, min_height = scene in {"terrace", "campus4"}, _SMALLEST.get(scene, 0.25)
+        views.append(ScoredView(video.stem, video, truth if truth.exists() else None, marked, min_height))
     if not views:
         raise CannotRunError(f"needs the recordings {folder}/*.mp4; --data or MYVIEW_TEST_DATA say where")
     return views
@@ -69,7 +69,7 @@ def views_of(data: Path, scene: str) -> list[ScoredView]:
 
 @dataclass(frozen=True, slots=True)
 class ViewScores:
-    """What boxes are worth, at an overlap (IoU) of one half; shares."""
+    """Scores at an overlap (IoU) of one half, in [0, 1]."""
 
     recall: float
     precision: float
@@ -77,7 +77,7 @@ class ViewScores:
 
 
 def scores_of_boxes(truth: list[MotRow], boxes: list[MotRow]) -> ViewScores:
-    """Score detections: recall as much as any association can reach, precision of all of them."""
+    """Score detections; recall and IDF1 are upper bounds for any association."""
     best = oracle_association(boxes, truth)
     people = sum(row.confidence != 0.0 for row in truth)
     recall = len(best) / max(people, 1)
@@ -92,7 +92,7 @@ def scores_of_tracks(truth: list[MotRow], tracks: list[MotRow]) -> ViewScores:
 
 
 def oracle(truths: dict[str, list[MotRow]], boxes: dict[str, list[MotRow]]) -> float:
-    """Return the joint IDF1 over all cameras of boxes that are given the true identity."""
+    """Return the joint IDF1 over all cameras of boxes with the true identities."""
     cameras = {
         name: TruthAndTracks(truth, oracle_association(boxes[name], truth)) for name, truth in truths.items()
     }

@@ -1,1 +1,1 @@
-"""Memory and time over many frames of one tracker."""
+"""Endurance: memory and time over many frames."""

@@ -1,4 +1,4 @@
-"""Memory and time over tens of thousands of frames: the tracker alone, and a whole camera pipeline.
+"""Endurance: memory and time of the tracker and of a camera pipeline over tens of thousands of frames.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.endurance --out out/bench
 
@@ -38,7 +38,7 @@ _SITE = {
 
 @dataclass(slots=True)
 class EnduranceRun:
-    """One long run."""
+    """The samples of a long run."""
 
     name: str
     samples: MemorySamples
@@ -47,7 +47,7 @@ class EnduranceRun:
 
 
 def run_tracker(frames: int) -> EnduranceRun:
-    """Push so many frames of a crowd into a tracker."""
+    """Push frames of an endless crowd into a tracker."""
     tracker = OnlineTracker(WindowSettings(), CostSettings(), create_solver(DEFAULT_SOLVER))
     scene = crowd(_PEOPLE, seed=1)
     run = EnduranceRun("tracker", MemorySamples())
@@ -62,7 +62,7 @@ def run_tracker(frames: int) -> EnduranceRun:
 
 
 def run_pipeline(frames: int) -> EnduranceRun:
-    """Put so many frames through a camera's source, encoder, detector and tracker."""
+    """Run frames through a camera's source, encoder, detector and tracker."""
     # Loaded only now: the tracker's memory is measured without the server's libraries.
     from server.camera.pipeline import CameraPipeline  # noqa: PLC0415
     from server.config.loader import build_config  # noqa: PLC0415
@@ -91,7 +91,7 @@ def _endure(run: EnduranceRun, frames: int, step: Callable[[int], None]) -> None
 
 
 def describe(report: Report, run: EnduranceRun) -> None:
-    """Print a row for each span of frames, and the growth after the first."""
+    """Print a row for each span of frames, and the growth after the first span."""
     rows = []
     for start, stop in spans(run.samples.frames[-1]):
         part = run.samples.between(start, stop)
@@ -117,7 +117,7 @@ def describe(report: Report, run: EnduranceRun) -> None:
 
 
 def spans(frames: int) -> Iterator[tuple[int, int]]:
-    """Return the spans of the table: of :data:`SPAN` frames, of a third of all where that is fewer."""
+    """Return the spans of the table: :data:`SPAN` frames each, or a third of all if that is less."""
     span = min(SPAN, frames // 3)
     return itertools.pairwise(range(0, frames + 1, span))
 

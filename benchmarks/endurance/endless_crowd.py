@@ -1,4 +1,4 @@
-"""An endless scene in which people come and go, made up frame by frame."""
+"""Simulated detections of an endless crowd in which people come and go."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.paper_experiments.grey_histograms import visible, wardrobe
+from benchmarks.paper_experiments.gray_histograms import visible, wardrobe
 from benchmarks.paper_experiments.noisy_detections import SceneParameters, detect
 from benchmarks.paper_experiments.walking_people import Walker, WalkParameters, inside, people_at
 from tracking import Detections
@@ -16,10 +16,9 @@ _WALKING = WalkParameters(3.0, 0.15, stay=(150, 500), away=(20, 200))
 
 
 def crowd(most: int, seed: int) -> Iterator[Detections]:
-    """Yield what is seen of at most so many people at once, for ever.
+    """Yield the detections of at most `most` people at once, forever.
 
-    Who comes after somebody has left is somebody else, in clothes of their own: objects are born and
-    forgotten all the time.
+    New people have new clothes: tracks are initiated and forgotten all the time.
     """
     rng = np.random.default_rng(seed)
     cast = SceneParameters(tuple(range(most)), 0, _WALKING)

@@ -1,4 +1,4 @@
-"""Memory over a long run: samples of what this process holds, and by how much that grows."""
+"""Memory samples of this process over a long run, and their growth."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _RESIDENT = 1
 
 
 def resident_megabytes() -> float:
-    """Return how much memory of this process is resident, megabytes (Linux)."""
+    """Return the resident memory of this process, megabytes (Linux)."""
     pages = int(_STATM.read_text(encoding="ascii").split()[_RESIDENT])
     return pages * os.sysconf("SC_PAGE_SIZE") / _MEGABYTE
 
 
 @dataclass(slots=True)
 class MemorySamples:
-    """What was in use after so many frames."""
+    """Memory and time after numbers of frames."""
 
     frames: list[int] = field(default_factory=list)
     megabytes: list[float] = field(default_factory=list)
@@ -38,7 +38,7 @@ class MemorySamples:
     """Python's own memory blocks in use: they tell a leak from a heap in pieces."""
 
     def take(self, frames: int) -> None:
-        """Note what is in use now, once Python has emptied its lists of free objects, which fill slowly."""
+        """Add a sample, after clearing Python's free lists, which fill slowly."""
         gc.collect()
         self.frames.append(frames)
         self.megabytes.append(resident_megabytes())
@@ -56,15 +56,15 @@ class MemorySamples:
         )
 
     def milliseconds_per_frame(self) -> float:
-        """Return the processor time of a frame between the first and the last sample."""
+        """Return the processor time per frame between the first and the last sample."""
         return 1e3 * (self.seconds[-1] - self.seconds[0]) / (self.frames[-1] - self.frames[0])
 
     def growth(self) -> float:
-        """Return by how many megabytes :data:`SPAN` frames add, by a straight line through the samples."""
+        """Return the growth per :data:`SPAN` frames, megabytes, by linear regression."""
         return self._per_span(self.megabytes)
 
     def block_growth(self) -> float:
-        """Return by how many blocks :data:`SPAN` frames add, likewise."""
+        """Return the growth of memory blocks per :data:`SPAN` frames, likewise."""
         return self._per_span(self.blocks)
 
     def _per_span(self, values: Sequence[float]) -> float:

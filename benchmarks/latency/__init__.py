@@ -1,1 +1,1 @@
-"""From the pulse to the browser, stage by stage."""
+"""Latency from the pulse to the browser, by stage."""

@@ -1,9 +1,9 @@
-"""The delay of `myview up` from the pulse to the frame shown in Chromium, split by stage.
+"""Latency of `myview up` from the pulse to the frame shown in Chromium, by stage.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.latency --out out/bench
 
-Three replayed views, all five processes and the browser on this machine, one viewer. The views are those of
-the embedded scene, recorded anew, or a scene of the data folder (`--views campus4`).
+Three replayed views, all five processes and the browser on this machine, one viewer. The views are renderings
+of the synthetic room, or a scene of the data folder (`--views campus4`).
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from benchmarks.latency.shown_frames import ShownFrames, watch_page
 from benchmarks.latency.stage_delays import STAGES, StageDelays, split
 
 _START_S = 15.0
-"""Of recording before what is measured: starting, learning the background, meeting people."""
+"""Seconds of recording before the measurement: start, background model, first people."""
 _SLOW = 95
-_COLOURS = ("#9ecae1", "#6baed6", "#3182bd", "#d9d9d9", "#fd8d3c", "#e6550d", "#74c476")
+_COLORS = ("#9ecae1", "#6baed6", "#3182bd", "#d9d9d9", "#fd8d3c", "#e6550d", "#74c476")
 
 
 async def watch(
     views: RecordedViews, folder: Path, settle_s: float, seconds: float
 ) -> tuple[BusTimestamps, ShownFrames]:
-    """Run the site, listen to its bus and watch its page.
+    """Run the site, subscribe to its bus and watch its page.
 
     Raises:
-        RuntimeError: the site did not start.
+        RuntimeError: the site does not start.
     """
     async with chromium() as browser, running_site(views, folder) as site:
         with listening(site.bus) as marks:
@@ -51,7 +51,7 @@ def describe(report: Report, name: str, delays: StageDelays, shown: ShownFrames,
     declared = shown.lookahead / shown.fps
     rows = [_row(stage, delays.stages[:, place], what) for place, (stage, what) in enumerate(STAGES.items())]
     rows += [
-        _row("whole", delays.totals, "from due to shown"),
+        _row("total", delays.totals, "from due to shown"),
         [
             "declared",
             "",
@@ -59,15 +59,17 @@ def describe(report: Report, name: str, delays: StageDelays, shown: ShownFrames,
             "",
             f"look-ahead: {shown.lookahead} frames at {shown.fps:g} a second",
         ],
-        _row("beyond it", delays.totals - declared, "what the machine takes"),
+        _row("excess", delays.totals - declared, "beyond the declared delay"),
     ]
     title = f"myview up on {name}: delay of {len(delays.pulses)} frames, ms"
     report.table(title, ["stage", "mean", "p50", "p95", "what"], rows)
-    report.say(f"{delays.shown_share:.1%} of the frames were shown; {delays.unknown} are not in the table")
-    report.say(f"decided without a camera that was late: {delays.late} of {delays.gops} GOPs")
-    report.say(f"not searched for people since the start: {shed} frames, all cameras together")
+    report.say(
+        f"{delays.shown_share:.1%} of the frames were shown; {delays.unknown} with unknown stages left out"
+    )
+    report.say(f"decided without a late camera: {delays.late} of {delays.gops} GOPs")
+    report.say(f"shed since the start: {shed} frames of all cameras")
     used = ", ".join(f"{who} {cores:.2f}" for who, cores in shown.cores.items())
-    report.say(f"cores in use meanwhile, of {os.cpu_count()}: {used}")
+    report.say(f"cores in use, of {os.cpu_count()}: {used}")
 
 
 def _row(name: str, seconds: np.ndarray, what: str) -> list[str]:
@@ -76,7 +78,7 @@ def _row(name: str, seconds: np.ndarray, what: str) -> list[str]:
 
 
 def plot(delays: StageDelays, shown: ShownFrames, path: Path, name: str) -> None:
-    """Draw the stages of the mean frame and of the slowest, and the delay over time."""
+    """Draw the mean delay by stage, of all and of the slowest frames, and the delay over time."""
     figure = Figure(figsize=(9, 5.5))
     bars, line = figure.subplots(2, 1, height_ratios=(3, 2))
     slow = delays.totals >= np.percentile(delays.totals, _SLOW)
@@ -84,7 +86,7 @@ def plot(delays: StageDelays, shown: ShownFrames, path: Path, name: str) -> None
     labels = ["all frames", f"slowest {100 - _SLOW} %"]
     left = np.zeros(len(labels))
     for place, stage in enumerate(STAGES):
-        bars.barh(labels, means[:, place], left=left, color=_COLOURS[place], label=stage, height=0.6)
+        bars.barh(labels, means[:, place], left=left, color=_COLORS[place], label=stage, height=0.6)
         left += means[:, place]
     declared = 1e3 * shown.lookahead / shown.fps
     bars.axvline(declared, color="black", linestyle="--", linewidth=1, label="declared look-ahead")

@@ -1,4 +1,4 @@
-"""A plain zenoh subscriber that notes when the site's messages came and what times they carry."""
+"""A zenoh subscriber that records the arrival and the timestamps of a site's messages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from server.messaging.messages import CameraTracks, FrameHeader, GopChoices, cam
 
 @dataclass(frozen=True, slots=True)
 class FrameTimes:
-    """One access unit of one camera. All times are unix seconds."""
+    """Timestamps of an access unit of a camera, unix seconds."""
 
     due: float
     taken: float
@@ -26,7 +26,7 @@ class FrameTimes:
 
 @dataclass(frozen=True, slots=True)
 class DecisionRecord:
-    """One GOP's choices."""
+    """The view choices of a GOP."""
 
     first: int
     frames: int
@@ -37,33 +37,33 @@ class DecisionRecord:
 
 @dataclass(slots=True)
 class BusTimestamps:
-    """What was heard on the bus."""
+    """Timestamps of the messages on the bus."""
 
     frames: dict[tuple[str, int], FrameTimes] = field(default_factory=dict)
     """By camera and pulse."""
     solved: dict[int, dict[str, float]] = field(default_factory=dict)
-    """By last pulse of the window: when each camera had solved it."""
+    """When each camera solved a window, by the window's last pulse."""
     decisions: list[DecisionRecord] = field(default_factory=list)
     shed: int = 0
-    """Frames that were missed or not searched for people, all cameras together."""
+    """Frames that were missed or not searched, of all cameras."""
 
     def video(self, camera: str, head: FrameHeader, received: float) -> None:
-        """Note a frame."""
+        """Add a frame."""
         self.frames[camera, head.pulse] = FrameTimes(head.due, head.taken, head.encoded, received)
 
     def tracks(self, message: CameraTracks) -> None:
-        """Note a window."""
+        """Add a window."""
         self.solved.setdefault(message.last, {})[message.camera] = message.solved_at
         self.shed += len(message.shed)
 
     def choices(self, message: GopChoices, received: float) -> None:
-        """Note a decision."""
+        """Add a decision."""
         self.decisions.append(DecisionRecord(message.first, message.frames, message.choices, received))
 
 
 @contextlib.contextmanager
 def listening(address: str) -> Iterator[BusTimestamps]:
-    """Listen to the site whose router is at the address, as any outsider could."""
+    """Subscribe to the messages of the site whose router is at the address."""
     marks = BusTimestamps()
     head, tracks = msgspec.json.Decoder(FrameHeader), msgspec.json.Decoder(CameraTracks)
     choices = msgspec.json.Decoder(GopChoices)

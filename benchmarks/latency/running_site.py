@@ -1,4 +1,4 @@
-"""`myview up` on replayed views, on ports that are free."""
+"""`myview up` on replayed views, on free ports."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ _END_S = 15.0
 
 
 class PlayedViews(Protocol):
-    """What the configuration of a site needs to know of the views that it plays."""
+    """The sections of a site's configuration that describe its views."""
 
     @property
     def cameras(self) -> list[dict[str, Any]]:
-        """The configuration's cameras."""
+        """The section `cameras` of the configuration."""
 
     @property
     def site(self) -> dict[str, Any]:
-        """The configuration's site."""
+        """The section `site` of the configuration."""
 
     @property
     def ground(self) -> Path | None:
-        """Homographies to the ground plane."""
+        """The file of homographies to the ground plane."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunningSite:
-    """A site that is running."""
+    """A running site."""
 
     url: str
     bus: str
-    """Where its zenoh router listens."""
+    """The address of its zenoh router."""
     process: asyncio.subprocess.Process
 
 
@@ -56,12 +56,12 @@ async def running_site(
     environment: Mapping[str, str] | None = None,
     settings: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> AsyncIterator[RunningSite]:
-    """Run `myview up` on the views; its log goes into the folder.
+    """Run `myview up` on the views, with its log in the folder.
 
-    `environment` and `settings`, by section, are set besides.
+    `environment` and `settings`, by section, are added.
 
     Raises:
-        RuntimeError: it did not start; why stands in the log.
+        RuntimeError: it does not start; the log says why.
     """
     sync, bus, http = (free_port() for _ in range(3))
     address = f"tcp/127.0.0.1:{bus}"
@@ -94,7 +94,7 @@ async def running_site(
 
 
 async def _until_up(site: RunningSite) -> None:
-    """Wait until the best-view service answers: before the first pulse, which it is waited for."""
+    """Wait until the best-view service answers, which is before the first pulse."""
     loop = asyncio.get_running_loop()
     give_up = loop.time() + _START_S
     async with aiohttp.ClientSession() as session:

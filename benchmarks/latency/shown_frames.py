@@ -1,4 +1,4 @@
-"""The page in Chromium: which frame was shown when."""
+"""The page in Chromium, and the time when it showed each frame."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ _READ_EVERY_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class ShownFrames:
-    """What the page showed while it was measured."""
+    """The frames that the page showed during the measurement."""
 
     object: int
     at: dict[int, float]
     """By pulse: when it was first shown, unix seconds."""
     lookahead: int
-    """Frames of delay that the site declares."""
+    """The look-ahead that the site declares, frames."""
     fps: float
     cores: dict[str, float]
-    """Cores in use meanwhile, by what used them."""
+    """Cores in use, by process name."""
 
 
 async def watch_page(browser: Browser, url: str, settle_s: float, seconds: float) -> ShownFrames:
-    """Open the page, let it play for a while, and note the frames of the seconds after that."""
-    # The page's policy forbids eval, which it is asked with here.
+    """Open the page, let it settle, then record the shown frames for some seconds."""
+    # The page's policy forbids eval, which Playwright needs.
     page = await browser.new_page(viewport={"width": 1280, "height": 800}, bypass_csp=True)
     try:
         await page.goto(url)

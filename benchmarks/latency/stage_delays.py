@@ -1,8 +1,8 @@
-"""From what was heard and seen to the delay of every frame, split by stage; the stages add up to the whole.
+"""The delay of every frame, split by stage; the stages add up to the total.
 
-A GOP is decided and sent at once, when the tracks of its whole look-ahead are there: its first frame is then
-due to be shown, and its k-th frame k frames later. Both waits, for the frames ahead and behind the GOP's
-earlier frames, are the look-ahead's; together they are the same for every frame.
+A GOP is decided and sent at once, when the tracks of its whole look-ahead have arrived: its first frame is
+then due to be shown, and its k-th frame k frames later. Both waits, for the frames ahead and for the GOP's
+earlier frames, belong to the look-ahead; their sum is the same for every frame.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from benchmarks.latency.bus_subscriber import BusTimestamps, DecisionRecord
 from benchmarks.latency.shown_frames import ShownFrames
 
 STAGES = {
-    "taken": "from when the pulse is due to the picture",
+    "captured": "from when the pulse is due to the picture",
     "encoded": "the picture to H.264",
     "received": "over the bus, by a subscriber of the best view's router",
-    "look-ahead": "until the last frame that the decision looks at is due",
-    "solved": "until every camera in time has found, tracked, solved up to it",
-    "decided": "until it is decided and heard on the bus; late cameras awaited",
+    "look-ahead": "until the last frame of the look-ahead is due",
+    "solved": "until every camera in time has detected, tracked and solved up to it",
+    "decided": "until the decision arrives on the bus; includes waiting for late cameras",
     "shown": "HTTP, the player's buffer, decoding, the screen",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class StageDelays:
-    """Seconds of every frame that was shown and whose way is known."""
+    """Delays by stage of every shown frame whose timestamps are known, seconds."""
 
     pulses: NDArray[np.int64]
     """``(frames,)``, ascending."""
@@ -38,9 +38,9 @@ class StageDelays:
     shown_share: float
     """Frames shown, of all between the first and the last shown."""
     unknown: int
-    """Frames shown that are left out, because a part of their way was not heard of."""
+    """Shown frames that are left out, because a timestamp is missing."""
     gops: int
-    """Decisions on what was shown."""
+    """Decisions on shown frames."""
     late: int
     """Of these: made before every camera had solved its window."""
 
@@ -52,14 +52,14 @@ class StageDelays:
 
 
 def split(marks: BusTimestamps, shown: ShownFrames) -> StageDelays:
-    """Split the delay of every frame that was shown.
+    """Split the delay of every shown frame by stage.
 
     Raises:
-        ValueError: there is none whose way is known.
+        ValueError: no shown frame has all timestamps.
     """
     rows = sorted(_rows(marks, shown))
     if not rows:
-        raise ValueError("no frame was shown whose way is known")
+        raise ValueError("no shown frame has all timestamps")
     first, last = min(shown.at), max(shown.at)
     decisions = [it for it in marks.decisions if first <= it.first <= last]
     return StageDelays(
@@ -95,15 +95,15 @@ class _SolvedWindows:
     last: int
     """The window's last pulse."""
     at: float | None
-    """When the last of the cameras in time had solved it; None when no camera was."""
+    """When the last camera in time had solved it; None: no camera was in time."""
     late: bool
-    """Some camera was not."""
+    """Whether some camera was late."""
 
 
 def _solved(marks: BusTimestamps, decision: DecisionRecord, lookahead: int) -> _SolvedWindows:
-    """Find the first window that reaches to the end of a decision's look-ahead.
+    """Return the first window that reaches the end of a decision's look-ahead.
 
-    Cameras that had not solved it when the decision was heard of were decided without.
+    Cameras that had not solved it when the decision arrived were left out of the decision.
     """
     needed = decision.first + lookahead - 1
     last = min((last for last in marks.solved if last >= needed), default=needed)

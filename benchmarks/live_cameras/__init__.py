@@ -1,1 +1,1 @@
-"""Live cameras: whether tracking keeps up, and what each stage costs."""
+"""Real-time tracking of live cameras, and its cost by stage."""

@@ -1,9 +1,9 @@
-"""Four live cameras at 25 frames a second of CIF: does tracking keep up, and what does each stage cost?
+"""Real-time tracking of four live cameras (CIF, 25 frames a second), and its cost by stage.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.live_cameras --out out/bench
 
-Runs a real site (`myview up`), all seven processes on this machine, on recordings played again and again or
-on the embedded scene (`--views room`). Costs are processor time inside the real camera processes.
+Runs a real site (`myview up`), all seven processes on this machine, on looped recordings or on the synthetic
+room (`--views room`). Costs are processor time inside the real camera processes.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from tracking.boxes import Floats
 _OWN = "measuring"
 _MS = 1e3
 _WAITS = {
-    "taken": "from when the pulse is due to the picture",
+    "captured": "from when the pulse is due to the picture",
     "encoded": "the picture to H.264",
     "received": "over the bus",
     "solved": "from when a window's last frame is due until the window is solved",
@@ -48,7 +48,7 @@ _WAITS = {
 
 @dataclass(frozen=True, slots=True)
 class SiteSnapshot:
-    """All that is read at one moment."""
+    """All counters of the site at one moment."""
 
     busy: ProcessorUsage
     counts: FrameCounts
@@ -57,7 +57,7 @@ class SiteSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class LiveRun:
-    """A run between two moments."""
+    """A measured run between two snapshots."""
 
     start: SiteSnapshot
     stop: SiteSnapshot
@@ -74,12 +74,12 @@ class LiveRun:
 
     @property
     def counts(self) -> FrameCounts:
-        """What was counted between."""
+        """The counts of the run."""
         return self.stop.counts.since(self.start.counts)
 
     @property
     def solved(self) -> Floats:
-        """Each camera's windows: the last pulse, and the seconds from when it was due, `(windows, 2)`."""
+        """All cameras' windows, `(windows, 2)`: last pulse, and seconds from its due time to the solution."""
         due = {pulse: frame.due for (_, pulse), frame in self.marks.frames.items()}
         rows = [
             (last, at - due[last])
@@ -91,10 +91,10 @@ class LiveRun:
 
 
 async def watch(live: LoopedViews, folder: Path, settle_s: float, seconds: float) -> LiveRun:
-    """Run the site and watch it.
+    """Run the site, and measure it after it has settled.
 
     Raises:
-        RuntimeError: the site did not start.
+        RuntimeError: the cameras do not start in time.
     """
     times = folder / "stages"
     times.mkdir()
@@ -110,16 +110,16 @@ async def watch(live: LoopedViews, folder: Path, settle_s: float, seconds: float
             await asyncio.sleep(seconds)
             stop = await moment()
     if not start.stages:
-        raise RuntimeError("the cameras did not start in time; --settle gives them longer")
+        raise RuntimeError("the cameras did not start in time; a longer --settle may help")
     return LiveRun(start, stop, marks, first_pulse)
 
 
 def describe(report: Report, name: str, watched: LiveRun) -> None:
-    """Print the tables and the verdict."""
+    """Print the tables, and whether tracking keeps up."""
     counts = watched.counts
     report.table(
         f"myview up, {CAMERAS} cameras of {name} at {FPS:g} a second: frames",
-        ["camera", "received", "missed", "not searched", "messages not understood"],
+        ["camera", "received", "missed", "not searched", "bad messages"],
         [
             [camera, str(it["frames"]), str(it["missed"]), str(it["shed"]), str(it["bad_messages"])]
             for camera, it in counts.cameras.items()
@@ -136,13 +136,13 @@ def describe(report: Report, name: str, watched: LiveRun) -> None:
 
 
 def _describe_stages(report: Report, used: Mapping[str, Mapping[str, float]]) -> None:
-    names = {**STAGES, REST: "pulses, event loop, the bus's threads, thumbnails"}
+    names = {**STAGES, REST: "pulses, event loop, threads of the bus, thumbnails"}
     rows = [
         [stage, *(f"{used[camera][stage]:.2f}" for camera in used), _cores(used, [stage]), what]
         for stage, what in names.items()
     ]
     total = [f"{sum(used[camera].values()):.2f}" for camera in used]
-    rows.append(["together", *total, _cores(used, list(names)), ""])
+    rows.append(["total", *total, _cores(used, list(names)), ""])
     report.table("processor ms per frame", ["stage", *used, "cores, all", "what"], rows)
 
 
@@ -158,11 +158,11 @@ def _describe_waits(report: Report, watched: LiveRun) -> None:
         [name, *(f"{_MS * value:.1f}" for value in np.percentile(wait, [50, 95, 100])), what]
         for (name, what), wait in zip(_WAITS.items(), waits, strict=True)
     ]
-    report.table("by the clock, ms", ["stage", "p50", "p95", "most", "what"], rows)
+    report.table("wall-clock time, ms", ["stage", "p50", "p95", "max.", "what"], rows)
 
 
 def plot(watched: LiveRun, name: str, path: Path) -> None:
-    """Draw what each stage costs, and how long windows took over time."""
+    """Draw the cost of each stage, and the time to solve windows over time."""
     figure = Figure(figsize=(9, 6))
     bars, line = figure.subplots(2, 1)
     used = watched.milliseconds
@@ -174,11 +174,11 @@ def plot(watched: LiveRun, name: str, path: Path) -> None:
     bars.set(
         xlabel="processor ms per frame", title=f"myview up, {CAMERAS} cameras of {name} at {FPS:g} a second"
     )
-    bars.axvline(_MS / FPS, color="black", linestyle="--", linewidth=1, label="one core, all of the time")
+    bars.axvline(_MS / FPS, color="black", linestyle="--", linewidth=1, label="one full core")
     bars.legend(ncols=5, fontsize="small")
     solved = watched.solved
     line.plot((solved[:, 0] - watched.first_pulse) / FPS, _MS * solved[:, 1], ".", markersize=3)
-    line.set(xlabel="seconds", ylabel="a window is solved after, ms", ylim=(0, None))
+    line.set(xlabel="seconds", ylabel="time until a window is solved, ms", ylim=(0, None))
     figure.tight_layout()
     figure.savefig(path, dpi=110)
 

@@ -1,4 +1,4 @@
-"""What the site says of itself: frames that came, were missed or not searched, and windows that came late."""
+"""The site's own counters: received, missed and shed frames, and late windows."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ class FrameCounts:
     """Counters of the best-view service.
 
     Attributes:
-        cameras: by camera, then by what is counted.
-        late: windows whose tracks came after they were decided, all cameras together.
+        cameras: by camera, then by counter.
+        late: windows whose tracks arrived after the decision, of all cameras.
     """
 
     cameras: Mapping[str, Mapping[str, int]]
     late: int
 
     def since(self, earlier: FrameCounts) -> FrameCounts:
-        """Return what was counted since an earlier moment."""
+        """Return the difference to earlier counts."""
         cameras = {
             camera: {
                 what: number - earlier.cameras.get(camera, {}).get(what, 0) for what, number in it.items()
@@ -35,12 +35,12 @@ class FrameCounts:
 
     @property
     def dropped(self) -> int:
-        """Frames that were missed or not searched, all cameras together."""
+        """Frames that were missed or not searched, of all cameras."""
         return sum(it["missed"] + it["shed"] for it in self.cameras.values())
 
 
 def counts_in(metrics: str, late: int) -> FrameCounts:
-    """Read the text of `/metrics`."""
+    """Parse the text of `/metrics`."""
     cameras: dict[str, dict[str, int]] = {}
     for family in text_string_to_metric_families(metrics):
         for sample in family.samples:
@@ -53,11 +53,11 @@ def counts_in(metrics: str, late: int) -> FrameCounts:
 
 
 async def read_counts(url: str) -> FrameCounts:
-    """Ask a running site."""
+    """Read the counters of a running site."""
     async with aiohttp.ClientSession() as session:
         async with session.get(f"{url}metrics") as answer:
             metrics = await answer.text()
-        # The metric of late windows leaves out cameras that are not waited for any more: they are late, too.
+        # The metric of late windows leaves out cameras that are no longer waited for.
         async with session.get(f"{url}api/cameras") as answer:
             late = sum(camera["late"] for camera in (await answer.json())["cameras"])
     return counts_in(metrics, late)

@@ -1,4 +1,4 @@
-"""Four cameras at 25 frames a second of CIF: recordings of crowds played again and again, or the scene."""
+"""Four looped cameras (CIF, 25 frames a second): recordings of crowds, or the synthetic room."""
 
 from __future__ import annotations
 
@@ -20,34 +20,34 @@ _ROOM_PEOPLE, _ROOM_SEED, _ROOM_S = 5, 1, 60.0
 
 @dataclass(frozen=True, slots=True)
 class LoopedViews:
-    """Cameras that never end."""
+    """Cameras that play their recordings in a loop."""
 
     name: str
     views: tuple[RecordedViews, ...]
 
     @property
     def ground(self) -> Path | None:
-        """Homographies to the ground, where all cameras are of one scene."""
+        """The file of homographies, where all cameras are of one scene."""
         return self.views[0].ground if len(self.views) == 1 else None
 
     @property
     def cameras(self) -> list[dict[str, Any]]:
-        """The configuration's cameras."""
+        """The section `cameras` of the configuration."""
         found = [camera for views in self.views for camera in views.cameras][:CAMERAS]
         names = [f"c{number}" for number in range(len(found))]
         return [{**one, "id": name, "at_end": "loop"} for name, one in zip(names, found, strict=True)]
 
     @property
     def site(self) -> dict[str, Any]:
-        """The configuration's site."""
+        """The section `site` of the configuration."""
         return {"name": "bench", "fps": FPS, "width": WIDTH, "height": HEIGHT}
 
 
 def live_views(name: str, data: Path, folder: Path) -> LoopedViews:
-    """Return the cameras of that name; the scene is recorded into the folder first.
+    """Return the cameras of that name; the synthetic room is first rendered into the folder.
 
     Raises:
-        CannotRunError: the recordings are not there.
+        CannotRunError: the recordings are missing.
     """
     if name == ROOM:
         scene = Scene(ROOM, CAMERAS, _ROOM_PEOPLE, _ROOM_SEED, WIDTH, HEIGHT, FPS)
@@ -57,7 +57,7 @@ def live_views(name: str, data: Path, folder: Path) -> LoopedViews:
 
 
 def usual_views(data: Path) -> str:
-    """Return the recordings' name where they are there, the scene's otherwise."""
+    """Return the name of the recordings if they are available, else that of the synthetic room."""
     try:
         for scene in _SCENES:
             find_views(data, scene)

@@ -1,7 +1,7 @@
-"""What each stage of a live camera process costs, measured inside the real process.
+"""Processor time of the stages of a camera process, measured inside the real process.
 
 `hook/sitecustomize.py` calls :func:`time_camera` as the process starts. It wraps public methods of the
-real classes and writes what they took into a file from time to time; nothing else is changed.
+real classes and writes their times into a file periodically; nothing else is changed.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ _WRITE_EVERY = 25
 STAGES = {
     "take": "the recording's H.264 to a picture of the site's size",
     "encode": "the picture to H.264, once",
-    "detect": "background, silhouettes, looks",
-    "witness": "scores again, by what the other cameras found",
-    "track": "networks, births, templates",
+    "detect": "background, silhouettes, appearance",
+    "witness": "rescoring by the detections of other cameras",
+    "track": "networks, initiation, templates",
     "solve": "the network programs",
     "report": "tracks to messages",
     "publish": "messages and pictures onto the bus",
 }
 REST = "rest"
-"""Of the process: pulses, event loop, the bus's own threads, thumbnails."""
+"""Time of the process outside the stages: pulses, event loop, threads of the bus, thumbnails."""
 
 
 @dataclass(frozen=True, slots=True)
 class CameraStageTimes:
-    """What a camera process has used since it started.
+    """Processor time of a camera process since its start.
 
     Attributes:
-        frames: frames taken.
+        frames: captured frames.
         seconds: processor time of each stage, without the stages inside it.
         process: processor time of the whole process.
     """
@@ -52,7 +52,7 @@ class CameraStageTimes:
     process: float
 
     def milliseconds_since(self, earlier: CameraStageTimes) -> dict[str, float]:
-        """Return processor milliseconds per frame of each stage and of the rest since an earlier moment."""
+        """Return processor milliseconds per frame of each stage and of the rest since earlier times."""
         frames = max(self.frames - earlier.frames, 1)
         found = {name: 1e3 * (self.seconds[name] - earlier.seconds[name]) / frames for name in STAGES}
         whole = 1e3 * (self.process - earlier.process) / frames
@@ -60,13 +60,13 @@ class CameraStageTimes:
 
 
 def hooked_environment(folder: Path) -> dict[str, str]:
-    """Return what the environment of `myview up` needs so that its cameras time themselves into a folder."""
+    """Return the environment variables that make cameras of `myview up` write times into a folder."""
     path = [str(_HOOK), str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     return {"PYTHONPATH": os.pathsep.join(filter(None, path)), FOLDER_VARIABLE: str(folder)}
 
 
 def read_stages(folder: Path) -> dict[str, CameraStageTimes]:
-    """Read what the cameras have written last."""
+    """Read the last times of each camera."""
     return {
         file.stem: CameraStageTimes(**json.loads(file.read_text(encoding="utf-8")))
         for file in sorted(folder.glob("*.json"))
@@ -74,14 +74,14 @@ def read_stages(folder: Path) -> dict[str, CameraStageTimes]:
 
 
 class ThreadStopwatch:
-    """Adds up each stage's own processor time, thread by thread: stages of two threads run side by side."""
+    """Adds up the processor time of each stage by thread, since stages run in parallel threads."""
 
     def __init__(self, stages: Iterable[str] = STAGES) -> None:
         self.seconds = dict.fromkeys(stages, 0.0)
         self._local = threading.local()
 
     def wrap(self, owner: type, method: str, stage: str, after: Callable[[], None] | None = None) -> None:
-        """Time a method from now on; `after` is called when it has returned."""
+        """Time a method from now on; `after` is called after each call."""
         original = getattr(owner, method)
 
         @functools.wraps(original)
@@ -93,7 +93,7 @@ class ThreadStopwatch:
                 return original(*args, **kwargs)
             finally:
                 spent = time.thread_time() - start
-                # A stage runs in one thread only, so that nobody else adds to it.
+                # A stage runs in one thread only, so this needs no lock.
                 self.seconds[stage] += spent - inner.pop()
                 if inner:
                     inner[-1] += spent
@@ -104,8 +104,8 @@ class ThreadStopwatch:
 
 
 def time_camera(folder: str, camera: str) -> None:
-    """Time the stages of this process, which is about to be a camera's."""
-    # What is timed is imported here: the benchmark itself need not load it.
+    """Time the stages of this process, which becomes a camera process."""
+    # Imported here: the benchmark itself does not need these classes.
     from server.camera.peers.cross_view_scorer import CrossViewScorer  # noqa: PLC0415
     from server.camera.pipeline import CameraPipeline  # noqa: PLC0415
     from server.messaging.bus import Bus  # noqa: PLC0415

@@ -115,9 +115,9 @@ def _plot(found: dict[str, OutcomeCounts], path: Path) -> None:
     names = ["nobody helps", *found]
     axes.barh(names[0], next(iter(found.values())).unaided.total(), color="0.6", label="without help")
     left = [0.0] * len(found)
-    for cause, colour in zip(CAUSES, (f"C{n}" for n in range(len(CAUSES))), strict=True):
+    for cause, color in zip(CAUSES, (f"C{n}" for n in range(len(CAUSES))), strict=True):
         counts = [cases.left[cause] for cases in found.values()]
-        axes.barh(names[1:], counts, left=left, color=colour, label=cause)
+        axes.barh(names[1:], counts, left=left, color=color, label=cause)
         left = [before + more for before, more in zip(left, counts, strict=True)]
     axes.invert_yaxis()
     axes.set_xlabel("identity failures")

@@ -1,9 +1,9 @@
-"""Which colours are those of what moves: learned from pictures, without anybody who marks them.
+"""Which colors are those of what moves: learned from pictures, without anybody who marks them.
 
-A weed that sways, a net of light on the sand and a fish all differ from a still background. But the colours
+A weed that sways, a net of light on the sand and a fish all differ from a still background. But the colors
 of the weed are mostly seen where nothing differs, and those of the fish only where something does. So a
-colour's share of foreground tells them apart, as histograms of skin tell hands from walls (Jones & Rehg, IJCV
-2002), and it tells as much of who is pale in the murk as of who is near: pale colours are learned, too.
+color's share of foreground tells them apart, as histograms of skin tell hands from walls (Jones & Rehg, IJCV
+2002), and it tells as much of who is pale in the murk as of who is near: pale colors are learned, too.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ import numpy.typing as npt
 from tracking.detectors.base import Image, Mask, Plane
 
 _LIGHT, _CHROMA = 16, 32
-"""Bins of lightness, and of each of the two opponent colours of CIELAB."""
+"""Bins of lightness, and of each of the two opponent colors of CIELAB."""
 _PER_LIGHT, _PER_CHROMA = 16, 4
 """Levels of a bin: beyond half of the chroma's range nothing natural is left."""
 _MIDDLE = 128
 _NEVER_SEEN = 0.5
-"""Pixels of foreground, and of background, that every colour is taken to have had before."""
+"""Pixels of foreground, and of background, that every color is taken to have had before."""
 _AROUND = np.ones((5, 5), dtype=np.uint8)
-"""Pixels around the foreground that belong to neither: its edges are of mixed colours."""
+"""Pixels around the foreground that belong to neither: its edges are of mixed colors."""
 
 
 class ForegroundColors:
-    """How often each colour was foreground where it was seen."""
+    """How often each color was foreground where it was seen."""
 
     def __init__(self, seen: Iterable[tuple[Image, Mask]]) -> None:
         """Learn from pictures, each with its foreground `(H, W)`, 255 where something differs.
@@ -47,7 +47,7 @@ class ForegroundColors:
         self._shares = ((moving + _NEVER_SEEN) / (moving + still + 2 * _NEVER_SEEN)).astype(np.float32)
 
     def shares(self, image: Image) -> Plane:
-        """Return how often each pixel's colour was foreground, `(H, W)` in [0, 1]; unknown colours ½."""
+        """Return how often each pixel's color was foreground, `(H, W)` in [0, 1]; unknown colors ½."""
         return np.asarray(self._shares[_codes(image)])
 
 
@@ -60,6 +60,6 @@ def _codes(image: Image) -> npt.NDArray[np.int32]:
 
 
 def _smooth(counts: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Let neighbouring chromas share what was counted: of a few pictures most bins are empty."""
+    """Let neighboring chromas share what was counted: of a few pictures most bins are empty."""
     planes = counts.reshape(_LIGHT, _CHROMA, _CHROMA)
     return np.concatenate([cv2.blur(plane, (3, 3)).ravel() for plane in planes])

@@ -2,9 +2,9 @@
 
 As in the thesis (Todor 2009, section 8.2) every connected piece of foreground that is large enough is found;
 so are the parts that it falls into when it is eroded a little, since bodies that touch are one piece.
-Foreground is what has the colours of what differs from the median of pictures seen before: weeds that sway
-differ, too, but not their colours, and the pale bands of a fish belong to it. The score of a piece is how
-surely its colours are foreground.
+Foreground is what has the colors of what differs from the median of pictures seen before: weeds that sway
+differ, too, but not their colors, and the pale bands of a fish belong to it. The score of a piece is how
+surely its colors are foreground.
 MyView's own detector looks for upright people: those of the court are found by it.
 """
 
@@ -30,11 +30,11 @@ from tracking.detectors.color_histogram import AppearanceExtractor
 _AHEAD, _EVERY = 31, 20
 """Pictures of which the background is the median, and frames between them."""
 _DIFFERS = 32
-"""Grey levels by which the changes of a pixel's channels must differ."""
+"""Gray levels by which the changes of a pixel's channels must differ."""
 _FAMILIAR = 0.3
-"""Share of foreground from which a colour is one."""
+"""Share of foreground from which a color is one."""
 _SURE = 0.7
-"""Mean share of the colours of a piece that is surely somebody."""
+"""Mean share of the colors of a piece that is surely somebody."""
 _LEAST_AREA = 80
 """Pixels of a piece."""
 _THINNER, _LEAST_CORE = (2, 4), 25
@@ -73,7 +73,7 @@ class ForegroundBlobDetector:
         return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, self._round), dtype=np.uint8)
 
     def _bodies(self, shares: Plane) -> Mask:
-        """Return a mask of familiar colours, `(H, W)`: whole bodies with their pale bands, nothing thin."""
+        """Return a mask of familiar colors, `(H, W)`: whole bodies with their pale bands, nothing thin."""
         mask = np.where(shares >= _FAMILIAR, np.uint8(255), np.uint8(0))
         whole = cv2.morphologyEx(cv2.medianBlur(mask, 3), cv2.MORPH_CLOSE, self._wide)
         return np.asarray(cv2.morphologyEx(whole, cv2.MORPH_OPEN, self._round), dtype=np.uint8)

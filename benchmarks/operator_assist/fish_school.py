@@ -101,7 +101,7 @@ def _found(boxes: Floats, shares: Floats, depth: Floats, rng: np.random.Generato
 
 
 def _look(clear: float, rng: np.random.Generator) -> Floats:
-    """Return the grey histogram `(_BINS,)` of a fish: paler the farther, rippled by the light."""
+    """Return the gray histogram `(_BINS,)` of a fish: paler the farther, rippled by the light."""
     level = 0.75 * _BINS - 20.0 * clear + rng.normal(0.0, 0.7)
     counts = np.histogram(rng.normal(level, 4.0, 1500), bins=_BINS, range=(0, _BINS))[0] + 0.01
     return np.asarray(counts / counts.sum())

@@ -1,1 +1,1 @@
-"""MyView beside other trackers, on public detections."""
+"""Comparison with other trackers on public detections."""

@@ -1,10 +1,10 @@
-"""MyView beside other trackers on the same public detections: HOTA, MOTA, IDF1, identity switches.
+"""Comparison with other trackers on the same public detections: HOTA, MOTA, IDF1, identity switches.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.other_trackers --data ../shared/data --out out/bench
 
-All with their own defaults, MyView too: what `myview track --det` gives. The peers are installed by pip into
-an environment of their own, which is kept in the user's cache; where that cannot be, only MyView is
-measured. Perfect association is the ceiling: every detection joined to the person it is at.
+All run with their defaults, MyView as `myview track --det`. The other trackers are installed by pip into
+their own environment in the user's cache; where that fails, only MyView is measured. Perfect association is
+the upper bound: every detection gets the id of its person.
 """
 
 from __future__ import annotations
@@ -51,18 +51,18 @@ Table = dict[str, dict[str, Scores]]
 
 
 def environment(folder: Path, report: Report) -> OtherTrackerEnvironment | None:
-    """Return the peers' environment, or say why there is none."""
+    """Return the environment of the other trackers; report why where it cannot be made."""
     try:
         return peer_environment(folder)
     except OtherTrackersUnavailableError as problem:
-        report.say(f"without the peers, which cannot be installed here: {problem}")
+        report.say(f"without other trackers, which cannot be installed here: {problem}")
         return None
 
 
 def tracks_of(
     sequence: Recording, peers: OtherTrackerEnvironment | None, report: Report, *, pictures: bool
 ) -> Iterator[tuple[str, list[MotRow]]]:
-    """Yield everybody's tracks of a sequence, MyView's first and perfect association's last."""
+    """Yield each tracker's tracks of a sequence, MyView's first and perfect association's last."""
     yield OURS, track(sequence)
     if pictures and sequence.video is not None and sequence.video.is_file():
         yield PICTURES, track(sequence, pictures=True)
@@ -84,13 +84,13 @@ def _peers_tracks(
 def difference(
     peers: OtherTrackerEnvironment, sequence: Recording, tracks: list[MotRow], scores: Scores
 ) -> float:
-    """Return by how much the peers' own evaluation, which follows TrackEval, differs from ours at most."""
+    """Return the largest difference of the scores to those of a TrackEval port."""
     theirs = peers.score(read_rows(sequence.truth), tracks)
     return max(abs(float(getattr(scores, name)) - value) for name, value in theirs.items())
 
 
 def lead(table: Table) -> list[list[str]]:
-    """Compare MyView with the best peer of each score: more is better, but for switches."""
+    """Return the differences to the best other tracker in each score."""
     rows = []
     names = [peer.name for peer in PEERS]
     for sequence, found in table.items():
@@ -109,7 +109,7 @@ def run(options_data: Path, out: Path, folder: Path, names: list[str] | None, *,
     """Measure, print and save."""
     sequences = find_recordings(options_data, names)
     report = Report()
-    report.say(f"peers: {', '.join(PACKAGES)}, with their defaults")
+    report.say(f"other trackers: {', '.join(PACKAGES)}, with their defaults")
     peers = environment(folder, report)
     table: Table = {}
     worst = 0.0
@@ -130,11 +130,13 @@ def run(options_data: Path, out: Path, folder: Path, names: list[str] | None, *,
             [name, *format_scores(average_scores([it[name] for it in table.values()]), _SHOWN)]
             for name in everywhere
         ]
-        report.table("mean of the sequences; counts are totals", ["", *_HEADINGS], averages)
+        report.table("mean over the sequences; counts are totals", ["", *_HEADINGS], averages)
     ahead = lead(table)
     if ahead:
-        report.table("MyView less the best peer of each score", ["", "HOTA", "MOTA", "IDF1", "IDSW"], ahead)
-        report.say(f"the peers' own evaluation differs from these scores by at most {worst:.1g}")
+        report.table(
+            "MyView minus the best other tracker in each score", ["", "HOTA", "MOTA", "IDF1", "IDSW"], ahead
+        )
+        report.say(f"the TrackEval port differs from these scores by at most {worst:.1g}")
     report.save(out / "other_trackers.txt")
     plot(table, CEILING, out / "other_trackers.png")
 
@@ -143,7 +145,7 @@ def main() -> None:
     """Run the benchmark."""
     options = parser(__doc__, "other_trackers")
     options.add_argument(
-        "--environment", type=Path, default=default_folder(), help="folder that the peers are installed in"
+        "--environment", type=Path, default=default_folder(), help="folder of the other trackers' environment"
     )
     options.add_argument("--sequence", action="append", help="only this one; may be repeated")
     options.add_argument(

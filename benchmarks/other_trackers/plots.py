@@ -1,4 +1,4 @@
-"""The peer table as bars."""
+"""The table of trackers as bars."""
 
 from __future__ import annotations
 
@@ -10,17 +10,19 @@ from tracking.evaluation import Scores
 
 _PANELS = (("hota", "HOTA, %"), ("idf1", "IDF1, %"), ("switches", "identity switches"))
 _WIDTH = 0.8
-"""Of a sequence's bars together; the rest is the gap to the next."""
+"""Width of a sequence's bars; the rest is the gap to the next."""
 
 _CEILING = "0.8"
-"""Grey: it is no tracker."""
+"""Gray: it is no tracker."""
 
 
 def plot(table: dict[str, dict[str, Scores]], ceiling: str, path: Path) -> None:
-    """Draw HOTA, IDF1 and switches: a group of bars for each sequence, the ceiling pale."""
+    """Draw HOTA, IDF1 and switches: a group of bars for each sequence, the upper bound pale."""
     from matplotlib import pyplot as plt  # noqa: PLC0415 — after the backend is chosen
 
-    fullest_first = sorted(table.values(), key=len, reverse=True)  # whoever is in few has their place, too
+    fullest_first = sorted(
+        table.values(), key=len, reverse=True
+    )  # a tracker that is missing in some sequences keeps its place
     trackers = list(dict.fromkeys(name for found in fullest_first for name in found))
     figure, axes = plt.subplots(len(_PANELS), 1, figsize=(11, 9), sharex=True)
     places = np.arange(len(table))
@@ -32,8 +34,8 @@ def plot(table: dict[str, dict[str, Scores]], ceiling: str, path: Path) -> None:
                 percent * getattr(found[tracker], score) if tracker in found else np.nan
                 for found in table.values()
             ]
-            colour = _CEILING if tracker == ceiling else None
-            axis.bar(places + (index + 0.5) * wide - _WIDTH / 2, values, wide, label=tracker, color=colour)
+            color = _CEILING if tracker == ceiling else None
+            axis.bar(places + (index + 0.5) * wide - _WIDTH / 2, values, wide, label=tracker, color=color)
         axis.set(ylabel=label)
         axis.grid(axis="y", alpha=0.3)
     axes[0].legend(ncols=4, fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0))

@@ -1,10 +1,10 @@
-"""Runs another tracker on a file of detections; executed by the peers' own environment alone.
+"""Runs another tracker on a file of detections, in the other trackers' own environment.
 
     python runner.py track NAME DETECTIONS TRACKS
     python runner.py score TRUTH TRACKS
 
-Files are MOTChallenge text. It imports nothing of MyView, and MyView nothing of it. `score` prints the
-peers' own evaluation, to check ours by.
+Files are MOTChallenge text. It imports nothing of MyView, and MyView nothing of it. `score` prints the scores
+of a TrackEval port, to check MyView's own.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 WINDOW = 20
-"""Frames that motile sees at once; neighbouring windows share one."""
+"""Frames in a window of motile; neighboring windows share one."""
 
 LEAST_IOU = 0.1
-"""Boxes of two frames that overlap by less are not joined by motile."""
+"""Overlap (IoU) from which motile may join boxes of two frames."""
 
 Rows = np.ndarray[tuple[int, int], np.dtype[np.float64]]
 
@@ -38,7 +38,7 @@ def read(path: Path) -> Rows:
 
 
 def line(frame: int, number: int, box: np.ndarray[Any, np.dtype[np.float64]]) -> str:
-    """Return a row of a result."""
+    """Format a row of tracks."""
     left, top, right, bottom = (float(side) for side in box)
     return f"{frame},{number},{left:.2f},{top:.2f},{right - left:.2f},{bottom - top:.2f},1,-1,-1,-1\n"
 
@@ -55,7 +55,7 @@ def online(kind: str) -> Callable[[Rows], Iterator[str]]:
             found = tracker.update(supervision.Detections(xyxy=here[:, 2:6], confidence=here[:, 6]))
             numbers = [] if found.tracker_id is None else found.tracker_id
             for box, number in zip(found.xyxy, numbers, strict=True):
-                if number >= 0:  # -1: not confirmed yet
+                if number >= 0:  # -1: not confirmed
                     yield line(frame, int(number) + 1, box)
 
     return run
@@ -64,14 +64,14 @@ def online(kind: str) -> Callable[[Rows], Iterator[str]]:
 def windows(rows: Rows) -> Iterator[str]:
     """Yield the tracks of motile, window by window.
 
-    It leaves the costs to its user. Here a box costs 0.5 less its confidence, a track 1, and joining two
-    boxes of neighbouring frames 0.5 less their overlap.
+    The costs are chosen here: a box costs 0.5 minus its confidence, a track 1, and joining two boxes of
+    neighboring frames 0.5 minus their overlap.
     """
     numbers: dict[int, int] = {}
     last = int(rows[:, 0].max())
     for start in range(1, max(last, 2), WINDOW - 1):
         frames = [np.flatnonzero(rows[:, 0] == frame) for frame in range(start, start + WINDOW)]
-        if start > 1:  # in the frame that two windows share, the first has decided
+        if start > 1:  # the first of two windows decides their common frame
             frames[0] = np.array([it for it in frames[0].tolist() if it in numbers], dtype=np.intp)
         for box, parent in linked(rows, frames):
             if box not in numbers:
@@ -81,7 +81,7 @@ def windows(rows: Rows) -> Iterator[str]:
 
 
 def linked(rows: Rows, frames: list[np.ndarray[Any, np.dtype[np.intp]]]) -> list[tuple[int, int | None]]:
-    """Solve one window; give the boxes that are taken, by frame, each with the one it continues."""
+    """Solve one window; return the selected boxes by frame, each with its predecessor."""
     import motile  # noqa: PLC0415 — only in its own process
     from motile import constraints, costs, variables  # noqa: PLC0415
 
@@ -114,7 +114,7 @@ def linked(rows: Rows, frames: list[np.ndarray[Any, np.dtype[np.intp]]]) -> list
 
 
 def iou(first: np.ndarray[Any, Any], second: np.ndarray[Any, Any]) -> float:
-    """Return the intersection over the union of two boxes."""
+    """Compute the intersection over union of two boxes."""
     sides = np.minimum(first[2:], second[2:]) - np.maximum(first[:2], second[:2])
     if sides.min() <= 0.0:
         return 0.0
@@ -123,7 +123,7 @@ def iou(first: np.ndarray[Any, Any], second: np.ndarray[Any, Any]) -> float:
 
 
 def own_scores(truth: Path, tracks: Path) -> dict[str, float]:
-    """Return the scores by the peers' own evaluation, which follows TrackEval."""
+    """Compute the scores with the port of TrackEval."""
     from trackers.eval import evaluate_mot_sequence  # noqa: PLC0415 — only where it is needed
 
     found = evaluate_mot_sequence(truth, tracks, ["CLEAR", "HOTA", "Identity"])
@@ -136,7 +136,7 @@ def own_scores(truth: Path, tracks: Path) -> dict[str, float]:
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Run the command."""
     what, *words = sys.argv[1:]
     if what == "score":
         truth, tracks = map(Path, words)

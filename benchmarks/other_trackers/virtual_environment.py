@@ -1,4 +1,4 @@
-"""The other trackers, installed by pip in an environment of their own."""
+"""The virtual environment of the other trackers, installed by pip."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pathlib import Path
 from tracking.motchallenge import MotRow, format_rows, read_rows
 
 PACKAGES = ("trackers==2.6.1", "supervision==0.31.2", "motile==1.0.1", "ilpy==0.6.0")
-"""Pinned, since their numbers are quoted."""
+"""Pinned versions, since their scores are quoted."""
 
 _RUNNER = Path(__file__).with_name("runner.py")
 _INSTALL_S = 900.0
@@ -24,11 +24,11 @@ _RUN_S = 600.0
 
 @dataclass(frozen=True, slots=True)
 class OtherTracker:
-    """Another tracker."""
+    """A tracker to compare with."""
 
     name: str
     runs: str
-    """What the runner calls it."""
+    """Its name in the runner."""
 
 
 PEERS = (
@@ -41,7 +41,7 @@ PEERS = (
 
 
 class OtherTrackersUnavailableError(Exception):
-    """The other trackers cannot be installed, or do not run; the text says why in one line."""
+    """The other trackers cannot be installed or run; the text says why in one line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +51,10 @@ class OtherTrackerEnvironment:
     python: Path
 
     def track(self, peer: OtherTracker, detections: Path) -> list[MotRow]:
-        """Return a peer's tracks.
+        """Return another tracker's tracks.
 
         Raises:
-            OtherTrackersUnavailableError: it failed.
+            OtherTrackersUnavailableError: the tracker failed.
         """
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "tracks.txt"
@@ -62,14 +62,14 @@ class OtherTrackerEnvironment:
             return read_rows(out)
 
     def score(self, truth: list[MotRow], tracks: list[MotRow]) -> dict[str, float]:
-        """Return HOTA, MOTA, IDF1 and switches by the peers' own evaluation.
+        """Return HOTA, MOTA, IDF1 and switches by the TrackEval port.
 
         Raises:
-            OtherTrackersUnavailableError: it failed.
+            OtherTrackersUnavailableError: the evaluation failed.
         """
         with tempfile.TemporaryDirectory() as folder:
             there, found = Path(folder) / "truth.txt", Path(folder) / "tracks.txt"
-            # It counts only pedestrians, class 1, which not every file says that people are.
+            # It counts only class 1, pedestrians, which not every file sets.
             there.write_text(format_rows(truth).replace("-1,-1,-1\n", "1,1\n"), encoding="ascii")
             found.write_text(format_rows(tracks), encoding="ascii")
             scores: dict[str, float] = json.loads(self._run("score", str(there), str(found)))
@@ -78,7 +78,7 @@ class OtherTrackerEnvironment:
     def _run(self, *words: str) -> str:
         try:
             done = subprocess.run(
-                # -P: a file beside the runner that is called as one of their packages is not that package.
+                # -P: files beside the runner must not shadow packages.
                 [str(self.python), "-P", str(_RUNNER), *words],
                 capture_output=True,
                 text=True,
@@ -91,20 +91,20 @@ class OtherTrackerEnvironment:
 
 
 def default_folder() -> Path:
-    """Return where the environment is kept: the user's cache, by what is installed in it."""
+    """Return the folder of the environment in the user's cache, named by its packages."""
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     wanted = hashlib.sha256(" ".join([sys.version, *PACKAGES]).encode()).hexdigest()[:12]
     return cache / "myview" / f"peers-{wanted}"
 
 
 def peer_environment(folder: Path) -> OtherTrackerEnvironment:
-    """Return environment in the folder; it is made, which takes a network and a minute, if it is not there.
+    """Return the environment in the folder; install it first, with network access, where it is missing.
 
     Raises:
-        OtherTrackersUnavailableError: it cannot be made.
+        OtherTrackersUnavailableError: the installation failed.
     """
     python = folder / "bin" / "python"
-    done = folder / ".done"  # written last: without it the folder is half an environment
+    done = folder / ".done"  # written last: without it the environment is incomplete
     if not done.exists():
         shutil.rmtree(folder, ignore_errors=True)
         pip = [
@@ -128,7 +128,7 @@ def peer_environment(folder: Path) -> OtherTrackerEnvironment:
 
 
 def _last_line(error: Exception) -> str:
-    """Return what a command said last, or what became of it."""
+    """Return the last line of a command's output, or its exit code."""
     said = error.stderr if isinstance(error, subprocess.CalledProcessError) else ""
     lines = [text for text in (said or str(error)).splitlines() if text.strip()]
     return lines[-1].strip() if lines else type(error).__name__

@@ -50,7 +50,7 @@ def plot(result: OverloadResult, path: Path) -> None:
     levels, delay = figure.subplots(2, 1, sharex=True)
     times = [it.at for it in result.samples]
     levels.step(
-        *zip(*result.started, (times[-1], 1), strict=True), where="post", label="cameras", color="grey"
+        *zip(*result.started, (times[-1], 1), strict=True), where="post", label="cameras", color="gray"
     )
     means = [float(np.mean(it.levels)) if it.levels else 0.0 for it in result.samples]
     levels.plot(times, means, label="shed level, mean of the cameras")

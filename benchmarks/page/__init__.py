@@ -1,1 +1,1 @@
-"""The page on a running site: switching people, memory over a visit, hours of it."""
+"""The page on a running site: switching people, and memory over a visit and over hours."""

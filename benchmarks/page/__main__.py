@@ -1,11 +1,11 @@
-"""The page on the demo: from a click to the new person's first frame, and what a visit costs the browser.
+"""The page on the demo: time from a click to the new person's first frame, and memory over a visit.
 
     python -m benchmarks.page --out out/bench
     python -m benchmarks.page --part hours
 
-A switch is a press on another person's card. It is over when the first frame of their best view has been
-shown, by the browser's own clock. Memory is the JavaScript heap after a collection, and what the player keeps
-buffered. ``--part hours`` plays eight hours of a small site in a quarter of an hour.
+A switch is a click on another person's card. It ends when the first frame of their best view has been shown,
+by the browser's own clock. Memory is the JavaScript heap after a collection, and the player's buffered video.
+``--part hours`` plays eight hours of a small site in a quarter of an hour.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from benchmarks.page import long_playback as page_hours
 
 _PLAYING_MS = 60_000
 _SETTLE_S = 15.0
-"""Until some people are known."""
+"""Milliseconds until some people are known."""
 _BETWEEN_S = 0.5
 _GOAL_MS = 500.0
 
@@ -36,9 +36,9 @@ _OTHERS = """async () => {
   return objects.filter((it) => it.visible && it.object !== myview.object).map((it) => it.object);
 }"""
 _SHOWN = "myview.switches.at(-1)?.shownAt !== null"
-"""Of whom was chosen last: who was left before they were shown, and is chosen again, is shown once."""
+"""Of the last choice: a person who is chosen again before being shown is shown once."""
 _TRIES = 20
-"""For each switch that is wanted: on a machine that is too slow nobody else may be in view."""
+"""Tries for each switch: on a slow machine there may be nobody else in view."""
 _BUFFERED = (
     "video.buffered.length ? video.buffered.end(video.buffered.length - 1) - video.buffered.start(0) : 0"
 )
@@ -46,11 +46,11 @@ _BUFFERED = (
 
 @dataclass(frozen=True, slots=True)
 class PageVisit:
-    """What a visit to the page was like.
+    """The measurements of a visit to the page.
 
     Attributes:
         switches: milliseconds from each click to the first frame of the new person.
-        seconds: when memory was read, since the page was open.
+        seconds: (readings,) time since the page was opened.
         heap: (readings,) megabytes.
         buffered: (readings,) seconds of video.
         delays: (readings,) milliseconds that the picture was behind the pulse.
@@ -64,9 +64,9 @@ class PageVisit:
 
 
 async def visit(url: str, switches: int, minutes: float) -> PageVisit:
-    """Open the page, switch from person to person, and then watch."""
+    """Open the page, switch from person to person, then watch."""
     async with chromium() as browser:
-        # The page's policy forbids eval, which it is asked with here.
+        # The page's policy forbids eval, which Playwright needs.
         page = await browser.new_page(viewport={"width": 1280, "height": 800}, bypass_csp=True)
         await open_when_there(page, url)
         await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
@@ -91,7 +91,7 @@ async def visit(url: str, switches: int, minutes: float) -> PageVisit:
 
 
 async def _switch(page: Page, turn: int) -> list[float]:
-    """Press on somebody else's card; give how long their first frame took, nothing where nobody else is."""
+    """Click on another person's card; return the time to their first frame, empty without other people."""
     others = await page.evaluate(_OTHERS)
     if not others:
         return []
@@ -144,7 +144,7 @@ def describe(report: Report, it: PageVisit) -> None:
 
 
 def plot(it: PageVisit, path: Path) -> None:
-    """Draw how long switches took, and memory and delay over the visit."""
+    """Draw the switch times, and memory and delay over the visit."""
     figure = Figure(figsize=(9, 6))
     took, memory = figure.subplots(2, 1)
     took.plot(
@@ -163,7 +163,7 @@ def plot(it: PageVisit, path: Path) -> None:
 
 
 async def run(options: argparse.Namespace) -> PageVisit:
-    """Run the demo and visit it."""
+    """Run the demo, and measure a visit."""
     async with demo_at(options.fps) as url:
         return await visit(url, options.switches, options.minutes)
 

@@ -1,4 +1,4 @@
-"""A small site whose clock runs faster than the world's: hours of streams and events in minutes."""
+"""A small fake site with an accelerated clock: hours of streams and events in minutes."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ _LOOP = 10 * _GOP
 _CAMERAS = ("c0", "c1", "c2", "c3")
 _PEOPLE = 6
 _SHOT = 7
-"""GOPs for which one camera shows somebody."""
+"""GOPs after which the camera of a person changes."""
 _AHEAD = 2 * _GOP
 """Frames of the look-ahead."""
 
 
 @dataclass(frozen=True, slots=True)
 class FastClock:
-    """Seconds of the site, ``speed`` for each of the world's."""
+    """The site's clock, ``speed`` times as fast as real time."""
 
     speed: float
     begun: float
@@ -45,12 +45,12 @@ class FastClock:
         return self.begun + (time.time() - self.begun) * self.speed
 
     async def until(self, moment: float) -> None:
-        """Wait for a moment of the site."""
+        """Wait until a moment of the site's time."""
         await asyncio.sleep(max(0.0, (moment - self.now()) / self.speed))
 
 
 class FastSite:
-    """Serves the page and what it needs: pictures that were encoded once, again and again at new times."""
+    """Serves the page and its API, with a loop of encoded pictures at new times."""
 
     def __init__(self, clock: FastClock) -> None:
         self._clock = clock
@@ -60,7 +60,7 @@ class FastSite:
         self._head = init_segment(self._stream_format.parameters, _WIDTH, _HEIGHT)
 
     def app(self) -> web.Application:
-        """Return what answers the page."""
+        """Return the web application."""
         app = web.Application()
         app.router.add_get("/", _file)
         app.router.add_get("/page/{name}", _file)
@@ -84,7 +84,7 @@ class FastSite:
 
     @property
     def _edge(self) -> int:
-        """The first pulse of the newest whole GOP that is decided."""
+        """The first pulse of the newest decided GOP."""
         return (int((self._clock.now() - self._clock.begun) * _FPS) - _AHEAD) // _GOP * _GOP
 
     async def _released(self) -> AsyncIterator[int]:
@@ -140,7 +140,7 @@ class FastSite:
     async def _best(self, request: web.Request) -> web.StreamResponse:
         number = int(request.match_info["object"])
         response = web.StreamResponse(headers={"Content-Type": "video/mp4"})
-        with contextlib.suppress(ConnectionError):  # the page leaves one person for another
+        with contextlib.suppress(ConnectionError):  # the page switches to another person
             await response.prepare(request)
             await response.write(self._head)
             async for first in self._released():
@@ -170,7 +170,7 @@ def _camera(number: int, pulse: int) -> int:
 
 
 def _there(first: int) -> list[int]:
-    """Return who is in view: a new number every few minutes, and nobody is known for more than an hour."""
+    """Return the people in view: a new number every few minutes, each known for at most an hour."""
     newest = first // (_FPS * 600)
     return list(range(newest, newest + _PEOPLE))
 
@@ -219,7 +219,7 @@ async def _file(request: web.Request) -> web.StreamResponse:
 
 @contextlib.asynccontextmanager
 async def serving(clock: FastClock) -> AsyncIterator[str]:
-    """Serve the site on a port that the system chooses; give its address."""
+    """Serve the site on a free port; yield its address."""
     site = await asyncio.to_thread(FastSite, clock)
     runner = web.AppRunner(site.app(), shutdown_timeout=0.05, handler_cancellation=True)
     await runner.setup()

@@ -1,8 +1,8 @@
-"""Hours of playing in minutes: does the page grow, does it fall behind?
+"""Hours of playback in minutes: growth of the page's memory and delay.
 
-The page's clock, its timers and the site run faster together. A browser plays at sixteen times the speed at
-the most: beyond that the page, which takes it for a slow machine, jumps on now and then. All that comes goes
-through the download, the SourceBuffer, the decisions, the band and the list of people.
+The page's clock, its timers and the site are accelerated alike. A browser plays at sixteen times the speed at
+most: beyond that the page skips ahead, as on a slow machine. All media pass the download, the SourceBuffer,
+the decisions, the timeline and the list of people.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _STATE = """() => ({
   ranges: video.buffered.length,
   buffered: video.buffered.end(video.buffered.length - 1) - video.buffered.start(0),
 })"""
-# Who came last stays for an hour: the picture goes on until the next reading.
+# The newest person stays for an hour, so the picture continues until the next reading.
 _NEWEST = "document.querySelector('#people li:last-child button').click()"
 _WATCHED = """() => { window.shown = 0;
   const count = () => { shown += 1; video.requestVideoFrameCallback(count); };
@@ -66,15 +66,15 @@ class BrowserSample:
 
     Attributes:
         hours: of the site's time.
-        heap: megabytes of JavaScript after a collection.
-        nodes: of the document, those that are not collected.
-        listeners: of events.
-        ranges: of the SourceBuffer.
-        buffered: seconds of video from the first of them to the last.
-        behind: milliseconds of the site's time, the median of the last frames shown.
+        heap: JavaScript heap after a collection, megabytes.
+        nodes: DOM nodes.
+        listeners: event listeners.
+        ranges: buffered ranges of the SourceBuffer.
+        buffered: seconds of video from the first range to the last.
+        behind: median delay of the last shown frames, milliseconds of the site's time.
         stood: seconds of the site's time since the last frame was shown.
         shown: frames since the beginning.
-        load: of the machine, tasks per minute that ran or wanted to.
+        load: load average of the machine.
     """
 
     hours: float
@@ -90,7 +90,7 @@ class BrowserSample:
 
 
 async def play(hours: float, speed: float) -> list[BrowserSample]:
-    """Play so many hours; switch to who came last now and then, as a viewer does."""
+    """Play for hours; switch to the newest person now and then, as a viewer does."""
     clock = FastClock(speed, time.time())
     async with serving(clock) as url, chromium() as browser:
         page = await browser.new_page(viewport={"width": 1280, "height": 800})
@@ -108,7 +108,7 @@ async def play(hours: float, speed: float) -> list[BrowserSample]:
             await clock.until(begun + 3600 * hours * number / _READINGS)
             await page.evaluate(
                 _NEWEST
-            )  # who is known for an hour yet: the picture goes on until the next reading
+            )  # known for another hour, so the picture continues until the next reading
             await page.keyboard.press("w")
             readings.append(await _read(page, tools, (clock.now() - begun) / 3600))
     return readings
@@ -135,7 +135,7 @@ async def _read(page: Page, tools: CDPSession, hours: float) -> BrowserSample:
 
 
 def describe(report: Report, readings: list[BrowserSample], speed: float) -> None:
-    """Print the table, and what grew from the first half to the second."""
+    """Print the table, and the growth from the first half to the second."""
     report.table(
         f"the page over hours, {speed:g} times as fast",
         [

@@ -1,1 +1,1 @@
-"""The paper's experiments again, on drawn scenes."""
+"""The paper's experiments, repeated on synthetic scenes."""

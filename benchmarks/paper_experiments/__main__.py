@@ -1,10 +1,10 @@
-"""The paper's tracking experiments (IV.A) again, on synthetic scenes whose truth is known.
+"""The paper's tracking experiments (IV.A), repeated on synthetic scenes with ground truth.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.paper_experiments --out out/bench
 
-Counts wrong labels per frame of the LP, its exact optimum, greedy and separate dynamic programming, and in
-how many windows the LP was integral: means over several scenes. How hard the scenes are is chosen here, so
-that the solvers may be compared with each other; the paper's own figures stand beside for orientation.
+Counts wrong labels per frame of the LP, its exact optimum, greedy and separate dynamic programming, and the
+windows in which the LP was integral: means over several scenes. The difficulty of the scenes is chosen here,
+to compare the solvers with each other; the paper's own results are quoted for orientation.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from tracking import create_solver
 
 _PLOTTED = ("columns", "greedy-dp", "separate-dp")
 _LINEAR = ("columns", "exact")
-"""Solvers whose report says whether the linear program was integral."""
+"""Solvers that report whether the linear program was integral."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SolverOutcome:
-    """What one solver made of one scene."""
+    """The labels of a solver in a scene, and their errors."""
 
     followed: TrackedLabels
     labels: LabelErrors
 
     @property
     def integral(self) -> int:
-        """Windows whose program was integral by itself."""
+        """Windows whose linear program was integral."""
         return sum(report.integral for report in self.followed.reports)
 
 
 def attempt(scene: ExperimentScene, setting: TrackerSetting, solver: str) -> SolverOutcome:
-    """Follow everybody in a scene, and judge the labels."""
+    """Track the objects of a scene, and count the errors of the labels."""
     followed = follow(scene, setting.costs, setting.window, create_solver(solver))
     return SolverOutcome(followed, judge(scene, followed.boxes))
 
@@ -75,7 +75,7 @@ def run(experiment: Experiment, seeds: int | None, report: Report, out: Path) ->
         rows += [row(setting, name, outcomes) for name, outcomes in found.items()]
         if setting is experiment.settings[0]:
             shown = {name: (found[name][0].followed.boxes, found[name][0].labels) for name in _PLOTTED}
-            title = f"{experiment.title}; the paper's {experiment.figure}"
+            title = f"{experiment.title}; as in the paper's {experiment.figure}"
             plot(scenes[0].truth, shown, title, out / f"paper_experiments-{experiment.name}.png")
     frames, observations = scenes[0].truth.frames, np.mean([scene.observations for scene in scenes])
     report.table(
@@ -98,8 +98,8 @@ def main() -> None:
     for experiment in EXPERIMENTS:
         if not chosen.experiment or experiment.name in chosen.experiment:
             run(experiment, chosen.seeds, report, chosen.out)
-    report.say("wrong: a label on somebody else or on nothing; of these, not its like: on nobody of its kit")
-    report.say("missing: a label nowhere though its object is in view and was detected; ± over the scenes")
+    report.say("wrong: a label on another object or on nothing; of these, unlike: on nobody of the same kit")
+    report.say("missing: no label though its object is in view and was detected; ± over the scenes")
     report.say(
         "default: CostSettings and WindowSettings as they are (for the toys with c_a, c_b of sub-images)"
     )

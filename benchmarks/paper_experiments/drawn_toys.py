@@ -1,8 +1,8 @@
-"""Two toys that pass in front of each other, drawn, and found by template matching (paper IV.A.1).
+"""Two drawn toys that pass in front of each other, detected by template matching (paper IV.A.1).
 
-The background holds patches that resemble the toys; the toys turn a little, the light changes, and which of
-them is nearer changes from one meeting to the next. Each has its own observations: about 80 local peaks of
-the match with its picture in the first frame.
+The background has patches that resemble the toys; the toys turn a little, the light changes, and the nearer
+toy alternates from meeting to meeting. Each has its own observations: about 80 local peaks of the match with
+its picture in the first frame.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ TOYS = 2
 _TALL, _WIDE = 72, 56
 """Pixels of a toy."""
 _SPOTS = 4
-"""Spots of colour a side of a toy's texture."""
+"""Spots of color on each side of a toy's texture."""
 _SPOTS_BEHIND = 24
 _ALIKE = 0.5
 """Share of the first toy's texture in the second's."""
@@ -34,9 +34,9 @@ _LIKE = 0.15
 _TURN_DEGREES = 4.0
 _LIGHT = 0.06
 _APART = 0.01
-"""Peaks are this share of a toy's size apart, so that there are nearly as many as in the paper."""
+"""Least distance of peaks, as a share of a toy's size: so there are nearly as many as in the paper."""
 _NOISE = 4.0
-"""Grey levels, standard deviation of a pixel."""
+"""Gray levels, standard deviation of a pixel."""
 _MEETING = 55.0
 """Frames between two meetings."""
 _SWING = 70.0
@@ -45,7 +45,7 @@ _SWING = 70.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Toys:
-    """The pictures of the toys and of what is behind them.
+    """The textures and paths of the toys, and the background.
 
     Attributes:
         looks: `(TOYS, _TALL, _WIDE, 3)`.
@@ -59,7 +59,7 @@ class Toys:
 
 
 def toys(frames: int, rng: np.random.Generator) -> Toys:
-    """Make two toys, a background and their ways."""
+    """Create two toys, their paths and a background."""
     looks = np.array([_texture(_TALL, _WIDE, _SPOTS, rng) for _ in range(TOYS)])
     looks[1:] = _ALIKE * looks[0] + (1.0 - _ALIKE) * looks[1:]
     behind = 0.5 * _texture(HEIGHT, WIDTH, _SPOTS_BEHIND, rng) + 60.0
@@ -73,7 +73,7 @@ def toys(frames: int, rng: np.random.Generator) -> Toys:
 
 
 def play_toys(frames: int, seed: int, peaks: int = 80) -> ExperimentScene:
-    """Draw the toys and find them; the same seed gives the same."""
+    """Draw the toys and detect them; deterministic by seed."""
     rng = np.random.default_rng(seed)
     made = toys(frames, rng)
     shown = list(draw(made, rng))
@@ -94,13 +94,13 @@ def play_toys(frames: int, seed: int, peaks: int = 80) -> ExperimentScene:
 
 
 def draw(made: Toys, rng: np.random.Generator) -> Iterator[tuple[Image, Floats]]:
-    """Draw frame after frame, with the share of each toy that is visible, `(TOYS,)`."""
+    """Yield the drawn frames with the visible share of each toy, `(TOYS,)`."""
     phases = rng.uniform(0.0, 2.0 * np.pi, TOYS)
     for t in range(made.middles.shape[1]):
         canvas = made.behind.copy()
         covered = np.full((HEIGHT, WIDTH), -1)
         whole = np.ones(TOYS)
-        # Who is nearer changes between the meetings, when they are apart.
+        # The nearer toy changes between meetings.
         nearer = int(t / _MEETING + 0.5) % TOYS
         for k in (1 - nearer, nearer):
             angle = _TURN_DEGREES * np.sin(t / 23.0 + phases[k]) - _TURN_DEGREES * np.sin(phases[k])
@@ -131,7 +131,7 @@ def _mask() -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
 
 
 def _ways(frames: int, rng: np.random.Generator) -> Floats:
-    """Return the toys' middles: to and fro on both sides of each other, at a height that wanders."""
+    """Return the toys' centers: back and forth past each other, at a drifting height."""
     t = np.arange(frames)
     along = np.cos(np.pi * t / _MEETING)
     swing = _SWING * along * np.abs(along)  # slow where they meet

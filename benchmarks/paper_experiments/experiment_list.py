@@ -1,4 +1,4 @@
-"""The paper's experiments (IV.A and Example 1 of II.D): their scenes, their settings, its own figures."""
+"""The paper's experiments (IV.A and Example 1 of II.D): scenes, settings, and the paper's own results."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ PAPER_WINDOW = WindowSettings(
     forget_after=_FOR_EVER,
     template_update_rate=0.0,
 )
-"""Segments of 20 frames with the templates' one. They move on by 18: so 1351 frames are 75 segments and
-2431 are 135, as in the paper. Anybody may be anywhere, and nobody is ever forgotten."""
+"""Segments of 20 frames, including the templates' one, with a stride of 18: so 1351 frames are 75 segments
+and 2431 are 135, as in the paper. No gating, and tracks are never terminated."""
 
 SOLVERS = ("columns", "exact", "greedy-dp", "separate-dp")
 LAYOUT = 0.0005
-"""μ where the layout term is on: what the jump of one side of a box by a pixel costs, for each pair."""
+"""μ of the layout term: cost of a jump of one side of a box by a pixel, for each pair."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrackerSetting:
-    """How a scene is followed."""
+    """The settings that a scene is tracked with."""
 
     name: str
     costs: CostSettings
@@ -47,12 +47,12 @@ class Experiment:
 
     Attributes:
         name: on the command line.
-        title: what is in the scene.
-        figure: the paper's figure that the plot repeats.
-        play: makes the scene of a seed.
-        settings: how it is followed.
-        paper: what the paper reports of its own recording.
-        scenes: how many scenes it is played on, each with a seed of its own.
+        title: a description of the scene.
+        figure: the figure of the paper.
+        play: returns the scene of a seed.
+        settings: of the tracker.
+        paper: the paper's result on its own recording.
+        scenes: number of scenes, each with its own seed.
     """
 
     name: str
@@ -79,7 +79,7 @@ def _layout(costs: CostSettings) -> TrackerSetting:
 
 
 def _whole(frames: int, costs: CostSettings = PAPER_COSTS) -> TrackerSetting:
-    """Solve the whole sequence at once, as the paper does here."""
+    """Return settings that solve the whole sequence at once, as the paper does here."""
     window = replace(PAPER_WINDOW, window=frames, stride=frames, birth_window=frames)
     return TrackerSetting("paper, one window", costs, window)
 
@@ -94,7 +94,7 @@ _TOYS_DEFAULT = replace(CostSettings(), measure="intersection", change=0.1, occl
 _THREE_COSTS = replace(PAPER_COSTS, occlusion=0.35)
 
 _EXAMPLE_FRAMES, _TOYS_FRAMES, _TWO_FRAMES, _THREE_FRAMES, _FOUR_FRAMES = 340, 307, 1351, 2431, 500
-"""As long as the paper's recordings."""
+"""The lengths of the paper's recordings."""
 
 _EXAMPLE = SceneParameters((0, 1), _EXAMPLE_FRAMES, WalkParameters(4.0, 0.15, side=90.0))
 _TWO = SceneParameters((0, 1), _TWO_FRAMES, WalkParameters(8.0, 0.25, side=70.0))

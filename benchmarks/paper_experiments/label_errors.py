@@ -1,4 +1,4 @@
-"""Counting wrong labels against the truth, as the paper does by eye (IV.A)."""
+"""Errors of labels against the ground truth, which the paper counts by eye (IV.A)."""
 
 from __future__ import annotations
 
@@ -12,25 +12,24 @@ from benchmarks.paper_experiments.scene import ExperimentScene, ObjectTruth
 from tracking.boxes import Floats, iou
 
 _ON = 0.3
-"""Least overlap (IoU) of a label's box with its object: looser than an evaluation, as an eye is."""
+"""Least overlap (IoU) of a label's box with its object: looser than in an evaluation."""
 _FOUND = 0.5
-"""Least overlap of an observation that the label has to be on."""
+"""Least overlap (IoU) of an observation with the object that it detects."""
 _IN_VIEW = 0.5
-"""Least visible share of an object whose label must not be missing."""
+"""Visible share of an object from which its label must not be missing."""
 
 Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelErrors:
-    """What is wrong with the labels of n objects in T frames, each `(n, T)`.
+    """The errors of the labels of n objects in T frames, each `(n, T)`.
 
     Attributes:
-        wrong: the label is on somebody else, or on nothing: its box hardly overlaps its own object, or
-            another one more.
-        unlike: of these, the label is on nothing or on somebody who does not look like its object: no two
-            of one kit have changed names.
-        missing: the object is in view and was found by the detector, and its label is nowhere.
+        wrong: the label is on another object, or on nothing: its box hardly overlaps its own object, or
+            overlaps another one more.
+        unlike: of these, the label is on nothing or on an object of another kit.
+        missing: the object is in view and was detected, but has no label.
     """
 
     wrong: Bools
@@ -39,12 +38,12 @@ class LabelErrors:
 
 
 def per_frame(labels: Bools) -> float:
-    """Return how many of the labels of all objects, `(n, T)`, are marked in a frame, as the paper counts."""
+    """Return the mean number of marked labels `(n, T)` per frame, as the paper counts."""
     return float(labels.sum() / labels.shape[1])
 
 
 def judge(scene: ExperimentScene, boxes: Floats) -> LabelErrors:
-    """Judge the labels' boxes, `(n, T, 4)`, NaN where a label is nowhere."""
+    """Find the errors of the labels' boxes, `(n, T, 4)`, NaN: no label."""
     truth = scene.truth
     whose = _whose(truth, boxes)
     shown = ~np.isnan(boxes[..., 0])
@@ -59,7 +58,7 @@ def judge(scene: ExperimentScene, boxes: Floats) -> LabelErrors:
 
 
 def _whose(truth: ObjectTruth, boxes: Floats) -> NDArray[np.int64]:
-    """Return the object that each label's box is on, `(n, T)`; -1: on none. Of equals, the label's own."""
+    """Return the object that each label's box is on, `(n, T)`; -1: none. Ties go to its own object."""
     overlaps = np.nan_to_num(iou(boxes[:, None], truth.boxes[None]))
     own = np.arange(len(boxes))
     overlaps[own, own] += 1e-9
@@ -68,7 +67,7 @@ def _whose(truth: ObjectTruth, boxes: Floats) -> NDArray[np.int64]:
 
 
 def _found(scene: ExperimentScene, k: int, t: int) -> bool:
-    """Return whether the detector found an object."""
+    """Return whether an object was detected."""
     if np.isnan(scene.truth.boxes[k, t, 0]):
         return False
     seen = scene.seen[k if len(scene.seen) > 1 else 0][t]
@@ -76,9 +75,9 @@ def _found(scene: ExperimentScene, k: int, t: int) -> bool:
 
 
 def named(truth: ObjectTruth, tracks: dict[int, Floats]) -> Floats:
-    """Return each object the track that follows it longest, `(n, T, 4)`: for objects that had to be found.
+    """Return the track that follows each object longest, `(n, T, 4)`, for objects without templates.
 
-    One track for each object and one object for each track; an object left without has no label.
+    The assignment is one to one; an object without a track has no label.
     """
     boxes = np.full_like(truth.boxes, np.nan)
     numbers = sorted(tracks)

@@ -1,8 +1,8 @@
-"""Squash players and people in an office, as a noisy detector sees them (paper IV.A.2 to 4 and Example 1).
+"""Simulated noisy detections of squash players and people in an office (paper IV.A.2 to 4 and Example 1).
 
-No pictures are drawn: what matters to the program is which boxes are found and how alike they look. Each
-frame has boxes a little off, further ones of a wrong place and size on the same people, boxes on nobody, and
-people who are not found, more so who is half covered.
+No pictures are drawn: the program sees only boxes and their appearance. Each frame has inexact boxes, further
+boxes of wrong place and size on the same people, false positives, and missed people, more often when
+occluded.
 """
 
 from __future__ import annotations
@@ -11,30 +11,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.paper_experiments.grey_histograms import BINS, Clothing, histogram, visible, wardrobe
+from benchmarks.paper_experiments.gray_histograms import BINS, Clothing, histogram, visible, wardrobe
 from benchmarks.paper_experiments.scene import HEIGHT, WIDTH, ExperimentScene, ObjectTruth
 from benchmarks.paper_experiments.walking_people import WalkParameters, inside, people_at, walks
 from tracking import Detections, Template
 from tracking.boxes import Floats
 
 _LEAST_VISIBLE = 0.3
-"""Of whom less is visible is not found."""
+"""Visible share from which a person can be detected."""
 
 
 @dataclass(frozen=True, slots=True)
 class SceneParameters:
-    """Who is in a scene and how badly they are detected.
+    """The people of a scene and the errors of their detections.
 
     Attributes:
-        kits: the kit number of each person; those of one number look alike.
+        kits: the kit number of each person; people of one kit look alike.
         frames: T.
-        walking: how they move.
-        height: pixels of the nearest.
-        missed: share of the frames in which somebody in full view is not found.
+        walking: their motion.
+        height: of the nearest person, pixels.
+        missed: share of the frames in which a fully visible person is not detected.
         off: standard deviation of a box's place and size, in heights.
-        wrong_sizes: boxes of wrong place and size on each person and frame, on average.
-        clutter: boxes on nobody in each frame, on average.
-        known: the objects are known in the first frame; otherwise they have to be found.
+        wrong_sizes: mean number of boxes of wrong place and size per person and frame.
+        clutter: mean number of false positives per frame.
+        known: the objects are known in the first frame; otherwise they must be detected.
     """
 
     kits: tuple[int, ...]
@@ -49,7 +49,7 @@ class SceneParameters:
 
 
 def play(cast: SceneParameters, seed: int) -> ExperimentScene:
-    """Play a scene; the same seed gives the same."""
+    """Simulate a scene; deterministic by seed."""
     rng = np.random.default_rng(seed)
     clothes = wardrobe(cast.kits, rng)
     feet = walks(len(cast.kits), cast.frames, cast.walking, rng)
@@ -68,9 +68,9 @@ def play(cast: SceneParameters, seed: int) -> ExperimentScene:
 def detect(
     cast: SceneParameters, people: Floats, shares: Floats, clothes: Clothing, rng: np.random.Generator
 ) -> Detections:
-    """Return what is found in one frame, in no order that tells who is who.
+    """Return the detections of one frame, in random order.
 
-    `people` are boxes `(n, 4)`, NaN who is away; `shares` `(n,)` how much of each is visible.
+    `people` are boxes `(n, 4)`, NaN while absent; `shares` `(n,)` their visible shares.
     """
     found: list[tuple[Floats, float]] = []
     for box, share in zip(people, shares, strict=True):

@@ -1,4 +1,4 @@
-"""Where objects and labels are over time, as in the paper's Figs. 8, 14, 18 and 20."""
+"""Plots of objects and labels over time, as in the paper's Figs. 8, 14, 18 and 20."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.paper_experiments.label_errors import LabelErrors
 from benchmarks.paper_experiments.scene import ObjectTruth
 from tracking.boxes import Floats
 
-_COLOURS = ("#1b6ca8", "#2e9e4f", "#c77700", "#8d3fae")
+_COLORS = ("#1b6ca8", "#2e9e4f", "#c77700", "#8d3fae")
 _AXES = ("x", "y")
 """Of the boxes' top left corner."""
 
@@ -28,9 +28,9 @@ def plot(
         for row, name in enumerate(_AXES):
             axis = axes[row, column]
             for k in range(truth.objects):
-                colour, wrong = _COLOURS[k % len(_COLOURS)], labels.wrong[k]
-                axis.plot(frames, truth.boxes[k, :, row], color=colour, linewidth=3, alpha=0.25)
-                axis.plot(frames, boxes[k, :, row], ".", color=colour, markersize=2, label=f"object {k}")
+                color, wrong = _COLORS[k % len(_COLORS)], labels.wrong[k]
+                axis.plot(frames, truth.boxes[k, :, row], color=color, linewidth=3, alpha=0.25)
+                axis.plot(frames, boxes[k, :, row], ".", color=color, markersize=2, label=f"object {k}")
                 axis.plot(frames[wrong], boxes[k, wrong, row], "x", color="red", markersize=4)
             axis.set(ylabel=f"{name} of the box, pixels" if column == 0 else "")
         axes[0, column].set(title=f"{solver}: {labels.wrong.sum()} wrong labels")

@@ -1,4 +1,4 @@
-"""What an experiment is played on: the truth of every frame, and what a detector saw in it."""
+"""The scenes of the experiments: ground truth and detections of every frame."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ WIDTH, HEIGHT = 352, 288
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectTruth:
-    """Where n objects are in T frames.
+    """The ground truth of n objects in T frames.
 
     Attributes:
-        boxes: `(n, T, 4)` pixels, whole boxes, hidden or not; NaN while the object is out of the picture.
-        visible: `(n, T)`, share of the box that nobody nearer covers; 0 out of the picture.
+        boxes: `(n, T, 4)` pixels, whole boxes, occluded or not; NaN while the object is out of the picture.
+        visible: `(n, T)`, unoccluded share of the box; 0 out of the picture.
     """
 
     boxes: Floats
@@ -39,10 +39,10 @@ class ExperimentScene:
     """One synthetic recording.
 
     Attributes:
-        truth: where everybody is.
+        truth: the ground truth.
         seen: `seen[p][t]` are the observations of frame t; one set p for all objects, or one for each.
-        templates: the objects in frame 0; empty where they have to be found.
-        kits: what each object wears, by number; those of one number look alike.
+        templates: the objects in frame 0; empty where they must be detected.
+        kits: the kit number of each object; objects of one kit look alike.
     """
 
     truth: ObjectTruth
@@ -52,6 +52,6 @@ class ExperimentScene:
 
     @property
     def observations(self) -> float:
-        """The mean number of observations in a frame, of one object."""
+        """The mean number of observations per frame in a set."""
         counts = [len(frame) for frames in self.seen for frame in frames]
         return sum(counts) / len(counts)

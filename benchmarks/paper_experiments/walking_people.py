@@ -1,4 +1,4 @@
-"""How people walk, run, leave and return: the place of their feet in every frame."""
+"""Simulated walking people: the position of their feet in every frame."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from benchmarks.paper_experiments.scene import HEIGHT, WIDTH
 from tracking.boxes import Floats
 
 _FAR_Y, _NEAR_Y = 130.0, 280.0
-"""Rows of the picture between which feet are."""
+"""Rows of the picture between which the feet are."""
 _OUT = 60.0
-"""Pixels beyond a side at which nothing of a person is left in the picture."""
+"""Pixels beyond a side at which a person is completely out of the picture."""
 _NEAR_GOAL = 12.0
 
 
@@ -21,11 +21,11 @@ class WalkParameters:
     """How people move.
 
     Attributes:
-        speed: pixels a frame at most.
-        turn: share of the way to the wanted velocity made in each frame: how sharply they turn.
-        stay: shortest and longest stay in the picture, frames; None: for ever.
+        speed: pixels per frame at most.
+        turn: share of the change to the target velocity in each frame: how sharply they turn.
+        stay: shortest and longest stay in the picture, frames; None: forever.
         away: shortest and longest absence, frames.
-        side: pixels from the picture's sides that they keep; the more, the oftener they meet.
+        side: distance that they keep from the picture's sides, pixels; the larger, the more often they meet.
     """
 
     speed: float
@@ -36,7 +36,7 @@ class WalkParameters:
 
 
 class Walker:
-    """Somebody on the way from one goal to the next."""
+    """A person who walks from goal to goal."""
 
     def __init__(self, walking: WalkParameters, start: Floats, rng: np.random.Generator) -> None:
         self._walking, self._rng = walking, rng
@@ -46,7 +46,7 @@ class Walker:
         self._back_in = 0
 
     def step(self) -> Floats:
-        """Return the feet of the next frame, NaN while away."""
+        """Return the feet in the next frame, NaN while absent."""
         if self._back_in:
             self._back_in -= 1
             if not self._back_in:
@@ -84,9 +84,9 @@ class Walker:
 
 
 def walks(people: int, frames: int, walking: WalkParameters, rng: np.random.Generator) -> Floats:
-    """Return the feet of each person in each frame, `(people, frames, 2)` pixels; NaN while away.
+    """Return the feet of each person in each frame, `(people, frames, 2)` pixels; NaN while absent.
 
-    In the first frame everybody is there, side by side.
+    In the first frame all are present, side by side.
     """
     apart = (WIDTH - 2 * walking.side) / people
     starts = [
@@ -98,7 +98,7 @@ def walks(people: int, frames: int, walking: WalkParameters, rng: np.random.Gene
 
 
 def people_at(feet: Floats, height: float) -> Floats:
-    """Return boxes of people whose feet are given, `(..., 4)`; `height`, pixels, is that of the nearest."""
+    """Return the boxes of people at these feet, `(..., 4)`; `height`, pixels, is that of the nearest."""
     x, y = feet[..., 0], feet[..., 1]
     tall = height * (0.62 + 0.38 * (y - _FAR_Y) / (_NEAR_Y - _FAR_Y))
     wide = 0.42 * tall
@@ -106,7 +106,7 @@ def people_at(feet: Floats, height: float) -> Floats:
 
 
 def inside(boxes: Floats) -> Floats:
-    """Cut boxes `(..., 4)` at the picture's borders; NaN where less than a third of the width is left."""
+    """Clip boxes `(..., 4)` to the picture; NaN where less than a third of the width is left."""
     cut = boxes.copy()
     cut[..., 0::2] = np.clip(boxes[..., 0::2], 0.0, WIDTH)
     cut[..., 1::2] = np.clip(boxes[..., 1::2], 0.0, HEIGHT)

@@ -1,4 +1,4 @@
-"""Following the objects of a scene window by window, with any solver."""
+"""Tracking of a scene's objects window by window, with any solver."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from tracking.solvers.base import OCCLUDED, Solver
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedLabels:
-    """Where the labels were put.
+    """The boxes of the labels.
 
     Attributes:
-        boxes: `(n, T, 4)` pixels, NaN where a label is nowhere.
-        reports: what the solver proved, window by window.
+        boxes: `(n, T, 4)` pixels, NaN: no label.
+        reports: of the solver, window by window.
     """
 
     boxes: Floats
@@ -31,7 +31,7 @@ class TrackedLabels:
 def follow(
     scene: ExperimentScene, costs: CostSettings, window: WindowSettings, solver: Solver
 ) -> TrackedLabels:
-    """Follow everybody through a scene; who is not known at the start is found as in II.E."""
+    """Track the objects of a scene; without templates they are detected as in II.E."""
     if scene.templates:
         return _follow_known(scene, costs, window, solver)
     return _follow_found(scene, costs, window, solver)
@@ -40,7 +40,7 @@ def follow(
 def _follow_known(
     scene: ExperimentScene, costs: CostSettings, window: WindowSettings, solver: Solver
 ) -> TrackedLabels:
-    """Solve window after window; a window's templates are the first ones, where they last were."""
+    """Solve window after window; a window's templates are the first ones at their last places."""
     frames = scene.truth.frames
     boxes = np.full((len(scene.templates), frames, BOX_SIDES), np.nan)
     for k, item in enumerate(scene.templates):
@@ -76,7 +76,7 @@ def _network(
 def _follow_found(
     scene: ExperimentScene, costs: CostSettings, window: WindowSettings, solver: Solver
 ) -> TrackedLabels:
-    """Let the online tracker find and follow everybody."""
+    """Track with the online tracker, which initiates tracks itself."""
     tracker = OnlineTracker(window, costs, solver)
     tracks: dict[int, Floats] = {}
     reports = []

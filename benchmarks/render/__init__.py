@@ -1,1 +1,1 @@
-"""How fast recordings are rendered, and where the processor time goes."""
+"""Rendering speed of recordings, and processor time by stage."""

@@ -1,10 +1,10 @@
-"""How fast `myview render` is on three recorded views, and where its processor time goes.
+"""Speed of `myview render` on three recorded views, and its processor time by stage.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.render --data ../shared/data --out out/bench
 
-First the command itself, with all its processes; then the same classes in one process, stage by stage.
-A frame is one camera's picture. Times are processor time, so that other work on the machine does not
-count, except for the wall time.
+First the command itself, with all its processes; then the same classes in one process, by stage. A frame is
+one camera's picture. Times are processor time, which excludes other work on the machine, except for the wall
+time.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ class RenderRun:
     """One run of the command."""
 
     frames: int
-    """All cameras together."""
+    """Frames of all cameras."""
     views: int
     fps: float
-    """The recordings' own rate."""
+    """Frame rate of the recordings."""
     wall_s: float
     cpu_s: float
-    """All processes together, their start included."""
+    """Processor time of all processes, including their start."""
 
 
 def time_command(views: RecordedViews, config: Path, folder: Path) -> RenderRun:
@@ -50,7 +50,7 @@ def time_command(views: RecordedViews, config: Path, folder: Path) -> RenderRun:
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     subprocess.run(command, env=one_thread_environment(), check=True, stdout=subprocess.DEVNULL)
     wall = time.perf_counter() - start
-    # The command waits for its workers, so that theirs is in what it used.
+    # The command waits for its workers, so their time is included.
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
     return RenderRun(views.frames, len(views.videos), views.site["fps"], wall, cpu)
@@ -64,9 +64,9 @@ def describe(report: Report, name: str, run: RenderRun) -> None:
         ["", "", ""],
         [
             ["wall time", f"{wall:.1f}", "s"],
-            ["processor time", f"{cpu:.1f}", "s, all processes, their start included"],
+            ["processor time", f"{cpu:.1f}", "s, all processes, including their start"],
             ["cores used", f"{cpu / wall:.2f}", f"of {os.cpu_count()}, with other work on them"],
-            ["frames per second", f"{frames / wall:.0f}", "all views together, by the clock"],
+            ["frames per second", f"{frames / wall:.0f}", "all views together, wall time"],
             ["frames per second and core", f"{frames / cpu:.0f}", "by processor time"],
             [
                 "times real time, per core",
@@ -78,7 +78,7 @@ def describe(report: Report, name: str, run: RenderRun) -> None:
 
 
 def describe_stages(report: Report, times: RenderStageTimes, whole_ms: float) -> None:
-    """Print the table of the stages; ``whole_ms`` is the command's processor time per frame."""
+    """Print the table of stages; ``whole_ms`` is the command's processor time per frame."""
     total = sum(times.ms.values())
     rows = [
         [stage, f"{value:.2f}", f"{value / total:.0%}", STAGES[stage]] for stage, value in times.ms.items()
@@ -89,7 +89,7 @@ def describe_stages(report: Report, times: RenderStageTimes, whole_ms: float) ->
             "the command",
             f"{whole_ms:.2f}",
             f"{whole_ms / total:.0%}",
-            "more: starting, plots, other processes",
+            "rest: start, plots, other processes",
         ],
     ]
     report.table("Processor time per frame by stage", ["stage", "ms", "share", "what"], rows)

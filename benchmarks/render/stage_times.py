@@ -1,4 +1,4 @@
-"""The classes of `myview render` in one process, timed stage by stage."""
+"""The classes of `myview render` in one process, timed by stage."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ STAGES = {
     "decode": "the recording's H.264 to a picture of the site's size",
     "encode": "the picture to H.264, once",
     "detect": "background, box filters, histograms",
-    "witness": "scores again, by what the other cameras found",
-    "track": "networks, births, templates",
+    "witness": "rescoring by the detections of other cameras",
+    "track": "networks, initiation, templates",
     "solve": "the network programs",
     "publish": "tracks to messages",
-    "decide": "who is who, and the view of each person",
-    "write": "lining up, fragments, films, tracks, choices",
+    "decide": "identities, and the view of each person",
+    "write": "alignment, fragments, films, tracks, choices",
 }
 
 
@@ -40,7 +40,7 @@ class RenderStageTimes:
 
 
 def time_stages(views: RecordedViews, config_path: Path, folder: Path) -> RenderStageTimes:
-    """Render the views in this process into a new folder and give each stage's time per frame."""
+    """Render the views in this process into a new folder; return each stage's time per frame."""
     config = config_for_videos(
         views.videos, base=read_content(config_path), folder=config_path.parent, ground=views.ground
     )
@@ -67,7 +67,7 @@ def time_stages(views: RecordedViews, config_path: Path, folder: Path) -> Render
 
 
 def _render(config: Config, folder: Path) -> int:
-    """Do what the command does, without its workers; give the number of frames."""
+    """Render as the command does, without worker processes; return the number of frames."""
     renderer = Renderer(config, folder)
     pipelines = {camera: CameraPipeline(config, camera) for camera in config.camera_ids}
     try:

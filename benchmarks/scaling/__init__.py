@@ -1,1 +1,1 @@
-"""Many simulated cameras on one best-view process."""
+"""Scaling: many simulated cameras on one best-view process."""

@@ -1,11 +1,11 @@
-"""Many cameras: what the best-view process uses for a frame, where it goes, and how it grows; a plot.
+"""Scaling: cost of the best-view process per frame, by stage, and its growth with cameras; a plot.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.scaling --out out/bench
 
-People are simulated, and so are the cameras' trackers and pictures (one small GOP, sent again and again). The
-bus, the pulses and the best-view process are real; the process is timed from inside. Large sites get pulses
-more slowly, so that the cost of a frame is told and not that of a queue: "cores at 25" is what the frames of
-a second take at 25 a second. Above one the process does not keep up, since it decides in one thread.
+People are simulated, and so are the cameras' trackers and pictures (one small GOP in a loop). The bus, the
+pulses and the best-view process are real; the process is timed from inside. Large sites get slower pulses, so
+that the cost of a frame does not include queueing: "cores at 25" is the cost of 25 frames a second. Above one
+the process does not keep up, since it decides in one thread.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ _FPS = 25.0
 _CAMERAS = (4, 16, 36, 64, 100)
 _QUICK_CAMERAS = (4, 16)
 _EASY = 16
-"""Cameras that get pulses at the full rate; more get them more slowly."""
+"""Cameras up to which pulses have the full rate; larger sites get slower ones."""
 _GROWTH = 1.5
-"""Power of the number of cameras with which pulses become slower: that of what a frame costs, and some."""
+"""Exponent of the number of cameras by which pulses become slower: slightly above that of the cost."""
 _SETTLE, _EPOCHS = 16, 20
 _QUICK_SETTLE, _QUICK_EPOCHS = 12, 8
 _ABOUT_REST = "zenoh's threads and router, copies off the bus, the event loop"
 
 
 def exponent(cameras: Sequence[int], values: Sequence[float]) -> float:
-    """Fit ``values ~ cameras^k`` by least squares of the logarithms; give k, NaN for fewer than two sizes."""
+    """Fit ``values ~ cameras^k`` by least squares of logarithms; return k, NaN for fewer than two sizes."""
     if len(cameras) < 2:
         return float("nan")
     return float(np.polyfit(np.log(cameras), np.log(values), 1)[0])
@@ -86,13 +86,13 @@ def describe(report: Report, loads: Sequence[SiteLoad]) -> None:
         for stage, about in names.items()
     ]
     total = [it.milliseconds for it in loads]
-    rows.append(["together", *(f"{it:.1f}" for it in total), f"{exponent(cameras, total):.2f}", ""])
+    rows.append(["total", *(f"{it:.1f}" for it in total), f"{exponent(cameras, total):.2f}", ""])
     report.table(
         "processor ms a frame, by cameras, and the exponent of growth",
         ["stage", *(f"{it}" for it in cameras), "grows", "what"],
         rows,
     )
-    report.say("messages and bytes are for 25 pulses a second; late: windows decided without their camera")
+    report.say("messages and bytes: at 25 pulses a second; late: windows decided without their camera")
 
 
 def _services(loads: Sequence[SiteLoad]) -> str:
@@ -101,7 +101,7 @@ def _services(loads: Sequence[SiteLoad]) -> str:
 
 
 def plot(loads: Sequence[SiteLoad], path: Path) -> None:
-    """Draw what a frame costs over the number of cameras, by stage."""
+    """Draw the cost of a frame over the number of cameras, by stage."""
     from matplotlib.figure import Figure  # noqa: PLC0415 — only after what is measured
 
     figure = Figure(figsize=(9, 5), layout="constrained")
@@ -140,8 +140,8 @@ def measure(options: argparse.Namespace) -> None:
 def main() -> None:
     """Read the command line and run."""
     options = parser(__doc__, "scaling")
-    options.add_argument("--quick", action="store_true", help="two small sites, for a short while")
-    options.add_argument("--cameras", type=int, action="append", help="only so many; may be repeated")
+    options.add_argument("--quick", action="store_true", help="two small sites, briefly")
+    options.add_argument("--cameras", type=int, action="append", help="only this number; may be repeated")
     options.add_argument("--people", type=int, default=30, help="in each camera's view, on average")
     options.add_argument("--share", type=int, default=1, help="best-view services that share the site")
     options.add_argument("--fps", type=float, help="pulses a second; without it, fewer for large sites")

@@ -1,9 +1,9 @@
-"""A process that stands for many cameras: on the pulses it publishes what they would, through the real bus.
+"""A process that simulates many cameras: on each pulse it publishes their messages through the real bus.
 
     python -m benchmarks.scaling.simulated_cameras SITE.yaml PER_CAMERA FIRST COUNT
 
-Pictures are one small GOP, encoded once, sent again and again: the best-view service never looks into them.
-So are small pictures of people, one for each track every second of frames.
+Pictures are one small GOP, encoded once and sent in a loop: the best-view service never decodes them. So are
+thumbnails, one for each track every second.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from server.system.child_process import terminate_with_parent
 _THUMBS_EVERY = 5
 """Epochs."""
 _THUMB = bytes(1500)
-"""As long as such a picture is; nobody looks at it."""
+"""A dummy of the size of a thumbnail."""
 
 
 async def serve(config: Config, hall: SimulatedHall, cameras: range) -> None:
@@ -37,8 +37,8 @@ async def serve(config: Config, hall: SimulatedHall, cameras: range) -> None:
     trackers = {camera: SimulatedTracker(hall, camera, boot) for camera in cameras}
     keys, bus = ZenohKeys(config.site.name), Bus.client(config.zenoh)
     encoder = Encoder(config.site, config.encode)
-    grey = np.full((HEIGHT, WIDTH, 3), 128, dtype=np.uint8)
-    gop = [encoder.encode(frame, grey) for frame in range(config.encode.gop)]
+    gray = np.full((HEIGHT, WIDTH, 3), 128, dtype=np.uint8)
+    gop = [encoder.encode(frame, gray) for frame in range(config.encode.gop)]
     there = asyncio.Event()
     bus.watch_alive(keys.bestview("alive"), lambda _, alive: there.set() if alive else None)
     await there.wait()
@@ -57,7 +57,7 @@ async def serve(config: Config, hall: SimulatedHall, cameras: range) -> None:
                         _tracks(bus, keys, message)
                         if epoch % _THUMBS_EVERY == 0:
                             _thumbnails(bus, keys, message)
-                        # The bus's threads and the next pulse want their turn.
+                        # Lets the bus's threads and the next pulse run.
                         await asyncio.sleep(0)
     finally:
         bus.close()

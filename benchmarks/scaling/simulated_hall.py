@@ -1,4 +1,4 @@
-"""A hall of any size: cameras in a grid that each see about as many people, who walk about."""
+"""A simulated hall of any size: cameras in a grid, each with about as many walking people in view."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from tracking.boxes import Floats
 WIDTH, HEIGHT = 640, 360
 WINDOW, STRIDE = 15, 5
 _SPACING = 10.0
-"""Metres between cameras."""
+"""Meters between cameras."""
 _NEAREST, _FARTHEST = 5.0, 20.0
-"""Metres ahead of a camera in which it sees people: about three cameras' ground each."""
+"""Meters ahead of a camera in which it sees people: the ground of about three cameras."""
 _FOCAL, _EYE, _HORIZON = 400.0, 3.0, 100.0
 _TALL, _PACE = 1.75, 0.05
-"""Metres; metres a frame."""
+"""Meters, and meters per frame."""
 _BINS = 64
 _NOISE = 0.02
-"""Of the box height: errors of its edges."""
+"""Errors of a box's edges, as a share of its height."""
 _LOST_EPOCHS = 2
-"""After so many a person who was out of view has another number in that camera."""
+"""Frames out of view after which a person gets a new track id in a camera."""
 _SPOTS = 20_000
 
 
 @dataclass(frozen=True, slots=True)
 class CameraView:
-    """What one camera sees of the people in one window.
+    """The people in a camera's view in one window.
 
     Attributes:
-        people: (K,) rows of those seen at least once.
+        people: (K,) rows of the people seen at least once.
         boxes: (K, M, 4) pixels, NaN where out of view.
     """
 
@@ -43,7 +43,7 @@ class CameraView:
 
 @dataclass(frozen=True)
 class SimulatedHall:
-    """`cameras` cameras, with so many people that each sees `per_camera` on average."""
+    """A hall with `cameras` cameras, each of which sees `per_camera` people on average."""
 
     cameras: int
     per_camera: int
@@ -55,7 +55,7 @@ class SimulatedHall:
 
     @cached_property
     def grounds(self) -> list[Floats]:
-        """Each camera's homography from the picture to the floor, metres."""
+        """Each camera's homography from the picture to the floor, meters."""
         return [np.asarray(np.linalg.inv(view), dtype=np.float64) for view in self._views]
 
     @cached_property
@@ -84,7 +84,7 @@ class SimulatedHall:
 
     @cached_property
     def people(self) -> int:
-        """How many there are."""
+        """The number of people."""
         spots = np.random.default_rng(0).uniform(0.0, 1.0, (_SPOTS, 2)) * self._size
         seen = sum(np.count_nonzero(~np.isnan(self._boxes(view, spots)[:, 0])) for view in self._views)
         return round(self.per_camera * self.cameras * _SPOTS / seen)
@@ -100,17 +100,17 @@ class SimulatedHall:
 
     @cached_property
     def histograms(self) -> Floats:
-        """(people, bins) what everybody wears."""
+        """(people, bins) the appearance of each person."""
         return np.random.default_rng(2).dirichlet(np.full(_BINS, 0.3), self.people)
 
     def places(self, first: int, last: int) -> Floats:
-        """Where everybody is, (people, frames, 2) metres: straight ahead, and back from the walls."""
+        """Return the positions (people, frames, 2), meters: straight lines, reflected at the walls."""
         begin, pace = self._walks
         way = begin[:, None] + pace[:, None] * np.arange(first, last + 1)[:, None]
         return np.asarray(self._size - np.abs(way % (2 * self._size) - self._size))
 
     def view(self, camera: int, places: Floats, seed: int) -> CameraView:
-        """Project everybody into a camera; errors of the boxes come from the seed."""
+        """Project people into a camera, with seeded errors of the boxes."""
         boxes = self._boxes(self._views[camera], places)
         people = np.flatnonzero(~np.isnan(boxes[..., 0]).all(axis=1))
         boxes = boxes[people]
@@ -130,7 +130,7 @@ class SimulatedHall:
 
 
 class SimulatedTracker:
-    """Simulates one camera's tracker: whoever comes back into view gets a new track number."""
+    """Simulates a camera's tracker: a person who comes back into view gets a new track id."""
 
     def __init__(self, hall: SimulatedHall, camera: int, boot: int) -> None:
         self._hall, self._camera, self._boot = hall, camera, boot
@@ -139,7 +139,7 @@ class SimulatedTracker:
         self._count = 0
 
     def message(self, epoch: int, places: Floats) -> CameraTracks:
-        """Report the window that ends with an epoch; `places` are everybody's in its frames."""
+        """Return the message of the window that ends with an epoch; `places` are positions in its frames."""
         last = (epoch + 1) * STRIDE - 1
         first = last + 1 - places.shape[1]
         final_to = max(first - 1, last - (WINDOW - STRIDE))

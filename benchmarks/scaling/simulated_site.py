@@ -1,4 +1,4 @@
-"""A site of simulated cameras: pulses, the real best-view process, and what it used between two moments."""
+"""A site of simulated cameras with the real best-view process, and the measurement of its cost."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ _LOG = "site.log"
 
 @dataclass(frozen=True, slots=True)
 class SiteLoad:
-    """What carrying a site costs the best-view process.
+    """The cost of a site for the best-view process.
 
     Attributes:
         cameras: of the site.
         people: in it.
-        fps: pulses a second.
-        services: best-view services that share the site; what follows is the mean of them.
+        fps: pulses per second.
+        services: best-view services that share the site; costs are their mean.
         per_camera: people in a camera's view, on average.
-        stages: processor milliseconds a frame (of all cameras together) by stage, the rest too.
-        messages: a second, at 25 pulses a second.
-        megabytes: likewise.
+        stages: processor milliseconds per frame (of all cameras), by stage, including the rest.
+        messages: per second, at 25 pulses a second.
+        megabytes: per second, likewise.
         memory: resident megabytes at the end.
-        late: windows that came too late, in the measured time.
-        epochs: measured.
+        late: late windows in the measured time.
+        epochs: measured epochs.
     """
 
     cameras: int
@@ -56,7 +56,7 @@ class SiteLoad:
 
     @property
     def milliseconds(self) -> float:
-        """Processor milliseconds a frame."""
+        """Processor milliseconds per frame."""
         return sum(self.stages.values())
 
 
@@ -75,7 +75,7 @@ def carry(
     """Run the site for `settle` epochs, and measure over the `epochs` after them.
 
     Raises:
-        RuntimeError: it did not come so far in time; what the processes said is in the text.
+        RuntimeError: it does not get so far in time; the text has the logs.
     """
     folder.mkdir(parents=True)
     with _running(hall, fps, folder, services) as running:
@@ -97,7 +97,7 @@ def _load(
     frames = STRIDE * (stop.epochs - start.epochs)
     stages = {name: 1e3 * (stop.seconds[name] - start.seconds[name]) / frames for name in STAGES}
     stages[REST] = 1e3 * (stop.process - start.process) / frames - sum(stages.values())
-    # The lists are told by the clock, whatever the rate of the pulses.
+    # Lists of people are sent by wall-clock time, whatever the pulse rate.
     stages[LISTS] *= frames / (25.0 * (stop.at - start.at))
     return SiteLoad(
         cameras=hall.cameras,
@@ -123,7 +123,7 @@ def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> It
         "site": {"name": "hall", "fps": fps, "width": WIDTH, "height": HEIGHT},
         "sync": {"port": sync, "start_timeout_s": 3.0},
         "zenoh": {"connect": address, "listen": address},
-        # The rate is set to what is measured, not to what people would see: waiting is counted in frames.
+        # The configured rate is the measured one, not the viewers': timeouts are counted in frames.
         "view": {"late_after_s": 12.5 / fps, "share": {"of": services}},
         "cameras": [
             {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
@@ -179,11 +179,11 @@ def _after(times: Path, epochs: int, folder: Path) -> ServiceTimes:
             return found
         time.sleep(_POLL_S)
     said = (folder / _LOG).read_text(encoding="utf-8", errors="replace")
-    raise RuntimeError(f"the site did not come to epoch {epochs}; its processes said:\n{said[-2000:]}")
+    raise RuntimeError(f"the site did not reach epoch {epochs}; its log:\n{said[-2000:]}")
 
 
 def _late(url: str) -> int:
-    """Windows that were decided without a camera that was there."""
+    """Read the windows that were decided without a present camera."""
     with urllib.request.urlopen(f"{url}metrics", timeout=_PATIENCE_S) as answer:  # noqa: S310 — own address
         metrics = answer.read().decode()
     return next(

@@ -1,4 +1,4 @@
-"""The real best-view process, timed stage by stage from inside.
+"""The real best-view process, timed by stage from inside.
 
     python -m benchmarks.scaling.timed_service TIMES.json bestview SITE.yaml
 
@@ -33,34 +33,34 @@ from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 LISTS = "lists"
 STAGES = {
-    "tracks in": "the cameras' windows out of JSON, checked, laid in line",
-    "frames in": "access units made into fragments, on the shelves; small pictures",
+    "tracks in": "decoding, validation and alignment of the cameras' windows",
+    "frames in": "access units to fragments in the frame buffers; thumbnails",
     "align": "epochs taken out",
-    "who is who": "identity over all cameras",
+    "who is who": "identities across cameras",
     "people": "messages to tracks, boxes by person",
     "quality": "of every view",
-    "costs": "laid out by frame, camera and person",
-    "choose": "the program, and the decision put together",
-    "board": "what the page, programs and the bus are told",
-    "publish": "that to JSON and onto the bus",
+    "costs": "quality by frame, camera and person",
+    "choose": "the selection program, and the decision",
+    "board": "content for the page, the API and the bus",
+    "publish": "encoding as JSON, and publishing",
     "splice": "everybody's chosen GOP",
-    LISTS: "of people and cameras for the page, every second",
+    LISTS: "lists of people and cameras for the page, every second",
 }
 REST = "rest"
-"""Of the process: zenoh's threads and router, copies off the bus, the event loop, pulses."""
+"""Time outside the stages: zenoh's threads and router, copies off the bus, the event loop, pulses."""
 
 
 @dataclass(frozen=True, slots=True)
 class ServiceTimes:
-    """What the service has done and used since it started.
+    """Counts and processor time of the service since its start.
 
     Attributes:
         epochs: decided.
         seconds: processor time of each stage, without the stages inside it.
         process: processor time of the whole process.
-        messages: that came, of all kinds.
+        messages: received messages of all kinds.
         size: their bytes.
-        at: when this was, seconds by a clock that never steps.
+        at: time of the reading, seconds of the monotonic clock.
     """
 
     epochs: int
@@ -72,12 +72,12 @@ class ServiceTimes:
 
     @classmethod
     def read(cls, path: Path) -> ServiceTimes | None:
-        """Read what was written last; None: nothing yet."""
+        """Read the last times; None: there are none yet."""
         return cls(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None
 
 
 def watch(path: Path) -> None:
-    """Time this process from now on, and write into the file after every epoch."""
+    """Time this process from now on, and write the times into the file after every epoch."""
     watched = ThreadStopwatch(STAGES)
     count = {"epochs": 0, "messages": 0, "size": 0}
 

@@ -1,1 +1,1 @@
-"""A picture of the page, for the documents."""
+"""Screenshots of the pages for the documents."""

@@ -1,8 +1,8 @@
-"""Takes the README's pictures of the page, on the demo: a desktop's window and a phone's.
+"""Takes the README's screenshots of the page on the demo, in a desktop's and a phone's window.
 
     python -m benchmarks.screenshots --out docs/pictures
 
-Lets the page play for a minute, then takes a picture at several moments and keeps the one with most to see.
+Lets the page play for a minute, then takes screenshots at several moments and keeps the best one.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ _READY = "MyView is ready: "
 _READY_S = 90.0
 _PLAYING_MS = 60_000
 _MOMENTS = 12
-"""Pictures taken of each size; the best is kept."""
+"""Screenshots of each size; the best is kept."""
 _LANDED_S = 1.5
-"""How long the page may take to show somebody else, the list to follow, and their boxes to be there."""
+"""Milliseconds for the page to show another person, the list, and the boxes."""
 _MOST_BYTES = 300_000
-_COLOURS = (256, 128, 64)
-"""Palettes tried until a picture is small enough."""
+_COLORS = (256, 128, 64)
+"""Palette sizes that are tried until a picture is small enough."""
 
 _RATED = """async () => {
   const { objects } = await (await fetch('api/objects')).json();
@@ -44,14 +44,14 @@ _RATED = """async () => {
   }));
   return rated.sort((a, b) => b.score - a.score);
 }"""
-"""Who is in view, best first: many people, in the one picture too, who are seen by many cameras and large."""
+"""People in view, best first: large, in view of many cameras, and together with many others."""
 
 _PLAYS = "myview.state === 'playing' && myview.camera !== null"
 
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """One picture to take."""
+    """A screenshot to take."""
 
     name: str
     width: int
@@ -63,10 +63,10 @@ SHOTS = (Shot("page", 1280, 800), Shot("phone", 360, 740))
 
 @contextlib.asynccontextmanager
 async def demo() -> AsyncIterator[str]:
-    """Run `myview demo`; give its address once it says that it is ready.
+    """Run `myview demo`; yield its address once it is ready.
 
     Raises:
-        RuntimeError: it did not become ready.
+        RuntimeError: it does not become ready.
     """
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "server.cli.main", "demo", "--no-browser", "--port", "0"),
@@ -94,7 +94,7 @@ async def _address(process: asyncio.subprocess.Process) -> str:
 
 
 async def take(out: Path, fill_s: float) -> list[Path]:
-    """Run the demo, open the page in all sizes, let it play, and take the pictures."""
+    """Run the demo, open the page in all sizes, let it play, and take the screenshots."""
     async with chromium() as browser, demo() as url:
         pages = [await _open(browser, url, shot) for shot in SHOTS]
         await asyncio.sleep(fill_s)
@@ -111,7 +111,7 @@ def _write(pictures: dict[str, bytes], out: Path) -> list[Path]:
 
 
 async def _open(browser: Browser, url: str, shot: Shot) -> tuple[Page, Shot]:
-    # The page's policy forbids eval, which it is asked with here.
+    # The page's policy forbids eval, which Playwright needs.
     page = await browser.new_page(viewport={"width": shot.width, "height": shot.height}, bypass_csp=True)
     await page.goto(url)
     await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
@@ -119,17 +119,17 @@ async def _open(browser: Browser, url: str, shot: Shot) -> tuple[Page, Shot]:
 
 
 async def _best_picture(page: Page) -> bytes:
-    """Take pictures of whoever is seen best at several moments; give the best.
+    """Take screenshots of the best visible person at several moments; return the best.
 
     Raises:
-        RuntimeError: nobody was in view at any of them.
+        RuntimeError: nobody is in view at any of them.
     """
     best, best_score = b"", 0.0
     for _ in range(_MOMENTS):
         rated = await page.evaluate(_RATED)
         if rated:
             await page.click(f"#people li[data-object='{rated[0]['object']}'] .person")
-        await page.mouse.move(0, 0)  # nothing is to be lit up under it
+        await page.mouse.move(0, 0)  # so that nothing is highlighted below the pointer
         await page.evaluate("document.activeElement.blur(), scrollTo(0, 0)")
         await asyncio.sleep(_LANDED_S)
         score = await _score(page)
@@ -142,7 +142,7 @@ async def _best_picture(page: Page) -> bytes:
 
 
 async def _score(page: Page) -> float:
-    """Return how good the page looks; 0 when the chosen person is not being shown."""
+    """Return a score of the page; 0 when the chosen person is not shown."""
     if not await page.evaluate(_PLAYS):
         return 0.0
     number = await page.evaluate("myview.object")
@@ -150,22 +150,22 @@ async def _score(page: Page) -> float:
 
 
 def small_png(png: bytes) -> bytes:
-    """Return the picture with as many colours as fit into the size that a README's picture may have."""
+    """Return the picture with as many colors as fit into the file size of a README's picture."""
     image = Image.open(io.BytesIO(png)).convert("RGB")
     smaller = png
-    for colours in _COLOURS:
+    for colors in _COLORS:
         if len(smaller) <= _MOST_BYTES:
             break
         target = io.BytesIO()
-        # The median cut gives the white of the text to the walls; k-means takes it back.
-        palette = image.quantize(colours, Image.Quantize.MEDIANCUT, kmeans=3)
+        # The median cut merges the white of the text with the walls; k-means separates it again.
+        palette = image.quantize(colors, Image.Quantize.MEDIANCUT, kmeans=3)
         image.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG).save(target, "PNG", optimize=True)
         smaller = target.getvalue()
     return smaller
 
 
 def main() -> None:
-    """Take the pictures."""
+    """Take the screenshots."""
     options = argparse.ArgumentParser(
         prog="python -m benchmarks.screenshots", description=__doc__.splitlines()[0]
     )

@@ -1,9 +1,9 @@
-"""Takes the documents' pictures of both pages in each of their states, on the demo, in three widths.
+"""Takes the documents' screenshots of both pages in each of their states, on the demo, in three widths.
 
     python -m benchmarks.screenshots.page_states --out docs/pictures
 
-The states come about as they do: somebody leaves, a camera's process stops, the server is ended. Only that
-nobody is known yet is what the page is told by this script: on the demo it is over within a moment.
+The states are real: a person leaves, a camera process is stopped, the server is terminated. Only the state
+without any people is faked by this script: on the demo it is over within a moment.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from benchmarks.common.environment import ROOT, CannotRunError, finish
 from benchmarks.common.process_load import running_pids
 
 WIDTHS = {360: 740, 800: 900, 1600: 900}
-"""Widths of the window, and its heights."""
+"""Sizes of the window."""
 _WIDEST = 1000
-"""Pixels of a picture in the documents; wider ones are made smaller."""
+"""Largest width of a picture in the documents, pixels; wider ones are scaled down."""
 _QUALITY = 55
 _PATIENCE_MS = 6_000
 _TRIES = 12
 _LONG_MS = 120_000
 _LANDED_MS = 1_500
-"""For somebody else to be shown, and the list to follow."""
+"""Milliseconds for another person to be shown, and the list to follow."""
 _SETTLED_S = 1.2
-"""After another size, until the picture and the boxes are there again."""
+"""Milliseconds after a resize until the picture and the boxes are back."""
 _MINUTE_S = 60.0
 
 _NOBODY = """const listen = EventSource.prototype.addEventListener;
@@ -58,9 +58,9 @@ _LEFT = """async () => {
   return objects.filter((it) => !it.visible && it.thumbnail).map((it) => it.object);
 }"""
 _SECTIONS = ("cameras", "floor", "known", "zones", "calibration", "view-selection")
-"""Of the operator's page."""
+"""Sections of the operator's page."""
 _MEASURED_MS = 8_000
-"""Until a section has its pictures, and what is measured over some seconds."""
+"""Milliseconds until a section has its pictures and measurements."""
 _PLAYS = "myview.state === 'playing' && myview.camera !== null"
 _TABLE = "document.querySelector('#why table')"
 _AWAY = "document.querySelector('#cameras .away')"
@@ -71,31 +71,31 @@ Prepare = Callable[[], Awaitable[None]]
 
 @dataclass(frozen=True, slots=True)
 class ScreenshotSession:
-    """A page whose pictures are taken, and where they go."""
+    """An open page, and the folder for its screenshots."""
 
     page: Page
     out: Path
 
     async def shoot(self, state: str, prepare: Prepare, until: str = _PLAYS) -> None:
-        """Take the picture of a state in all widths, each when a JavaScript expression holds.
+        """Take screenshots of a state in all widths, each when a JavaScript expression holds.
 
-        People come and go meanwhile: what does not come about is prepared again.
+        People come and go meanwhile: a state that is not reached is prepared again.
 
         Raises:
-            RuntimeError: it has not come about in time.
+            RuntimeError: the state is not reached in time.
         """
         for width, height in WIDTHS.items():
             await self.page.set_viewport_size({"width": width, "height": height})
             for _ in range(_TRIES):
                 await prepare()
-                await self.page.mouse.move(0, 0)  # nothing is to be lit up under it
+                await self.page.mouse.move(0, 0)  # so that nothing is highlighted below the pointer
                 await self.page.evaluate("document.activeElement.blur(), scrollTo(0, 0)")
                 await asyncio.sleep(_SETTLED_S)
                 with contextlib.suppress(LateError):
                     await self.page.wait_for_function(until, timeout=_PATIENCE_MS)
                     break
             else:
-                raise RuntimeError(f"{state}: has not come about")
+                raise RuntimeError(f"{state}: not reached")
             png = await self.page.screenshot()
             await asyncio.to_thread(_write, png, self.out / f"{state}-{width}.webp")
 
@@ -103,7 +103,7 @@ class ScreenshotSession:
         """Prepare nothing."""
 
     async def choose(self, script: str, keys: str = "") -> None:
-        """Choose the first of those whom a script finds, as soon as there is one, and press keys."""
+        """Choose the first person that a script returns, as soon as there is one, and press keys."""
         number = (await self._found(script))[0]
         await self.page.evaluate(f"document.querySelector(`li[data-object='{number}'] .person`)?.click()")
         await self.page.wait_for_timeout(_LANDED_MS)
@@ -111,7 +111,7 @@ class ScreenshotSession:
             await self.page.keyboard.press(key)
 
     async def beside(self) -> None:
-        """Choose somebody, and two more beside them."""
+        """Choose a person, and two more beside them."""
         await self.choose(_SEEN_BY_MANY)
         for number in (await self._found(_SEEN_BY_MANY))[1:3]:
             plus = f"li[data-object='{number}'] .plus[aria-pressed=false]"
@@ -122,11 +122,11 @@ class ScreenshotSession:
             if found := await self.page.evaluate(script):
                 return list(found)
             await self.page.wait_for_timeout(_LANDED_MS)
-        raise RuntimeError("nobody was in view, or had left, for long enough")
+        raise RuntimeError("no person was in view, or had left, for long enough")
 
 
 async def take_operating(out: Path, fps: float) -> None:
-    """Run the demo and take the pictures of the operator's page."""
+    """Run the demo, and take screenshots of the operator's page."""
     async with chromium() as browser, demo_at(fps) as url:
         async with _sitting(browser, url, out) as sitting:
             await sitting.page.wait_for_function(_PLAYS, timeout=_LONG_MS)
@@ -138,7 +138,7 @@ async def take_operating(out: Path, fps: float) -> None:
 
 
 async def take_watching(out: Path, fps: float) -> None:
-    """Run the demo and take the pictures of the viewer's page."""
+    """Run the demo, and take screenshots of the viewer's page."""
     async with chromium() as browser, contextlib.AsyncExitStack() as stack:
         url = await stack.enter_async_context(demo_at(fps))
         async with _sitting(browser, url, out, _NOBODY) as sitting:
@@ -156,7 +156,7 @@ async def take_watching(out: Path, fps: float) -> None:
 async def _sitting(
     browser: Browser, url: str, out: Path, script: str = ""
 ) -> AsyncIterator[ScreenshotSession]:
-    # The page's policy forbids eval, which it is asked with here.
+    # The page's policy forbids eval, which Playwright needs.
     page = await browser.new_page(bypass_csp=True)
     if script:
         await page.add_init_script(script)
@@ -182,7 +182,7 @@ async def _watched(sitting: ScreenshotSession) -> None:
 
 
 async def _gone(sitting: ScreenshotSession) -> None:
-    """A moment of the past, somebody who has left, and a camera whose process does nothing any more."""
+    """Take screenshots of a paused page, of a person who has left, and of a stopped camera."""
     page = sitting.page
 
     async def stopped() -> None:
@@ -211,7 +211,7 @@ def _write(png: bytes, path: Path) -> None:
 
 
 def main() -> None:
-    """Take the pictures."""
+    """Take the screenshots."""
     options = argparse.ArgumentParser(
         prog="python -m benchmarks.screenshots.page_states", description=__doc__.splitlines()[0]
     )

@@ -59,17 +59,17 @@ class LoopedRecordings:
 
     @property
     def cameras(self) -> list[dict[str, Any]]:
-        """The configuration's cameras."""
+        """The section `cameras` of the configuration."""
         return [{"id": it, "source": str(self.folder / f"{it}.mp4"), "at_end": "loop"} for it in CAMERAS]
 
     @property
     def site(self) -> dict[str, Any]:
-        """The configuration's site."""
+        """The section `site` of the configuration."""
         return {"name": "soak", "fps": self.time_scale.fps, "width": WIDTH, "height": HEIGHT}
 
     @property
     def ground(self) -> Path | None:
-        """Homographies to the ground plane."""
+        """The file of homographies to the ground plane."""
         return self.folder / "ground.json"
 
     def settings(self, recorded: Path, keep_hours: float) -> dict[str, dict[str, Any]]:

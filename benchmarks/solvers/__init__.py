@@ -1,1 +1,1 @@
-"""The solvers of the tracking program against each other."""
+"""Comparison of the solvers of the tracking program."""

@@ -1,9 +1,9 @@
-"""How fast the solvers of the tracking program are: tables, and the paper's Fig. 21 and Table I as plots.
+"""Speed of the solvers of the tracking program: tables, and the paper's Fig. 21 and Table I as plots.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.solvers --out out/bench
 
-Times are processor time of one thread, so that other work on the machine does not count; every ratio is
-of times from the same run.
+Times are processor time of one thread, which excludes other work on the machine; every ratio is of times from
+the same run.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ LIVE = (WindowSize(8, 16, 15), WindowSize(10, 40, 15), WindowSize(20, 40, 15))
 
 
 def named(case: WindowCase) -> list[str]:
-    """Return the cells that say which case it is."""
+    """Return the cells that name the case."""
     return [case.name, f"{case.size.objects}", f"{case.size.places}", f"{case.layout:g}"]
 
 
@@ -53,7 +53,7 @@ def ratios(case: WindowCase, seeds: int) -> list[str]:
 
 
 def exact(case: WindowCase, seeds: int) -> list[str]:
-    """Return a row: what the integer optimum takes, and how far the rounded answer is from it."""
+    """Return a row: the time of the integer optimum, and the gap of the rounded solution."""
     found = [
         (timed("exact", network), timed("columns", network).solution.report)
         for network in map(case.network, range(seeds))
@@ -71,12 +71,12 @@ def exact(case: WindowCase, seeds: int) -> list[str]:
     return [*named(case), *shares]
 
 
-def live_row(size: WindowSize, steps: int, *, told: bool) -> list[str]:
-    """Return a row: windows at stride 1, the building of the network from boxes and histograms included."""
-    found = live(size, steps, told=told)
+def live_row(size: WindowSize, steps: int, *, warm: bool) -> list[str]:
+    """Return a row: windows at stride 1, including building the network from boxes and histograms."""
+    found = live(size, steps, warm=warm)
     middle, late = np.percentile(1e3 * found.seconds, [50, 95])
     return [
-        "told" if told else "alone",
+        "warm" if warm else "cold",
         f"{size.objects}",
         f"{size.places}",
         f"{size.frames}",
@@ -98,12 +98,12 @@ def run(options: argparse.Namespace) -> None:
         [ratios(case, options.seeds) for case in CASES],
     )
     report.table(
-        "Live: building the network and solving it at every frame, gated; alone, or told by the last one; ms",
+        "Live: building and solving the network at every frame, gated; cold, or warm-started; ms",
         ["solver", "n", "K", "M", "median", "p95", "max", "no program, %", "rounds"],
-        [live_row(size, options.steps, told=told) for size in LIVE for told in (False, True)],
+        [live_row(size, options.steps, warm=warm) for size in LIVE for warm in (False, True)],
     )
     report.table(
-        "The integer optimum, and what columns' answer and bound are off it at worst, %; M = 20; ms",
+        "The integer optimum, and the largest gaps of columns' solution and bound, %; M = 20; ms",
         ["window", "n", "K", "μ", "median", "max", "answer", "bound"],
         [exact(case, options.seeds) for case in EXACT_CASES],
     )

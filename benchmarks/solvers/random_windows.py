@@ -1,4 +1,4 @@
-"""Windows to time solvers on: random observations, as in the paper's Fig. 21, and people who walk."""
+"""Windows to time solvers on: random observations, as in the paper's Fig. 21, and walking people."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SEEN = 0.9
 
 @dataclass(frozen=True, slots=True)
 class WindowSize:
-    """A window: `objects`, `places` in each frame, `frames`."""
+    """The size of a window: `objects`, `places` in each frame, `frames`."""
 
     objects: int
     places: int
@@ -26,7 +26,7 @@ class WindowSize:
 
 
 def random_window(size: WindowSize, settings: CostSettings, seed: int) -> Network:
-    """Random boxes and histograms in every frame (paper IV.A.5): nobody walks, conflicts bind."""
+    """Build a window of random boxes and histograms (paper IV.A.5): no motion, binding conflicts."""
     rng = np.random.default_rng(seed)
 
     def seen(count: int) -> Detections:
@@ -40,7 +40,7 @@ def random_window(size: WindowSize, settings: CostSettings, seed: int) -> Networ
 
 
 class Walkers:
-    """People who walk among false positives that look like one of them or like nobody."""
+    """Walking people among false positives, some of which resemble one of them."""
 
     def __init__(self, size: WindowSize, seed: int) -> None:
         self._size = size
@@ -50,14 +50,14 @@ class Walkers:
         self._speed = self._rng.normal(0.0, 3.0, (size.objects, 2))
 
     def templates(self) -> list[Template]:
-        """Return everybody where they are now."""
+        """Return the templates of all people at their current places."""
         return [
             Template(n, self.looks[n], np.concatenate([self.corners[n], self.corners[n] + PERSON]))
             for n in range(self._size.objects)
         ]
 
     def step(self) -> Detections:
-        """Walk on by a frame, turning back at the edges; give what is seen."""
+        """Move by a frame, turning back at the edges; return the observations."""
         rng, size = self._rng, self._size
         self._speed += rng.normal(0.0, 0.5, self._speed.shape)
         self._speed = np.clip(self._speed, -6.0, 6.0)
@@ -84,7 +84,7 @@ class Walkers:
 
 
 def walking_window(size: WindowSize, settings: CostSettings, seed: int) -> Network:
-    """Return one window of people who walk."""
+    """Build a window of walking people."""
     people = Walkers(size, seed)
     templates = people.templates()
     return build_network(templates, [people.step() for _ in range(size.frames)], settings)
@@ -93,7 +93,7 @@ def walking_window(size: WindowSize, settings: CostSettings, seed: int) -> Netwo
 def moving_windows(
     size: WindowSize, steps: int, seed: int
 ) -> Iterator[tuple[list[Template], list[Detections]]]:
-    """Yield the windows that a tracker with a stride of one frame solves one after the other."""
+    """Yield the windows of a tracker with a stride of one frame."""
     people = Walkers(size, seed)
     past = [people.templates()]
     frames: list[Detections] = []

@@ -1,4 +1,4 @@
-"""How long solvers take on windows: processor time, so that other work on the machine does not count."""
+"""Processor times of solvers on windows."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import Solution, create_solver
 
 GATE = 60.0
-"""Pixels a frame; people at 25 frames a second and CIF move a tenth of it."""
+"""Pixels per frame: ten times what people move at 25 frames a second and CIF."""
 
 REPEATS = 3
-"""Solves whose median is a quick solver's time."""
+"""Repetitions for the median time of a quick solver."""
 
 Window = Callable[[WindowSize, CostSettings, int], Network]
 
 
 @dataclass(frozen=True, slots=True)
 class WindowCase:
-    """A kind of window: `name`, how it is made, and the layout term's weight μ."""
+    """A kind of window: its `name`, its generator, and the weight μ of the layout term."""
 
     name: str
     window: Window
@@ -32,7 +32,7 @@ class WindowCase:
     layout: float = 0.0
 
     def network(self, seed: int, gate: float | None = None) -> Network:
-        """Build one."""
+        """Build the network of a window."""
         return self.window(self.size, replace(PAPER_COSTS, layout=self.layout, gate=gate), seed)
 
 
@@ -55,14 +55,14 @@ EXACT_CASES = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedSolution:
-    """A solution, and the processor time it took."""
+    """A solution with its processor time."""
 
     seconds: float
     solution: Solution
 
 
 def timed(solver: str, network: Network) -> TimedSolution:
-    """Solve once."""
+    """Solve a network, and measure the time."""
     found = create_solver(solver)
     start = time.process_time()
     solution = found.solve(network)
@@ -70,18 +70,18 @@ def timed(solver: str, network: Network) -> TimedSolution:
 
 
 def seconds(solver: str, network: Network, repeats: int = 1) -> float:
-    """Return the median time of some solves."""
+    """Return the median time of repeated solves."""
     return float(np.median([timed(solver, network).seconds for _ in range(repeats)]))
 
 
 def warm_up() -> None:
-    """Load what solvers load when they are first used."""
+    """Solve once, so that solvers load their libraries."""
     seconds("columns", random_window(WindowSize(2, 5, 3), PAPER_COSTS, 0))
 
 
 @dataclass(frozen=True, slots=True)
 class TimeRatio:
-    """Medians over windows, seconds, and the median ratio."""
+    """Median times over windows, seconds, and the median ratio."""
 
     arcs: float
     columns: float
@@ -98,21 +98,21 @@ def against_arcs(case: WindowCase, seeds: int, gate: float | None) -> TimeRatio:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LiveTimes:
-    """Windows one after the other: `seconds` of each, the network's building included, and `rounds`."""
+    """Times of consecutive windows: `seconds` of each, including building the network, and `rounds`."""
 
     seconds: np.ndarray
     rounds: np.ndarray
 
 
-def live(size: WindowSize, steps: int, *, told: bool) -> LiveTimes:
-    """Solve windows at a stride of one frame; `told`: each with the hint of the one before."""
+def live(size: WindowSize, steps: int, *, warm: bool) -> LiveTimes:
+    """Solve windows at a stride of one frame; `warm`: each with the warm start of the previous one."""
     solver, settings = create_solver("columns"), replace(PAPER_COSTS, gate=GATE)
     times, rounds = [], []
     hint = None
     for templates, frames in moving_windows(size, steps, seed=0):
         start = time.process_time()
         solution = solver.solve(build_network(templates, frames, settings), hint)
-        if told:
+        if warm:
             hint = solution.warm_start.shift(1, range(size.objects))
         times.append(time.process_time() - start)
         rounds.append(solution.report.rounds)

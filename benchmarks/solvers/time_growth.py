@@ -1,4 +1,4 @@
-"""How solvers' times grow with the window, and the paper's Fig. 21 and Table I as plots."""
+"""Growth of the solvers' times with the window, and the paper's Fig. 21 and Table I as plots."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def exponent(sizes: tuple[WindowSize, ...], times: tuple[float, ...]) -> float:
 
 
 def grown(sweep: SizeSweep, solver: str, seeds: int) -> TimeGrowth:
-    """Time a solver along a sweep: the mean over random windows, as in the paper."""
+    """Time a solver along a sweep: means over random windows, as in the paper."""
     repeats = REPEATS if solver != "arcs" else 1
     times = tuple(
         float(np.mean([seconds(solver, random_window(size, PAPER_COSTS, k), repeats) for k in range(seeds)]))

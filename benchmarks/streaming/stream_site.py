@@ -57,7 +57,7 @@ class ViewerProcess:
 
 
 class StreamSite:
-    """A site that is running."""
+    """A running site."""
 
     def __init__(self, http: int, service: subprocess.Popen[bytes], folder: Path) -> None:
         self.http, self.folder = http, folder

@@ -1,1 +1,1 @@
-"""The survey's comparison of trackers with measurements for its words."""
+"""The survey's comparison of trackers, with measurements in place of its words."""

@@ -1,16 +1,16 @@
-"""The survey's Table 1 with measurements in place of its words: occlusion, identities, targets, real time.
+"""The survey's Table 1, measured: occlusion, identities, targets, real time.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.survey_table --data ../shared/data --out out/bench
 
-Todor (2009, section 7.5) compares trackers by words: whether they are robust to occlusion, follow many
-targets, keep identities and run in real time. Here each of them, and the network program, follows the same
-people in the same pictures with the same detections; beside what is measured stands the word. Two columns of
-the words are no measurements (what distributions and motions a method can represent) and are left out.
+Todor (2009, section 7.5) rates trackers in words: whether they are robust to occlusion, track many targets,
+keep identities and run in real time. Here each of them, and the network program, tracks the same people in
+the same pictures with the same detections; the word is printed beside the measurement. Two columns that
+cannot be measured (the distributions and motions that a method can represent) are left out.
 
-An occlusion is a person of the truth who is hidden and comes back. Survived is that the number around whom
-they are in the second before is the one in the second after. Recordings: PETS 2009 and terrace where they
-are, and rooms that are drawn, whose truth knows every hidden pixel. Targets are how many people's boxes are
-right at a time, of how many are there. The time is the tracker's alone, on one core.
+An occlusion is a true person who is hidden and reappears. It is survived if their id in the second before is
+that in the second after. Recordings: PETS 2009 and terrace where they are available, and synthetic rooms,
+whose ground truth knows every hidden pixel. Targets: people with a correct box at a time, of those present.
+The time is the tracker's alone, on one core.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import matplotlib as mpl
 from benchmarks.baselines import SearchedView
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from benchmarks.survey_table.measured_row import REAL_TIME, TrackerRow, ViewMeasurement, measured, summed
+from benchmarks.survey_table.measured_row import REAL_TIME, TrackerRow, ViewMeasurement, combine, measure_view
 from benchmarks.survey_table.plots import plot
 from benchmarks.survey_table.survey_ratings import WORDS, SurveyRatings
 from server.cli.track.command import config_for_video, detect_frames
@@ -41,19 +41,19 @@ _DRAWN = (("room", 6, 1), ("room", 8, 2))
 """Scene, people, seed."""
 _DRAWN_S = 30.0
 _QUICK = 150
-"""Frames, the last ones of each view: there somebody is."""
+"""Frames at the end of each view, where people are present."""
 
 
-def recorded(data: Path) -> Iterator[SearchedView]:
-    """Yield the recordings that there are."""
+def recorded_views(data: Path) -> Iterator[SearchedView]:
+    """Yield the available recordings."""
     for scene, name, rate in _RECORDED:
         video, truth = data / scene / f"{name}.mp4", data / scene / "gt" / f"{name}.txt"
         if video.is_file() and truth.is_file():
             yield _searched(f"{scene} {name}", video, truth, rate)
 
 
-def drawn(seconds: float) -> Iterator[SearchedView]:
-    """Draw the scenes, as `myview scene` does, and search them."""
+def render_views(seconds: float) -> Iterator[SearchedView]:
+    """Yield renderings of the synthetic scenes with their detections."""
     for name, people, seed in _DRAWN:
         scene = Scene(name, cameras=1, objects=people, seed=seed)
         with tempfile.TemporaryDirectory() as folder:
@@ -76,25 +76,25 @@ def measure(options: argparse.Namespace) -> None:
     """Measure, print and save."""
     report = Report()
     table: dict[str, list[ViewMeasurement]] = {name: [] for name in tracker_names()}
-    # One after the other: the pictures of all of them at once are gigabytes.
-    for whole in chain(recorded(options.data), drawn(_DRAWN_S)):
+    # One after the other: the pictures of all views together take gigabytes.
+    for whole in chain(recorded_views(options.data), render_views(_DRAWN_S)):
         view = _shortened(whole, options.frames) if options.frames else whole
         for name, found in table.items():
-            found.append(measured(view, name))
+            found.append(measure_view(view, name))
         report.table(
             f"{view.name}: {len(view.frames)} frames at {view.fps:.0f} fps",
             ["", "survived", "switches", "IDF1 %", "HOTA %", "targets", "ms", "fps"],
             [[name, *_cells(found[-1])] for name, found in table.items()],
         )
-    rows = {name: summed(found) for name, found in table.items()}
+    rows = {name: combine(found) for name, found in table.items()}
     report.table(
-        "Table 1, over all views: measured, and the survey's word",
+        "Table 1 over all views: measured, and the survey's rating",
         ["", "occlusion", "", "identities", "", "targets", "", "real time", ""],
         [[name, *_with_words(row, WORDS.get(name, SurveyRatings()))] for name, row in rows.items()],
     )
     report.say(
-        "occlusion: survived with the number; identities: mean IDF1, switches; targets: people whose boxes "
-        f"are right, of those there; real time: the slowest view's frames a second over {REAL_TIME:.0f}"
+        "occlusion: survived with the same id; identities: mean IDF1, switches; targets: people with a "
+        f"correct box, of those present; real time: frames a second on the slowest view / {REAL_TIME:.0f}"
     )
     plot(table, options.out / "survey_table.png")
     report.save(options.out / "survey_table.txt")
@@ -102,11 +102,11 @@ def measure(options: argparse.Namespace) -> None:
 
 def _cells(it: ViewMeasurement) -> list[str]:
     return [
-        f"{it.kept} of {it.hidden}",
+        f"{it.survived} of {it.occlusions}",
         str(it.scores.switches),
         f"{100 * it.scores.idf1:.1f}",
         f"{100 * it.scores.hota:.1f}",
-        f"{it.followed:.1f} of {it.there:.1f}",
+        f"{it.tracked:.1f} of {it.present:.1f}",
         f"{it.milliseconds:.1f}",
         f"{1e3 / it.milliseconds:.0f}",
     ]
@@ -114,13 +114,13 @@ def _cells(it: ViewMeasurement) -> list[str]:
 
 def _with_words(row: TrackerRow, words: SurveyRatings) -> list[str]:
     return [
-        f"{100 * row.share_kept:.0f} %: {row.kept} of {row.hidden}",
+        f"{100 * row.survival_rate:.0f} %: {row.survived} of {row.occlusions}",
         words.occlusion,
         f"{100 * row.idf1:.0f} %, {row.switches}",
         words.identities,
-        f"{row.followed:.1f} of {row.there:.1f}",
+        f"{row.tracked:.1f} of {row.present:.1f}",
         words.targets,
-        f"{row.slowest / REAL_TIME:.1f}",
+        f"{row.lowest_fps / REAL_TIME:.1f}",
         words.real_time,
     ]
 

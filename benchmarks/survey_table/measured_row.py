@@ -1,4 +1,4 @@
-"""What stands in the survey's Table 1 of one tracker, on one view and over all of them."""
+"""The measurements of a tracker for the survey's Table 1, on one view and over all views."""
 
 from __future__ import annotations
 
@@ -10,67 +10,67 @@ from benchmarks.baselines import SearchedView, follow
 from tracking.evaluation import Scores, evaluate, find_occlusions, identities_kept
 
 REAL_TIME = 25.0
-"""Frames a second that cameras send, and that the survey's videos have."""
+"""Frame rate of cameras, and of the survey's videos."""
 
 
 @dataclass(frozen=True, slots=True)
 class ViewMeasurement:
-    """One tracker on one view.
+    """The measurements of a tracker on one view.
 
     Attributes:
-        kept: occlusions after which the number is the same.
-        hidden: all occlusions.
-        scores: what else is measured of the tracks.
-        followed: people whose boxes are right, per frame.
-        there: people who are there, per frame.
-        milliseconds: that the tracker takes for a frame.
+        survived: survived occlusions.
+        occlusions: all occlusions.
+        scores: of the tracks.
+        tracked: people with a correct box, per frame.
+        present: people present, per frame.
+        milliseconds: of the tracker, per frame.
     """
 
-    kept: int
-    hidden: int
+    survived: int
+    occlusions: int
     scores: Scores
-    followed: float
-    there: float
+    tracked: float
+    present: float
     milliseconds: float
 
 
 @dataclass(frozen=True, slots=True)
 class TrackerRow:
-    """One tracker over all views: sums of counts, means of shares, and the slowest view's frames a second."""
+    """A tracker over all views: sums of counts, means of shares, and the lowest frame rate."""
 
-    kept: int
-    hidden: int
+    survived: int
+    occlusions: int
     idf1: float
     switches: int
-    followed: float
-    there: float
-    slowest: float
+    tracked: float
+    present: float
+    lowest_fps: float
 
     @property
-    def share_kept(self) -> float:
-        """The share of all occlusions that were survived; 0 of none."""
-        return self.kept / max(self.hidden, 1)
+    def survival_rate(self) -> float:
+        """The share of survived occlusions; 0 without any."""
+        return self.survived / max(self.occlusions, 1)
 
 
-def measured(view: SearchedView, tracker: str) -> ViewMeasurement:
-    """Let one tracker follow one view."""
+def measure_view(view: SearchedView, tracker: str) -> ViewMeasurement:
+    """Measure a tracker on one view."""
     rows, milliseconds = follow(tracker, view)
     around = round(view.fps)
     found = find_occlusions(view.truth, around)
     scores = evaluate(view.truth, rows)
-    there = sum(row.confidence != 0.0 for row in view.truth) / len(view.frames)
-    kept = sum(identities_kept(found, view.truth, rows, around))
-    return ViewMeasurement(kept, len(found), scores, scores.recall * there, there, milliseconds)
+    present = sum(row.confidence != 0.0 for row in view.truth) / len(view.frames)
+    survived = sum(identities_kept(found, view.truth, rows, around))
+    return ViewMeasurement(survived, len(found), scores, scores.recall * present, present, milliseconds)
 
 
-def summed(found: Sequence[ViewMeasurement]) -> TrackerRow:
-    """Put one tracker's views together."""
+def combine(found: Sequence[ViewMeasurement]) -> TrackerRow:
+    """Combine a tracker's measurements of all views."""
     return TrackerRow(
-        kept=sum(it.kept for it in found),
-        hidden=sum(it.hidden for it in found),
+        survived=sum(it.survived for it in found),
+        occlusions=sum(it.occlusions for it in found),
         idf1=fmean(it.scores.idf1 for it in found),
         switches=sum(it.scores.switches for it in found),
-        followed=fmean(it.followed for it in found),
-        there=fmean(it.there for it in found),
-        slowest=1e3 / max(it.milliseconds for it in found),
+        tracked=fmean(it.tracked for it in found),
+        present=fmean(it.present for it in found),
+        lowest_fps=1e3 / max(it.milliseconds for it in found),
     )

@@ -8,19 +8,22 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.survey_table.measured_row import REAL_TIME, TrackerRow, ViewMeasurement, summed
+from benchmarks.survey_table.measured_row import REAL_TIME, TrackerRow, ViewMeasurement, combine
 
 _WIDTH = 0.8
 
 
 def plot(table: Mapping[str, Sequence[ViewMeasurement]], path: Path) -> None:
-    """Draw occlusions survived, identities, targets and speed of each tracker, over all views."""
-    rows: dict[str, TrackerRow] = {name: summed(found) for name, found in table.items()}
+    """Draw survived occlusions, identities, targets and speed of each tracker, over all views."""
+    rows: dict[str, TrackerRow] = {name: combine(found) for name, found in table.items()}
     panels = (
-        ("occlusions survived, %", [100 * row.share_kept for row in rows.values()]),
+        ("occlusions survived, %", [100 * row.survival_rate for row in rows.values()]),
         ("IDF1, %", [100 * row.idf1 for row in rows.values()]),
-        ("people right, of those there, %", [100 * row.followed / row.there for row in rows.values()]),
-        (f"times {REAL_TIME:.0f} fps, slowest view", [row.slowest / REAL_TIME for row in rows.values()]),
+        (
+            "people with a correct box, of those present, %",
+            [100 * row.tracked / row.present for row in rows.values()],
+        ),
+        (f"times {REAL_TIME:.0f} fps, slowest view", [row.lowest_fps / REAL_TIME for row in rows.values()]),
     )
     figure = Figure(figsize=(12, 0.7 + 0.42 * len(rows)))
     axes = figure.subplots(1, len(panels), sharey=True)

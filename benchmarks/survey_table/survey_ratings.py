@@ -1,4 +1,4 @@
-"""The words of the survey's Table 1, for the columns that are measured (Todor 2009, section 7.5)."""
+"""The ratings of the survey's Table 1, for the measured columns (Todor 2009, section 7.5)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class SurveyRatings:
-    """One tracker's row; empty where the survey has none."""
+    """The ratings of a tracker; empty where the survey has none."""
 
     occlusion: str = ""
     targets: str = ""

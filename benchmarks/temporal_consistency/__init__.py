@@ -1,1 +1,1 @@
-"""Temporal consistency from above: who is mistaken after a merge, and what pruning saves."""
+"""Temporal consistency in an overhead view: identity errors after merges, and the effect of pruning."""

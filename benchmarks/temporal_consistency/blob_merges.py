@@ -1,7 +1,7 @@
-"""Merges: who was in one blob with whom, and whether everybody is themselves again when they part.
+"""Merges of people in one blob, and identity errors after they part.
 
-People are merged while the difference blobs of two or more of them are one (Khalaf and Intille, section 4.1).
-A merge of n people is n chances to take somebody for somebody else afterwards.
+People are merged while two or more share one difference blob (Khalaf and Intille, section 4.1). A merge of n
+people is n chances of a wrong identity afterwards.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 NOBODY = -1
-"""The blob of somebody who is in none."""
+"""The blob number of a person without a blob."""
 
 
 @dataclass(frozen=True, slots=True)
 class PersonMerge:
-    """One person's time in a merge, between two times alone: stages, the last ones excluded."""
+    """A person's time in a merge, between two times alone: ranges of stages."""
 
     person: int
     before: tuple[int, int]
@@ -28,13 +28,13 @@ class PersonMerge:
     after: tuple[int, int]
 
 
-def merged(blobs: NDArray[np.int64]) -> list[PersonMerge]:
-    """Find the merges that begin and end in a recording, one for each person in each, by `(T, P)` blobs."""
+def find_merges(blobs: NDArray[np.int64]) -> list[PersonMerge]:
+    """Return the merges that begin and end in a recording, one for each person, by `(T, P)` blobs."""
     return [it for person in range(blobs.shape[1]) for it in _of(person, _alone(blobs, person))]
 
 
 def events(found: Sequence[PersonMerge], blobs: NDArray[np.int64]) -> int:
-    """Count the merges: people who are in one blob at one time are in the same one."""
+    """Count the distinct merges: people in one blob at one time are in the same merge."""
     group = list(range(len(found)))
     at: dict[tuple[int, int], int] = {}
     for place, it in enumerate(found):
@@ -45,33 +45,33 @@ def events(found: Sequence[PersonMerge], blobs: NDArray[np.int64]) -> int:
     return len(set(group))
 
 
-def mistaken(
-    found: Sequence[PersonMerge], blobs: NDArray[np.int64], told: Sequence[Mapping[int, int]]
+def count_wrong_ids(
+    found: Sequence[PersonMerge], blobs: NDArray[np.int64], tracked: Sequence[Mapping[int, int]]
 ) -> list[bool]:
-    """Return who of those merged is somebody else afterwards; `told` are the blobs by number of each stage.
+    """Return the merges after which a person has another id; `tracked` are the blobs by id of each stage.
 
-    Somebody's number is the one that is in their blob in most of the stages in which they are alone, before
-    and after. Who had none before cannot lose it.
+    A person's id is the most frequent one in their blob while they are alone, before and after. A person
+    without an id before cannot lose it.
     """
     wrong = []
     for it in found:
-        before = _number(it.person, it.before, blobs, told)
-        wrong.append(before is not None and before != _number(it.person, it.after, blobs, told))
+        before = _number(it.person, it.before, blobs, tracked)
+        wrong.append(before is not None and before != _number(it.person, it.after, blobs, tracked))
     return wrong
 
 
 def _number(
-    person: int, stages: tuple[int, int], blobs: NDArray[np.int64], told: Sequence[Mapping[int, int]]
+    person: int, stages: tuple[int, int], blobs: NDArray[np.int64], tracked: Sequence[Mapping[int, int]]
 ) -> int | None:
     counts = Counter(
-        number for t in range(*stages) for number, blob in told[t].items() if blob == blobs[t, person]
+        number for t in range(*stages) for number, blob in tracked[t].items() if blob == blobs[t, person]
     )
-    # Of equally frequent ones the lowest, whatever came first.
+    # Ties go to the lowest id.
     return min(counts, key=lambda number: (-counts[number], number)) if counts else None
 
 
 def _alone(blobs: NDArray[np.int64], person: int) -> list[bool | None]:
-    """Return for each stage whether a person has a blob of their own; None: no blob."""
+    """Return for each stage whether a person is alone in their blob; None: no blob."""
     mine = blobs[:, person]
     sharing = (blobs == mine[:, None]).sum(axis=1)
     return [
@@ -81,7 +81,7 @@ def _alone(blobs: NDArray[np.int64], person: int) -> list[bool | None]:
 
 
 def _of(person: int, alone: Sequence[bool | None]) -> Iterator[PersonMerge]:
-    """Cut a person's time into runs, and give those in merges that lie between two alone."""
+    """Return a person's runs of stages in merges that lie between two runs alone."""
     known = [(stage, state) for stage, state in enumerate(alone) if state is not None]
     runs = [(state, list(run)) for state, run in groupby(known, key=lambda it: it[1])]
     spans = [(state, (run[0][0], run[-1][0] + 1)) for state, run in runs]

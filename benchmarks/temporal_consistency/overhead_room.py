@@ -1,4 +1,4 @@
-"""The room from above, and what is in each half second of it: blobs, and who is really in which."""
+"""The overhead room: the blobs of each half second, and the true blob of each person."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from tracking.detectors import Image
 
 SIZE = (320, 240)
 _EMPTY = 25
-"""Pictures of the empty room, with their noise, that the background is learned from."""
+"""Noisy pictures of the empty room for the background model."""
 
 
 @dataclass(frozen=True, slots=True)
 class OverheadClip:
-    """One sequence: so many people for so long."""
+    """A sequence: number of people, length and seed."""
 
     people: int
     minutes: float
@@ -35,31 +35,34 @@ class OverheadClip:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BlobSequence:
-    """A sequence as it was seen.
+    """The blobs of a sequence.
 
     Attributes:
-        stages: from the first in which everybody is alone.
-        blobs: `(T, P)`, in which blob of its stage everybody really is.
-        metre: pixels.
-        seconds: what finding the blobs of all stages took.
+        stages: from the first in which all people are alone.
+        blobs: `(T, P)`, the true blob of each person in each stage.
+        pixels_per_meter: pixels per meter.
+        seconds: to detect the blobs of all stages.
     """
 
     clip: OverheadClip
     stages: tuple[Stage, ...]
     blobs: NDArray[np.int64]
-    metre: float
+    pixels_per_meter: float
     seconds: float
 
 
-def played(clip: OverheadClip, stage_s: float, colours: Sequence[float] = (1.0,)) -> list[BlobSequence]:
-    """Play a sequence, one picture a stage: what lies between is not looked at.
+def render_sequence(
+    clip: OverheadClip, stage_s: float, saturations: Sequence[float] = (1.0,)
+) -> list[BlobSequence]:
+    """Render a sequence, one picture per stage, and detect its blobs.
 
-    Each picture is also seen with only a share of its colour, for each of `colours`.
+    Once for each color saturation in `saturations`.
     """
     scene = _scene(clip, clip.people, stage_s)
     empty = _scene(clip, 0, stage_s)
     eyes = [
-        _BlobReader(scene.homography(0), [empty.image(0, it) for it in range(_EMPTY)], it) for it in colours
+        _BlobReader(scene.homography(0), [empty.image(0, it) for it in range(_EMPTY)], it)
+        for it in saturations
     ]
     for frame in range(round(clip.minutes * 60.0 / stage_s)):
         image, truth = scene.image(0, frame), scene.truth(frame)[0]
@@ -72,24 +75,24 @@ def played(clip: OverheadClip, stage_s: float, colours: Sequence[float] = (1.0,)
 
 
 class _BlobReader:
-    """Finds the blobs of pictures with a share of their colour, and says who is in which."""
+    """Detects the blobs of pictures at a color saturation, and assigns the true people to them."""
 
-    def __init__(self, homography: Floats | None, empty: Sequence[Image], colour: float) -> None:
+    def __init__(self, homography: Floats | None, empty: Sequence[Image], saturation: float) -> None:
         if homography is None:
             raise ValueError("people from above need a floor")
         across = np.array([[0.0, SIZE[1] / 2.0], [SIZE[0], SIZE[1] / 2.0]])
         left, right = to_ground(homography, across)
         self.finder = BlobDetector(SIZE, float(np.hypot(*(right - left))), BlobSettings())
-        self._colour = colour
-        self.finder.prepare([faded(image, colour) for image in empty])
+        self._color = saturation
+        self.finder.prepare([desaturated(image, saturation) for image in empty])
         self.stages: list[Stage] = []
         self.rows: list[NDArray[np.int64]] = []
         self.seconds = 0.0
 
     def look(self, frame: int, image: Image, truth: CameraTruth, people: int) -> None:
-        """Take a picture in; before everybody was alone once, nothing is kept of it."""
+        """Add a picture; stages before all people were alone once are dropped."""
         began = time.perf_counter()
-        found = self.finder.detect(faded(image, self._colour), learn=True)
+        found = self.finder.detect(desaturated(image, self._color), learn=True)
         self.seconds += time.perf_counter() - began
         row = np.full(people, NOBODY, dtype=np.int64)
         for number, box in zip(truth.ids.tolist(), truth.boxes, strict=True):
@@ -100,12 +103,12 @@ class _BlobReader:
             self.rows.append(row)
 
 
-def faded(image: Image, colour: float) -> Image:
-    """Return a picture with a share of its colour, as bright as it was."""
-    if colour == 1.0:
+def desaturated(image: Image, saturation: float) -> Image:
+    """Return a picture at a color saturation, with the same brightness."""
+    if saturation == 1.0:
         return image
-    grey = cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
-    return np.asarray(cv2.addWeighted(image, colour, grey, 1.0 - colour, 0.0), dtype=np.uint8)
+    gray = cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+    return np.asarray(cv2.addWeighted(image, saturation, gray, 1.0 - saturation, 0.0), dtype=np.uint8)
 
 
 def _scene(clip: OverheadClip, people: int, stage_s: float) -> Scene:
@@ -114,7 +117,7 @@ def _scene(clip: OverheadClip, people: int, stage_s: float) -> Scene:
 
 
 def _blob_of(box: Floats, found: tuple[Blob, ...]) -> int:
-    """Return the blob that fills most of the middle of somebody's box."""
+    """Return the blob that fills most of the center of a person's box."""
     middle, half = (box[:2] + box[2:]) / 2.0, (box[2:] - box[:2]) / 4.0
     core = np.rint(np.concatenate([middle - half, middle + half])).astype(int)
     filled = [_filled(blob, core) for blob in found]

@@ -1,1 +1,1 @@
-"""What choosing views costs, and how it grows."""
+"""Time of view selection, and its growth."""

@@ -1,10 +1,10 @@
-"""What choosing views costs, and how it grows with people and cameras; a plot.
+"""Time of view selection, and its growth with people and cameras; a plot.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.view_selection_speed --out out/bench
 
-The program alone has costs drawn from a seed, everybody seen by every camera. The whole decision is that of
-the best-view service's own classes on what cameras would send: people who walk before some of the cameras.
-Times are processor time of one thread, per frame of all cameras together.
+The program alone runs on random costs, with every person in every camera's view. The whole decision runs the
+best-view service's own classes on simulated track messages of people in view of some cameras. Times are
+processor time of one thread, per frame of all cameras together.
 """
 
 from __future__ import annotations
@@ -25,39 +25,39 @@ _SEEN_BY = (1, 2, 4)
 
 
 def program_row(gop: int, repeats: int) -> list[str]:
-    """Return a row: the program at the size that is promised, without and with a least shot of a second."""
+    """Return a row: the program at the promised size, without and with a minimum shot of a second."""
     free = frame_time(ProgramSize(_PEOPLE, _CAMERAS, _AHEAD, gop, 0), repeats)
     kept = frame_time(ProgramSize(_PEOPLE, _CAMERAS, _AHEAD, gop, -(-25 // gop)), repeats)
     return [f"{gop}", f"{1e3 * free:.3f}", f"{1e3 * kept:.3f}"]
 
 
 def decision_row(seen_by: int, gop: int, epochs: int, *, all_terms: bool) -> list[str]:
-    """Return a row: what the stages of the whole decision cost."""
+    """Return a row: the times of the stages of the whole decision."""
     spent = decision_times(SimulatedCrowd(_PEOPLE, _CAMERAS, seen_by), gop, epochs, all_terms=all_terms)
     stages = (
-        spent.reading,
+        spent.decoding,
         spent.quality,
         spent.costs,
-        spent.choice,
+        spent.selection,
         spent.decision,
         spent.people,
-        spent.telling,
+        spent.publishing,
     )
     return [f"{seen_by}", f"{gop}", "all" if all_terms else "default", *(f"{1e3 * it:.2f}" for it in stages)]
 
 
 def plot(report: dict[str, tuple[tuple[int, ...], list[float]]], path: Path) -> None:
-    """Draw how the program's time grows."""
+    """Draw the growth of the program's time."""
     from matplotlib.figure import Figure  # noqa: PLC0415 — loading it would count as the first row's time
 
     figure = Figure(figsize=(10, 4), layout="constrained")
     for axis, (label, (sizes, times)) in zip(figure.subplots(1, len(report)), report.items(), strict=True):
         axis.plot(sizes, [1e3 * value for value in times], marker="o", label="measured")
         straight = [1e3 * times[-1] * size / sizes[-1] for size in sizes]
-        axis.plot(sizes, straight, linestyle=":", label="in proportion to the last")
+        axis.plot(sizes, straight, linestyle=":", label="proportional to the last")
         axis.set(xlabel=label, ylabel="processor time a frame, ms", xscale="log", yscale="log")
         axis.legend()
-    figure.suptitle(f"Choosing views: N = {_AHEAD}, GOP 10")
+    figure.suptitle(f"View selection: N = {_AHEAD}, GOP 10")
     figure.savefig(path, dpi=120)
 
 
@@ -93,22 +93,20 @@ def run(options: argparse.Namespace) -> None:
             "seen by",
             "GOP",
             "terms",
-            "reading",
+            "decoding",
             "quality",
             "costs",
-            "choice",
+            "selection",
             "decision",
-            "who is who",
-            "telling",
+            "identities",
+            "publishing",
         ],
         rows,
     )
     report.say(
-        "decision: reading, quality, costs, choice and what is kept of them, from messages to everybody's"
+        "decision: decoding, quality, costs, selection and bookkeeping, from messages to selected views."
     )
-    report.say(
-        "camera. Beside it: keeping who is who (here by given numbers), and writing choices and boxes down"
-    )
+    report.say("Besides: identities (here by given ids), and encoding choices and boxes")
     report.say("for the files, the bus and the page.")
     options.out.mkdir(parents=True, exist_ok=True)
     plot(

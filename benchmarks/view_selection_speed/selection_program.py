@@ -1,4 +1,4 @@
-"""Times of the program that chooses views, on costs drawn from a seed."""
+"""Times of the view selection program on random costs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SWITCH_COST = 7.5
 
 @dataclass(frozen=True, slots=True)
 class ProgramSize:
-    """How much there is to choose."""
+    """The size of a selection problem."""
 
     objects: int
     cameras: int
@@ -26,9 +26,9 @@ class ProgramSize:
 
 
 def frame_time(size: ProgramSize, repeats: int) -> float:
-    """Return the seconds a frame: one choice serves all frames of a GOP; the median of some."""
+    """Return the median seconds per frame; one choice serves all frames of a GOP."""
     rng = np.random.default_rng(_SEED)
-    # As the service has them: objects innermost.
+    # The service's memory layout: objects innermost.
     cost = rng.random((size.lookahead, size.cameras, size.objects)).transpose(2, 0, 1)
     previous = rng.integers(0, size.cameras, size.objects)
     held = rng.integers(1, max(2, size.least_shot), size.objects)

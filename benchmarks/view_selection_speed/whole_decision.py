@@ -1,4 +1,4 @@
-"""Times of the whole decision, from what cameras send to everybody's camera, on made-up crowds."""
+"""Times of the whole decision, from track messages to selected views, on simulated crowds."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 _SEED, _WIDTH, _HEIGHT = 5, 1280, 720
 _WARM = 6
-"""Epochs before it counts: the look-ahead has to fill."""
+"""Epochs before the measurement, which fill the look-ahead."""
 _ALL = QualitySettings(
     size=1.0,
     truncation=0.5,
@@ -40,14 +40,14 @@ _ALL = QualitySettings(
 
 @dataclass(frozen=True, slots=True)
 class SimulatedCrowd:
-    """People who walk, each before as many of the cameras."""
+    """Walking people, each in view of `seen_by` of the cameras."""
 
     people: int
     cameras: int
     seen_by: int
 
     def epochs(self, config: Config, count: int) -> Iterator[Epoch]:
-        """Yield what the cameras say: each window anew, as the tracker sends it."""
+        """Yield the cameras' messages: each window anew, as the tracker sends it."""
         rng = np.random.default_rng(_SEED)
         window, stride = config.track.window.window, config.track.window.stride
         cameras = [rng.permutation(self.cameras)[: self.seen_by] for _ in range(self.people)]
@@ -75,59 +75,59 @@ class SimulatedCrowd:
 
 @dataclass(frozen=True, slots=True)
 class StageSeconds:
-    """Seconds of processor time a frame."""
+    """Processor time per frame by stage, seconds."""
 
-    reading: float
+    decoding: float
     """Boxes out of messages."""
     quality: float
     """Of views, from boxes."""
     costs: float
     """Laid out by person."""
-    choice: float
+    selection: float
     """The program."""
     rest: float
     """Whose each shot is, and what is said of it."""
     people: float
     """Who is who, with the numbers given: only the keeping of them."""
-    telling: float
+    publishing: float
     """Boxes and choices written down as messages."""
 
     @property
     def decision(self) -> float:
-        """From messages to everybody's camera."""
-        return self.reading + self.quality + self.costs + self.choice + self.rest
+        """From messages to the selected views."""
+        return self.decoding + self.quality + self.costs + self.selection + self.rest
 
 
 class _AppearanceRegistry:
-    """A registry that reads people's numbers off their looks."""
+    """A registry that decodes people's ids from their appearance."""
 
     def update(
         self, tracks: Sequence[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
-        """Return everybody their number."""
+        """Return the id of every tracklet."""
         del last_frame, pictures
         numbers = {TrackletKey(*it.key, 0): int(it.appearance[0].histogram[0]) for it in tracks}
         return IdentityUpdate(numbers, created=(), returned=(), departed=(), merged=(), split=())
 
 
 def decision_times(crowd: SimulatedCrowd, gop: int, epochs: int, *, all_terms: bool) -> StageSeconds:
-    """Decide for a crowd, and give what the stages cost."""
+    """Decide for a crowd; return the times of the stages."""
     config = _config(crowd, gop, asdict(_ALL) if all_terms else {})
     ground = np.array([[1.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.002, 1.0]])
     decider = ViewDecider(config, dict.fromkeys(config.camera_ids, ground), lambda _camera, _pulse: True)
     decider.people._registry = _AppearanceRegistry()  # type: ignore[assignment]  # noqa: SLF001 — joining is measured elsewhere
     board, watch = DecisionState(25.0), Stopwatch()
     stages: tuple[Watched, ...] = (
-        (WindowReader, "read", "reading"),
+        (WindowReader, "read", "decoding"),
         (ViewQualityBuffer, "put", "quality"),
         (LookaheadWindow, "__init__", "costs"),
         (LookaheadWindow, "part", "costs"),
         (LookaheadPart, "gops", "costs"),
-        (decider_module, "select_views_by_gop", "choice"),
+        (decider_module, "select_views_by_gop", "selection"),
         (ViewDecider, "step", "rest"),
         (PersonTracker, "update", "people"),
-        (PersonTracker, "boxes", "telling"),
-        (DecisionState, "put", "telling"),
+        (PersonTracker, "boxes", "publishing"),
+        (DecisionState, "put", "publishing"),
     )
     for epoch in crowd.epochs(config, _WARM + epochs):
         if epoch.number < _WARM:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import ablation
-from benchmarks.ablation import DEFAULT, TERMS, Ablation, cell
+from benchmarks.ablation import ABLATIONS, DEFAULT, Ablation, cell
 from benchmarks.common.environment import SKIPPED
 from benchmarks.common.public_detections import Recording, find_recordings, track
 from benchmarks.other_trackers import __main__ as peers
@@ -56,9 +56,9 @@ def test_what_is_measured_is_what_the_command_writes(recording: Recording, tmp_p
     assert recording.score(track(recording)).idf1 > 0.9
 
 
-@pytest.mark.parametrize("term", TERMS, ids=lambda term: term.name)
+@pytest.mark.parametrize("term", ABLATIONS, ids=lambda term: term.name)
 def test_a_term_is_switched_off_by_settings_that_there_are(term: Ablation, recording: Recording) -> None:
-    track(recording, term.off)
+    track(recording, term.settings)
 
 
 def test_a_setting_that_there_is_not_is_refused(recording: Recording) -> None:
@@ -75,10 +75,10 @@ def test_without_a_term_the_difference_is_told() -> None:
 def test_the_ablation_has_a_row_for_each_term(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ablation, "TERMS", TERMS[:1])
+    monkeypatch.setattr(ablation, "ABLATIONS", ABLATIONS[:1])
     ablation.run(find_recordings(data), tmp_path / "out", jobs=1)
     printed = (tmp_path / "out" / "ablation.txt").read_text(encoding="utf-8")
-    assert printed.count(DEFAULT.name) == printed.count(TERMS[0].name) == len(ablation.SCORES)
+    assert printed.count(DEFAULT.name) == printed.count(ABLATIONS[0].name) == len(ablation.SCORES)
 
 
 def test_myview_is_compared_with_the_best_peer_of_each_score() -> None:

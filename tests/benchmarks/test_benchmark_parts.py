@@ -168,7 +168,7 @@ def test_what_was_watched_is_itself_again_afterwards() -> None:
     assert Work.inner is before
 
 
-def test_a_picture_with_too_many_colours_is_made_small_and_stays_itself() -> None:
+def test_a_picture_with_too_many_colors_is_made_small_and_stays_itself() -> None:
     across, down = np.meshgrid(np.arange(640), np.arange(400))
     noise = np.random.default_rng(1).integers(0, 12, (400, 640, 3))
     pixels = (np.stack([across / 3, down / 2, (across + down) / 5], axis=2) + noise).astype(np.uint8)

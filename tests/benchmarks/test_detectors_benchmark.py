@@ -14,7 +14,7 @@ from tracking.motchallenge import MotRow
 
 TRUTH = [MotRow(1, 7, 10, 10, 20, 50), MotRow(1, 8, 100, 10, 20, 50), MotRow(2, 7, 12, 10, 20, 50)]
 FOUND = [MotRow(1, -1, 11, 10, 20, 50), MotRow(1, -1, 11, 12, 20, 50), MotRow(2, -1, 200, 10, 20, 50)]
-VIEW = ScoredView("c0", Path("c0.mp4"), None, watermark=False, smallest=0.2)
+VIEW = ScoredView("c0", Path("c0.mp4"), None, watermark=False, min_height=0.2)
 
 
 def test_boxes_are_right_once_for_each_person_in_each_frame() -> None:

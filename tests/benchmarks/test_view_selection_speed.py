@@ -21,8 +21,8 @@ def test_everybody_is_seen_by_as_many_cameras_as_asked_for() -> None:
 
 def test_a_decision_is_the_sum_of_its_stages_and_less_than_all() -> None:
     spent = decision_times(SimulatedCrowd(people=20, cameras=3, seen_by=2), 10, 4, all_terms=True)
-    stages = (spent.reading, spent.quality, spent.costs, spent.choice, spent.rest)
-    assert min(*stages, spent.people, spent.telling) > 0
+    stages = (spent.decoding, spent.quality, spent.costs, spent.selection, spent.rest)
+    assert min(*stages, spent.people, spent.publishing) > 0
     assert spent.decision == sum(stages)
 
 

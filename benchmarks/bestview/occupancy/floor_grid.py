@@ -26,7 +26,7 @@ class GridSettings:
     """The grid on the ground. Lengths are in person heights.
 
     Attributes:
-        step: between neighbouring places; 0.15 is a quarter of a metre, the paper's.
+        step: between neighboring places; 0.15 is a quarter of a metre, the paper's.
         aspect: width of a person over their height in the picture.
         least_seen: share of a person that must be inside some picture and not ignored.
         gate: distance from the border of the visible ground within which people enter and leave.

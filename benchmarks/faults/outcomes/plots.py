@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from benchmarks.faults.outcomes.fault_run import FaultOutcome
 from benchmarks.faults.video.stamped_views import CAMERAS
 
-_COLOURS = ("tab:blue", "tab:orange", "tab:green")
+_COLORS = ("tab:blue", "tab:orange", "tab:green")
 _ROW_INCHES = 0.35
 
 
@@ -23,11 +23,11 @@ def draw(outcomes: Sequence[FaultOutcome], path: Path) -> None:
     figure = Figure(figsize=(10, 1.2 + _ROW_INCHES * len(lines)), layout="constrained")
     axes = figure.subplots()
     for row, (outcome, received) in enumerate(lines):
-        for camera, colour in zip(CAMERAS, _COLOURS, strict=True):
+        for camera, color in zip(CAMERAS, _COLORS, strict=True):
             moments = np.array([at for at, of in received.fresh if of == camera]) - outcome.began
             label = camera if row == 0 else None
-            axes.scatter(moments, np.full(len(moments), row), s=8, color=colour, label=label)
-        axes.plot([outcome.until - outcome.began], [row], marker="|", color="grey")
+            axes.scatter(moments, np.full(len(moments), row), s=8, color=color, label=label)
+        axes.plot([outcome.until - outcome.began], [row], marker="|", color="gray")
     axes.axvline(0.0, color="red", linewidth=1)
     axes.set_yticks(range(len(lines)), [outcome.fault.name for outcome, _ in lines])
     axes.invert_yaxis()

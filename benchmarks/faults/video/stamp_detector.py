@@ -50,8 +50,8 @@ def write_reader(views: StampedViews, camera: str, path: Path) -> Path:
         ("ReduceMean", ["strip"], "columns", {"axes": [0, 1, 2], "keepdims": 0}),
         ("Reshape", ["columns", "blocks_shape"], "blocks", {}),
         ("Slice", ["blocks", "middle_from", "middle_to", "middle_axes"], "middles", {}),
-        ("ReduceMean", ["middles"], "greys", {"axes": [1], "keepdims": 0}),
-        ("Greater", ["greys", "half"], "bright", {}),
+        ("ReduceMean", ["middles"], "grays", {"axes": [1], "keepdims": 0}),
+        ("Greater", ["grays", "half"], "bright", {}),
         ("Cast", ["bright"], "bits", {"to": real}),
         # A strip is legible where each bit differs from its inverse in the second half.
         ("Split", ["bits"], "straight inverse", {"axis": 0}),

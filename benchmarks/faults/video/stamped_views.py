@@ -78,9 +78,9 @@ def stamp_picture(image: NDArray[np.uint8], camera: int, frame: int) -> NDArray[
     return marked
 
 
-def read_stamp(grey: NDArray[np.uint8]) -> FrameStamp | None:
+def read_stamp(gray: NDArray[np.uint8]) -> FrameStamp | None:
     """Read the strip of a picture ``(H, W)``; None: it is illegible."""
-    rows = grey[-BLOCK + EDGE : grey.shape[0] - EDGE, : 2 * BITS * BLOCK].astype(np.float64)
+    rows = gray[-BLOCK + EDGE : gray.shape[0] - EDGE, : 2 * BITS * BLOCK].astype(np.float64)
     blocks = rows.reshape(len(rows), 2 * BITS, BLOCK)[:, :, EDGE:-EDGE].mean(axis=(0, 2)) > _MIDDLE
     bits, inverse = blocks[:BITS], blocks[BITS:]
     if (bits == inverse).any():

@@ -79,7 +79,7 @@ def message(boxes: Sequence[Sequence[Box | None]], frames: int) -> CameraTracks:
     )
 
 
-@pytest.mark.parametrize(("calibrated", "parts"), [(True, 4), (False, 2)])
+@pytest.mark.parametrize(("calibrated", "tracklets"), [(True, 4), (False, 2)])
 def test_tracks_are_cut_where_two_were_in_one_place_if_there_is_a_ground_to_ask_by(
     calibrated: bool, tracklets: int
 ) -> None:

@@ -70,8 +70,8 @@ def recorded_frames(pulses: Iterable[int]) -> dict[int, int]:
 @pytest.mark.parametrize(("camera", "frame"), [(0, 0), (1, 517), (2, 999)])
 def test_a_picture_says_whose_it_is_and_which(camera: int, frame: int) -> None:
     noise = np.random.default_rng(1).integers(0, 255, (144, 256, 3), dtype=np.uint8)
-    grey = stamp_picture(noise, camera, frame).mean(axis=2).astype(np.uint8)
-    assert read_stamp(grey) == FrameStamp(f"c{camera}", frame)
+    gray = stamp_picture(noise, camera, frame).mean(axis=2).astype(np.uint8)
+    assert read_stamp(gray) == FrameStamp(f"c{camera}", frame)
     assert read_stamp(noise.mean(axis=2).astype(np.uint8)) is None
 
 

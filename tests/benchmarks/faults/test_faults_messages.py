@@ -23,7 +23,7 @@ class RecordingSink:
         self.values.setdefault(key.rpartition("/")[2], []).append(int(payload))
 
 
-@pytest.mark.parametrize("how", ["plain", "lost", "doubled", "disordered"])
+@pytest.mark.parametrize("mode", ["plain", "lost", "doubled", "disordered"])
 def test_messages_are_lost_doubled_or_disordered_and_pictures_are_not(mode: str) -> None:
     sink = RecordingSink()
     link = LossyLink(sink)

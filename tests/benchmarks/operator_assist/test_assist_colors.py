@@ -1,4 +1,4 @@
-"""The colours of what moves, told from those of what only sways."""
+"""The colors of what moves, told from those of what only sways."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from tracking.detectors.base import Mask
 WATER, WEED, FISH, PALE = (150, 120, 40), (40, 110, 50), (30, 120, 240), (90, 130, 190)
 
 
-def _picture(weed: int, fish: int, colour: tuple[int, int, int] = FISH) -> Image:
+def _picture(weed: int, fish: int, color: tuple[int, int, int] = FISH) -> Image:
     image = np.full((60, 80, 3), WATER, dtype=np.uint8)
     image[30:, weed : weed + 12] = WEED
-    image[10:22, fish : fish + 20] = colour
+    image[10:22, fish : fish + 20] = color
     return image
 
 
@@ -31,7 +31,7 @@ def _taught(pale: bool) -> ForegroundColors:
     return ForegroundColors(seen)
 
 
-def test_what_swims_has_familiar_colours_and_what_sways_has_not() -> None:
+def test_what_swims_has_familiar_colors_and_what_sways_has_not() -> None:
     shares = _taught(pale=False).shares(_picture(40, 50))
     assert shares.shape == (60, 80)
     assert shares[10:22, 50:70].min() > 0.9
@@ -45,9 +45,9 @@ def test_who_is_pale_in_the_murk_is_known_where_somebody_pale_was_seen(pale: boo
     assert (shares[10:22, 50:70].min() > 0.9) == pale
 
 
-def test_a_colour_that_was_never_seen_says_nothing() -> None:
+def test_a_color_that_was_never_seen_says_nothing() -> None:
     assert np.allclose(_taught(pale=False).shares(np.full((4, 5, 3), 255, dtype=np.uint8)), 0.5)
 
 
-def test_without_a_picture_every_colour_says_nothing() -> None:
+def test_without_a_picture_every_color_says_nothing() -> None:
     assert np.allclose(ForegroundColors([]).shares(_picture(0, 0)), 0.5)

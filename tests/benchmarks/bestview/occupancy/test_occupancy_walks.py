@@ -37,8 +37,8 @@ def test_the_grid_covers_what_is_seen_and_its_border_is_the_gate() -> None:
     view = plan_view(0.0)
     floor = build_grid([view], GridSettings(step=0.2, gate=0.2, least_seen=0.5))
     assert (view.visible_share(view.boxes(floor.places, 0.34)) >= 0.5).all()
-    neighbours = (floor.moves < len(floor.places)).sum(axis=1)
-    assert floor.gates[neighbours < 9].all()
+    neighbors = (floor.moves < len(floor.places)).sum(axis=1)
+    assert floor.gates[neighbors < 9].all()
     assert not floor.gates.all()
     for place, around in enumerate(floor.moves):
         assert all(place in floor.moves[it] for it in around if it < len(floor.places)), "there and back"
@@ -120,6 +120,6 @@ def test_paths_that_swapped_two_people_give_their_numbers_back() -> None:
     ],
     ids=["told apart and right", "alike", "nothing known of one"],
 )
-def test_paths_keep_their_numbers_where_colours_say_nothing_else(walkers: list[PathAppearance]) -> None:
+def test_paths_keep_their_numbers_where_colors_say_nothing_else(walkers: list[PathAppearance]) -> None:
     numbers = assign_ids(walkers, 1.0, MeetingSettings())
     assert [set(it.tolist()) for it in numbers] == [{1}, {2}]

@@ -1,4 +1,4 @@
-"""Grey histograms of boxes, from who and what is in them: nobody is drawn, the pixels are drawn by lot."""
+"""Gray histograms of boxes, sampled from the people and the background in them, without drawing pictures."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from tracking.boxes import Floats
 BINS = 64
 """As in the paper (IV.A.2)."""
 _ACROSS, _DOWN = 9, 18
-"""Points of a box that are looked at."""
+"""Sampled points of a box."""
 _PIXELS = 500
-"""Pixels of a box that are drawn by lot: fewer than it has, since neighbours are alike."""
+"""Random samples of a box: fewer than its pixels, since neighboring ones are correlated."""
 _BODY = 0.8
-"""Width of a body over that of its box: the rest is background."""
+"""Width of a body as a share of its box; the rest is background."""
 _TILES = 4
-"""Parts of the background a side, each grey in its own way."""
+"""Tiles of the background on each side, each with its own histogram."""
 _NOBODY = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clothing:
-    """What everybody and everything looks like.
+    """The appearance of people and background.
 
     Attributes:
         halves: `(people, 2, BINS)` histograms of the upper and the lower body.
@@ -37,7 +37,7 @@ class Clothing:
 
 
 def wardrobe(kits: tuple[int, ...], rng: np.random.Generator) -> Clothing:
-    """Dress people: those of the same kit number nearly alike, the others not."""
+    """Create the clothing: nearly equal for people of the same kit, different otherwise."""
     clothes = {kit: _clothes(place, len(set(kits)), rng) for place, kit in enumerate(dict.fromkeys(kits))}
     own = [clothes[kit] + rng.normal(0.0, 1.5, (2, 1)) for kit in kits]
     halves = np.array([[_bell(middles, rng) for middles in pair] for pair in own])
@@ -48,7 +48,7 @@ def wardrobe(kits: tuple[int, ...], rng: np.random.Generator) -> Clothing:
 
 
 def _clothes(place: int, kits: int, rng: np.random.Generator) -> Floats:
-    """Return the two grey levels of each half, `(2, 2)`, of a kit: kits differ most in the upper half."""
+    """Return the two gray levels of each half, `(2, 2)`, of a kit: kits differ most in the upper half."""
     level = 6.0 + (BINS - 12.0) * (place + 0.5) / kits
     shirt = level + np.array([0.0, rng.uniform(4, 8)])
     trousers = rng.uniform(4, BINS - 4) + np.array([0.0, rng.uniform(3, 6)])
@@ -63,9 +63,9 @@ def _bell(middles: Floats, rng: np.random.Generator) -> Floats:
 
 
 def owners(box: Floats, people: Floats) -> NDArray[np.int64]:
-    """Return which person each point of a box shows, `(_DOWN, _ACROSS)`; -1: none.
+    """Return the person at each point of a box, `(_DOWN, _ACROSS)`; -1: none.
 
-    `people` are boxes `(n, 4)`, NaN who is away; who has their feet lower in the picture is nearer.
+    `people` are boxes `(n, 4)`, NaN while absent; people with lower feet in the picture are nearer.
     """
     x = np.linspace(box[0], box[2], _ACROSS + 2)[1:-1]
     y = np.linspace(box[1], box[3], _DOWN + 2)[1:-1]
@@ -79,7 +79,7 @@ def owners(box: Floats, people: Floats) -> NDArray[np.int64]:
 
 
 def visible(people: Floats) -> Floats:
-    """Return the share of each person, `(n,)`, that nobody nearer covers; 0 of who is away."""
+    """Return the visible share of each person, `(n,)`; 0 while absent."""
     shares = np.zeros(len(people))
     for k, box in enumerate(people):
         if not np.isnan(box).any():
@@ -91,7 +91,7 @@ def visible(people: Floats) -> Floats:
 
 
 def histogram(box: Floats, people: Floats, clothes: Clothing, rng: np.random.Generator) -> Floats:
-    """Return the grey histogram of a box, `(BINS,)`, summing to 1: of all that is in it, with noise."""
+    """Return the gray histogram of a box's content, `(BINS,)`, summing to 1, with noise."""
     shown = owners(box, people)
     y = np.linspace(box[1], box[3], _DOWN + 2)[1:-1]
     column, row = _tile((box[0] + box[2]) / 2, WIDTH), _tile((box[1] + box[3]) / 2, HEIGHT)
