@@ -99,7 +99,7 @@ def test_without_the_peers_myview_is_measured_all_the_same(
     monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
     peers.run(data, tmp_path / "out", tmp_path / "environment", None, pictures=True)
     printed = (tmp_path / "out" / "other_trackers.txt").read_text(encoding="utf-8")
-    assert "without the peers, which cannot be installed here: " in printed
+    assert "without other trackers, which cannot be installed here: " in printed
     assert "MyView" in printed
     assert "perfect association" in printed
     assert (tmp_path / "out" / "other_trackers.png").stat().st_size > 1000

@@ -120,7 +120,7 @@ def test_frames_whose_way_is_not_known_are_counted() -> None:
 
 
 def test_a_page_that_showed_nothing_is_an_error() -> None:
-    with pytest.raises(ValueError, match="no frame was shown"):
+    with pytest.raises(ValueError, match="no shown frame has all timestamps"):
         split(live_marks(), seen({}))
 
 
