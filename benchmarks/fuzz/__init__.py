@@ -1,1 +1,1 @@
-"""Bytes that nobody meant, for everything that reads bytes from outside."""
+"""Fuzzing of everything that reads bytes from outside."""

@@ -1,13 +1,13 @@
-"""Everything that reads bytes from outside is given bytes that nobody meant: what comes of them.
+"""Fuzzing of everything that reads bytes from outside.
 
     python -m benchmarks.fuzz --part mot
     python -m benchmarks.fuzz --target bus-sessions --first 5000 --inputs 5000
     python -m benchmarks.fuzz --replay out/fuzz/mot-text.ValueError-read_rows.1.bin
 
-An input that is wrong is refused in one clear line, or counted and dropped. A crash is anything else: another
-exception, a traceback in an answer or in the log, an answer 500, two seconds of processor time, 200 MB more
-memory, a process that dies. Inputs are made from their number and --seed: every run has the same ones.
-One may be a script of many messages: all that the reader was given are counted.
+A wrong input must be refused with one clear line, or counted and dropped. Anything else is a crash: another
+exception, a traceback in a response or in the log, status 500, two seconds of processor time, 200 MB more
+memory, a process that dies. Inputs are made from their number and --seed, so every run has the same ones. An
+input may be a script of many messages, which are all counted.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ _COLUMNS = ("target", "inputs", "messages", "a second", "refused", "accepted", "
 
 
 def targets_of(part: str) -> tuple[type[Target], ...]:
-    """Return the targets of a part, whose libraries are loaded only now."""
+    """Import and return the targets of a part."""
     found: tuple[type[Target], ...] = importlib.import_module(f"benchmarks.fuzz.{PARTS[part]}").TARGETS
     return found
 
 
-def side_by_side(
+def run_parallel(
     targets: Sequence[type[Target]], plan: FuzzPlan, jobs: int
 ) -> Iterator[tuple[int, TargetResult]]:
-    """Run targets, so many at a time; give each one's place and what came of it, as they end."""
+    """Run targets, `jobs` at a time; yield each one's place and result, as they end."""
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("fork")) as pool:
         running = {pool.submit(_run, it, plan): place for place, it in enumerate(targets)}
         for done in as_completed(running):
@@ -62,16 +62,16 @@ def _run(target: type[Target], plan: FuzzPlan) -> TargetResult:
 
 
 def replay(path: Path) -> int:
-    """Feed a saved input again; give 1 where it still crashes."""
+    """Feed a saved input again; return 1 if it still crashes."""
     name = path.name.split(".")[0]
     part = name.split("-", maxsplit=1)[0]
     kind = next((it for it in targets_of(part) if it.name == name), None) if part in PARTS else None
     if kind is None:
         sys.exit(f"{path}: no saved input of this name; they are called TARGET.KIND.NUMBER.bin")
     target = kind()
-    attempt = InputFeeder(target)
-    with attempt.watching():
-        found = attempt.feed(path.read_bytes())
+    feeder = InputFeeder(target)
+    with feeder.watching():
+        found = feeder.feed(path.read_bytes())
     target.close()
     if isinstance(found, Crash):
         print(found.text)
@@ -80,27 +80,27 @@ def replay(path: Path) -> int:
     return 0
 
 
-def row(name: str, tally: TargetResult) -> list[str]:
-    """Return a line of the table."""
-    counts, rate = tally.counts, tally.counts.messages / tally.seconds if tally.seconds else 0.0
+def row(name: str, result: TargetResult) -> list[str]:
+    """Return a row of the table."""
+    counts, rate = result.counts, result.counts.messages / result.seconds if result.seconds else 0.0
     numbers = (counts.inputs, counts.messages, round(rate), counts.refused, counts.accepted, counts.crashes)
-    return [name, *map(str, numbers), str(tally.kinds)]
+    return [name, *map(str, numbers), str(result.kinds)]
 
 
 def main() -> None:
-    """Fuzz, print the table, and end with 1 where something crashed."""
+    """Fuzz, print the table, and exit with 1 if anything crashed."""
     options = argparse.ArgumentParser(prog="python -m benchmarks.fuzz", description=__doc__.splitlines()[0])
     options.add_argument("--part", action="append", choices=PARTS, help="only this one; may be repeated")
     options.add_argument("--target", action="append", help="only this one of a part; may be repeated")
-    options.add_argument("--messages", type=int, help=f"to each target; {MESSAGES}, if nothing else is said")
-    options.add_argument("--inputs", type=int, help="of each target, of however many messages")
+    options.add_argument("--messages", type=int, help=f"of each target; {MESSAGES} by default")
+    options.add_argument("--inputs", type=int, help="of each target, regardless of messages")
     options.add_argument("--first", type=int, default=0, help="the number of the first input")
     options.add_argument("--seconds", type=float, help="of each target at most")
     options.add_argument(
-        "--jobs", type=int, default=len(os.sched_getaffinity(0)), help="targets at a time; each has a process"
+        "--jobs", type=int, default=len(os.sched_getaffinity(0)), help="targets at a time, a process each"
     )
     options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--out", type=Path, default=ROOT / "out" / "fuzz", help="folder for what crashed")
+    options.add_argument("--out", type=Path, default=ROOT / "out" / "fuzz", help="folder for crashing inputs")
     options.add_argument("--replay", type=Path, metavar="FILE", help="only feed this input again")
     chosen = options.parse_args()
     if chosen.replay is not None:
@@ -113,7 +113,7 @@ def main() -> None:
         if not chosen.target or it.name in chosen.target
     ]
     if not targets:
-        options.error("no target of these parts has such a name")
+        options.error("no target of these parts has this name")
     plan = FuzzPlan(
         inputs=chosen.inputs,
         seconds=chosen.seconds,
@@ -122,15 +122,15 @@ def main() -> None:
         messages=MESSAGES if chosen.inputs is None and chosen.messages is None else chosen.messages,
         first=chosen.first,
     )
-    tallies: dict[int, TargetResult] = {}
-    for place, tally in side_by_side(targets, plan, max(1, chosen.jobs)):
-        tallies[place] = tally
-        print("  ".join(row(targets[place].name, tally)), file=sys.stderr, flush=True)
-    rows = [row(it.name, tallies[place]) for place, it in enumerate(targets)]
-    report.table("Inputs that nobody meant", _COLUMNS, rows)
-    begun = [str(chosen.first)] if chosen.first else []
-    report.save(chosen.out / f"fuzz-{'-'.join([*(chosen.target or chosen.part or ['all']), *begun])}.txt")
-    sys.exit(any(it.counts.crashes for it in tallies.values()))
+    results: dict[int, TargetResult] = {}
+    for place, result in run_parallel(targets, plan, max(1, chosen.jobs)):
+        results[place] = result
+        print("  ".join(row(targets[place].name, result)), file=sys.stderr, flush=True)
+    rows = [row(it.name, results[place]) for place, it in enumerate(targets)]
+    report.table("Fuzzing", _COLUMNS, rows)
+    suffix = [str(chosen.first)] if chosen.first else []
+    report.save(chosen.out / f"fuzz-{'-'.join([*(chosen.target or chosen.part or ['all']), *suffix])}.txt")
+    sys.exit(any(it.counts.crashes for it in results.values()))
 
 
 if __name__ == "__main__":

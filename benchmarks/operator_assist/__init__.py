@@ -1,1 +1,1 @@
-"""An operator who is asked where identities are about to fail (Todor, chapter 8)."""
+"""Operator assistance: a simulated operator helps where identities are about to fail (Todor, chapter 8)."""

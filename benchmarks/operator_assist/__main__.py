@@ -1,15 +1,15 @@
-"""An operator who helps: nine identical fish, or a court, with flags, pointing, and what comes of it.
+"""Operator assistance on nine identical fish, or a court: flags, pointing, and the remaining failures.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.operator_assist --out out/bench
 
-Clips of 20 seconds of fish that all look alike are drawn (Todor 2009, section 8.1) and tracked twice: alone,
-and with a simulated operator at the screen, who sees to one flag at a time, looks after a while, points at
-where the fish really is with errors of a hand, and follows it until it is alone again. The picture that
-they see is as late as MyView's is. What is foreseen becomes a flag where a site would raise one. Risks were
-learned (`python -m benchmarks.operator_assist.risk_weights`) on clips of even seeds; clips of odd seeds are
-measured.
-`--kind school` takes a school of boxes without pictures instead, of which there are many clips in little
-time; `--objects` says how many swim.
+Clips of 20 seconds of identical fish are rendered (Todor 2009, section 8.1) and tracked twice: without help,
+and with a simulated operator, who handles one flag at a time, reacts after a while, points at the true place
+of the fish with the errors of a hand, and follows it until it is alone again. Their picture has MyView's
+delay. Risk events become flags where a site would raise them. Risk weights were learned by
+`python -m benchmarks.operator_assist.risk_weights` on clips of even seeds; clips of odd seeds are measured.
+
+`--kind school` simulates a school of boxes without pictures, which is much faster; `--objects` sets the
+number of fish.
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ import matplotlib.pyplot as plt
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from benchmarks.operator_assist import outcome_table as assist_table
-from benchmarks.operator_assist import recall_curve as assist_curve
-from benchmarks.operator_assist.assisted_tracking import TrackedClip, watch
+from benchmarks.operator_assist import outcome_table, recall_curve
+from benchmarks.operator_assist.assisted_tracking import TrackedClip, track_clip
 from benchmarks.operator_assist.clip_kinds import ClipKind, kinds
 from benchmarks.operator_assist.flag_outcomes import CAUSES, OutcomeCounts, count
 from benchmarks.operator_assist.flag_selection import FlagSelector
@@ -33,22 +32,24 @@ from benchmarks.operator_assist.simulated_operator import OperatorProfile
 from server.config.sections import FlagSettings
 
 _ANY = 600
-"""Flags a minute: as many as there are."""
+"""Flags a minute: effectively unlimited."""
 _SWEEP = (
-    ("points exactly", OperatorProfile(error=0.0)),
-    ("points badly: 2/3 of a body", OperatorProfile(error=2.0 / 3.0)),
+    ("exact pointing", OperatorProfile(error=0.0)),
+    ("bad pointing: 2/3 of a body", OperatorProfile(error=2.0 / 3.0)),
     ("quick: 0.2 s", OperatorProfile(reaction_s=0.2)),
     ("slow: 1 s", OperatorProfile(reaction_s=1.0)),
-    ("picture not late", OperatorProfile(delay_s=0.0)),
-    ("sees nothing again", OperatorProfile(back_s=0.0)),
+    ("no picture delay", OperatorProfile(delay_s=0.0)),
+    ("no replay", OperatorProfile(back_s=0.0)),
 )
 
 
 def measure(options: argparse.Namespace) -> None:
     """Measure, print and save."""
     report, kind = Report(), kinds(options.objects, options.seconds)[options.kind]
-    alone = [watch(clip, kind.setup) for clip in kind.clips(options.clips, first=0 if options.even else 1)]
-    points = assist_curve.curve(alone, OperatorProfile())
+    alone = [
+        track_clip(clip, kind.setup) for clip in kind.clips(options.clips, first=0 if options.even else 1)
+    ]
+    points = recall_curve.curve(alone, OperatorProfile())
     few, any_number = (
         FlagSettings(per_minute=most, risk=options.risk) for most in (options.per_minute, _ANY)
     )
@@ -58,48 +59,52 @@ def measure(options: argparse.Namespace) -> None:
     ]
     if options.sweep:
         people += [(name, person, any_number) for name, person in _SWEEP]
-    found = {name: count(_helped(alone, kind, person, flags), person) for name, person, flags in people}
+    found = {
+        name: count(_with_operator(alone, kind, person, flags), person) for name, person, flags in people
+    }
     name = f"operator_assist-{options.kind}{options.objects or ''}"
     report.say(f"{len(alone)} clips, {points[0].minutes:.1f} minutes")
     report.table(
-        "What flags foresee",
-        ["risk from", "flags/min", "failures/min", "flags per failure", "foreseen", "possible at most"],
-        assist_curve.rows(points),
+        "Failures foreseen by flags",
+        ["risk from", "flags/min", "failures/min", "flags per failure", "foreseen", "upper bound"],
+        recall_curve.rows(points),
     )
-    _tell(report, found, thesis=options.kind != "court" and options.objects in {None, 9})
-    assist_curve.plot(points, options.out / f"{name}-flags.png")
+    _print_tables(report, found, thesis=options.kind != "court" and options.objects in {None, 9})
+    recall_curve.plot(points, options.out / f"{name}-flags.png")
     _plot(found, options.out / f"{name}.png")
     report.save(options.out / f"{name}.txt")
 
 
-def _helped(
+def _with_operator(
     alone: list[TrackedClip], kind: ClipKind, person: OperatorProfile, flags: FlagSettings
 ) -> list[tuple[TrackedClip, TrackedClip]]:
-    """Watch the clips once more, one after the other, with somebody at the screen."""
-    desk = FlagSelector(flags, alone[0].clip.fps)
-    return [(it, watch(it.clip, kind.setup, person, desk)) for it in alone]
+    """Track the clips again, one after the other, with an operator."""
+    selector = FlagSelector(flags, alone[0].clip.fps)
+    return [(it, track_clip(it.clip, kind.setup, person, selector)) for it in alone]
 
 
-def _tell(report: Report, found: dict[str, OutcomeCounts], *, thesis: bool) -> None:
+def _print_tables(report: Report, found: dict[str, OutcomeCounts], *, thesis: bool) -> None:
     report.table(
-        "What helping is worth",
+        "Effect of the operator",
         ["operator", "flags/min", "failures", "foreseen", "with help", "avoided", "new", "saved"],
-        [[name, *_row(cases)] for name, cases in found.items()],
+        [[name, *_row(outcome_counts)] for name, outcome_counts in found.items()],
     )
-    for name, cases in found.items():
-        title = f"Every flag and every failure: {name}"
-        report.table(title, assist_table.head(thesis=thesis), assist_table.texts(cases, thesis=thesis))
+    for name, outcome_counts in found.items():
+        title = f"All flags and failures: {name}"
+        report.table(
+            title, outcome_table.head(thesis=thesis), outcome_table.texts(outcome_counts, thesis=thesis)
+        )
 
 
-def _row(cases: OutcomeCounts) -> list[str]:
-    before, after = cases.unaided.total(), cases.left.total()
+def _row(outcome_counts: OutcomeCounts) -> list[str]:
+    before, after = outcome_counts.unaided.total(), outcome_counts.left.total()
     return [
-        f"{cases.flags_a_minute:.1f}",
+        f"{outcome_counts.flags_a_minute:.1f}",
         str(before),
-        _share(cases.foreseen, before),
+        _share(outcome_counts.foreseen, before),
         str(after),
-        str(cases.avoided),
-        str(cases.made),
+        str(outcome_counts.avoided),
+        str(outcome_counts.caused),
         _share(before - after, before),
     ]
 
@@ -109,14 +114,14 @@ def _share(part: int, whole: int) -> str:
 
 
 def _plot(found: dict[str, OutcomeCounts], path: Path) -> None:
-    """Draw the failures without help, and with it by why they are left."""
+    """Draw the failures without help, and with help by cause."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure, axes = plt.subplots(figsize=(8, 0.7 + 0.6 * (len(found) + 1)))
-    names = ["nobody helps", *found]
+    names = ["no operator", *found]
     axes.barh(names[0], next(iter(found.values())).unaided.total(), color="0.6", label="without help")
     left = [0.0] * len(found)
     for cause, color in zip(CAUSES, (f"C{n}" for n in range(len(CAUSES))), strict=True):
-        counts = [cases.left[cause] for cases in found.values()]
+        counts = [outcome_counts.left[cause] for outcome_counts in found.values()]
         axes.barh(names[1:], counts, left=left, color=color, label=cause)
         left = [before + more for before, more in zip(left, counts, strict=True)]
     axes.invert_yaxis()
@@ -132,13 +137,17 @@ def main() -> None:
     mpl.use("Agg")
     cv2.setNumThreads(1)
     options = parser(__doc__, "operator_assist")
-    options.add_argument("--kind", choices=kinds(), default="fish", help="what is filmed")
-    options.add_argument("--objects", type=int, help="how many of them; else nine fish, ten players")
+    options.add_argument("--kind", choices=kinds(), default="fish", help="kind of clips")
+    options.add_argument(
+        "--objects", type=int, help="number of fish or players; by default nine fish, ten players"
+    )
     options.add_argument("--clips", type=int, default=56, help="how many")
     options.add_argument("--seconds", type=float, default=20.0, help="of each")
     options.add_argument("--per-minute", type=int, default=FlagSettings().per_minute, help="flags at most")
-    options.add_argument("--risk", type=float, default=FlagSettings().risk, help="from which one is raised")
-    options.add_argument("--even", action="store_true", help="the seeds that risks were learned on")
+    options.add_argument(
+        "--risk", type=float, default=FlagSettings().risk, help="from which a flag is raised"
+    )
+    options.add_argument("--even", action="store_true", help="the seeds that risk weights were learned on")
     options.add_argument("--sweep", action="store_true", help="other operators, too")
     options.add_argument("--quick", action="store_true", help="4 clips")
     chosen = options.parse_args()

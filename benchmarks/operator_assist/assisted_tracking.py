@@ -1,4 +1,4 @@
-"""A clip tracked live, with an operator at the screen or without."""
+"""Live tracking of a clip, with or without a simulated operator."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from tracking.solvers import DEFAULT_SOLVER
 
 _ALL = FlagSettings(per_minute=600, risk=0.0)
 _BATCH = 3
-"""Frames of which pointings are sent together: a tenth of a second."""
+"""Frames whose corrections are sent together: a tenth of a second."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrackingSetup:
-    """How a camera tracks."""
+    """The settings of a camera's tracker."""
 
     window: WindowSettings
     costs: CostSettings
@@ -44,9 +44,9 @@ FISH = TrackingSetup(
     CostSettings(displacement=1.0, gate=1.2, motion_slack=0.5, motion_drift=0.1, reappearance_drift=0.1),
     InteractiveSettings(enabled=True),
 )
-"""What is counted in heights of a box, for bodies that are three times as long as high, and turn.
+"""Settings in box heights for bodies that are three times as long as high, and turn.
 
-Nobody comes or goes: who is new where somebody is known is a part of them."""
+Nobody enters or leaves: a new box on a known fish is a part of it."""
 
 PLAYERS = TrackingSetup(WindowSettings(), CostSettings(), InteractiveSettings(enabled=True))
 """MyView's defaults."""
@@ -54,61 +54,64 @@ PLAYERS = TrackingSetup(WindowSettings(), CostSettings(), InteractiveSettings(en
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedClip:
-    """What came of a clip.
+    """The tracking result of a clip.
 
     Attributes:
         clip: the clip.
-        failures: where identities failed, with all mended that was.
-        troubles: what was foreseen, with the newest frame when it was.
-        flags: what the operator was asked.
+        failures: remaining identity failures, after all repairs.
+        risk_events: risk events, with the newest frame when they were reported.
+        flags: flags that the operator got.
         tracks: the boxes by frame and id.
     """
 
     clip: Clip
     failures: list[IdentityFailure]
-    troubles: list[tuple[int, RiskEvent]]
+    risk_events: list[tuple[int, RiskEvent]]
     flags: list[OperatorFlag]
     tracks: dict[int, dict[int, Floats]]
 
 
-def watch(
-    clip: Clip, setup: TrackingSetup, person: OperatorProfile | None = None, desk: FlagSelector | None = None
+def track_clip(
+    clip: Clip,
+    setup: TrackingSetup,
+    person: OperatorProfile | None = None,
+    selector: FlagSelector | None = None,
 ) -> TrackedClip:
-    """Track a clip as a camera does, frame by frame; nobody helps where there is no person.
+    """Track a clip as a camera does, frame by frame, with an operator if there is a profile.
 
-    Flags are raised at the desk; without one, for all that is foreseen.
+    Without a flag selector, all risk events raise flags.
     """
-    desk = desk or FlagSelector(_ALL, clip.fps)
-    desk.begin()
+    selector = selector or FlagSelector(_ALL, clip.fps)
+    selector.begin()
     tracker = InteractiveTracker(setup.window, setup.costs, create_solver(DEFAULT_SOLVER), setup.assist)
-    operator = SimulatedOperator(person, desk, clip.truth, clip.fps, clip.seed) if person else None
+    operator = SimulatedOperator(person, selector, clip.truth, clip.fps, clip.seed) if person else None
     shown: dict[int, dict[int, Floats]] = {}
-    troubles: list[tuple[int, RiskEvent]] = []
+    risk_events: list[tuple[int, RiskEvent]] = []
     waiting: list[PositionCorrection] = []
-    count = len(clip.seen)
+    count = len(clip.detections)
     for newest in range(count + (operator.after if operator else 0)):
         if newest < count:
-            result = tracker.push(newest, clip.seen[newest])
-            _show(shown, result)
+            result = tracker.push(newest, clip.detections[newest])
+            _merge_result(shown, result)
             found: Sequence[RiskEvent] = result.risk_events if result else ()
-            troubles += [(newest, it) for it in found]
+            risk_events += [(newest, it) for it in found]
             if operator:
-                operator.hear(newest, found)
+                operator.receive(newest, found)
         elif newest == count:
-            _show(shown, tracker.flush())
-        pointing = operator.look(newest, shown) if operator else None
+            _merge_result(shown, tracker.flush())
+        pointing = operator.point(newest, shown) if operator else None
         waiting += [pointing] if pointing else []
         if waiting and newest % _BATCH == 0:
-            _show(shown, tracker.apply_corrections(waiting))
+            _merge_result(shown, tracker.apply_corrections(waiting))
             waiting = []
-    _show(shown, tracker.flush())
-    _show(shown, tracker.apply_corrections(waiting))
+    _merge_result(shown, tracker.flush())
+    _merge_result(shown, tracker.apply_corrections(waiting))
     failed = failures(clip.truth, shown, clip.fps)
-    return TrackedClip(clip, failed, troubles, operator.flags if operator else [], shown)
+    return TrackedClip(clip, failed, risk_events, operator.flags if operator else [], shown)
 
 
-def _show(shown: dict[int, dict[int, Floats]], result: WindowResult | None) -> None:
-    """Replace what was said of the frames of a result."""
+def _merge_result(shown: dict[int, dict[int, Floats]], result: WindowResult | None) -> None:
+    """Replace the boxes of the frames of a result."""
     if result is None:
         return
     for frame in range(result.first, result.last + 1):

@@ -1,4 +1,4 @@
-"""The clips that an operator helps with: what a detector saw in every frame, and who is really where."""
+"""The clips of the benchmark: detections and ground truth of every frame."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from tracking import Detections
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """One recording of one camera.
+    """A recording of one camera.
 
     Attributes:
-        seed: what it was made from.
-        fps: frames a second.
-        seen: what was found, frame by frame.
-        truth: who is where.
+        seed: of the random generator.
+        fps: frames per second.
+        detections: of each frame.
+        truth: the ground truth.
     """
 
     seed: int
     fps: float
-    seen: tuple[Detections, ...]
+    detections: tuple[Detections, ...]
     truth: ObjectTruth
 
     @property
     def minutes(self) -> float:
-        """How long it is."""
-        return len(self.seen) / self.fps / 60.0
+        """The length in minutes."""
+        return len(self.detections) / self.fps / 60.0

@@ -1,9 +1,9 @@
-"""A school of identical fish without pictures: what a detector of foreground would find of them.
+"""A simulated school of identical fish without pictures: the detections of a foreground detector.
 
 Nine fish of one length swim at random in a tank in front of the camera and avoid each other and the walls
 (Todor 2009, section 8.1). Their boxes grow with nearness and get shorter where they swim to or from the
-camera; what is far is faint in the murk. Where boxes overlap the foreground is one piece: who is half covered
-is found seldom, and what is found of the others is off.
+camera; far fish are pale. Half occluded fish are rarely detected, and boxes of partly occluded ones are
+inexact.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from tracking.boxes import Floats
 
 FPS = 30.0
 _TANK = np.array([3.0, 1.6, 3.0])
-"""Half sides across, down and away, fish lengths."""
+"""Half of the tank's width, height and depth, fish lengths."""
 _AWAY = 9.0
 _FOCAL = 900.0
 _MIDDLE = np.array([400.0, 300.0])
 _SPEED = 0.035
-"""Lengths a frame: a length a second."""
+"""Lengths per frame: one per second."""
 _APART = 1.1
 _BINS = 64
 _GRID = 12
 
 
-def school(seed: int, fish: int = 9, seconds: float = 20.0) -> Clip:
-    """Return a clip; the same seed gives the same."""
+def simulate_school(seed: int, fish: int = 9, seconds: float = 20.0) -> Clip:
+    """Simulate a clip; deterministic by seed."""
     rng = np.random.default_rng(seed)
     places, headings = _swim(fish, round(seconds * FPS), rng)
     boxes = _boxes(places, headings)
     shares = np.stack([_visible(boxes[:, t], places[:, t, 2]) for t in range(boxes.shape[1])], axis=1)
-    seen = tuple(_found(boxes[:, t], shares[:, t], places[:, t, 2], rng) for t in range(boxes.shape[1]))
-    return Clip(seed, FPS, seen, ObjectTruth(boxes, shares))
+    detections = tuple(_found(boxes[:, t], shares[:, t], places[:, t, 2], rng) for t in range(boxes.shape[1]))
+    return Clip(seed, FPS, detections, ObjectTruth(boxes, shares))
 
 
 def _swim(fish: int, frames: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Return the middles `(fish, frames, 3)` and unit headings of the same shape."""
+    """Return the centers `(fish, frames, 3)` and unit headings of the same shape."""
     angle = 2 * np.pi * np.arange(fish) / fish
     here = np.stack([2.4 * np.cos(angle), 1.2 * np.sin(angle), np.zeros(fish)], axis=1)
     way = np.tile([0.0, 0.0, -0.3], (fish, 1)) + rng.normal(0.0, 0.2, (fish, 3))
@@ -59,7 +59,7 @@ def _swim(fish: int, frames: int, rng: np.random.Generator) -> tuple[Floats, Flo
 
 
 def _boxes(places: Floats, headings: Floats) -> Floats:
-    """Return the boxes `(fish, frames, 4)` pixels of bodies a length long and a third high."""
+    """Return the boxes `(fish, frames, 4)`, pixels, of bodies one length long and a third high."""
     scale = _FOCAL / (_AWAY + places[..., 2])
     middle = _MIDDLE + places[..., :2] * scale[..., None]
     across = scale * (0.25 + 0.75 * np.hypot(headings[..., 0], 0.0))
@@ -69,7 +69,7 @@ def _boxes(places: Floats, headings: Floats) -> Floats:
 
 
 def _visible(boxes: Floats, depth: Floats) -> Floats:
-    """Return the share of each box `(n, 4)` that no nearer one covers, on a grid of points."""
+    """Return the unoccluded share of each box `(n, 4)`, on a grid of points."""
     steps = (np.arange(_GRID) + 0.5) / _GRID
     shares = np.ones(len(boxes))
     for n, (left, top, right, bottom) in enumerate(boxes):
@@ -85,7 +85,7 @@ def _visible(boxes: Floats, depth: Floats) -> Floats:
 
 
 def _found(boxes: Floats, shares: Floats, depth: Floats, rng: np.random.Generator) -> Detections:
-    """Return what is found in one frame, in no order that tells who is who."""
+    """Return the detections of one frame, in random order."""
     clear = np.clip(1.0 - 0.18 * (depth + _TANK[2]), 0.0, 1.0)
     found, scores, looks = [], [], []
     for n in rng.permutation(len(boxes)):
@@ -101,7 +101,7 @@ def _found(boxes: Floats, shares: Floats, depth: Floats, rng: np.random.Generato
 
 
 def _look(clear: float, rng: np.random.Generator) -> Floats:
-    """Return the gray histogram `(_BINS,)` of a fish: paler the farther, rippled by the light."""
+    """Return the gray histogram `(_BINS,)` of a fish: paler with distance, noisy by the light."""
     level = 0.75 * _BINS - 20.0 * clear + rng.normal(0.0, 0.7)
     counts = np.histogram(rng.normal(level, 4.0, 1500), bins=_BINS, range=(0, _BINS))[0] + 0.01
     return np.asarray(counts / counts.sum())

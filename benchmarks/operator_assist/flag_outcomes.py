@@ -1,4 +1,4 @@
-"""What became of every flag and of every failure: the thesis's Table 2 (Todor 2009, section 8.2)."""
+"""The outcomes of flags and the causes of failures: Table 2 of the thesis (Todor 2009, section 8.2)."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Outcome = Literal["helped", "not needed", "harmed", "no help"]
 Cause = Literal[
     "pointed in vain", "followed wrongly", "late", "busy", "no flag", "earlier failure", "not foreseen"
 ]
-"""Why a failure is left: the operator pointed at the right fish before and after it; followed another fish
-than the track that was named had been on; had not pointed when it happened; was busy with other flags;
-it was foreseen, but others were more worth a flag; its tracks had failed before; or nothing was foreseen."""
+"""The cause of a remaining failure: the operator pointed at the right fish before it, in vain; followed
+another fish than the flagged track's; pointed too late; was busy with other flags; it was foreseen, but other
+risk events got the flags; its tracks had failed before; or it was not foreseen."""
 
 CAUSES: tuple[Cause, ...] = get_args(Cause)
 
 _BEFORE_S = 3.0
-"""Seconds before a failure in which a trouble or a flag of its tracks is about it."""
+"""Seconds before a failure in which a risk event or a flag of its tracks counts as about it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,14 +35,14 @@ class OutcomeCounts:
 
     Attributes:
         minutes: of video.
-        clips: how many.
-        flags: by whether others were in the way of whom it was about, and by outcome.
+        clips: number of clips.
+        flags: by kind (occlusion by others) and by outcome.
         unaided: failures without help, by kind.
-        foreseen: those that a trouble told of early enough to be answered.
+        foreseen: those with an early enough risk event.
         left: failures with help, by cause.
         kinds: failures with help, by kind.
-        avoided: failures without help that are none with it.
-        made: failures with help that were none without.
+        avoided: failures without help that do not occur with it.
+        caused: failures with help that do not occur without.
     """
 
     minutes: float
@@ -53,66 +53,68 @@ class OutcomeCounts:
     left: Counter[Cause]
     kinds: Counter[Kind]
     avoided: int
-    made: int
+    caused: int
 
     @property
     def flags_a_minute(self) -> float:
-        """Flags raised a minute of video."""
+        """Flags raised per minute of video."""
         return self.flags.total() / self.minutes if self.minutes else 0.0
 
 
 def count(pairs: Sequence[tuple[TrackedClip, TrackedClip]], person: OperatorProfile) -> OutcomeCounts:
-    """Count over clips that were watched twice: without help, and with it."""
+    """Count over clips that were tracked twice: without and with help."""
     flags: Counter[tuple[Kind, Outcome]] = Counter()
     unaided: Counter[Kind] = Counter()
     left: Counter[Cause] = Counter()
     kinds: Counter[Kind] = Counter()
-    foreseen = avoided = made = 0
+    foreseen = avoided = caused = 0
     for alone, helped in pairs:
         fps = alone.clip.fps
-        found = matches(helped.clip.truth, helped.tracks)
+        matched = matches(helped.clip.truth, helped.tracks)
         for flag in helped.flags:
-            about = _about(flag, found)
+            about = _about(flag, matched)
             flags[_kind(flag, about, helped), _outcome(flag, about, alone, helped)] += 1
         for failure in alone.failures:
             unaided[failure.kind] += 1
-            foreseen += any(tells(it, at, failure, fps, person) for at, it in alone.troubles)
-            avoided += not _again(failure, helped.failures, fps)
+            foreseen += any(is_about(it, at, failure, fps, person) for at, it in alone.risk_events)
+            avoided += not _in_other_run(failure, helped.failures, fps)
         for failure in helped.failures:
             kinds[failure.kind] += 1
-            left[_cause(failure, helped, found)] += 1
-            made += not _again(failure, alone.failures, fps)
+            left[_cause(failure, helped, matched)] += 1
+            caused += not _in_other_run(failure, alone.failures, fps)
     minutes = sum(alone.clip.minutes for alone, _ in pairs)
-    return OutcomeCounts(minutes, len(pairs), flags, unaided, foreseen, left, kinds, avoided, made)
+    return OutcomeCounts(minutes, len(pairs), flags, unaided, foreseen, left, kinds, avoided, caused)
 
 
-def _about(flag: OperatorFlag, found: NDArray[np.int64]) -> set[int]:
-    """Return the fish that a flag is about: on whom its tracks were when it was raised, or last before.
+def _about(flag: OperatorFlag, matched: NDArray[np.int64]) -> set[int]:
+    """Return the fish that a flag is about: those under its tracks when it was raised, or last before.
 
-    And who was followed, whom the operator took for one of them. Nobody, where the tracks were on no fish.
-    `found` is which track each fish was matched with, `(n, T)`.
+    And the fish that the operator followed. Empty where the tracks were on no fish. `matched` is the track
+    that each fish is matched with, `(n, T)`.
     """
     about = set() if flag.fish is None else {flag.fish}
-    for number in flag.trouble.objects:
-        fish, frames = np.nonzero(found[:, : flag.raised + 1] == number)
+    for number in flag.event.objects:
+        fish, frames = np.nonzero(matched[:, : flag.raised + 1] == number)
         about |= set(fish[frames == frames.max(initial=-1)].tolist())
     return about
 
 
 def _kind(flag: OperatorFlag, about: set[int], helped: TrackedClip) -> Kind:
     """Return whether others occluded a flagged person between the flag and its risk event."""
-    first, last = sorted((flag.trouble.frame, flag.raised))
+    first, last = sorted((flag.event.frame, flag.raised))
     return kind_of(involved(helped.clip.truth, about, first, last, helped.clip.fps))
 
 
 def _outcome(flag: OperatorFlag, about: set[int], alone: TrackedClip, helped: TrackedClip) -> Outcome:
-    """Return what a flag was good for: whom it was about failed without help, with it, both, or neither."""
+    """Return the outcome of a flag: whether its fish failed without help, with it, both, or neither."""
     fps = helped.clip.fps
     ended = flag.until if flag.ended is None else max(flag.ended, flag.until)
-    first, last = min(flag.trouble.frame, flag.raised) - _BEFORE_S * fps, max(ended, flag.raised) + fps
+    first, last = min(flag.event.frame, flag.raised) - _BEFORE_S * fps, max(ended, flag.raised) + fps
 
-    def failed(watched: TrackedClip) -> bool:
-        return any(about & {*it.fish} and it.before <= last and it.frame >= first for it in watched.failures)
+    def failed(clip_result: TrackedClip) -> bool:
+        return any(
+            about & {*it.fish} and it.before <= last and it.frame >= first for it in clip_result.failures
+        )
 
     without, with_help = failed(alone), failed(helped)
     if without:
@@ -120,48 +122,50 @@ def _outcome(flag: OperatorFlag, about: set[int], alone: TrackedClip, helped: Tr
     return "harmed" if with_help else "not needed"
 
 
-def tells(
-    trouble: RiskEvent, newest: int, failure: IdentityFailure, fps: float, person: OperatorProfile
+def is_about(
+    event: RiskEvent, newest: int, failure: IdentityFailure, fps: float, person: OperatorProfile
 ) -> bool:
-    """Return whether a risk event is about a failure, and early enough for the operator to see it."""
+    """Return whether a risk event is about a failure, and early enough for the operator."""
     early = newest - person.delay_s * fps + person.reaction_s * fps <= failure.frame
-    return bool(
-        early and newest >= failure.before - _BEFORE_S * fps and {*trouble.objects} & {*failure.tracks}
-    )
+    return bool(early and newest >= failure.before - _BEFORE_S * fps and {*event.objects} & {*failure.tracks})
 
 
-def _again(failure: IdentityFailure, others: Sequence[IdentityFailure], fps: float) -> bool:
-    """Return whether a failure is among those of the other run: the same fish, at about the same time."""
+def _in_other_run(failure: IdentityFailure, others: Sequence[IdentityFailure], fps: float) -> bool:
+    """Return whether a failure also occurs in the other run: the same fish at about the same time."""
     return any(
         {*failure.fish} & {*it.fish} and it.before <= failure.frame + fps and it.frame >= failure.before - fps
         for it in others
     )
 
 
-def _cause(failure: IdentityFailure, helped: TrackedClip, found: NDArray[np.int64]) -> Cause:
-    """Return why a failure is left; `found` is which track each fish was matched with, `(n, T)`."""
-    fps, mine = helped.clip.fps, {*failure.tracks}
+def _cause(failure: IdentityFailure, helped: TrackedClip, matched: NDArray[np.int64]) -> Cause:
+    """Return the cause of a remaining failure; `matched` is the track of each fish, `(n, T)`."""
+    fps, own_tracks = helped.clip.fps, {*failure.tracks}
     first, last = failure.before - _BEFORE_S * fps, failure.frame + fps
     flags = [
         it
         for it in helped.flags
-        if (mine & {*it.trouble.objects} or it.fish in failure.fish) and first <= it.raised <= last
+        if (own_tracks & {*it.event.objects} or it.fish in failure.fish) and first <= it.raised <= last
     ]
-    seen_to = [it for it in flags if it.fish is not None and it.looks]
-    if any(_right(it, found) and it.looks[0] <= failure.frame for it in seen_to):
+    handled = [it for it in flags if it.fish is not None and it.pointing_frames]
+    if any(_right(it, matched) and it.pointing_frames[0] <= failure.frame for it in handled):
         return "pointed in vain"
-    if seen_to:
-        return "late" if any(_right(it, found) for it in seen_to) else "followed wrongly"
+    if handled:
+        return "late" if any(_right(it, matched) for it in handled) else "followed wrongly"
     if flags:
         return "busy" if any(it.begun is None for it in flags) else "late"
-    if any(it.frame < failure.before and {*it.tracks} & mine for it in helped.failures if it is not failure):
+    if any(
+        it.frame < failure.before and {*it.tracks} & own_tracks for it in helped.failures if it is not failure
+    ):
         return "earlier failure"
-    told = any(mine & {*it.objects} and first <= newest <= last for newest, it in helped.troubles)
-    return "no flag" if told else "not foreseen"
+    was_foreseen = any(
+        own_tracks & {*it.objects} and first <= newest <= last for newest, it in helped.risk_events
+    )
+    return "no flag" if was_foreseen else "not foreseen"
 
 
-def _right(flag: OperatorFlag, found: NDArray[np.int64]) -> bool:
-    """Return whether the fish that was followed is the one that the named track was on before."""
-    before = found[flag.fish, : max(flag.looks[0], 1)]
+def _right(flag: OperatorFlag, matched: NDArray[np.int64]) -> bool:
+    """Return whether the followed fish is the one that the flagged track was on before."""
+    before = matched[flag.fish, : max(flag.pointing_frames[0], 1)]
     known = before[before > 0]
     return bool(len(known) and known[-1] == flag.object)

@@ -1,4 +1,4 @@
-"""Which troubles become flags, clip after clip: as many a minute as a site raises, where it raises them."""
+"""Selection of the risk events that become flags, by a site's own flag budget."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from server.service.operator_assist.flag_budget import FlagBudget
 from tracking.interactive import RiskEvent
 
 _MOST = 1000
-"""Numbers that people of one clip have at most."""
+"""Largest track id in a clip."""
 
 
 class FlagSelector:
-    """Raises flags. The clips follow each other as if they were one recording."""
+    """Selects flags by the budget; the clips follow each other as if they were one recording."""
 
     def __init__(self, settings: FlagSettings, fps: float) -> None:
         self._budget = FlagBudget(settings, fps)
@@ -22,18 +22,18 @@ class FlagSelector:
         self._raised: dict[frozenset[int], int] = {}
 
     def begin(self) -> None:
-        """Begin another clip, in which people have other numbers."""
+        """Begin another clip, with other tracks."""
         self._began = self._last = self._last + 1
         self._raised = {}
 
-    def raised(self, newest: int, troubles: Sequence[RiskEvent]) -> list[RiskEvent]:
-        """Return those of a window's troubles for which a flag is raised, the riskiest first."""
+    def raised(self, newest: int, risk_events: Sequence[RiskEvent]) -> list[RiskEvent]:
+        """Return the risk events of a window that raise flags, the riskiest first."""
         now = self._last = self._began + newest
-        whose = [frozenset(self._began * _MOST + it for it in trouble.objects) for trouble in troubles]
-        for who, it in zip(whose, troubles, strict=True):
+        whose = [frozenset(self._began * _MOST + it for it in event.objects) for event in risk_events]
+        for who, it in zip(whose, risk_events, strict=True):
             self._budget.record_risk(now, who, it.risk)
         found = []
-        for who, it in sorted(zip(whose, troubles, strict=True), key=lambda it: -it[1].risk):
+        for who, it in sorted(zip(whose, risk_events, strict=True), key=lambda it: -it[1].risk):
             if now - self._raised.get(who, -(10**9)) > self._same and self._budget.is_worth_flag(
                 now, who, it.risk
             ):

@@ -1,4 +1,4 @@
-"""Where identities fail: a fish goes on under another number than before."""
+"""Identity failures: a fish continues under another track id."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from tracking.assignment import assign_pairs
 from tracking.boxes import Floats, iou
 
 _LEAST_IOU = 0.3
-"""From which a track is at a fish: boxes of bodies that turn are seldom exact."""
+"""Overlap (IoU) from which a track is on a fish: boxes of turning bodies are rarely exact."""
 _LASTS_S = 1.0 / 3.0
-"""Seconds for which a fish must be under another number: less is the crossing itself."""
+"""Seconds for which a fish must have another id: shorter changes belong to the crossing."""
 _TOGETHER_S = 1.0
-"""Seconds within which failures of the same fish or tracks are one: an exchange is one failure of two."""
+"""Seconds within which failures of the same fish or tracks are merged: a swap is one failure of two fish."""
 
 _IN_THE_WAY = 0.05
-"""Overlap (IoU) with another fish from which it is in the way."""
+"""Overlap (IoU) from which another fish is in the way."""
 
 Kind = Literal["alone", "2 way", "3 way"]
-"""Whether others were in the way: nobody, one, or two and more."""
+"""The number of fish in each other's way: alone, two, or three and more."""
 
 Tracks = Mapping[int, Mapping[int, Floats]]
 """The boxes `(4,)` of tracks, by frame and id."""
@@ -33,14 +33,14 @@ Tracks = Mapping[int, Mapping[int, Floats]]
 
 @dataclass(frozen=True, slots=True)
 class IdentityFailure:
-    """One identity failure.
+    """An identity failure.
 
     Attributes:
-        frame: the first frame in which a fish is under another number.
-        before: the last frame in which it was under its own.
-        fish: whose number changes, ascending.
-        tracks: the numbers that they had and have, ascending.
-        involved: fish that overlap each other around the failure, as of `involved`; 1 where none does.
+        frame: the first frame in which a fish has another id.
+        before: the last frame in which it had its own.
+        fish: whose id changes, ascending.
+        tracks: their ids before and after, ascending.
+        involved: number of fish in each other's way around the failure (see `involved`); 1: alone.
     """
 
     frame: int
@@ -51,19 +51,19 @@ class IdentityFailure:
 
     @property
     def kind(self) -> Kind:
-        """Whether others were in the way."""
+        """The kind by the number of involved fish."""
         return kind_of(self.involved)
 
 
 def kind_of(together: int) -> Kind:
-    """Name by how many fish are in each other's way what was or could have been a failure."""
+    """Return the kind by the number of fish in each other's way."""
     return "alone" if together < 2 else "2 way" if together == 2 else "3 way"
 
 
 def involved(truth: ObjectTruth, fish: Collection[int], first: int, last: int, fps: float) -> int:
-    """Count who is in whose way: those of some fish whom others overlap, and these others; 1: nobody.
+    """Count the given fish that others overlap, and these others; 1: there are none.
 
-    From a third of a second before the frame `first` to as long after the frame `last`.
+    From a third of a second before the frame `first` to a third of a second after the frame `last`.
     """
     around = round(_LASTS_S * fps)
     boxes = np.nan_to_num(truth.boxes[:, max(first - around, 0) : last + around])
@@ -77,9 +77,9 @@ def involved(truth: ObjectTruth, fish: Collection[int], first: int, last: int, f
 
 
 def matches(truth: ObjectTruth, tracks: Tracks) -> NDArray[np.int64]:
-    """Return the number of the track that each fish is matched with, `(n, T)`; 0: none.
+    """Return the id of the track that each fish is matched with, `(n, T)`; 0: none.
 
-    In each frame the assignment with the largest overlap of those that keep most pairs of the frame before.
+    The assignment with the largest overlap in each frame, which prefers the pairs of the previous frame.
     """
     found = np.zeros((truth.objects, truth.frames), dtype=np.int64)
     held = np.zeros(truth.objects, dtype=np.int64)
@@ -97,7 +97,7 @@ def matches(truth: ObjectTruth, tracks: Tracks) -> NDArray[np.int64]:
 
 
 def failures(truth: ObjectTruth, tracks: Tracks, fps: float) -> list[IdentityFailure]:
-    """Return the failures of a clip, in their order."""
+    """Return the failures of a clip, in order of time."""
     found = matches(truth, tracks)
     least, together = round(_LASTS_S * fps), _TOGETHER_S * fps
     changes = sorted(
@@ -120,7 +120,7 @@ def failures(truth: ObjectTruth, tracks: Tracks, fps: float) -> list[IdentityFai
 
 
 def _changes(numbers: NDArray[np.int64], least: int) -> list[tuple[int, int, int, int]]:
-    """Return (last frame before, first frame after, old, new) of one fish's lasting changes of number."""
+    """Return (last frame before, first frame after, old, new) of the lasting id changes of a fish."""
     runs: list[list[int]] = []
     for t in np.flatnonzero(numbers):
         if runs and runs[-1][0] == numbers[t]:

@@ -1,4 +1,4 @@
-"""Every flag and every failure as rows, beside those of the thesis's Table 2 (Todor 2009, section 8.2)."""
+"""The table of flags and failures, with the counts of the thesis's Table 2 (Todor 2009, section 8.2)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from benchmarks.operator_assist.flag_outcomes import CAUSES, Outcome, OutcomeCou
 from benchmarks.operator_assist.identity_failures import Kind
 
 _CLIPS_MINUTES = 56 * 20.0 / 60.0
-"""The thesis's: 56 clips of 20 seconds, each of nine fish."""
+"""Minutes of the thesis's 56 clips of 20 seconds, each of nine fish."""
 
 _WORDS: dict[Outcome, str] = {
     "helped": "the operator helped",
-    "not needed": "was not needed: a false flag",
+    "not needed": "not needed: a false flag",
     "harmed": "the operator harmed",
     "no help": "could not help",
 }
@@ -22,7 +22,7 @@ _WORDS: dict[Outcome, str] = {
 
 @dataclass(frozen=True, slots=True)
 class OutcomeRow:
-    """One row: what was counted, and the thesis's count, where it counted the same."""
+    """A row: a count, and the thesis's count, where it counted the same."""
 
     name: str
     count: int
@@ -31,7 +31,7 @@ class OutcomeRow:
 
 @dataclass(frozen=True, slots=True)
 class _FlagGroup:
-    """Flags by whether others were in the way; the thesis's counts of them, and of the two outcomes."""
+    """A group of flags by kind; the thesis's counts of them, and of the two outcomes."""
 
     name: str
     kinds: Sequence[Kind]
@@ -51,51 +51,53 @@ _WRONG = (
 _LEFT: Sequence[tuple[Kind, int]] = (("2 way", 15), ("3 way", 15), ("alone", 9))
 
 
-def table2(cases: OutcomeCounts) -> list[OutcomeRow]:
+def table2(outcome_counts: OutcomeCounts) -> list[OutcomeRow]:
     """Return the counts in the thesis's order.
 
-    It counts cases, of which each has a flag at most; of failures of more than two it does not say how many
-    had a flag, and of those alone, not what the operator did. What it has of why there was no flag it has of
-    crossings of two only.
+    The thesis counts cases with at most one flag each; it does not say how many failures of more than two
+    fish had a flag, nor what the operator did in failures of single fish. It has the causes of missing flags
+    for crossings of two only.
     """
     return [
-        OutcomeRow("flagged, tracked rightly", _sum(cases, ("helped", "not needed")), 53),
-        *_split(cases, _RIGHT, ("helped", "not needed")),
-        OutcomeRow("flagged, tracked wrongly", _sum(cases, ("harmed", "no help"))),
-        *_split(cases, _WRONG, ("harmed", "no help")),
-        OutcomeRow("failures with help", cases.left.total(), 39),
-        *(OutcomeRow(f"  {kind}", cases.kinds[kind], thesis) for kind, thesis in _LEFT),
-        *(OutcomeRow(f"  {cause}", cases.left[cause]) for cause in CAUSES),
+        OutcomeRow("flagged, tracked correctly", _sum(outcome_counts, ("helped", "not needed")), 53),
+        *_split(outcome_counts, _RIGHT, ("helped", "not needed")),
+        OutcomeRow("flagged, tracked wrongly", _sum(outcome_counts, ("harmed", "no help"))),
+        *_split(outcome_counts, _WRONG, ("harmed", "no help")),
+        OutcomeRow("failures with help", outcome_counts.left.total(), 39),
+        *(OutcomeRow(f"  {kind}", outcome_counts.kinds[kind], thesis) for kind, thesis in _LEFT),
+        *(OutcomeRow(f"  {cause}", outcome_counts.left[cause]) for cause in CAUSES),
     ]
 
 
 def head(*, thesis: bool) -> list[str]:
-    """Return the columns of `texts`."""
+    """Return the column headings of `texts`."""
     return ["", "count", *(["as 56 clips", "thesis"] if thesis else [])]
 
 
-def texts(cases: OutcomeCounts, *, thesis: bool) -> list[list[str]]:
-    """Return the rows as words; `thesis`: with its counts, and ours for as many minutes as it has."""
-    scale = _CLIPS_MINUTES / cases.minutes
+def texts(outcome_counts: OutcomeCounts, *, thesis: bool) -> list[list[str]]:
+    """Return the rows as text; `thesis`: with its counts, and ours scaled to its minutes."""
+    scale = _CLIPS_MINUTES / outcome_counts.minutes
     return [
         [
             it.name,
             str(it.count),
             *([f"{scale * it.count:.0f}", "-" if it.thesis is None else str(it.thesis)] if thesis else []),
         ]
-        for it in table2(cases)
+        for it in table2(outcome_counts)
     ]
 
 
 def _split(
-    cases: OutcomeCounts, parts: Sequence[_FlagGroup], outcomes: tuple[Outcome, Outcome]
+    outcome_counts: OutcomeCounts, parts: Sequence[_FlagGroup], outcomes: tuple[Outcome, Outcome]
 ) -> Iterator[OutcomeRow]:
-    """Yield flags of these outcomes by whether others were in the way, and by outcome."""
+    """Yield the rows of flags with these outcomes, by group and by outcome."""
     for it in parts:
-        yield OutcomeRow(it.name, _sum(cases, outcomes, it.kinds), it.thesis)
+        yield OutcomeRow(it.name, _sum(outcome_counts, outcomes, it.kinds), it.thesis)
         for outcome, theirs in zip(outcomes, it.theirs, strict=True):
-            yield OutcomeRow(f"    {_WORDS[outcome]}", _sum(cases, (outcome,), it.kinds), theirs)
+            yield OutcomeRow(f"    {_WORDS[outcome]}", _sum(outcome_counts, (outcome,), it.kinds), theirs)
 
 
-def _sum(cases: OutcomeCounts, outcomes: Sequence[Outcome], kinds: Sequence[Kind] = get_args(Kind)) -> int:
-    return sum(cases.flags[kind, outcome] for kind in kinds for outcome in outcomes)
+def _sum(
+    outcome_counts: OutcomeCounts, outcomes: Sequence[Outcome], kinds: Sequence[Kind] = get_args(Kind)
+) -> int:
+    return sum(outcome_counts.flags[kind, outcome] for kind in kinds for outcome in outcomes)

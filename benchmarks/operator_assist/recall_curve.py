@@ -1,4 +1,4 @@
-"""How many failures are foreseen by so many flags a minute."""
+"""The share of foreseen failures by the rate of flags."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from benchmarks.operator_assist.assisted_tracking import TrackedClip
-from benchmarks.operator_assist.flag_outcomes import tells
+from benchmarks.operator_assist.flag_outcomes import is_about
 from benchmarks.operator_assist.flag_selection import FlagSelector
 from benchmarks.operator_assist.simulated_operator import OperatorProfile
 from server.config.sections import FlagSettings
 from tracking.interactive import RiskEvent
 
 RISKS = (0.6, 0.5, 0.45, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.1, 0.0)
-"""Risks from which a flag is raised."""
+"""Risk thresholds of flags."""
 _MANY = 600
-"""Flags a minute: no fewer than that."""
+"""Flags a minute: effectively unlimited."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecallPoint:
-    """What flags of one risk foresee.
+    """The failures foreseen by the flags of a risk threshold.
 
     Attributes:
-        risk: from which a flag is raised.
-        flags: flags that were raised.
-        foreseen: failures that a flag told of in time; each by a flag of its own.
+        risk: the threshold.
+        flags: raised flags.
+        foreseen: failures with a flag in time; each by its own flag.
         failures: all failures.
         minutes: of video.
     """
@@ -41,46 +41,48 @@ class RecallPoint:
 
     @property
     def share(self) -> float:
-        """The share of the failures that is foreseen."""
+        """The share of foreseen failures."""
         return self.foreseen / self.failures if self.failures else 0.0
 
     @property
     def bound(self) -> float:
-        """The share that as many flags could foresee at most: a flag tells of one failure."""
+        """The upper bound of the share: each flag foresees at most one failure."""
         return min(self.flags / self.failures, 1.0) if self.failures else 0.0
 
 
-def curve(watched: Sequence[TrackedClip], person: OperatorProfile) -> list[RecallPoint]:
-    """Return what is foreseen from each of the risks on in clips that nobody helped with."""
-    return [_point(watched, person, FlagSettings(per_minute=_MANY, risk=risk)) for risk in RISKS]
+def curve(tracked_clips: Sequence[TrackedClip], person: OperatorProfile) -> list[RecallPoint]:
+    """Return the foreseen failures at each risk threshold in clips that were tracked without help."""
+    return [_point(tracked_clips, person, FlagSettings(per_minute=_MANY, risk=risk)) for risk in RISKS]
 
 
-def _point(watched: Sequence[TrackedClip], person: OperatorProfile, settings: FlagSettings) -> RecallPoint:
+def _point(
+    tracked_clips: Sequence[TrackedClip], person: OperatorProfile, settings: FlagSettings
+) -> RecallPoint:
     flags = foreseen = 0
-    desk = FlagSelector(settings, watched[0].clip.fps)
-    for it in watched:
-        desk.begin()
-        raised = _raised(it, desk)
+    selector = FlagSelector(settings, tracked_clips[0].clip.fps)
+    for it in tracked_clips:
+        selector.begin()
+        raised = _raised(it, selector)
         flags += len(raised)
         for failure in it.failures:
-            about = [k for k in raised if tells(k[1], k[0], failure, it.clip.fps, person)]
+            about = [k for k in raised if is_about(k[1], k[0], failure, it.clip.fps, person)]
             foreseen += bool(about)
-            for used in about[:1]:
-                raised.remove(used)
-    failures = sum(len(it.failures) for it in watched)
-    return RecallPoint(settings.risk, flags, foreseen, failures, sum(it.clip.minutes for it in watched))
+            for matched_flag in about[:1]:
+                raised.remove(matched_flag)
+    failures = sum(len(it.failures) for it in tracked_clips)
+    return RecallPoint(settings.risk, flags, foreseen, failures, sum(it.clip.minutes for it in tracked_clips))
 
 
-def _raised(watched: TrackedClip, desk: FlagSelector) -> list[tuple[int, RiskEvent]]:
+def _raised(tracked_clips: TrackedClip, selector: FlagSelector) -> list[tuple[int, RiskEvent]]:
     """Return the flags of a clip, each with the newest frame when it was raised."""
     windows: dict[int, list[RiskEvent]] = {}
-    for newest, it in watched.troubles:
+    for newest, it in tracked_clips.risk_events:
         windows.setdefault(newest, []).append(it)
-    return [(newest, it) for newest, told in windows.items() for it in desk.raised(newest, told)]
+    return [(newest, it) for newest, events in windows.items() for it in selector.raised(newest, events)]
 
 
 def rows(points: Sequence[RecallPoint]) -> list[list[str]]:
-    """Return the points as rows of a table: flags, failures, foreseen, the most that is possible."""
+    """Return the points as rows of a table: flags, failures, foreseen, upper bound."""
     return [
         [
             f"{it.risk:.2f}" if it.risk else "all",
@@ -95,7 +97,7 @@ def rows(points: Sequence[RecallPoint]) -> list[list[str]]:
 
 
 def plot(points: Sequence[RecallPoint], path: Path) -> None:
-    """Draw the share that is foreseen against flags a minute, below what is possible."""
+    """Draw the share of foreseen failures over flags a minute, with its upper bound."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure, axes = plt.subplots(figsize=(7, 4))
     flags = [it.flags / it.minutes for it in points]

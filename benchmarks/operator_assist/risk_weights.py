@@ -1,12 +1,12 @@
-"""Learn how likely what is foreseen goes wrong: the weights of `tracking/interactive/risk.py`.
+"""Learn the risk weights of `tracking/interactive/risk.py`.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.operator_assist.risk_weights --out out/bench
 
-Schools without pictures of even seeds are tracked with nobody at the screen. Their failures are about as
-rare as the thesis's; drawn fish and players fail so often that nearly every trouble goes wrong, and tell
-nothing apart. A trouble went wrong where an identity failure of one of its tracks followed that an operator
-who had been asked could have seen happen. Of each reason, the log odds of that are a weighted sum of the
-trouble's signs, by the likelihood with a small ridge.
+Schools without pictures, of even seeds, are tracked without an operator. Their failures are about as rare as
+the thesis's; drawn fish and players fail so often that nearly every risk event goes wrong, which separates
+nothing. A risk event went wrong if an identity failure of one of its tracks followed late enough for an
+operator. For each reason, the log odds of that are a weighted sum of the event's features, fitted by logistic
+regression with a small ridge.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ import numpy as np
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from benchmarks.operator_assist.assisted_tracking import TrackedClip, watch
+from benchmarks.operator_assist.assisted_tracking import TrackedClip, track_clip
 from benchmarks.operator_assist.clip_kinds import kinds
-from benchmarks.operator_assist.flag_outcomes import tells
+from benchmarks.operator_assist.flag_outcomes import is_about
 from benchmarks.operator_assist.simulated_operator import OperatorProfile
 from tracking.boxes import Floats
 from tracking.interactive import RiskFeatures, RiskReason
 
 _MARGIN, _GONE = 4.0, 5
-"""What is foreseen here: more than anybody would be asked about, so that the risk of that is known, too."""
+"""Settings that report more risk events than by default, to learn the risk of those, too."""
 _RIDGE = 1.0
 _STEPS = 50
 
 
-def fitted(terms: Floats, wrong: Floats) -> Floats:
+def fit_weights(terms: Floats, wrong: Floats) -> Floats:
     """Return the weights of a logistic regression of `wrong` (N,) on `terms` (N, D), by Newton's method."""
     weights = np.zeros(terms.shape[1])
     for _ in range(_STEPS):
@@ -43,41 +43,50 @@ def fitted(terms: Floats, wrong: Floats) -> Floats:
     return weights
 
 
-def examples(watched: Sequence[TrackedClip], reason: RiskReason) -> tuple[Floats, Floats]:
-    """Return the terms `(N, D)` of the troubles of a reason, and 1 where they went wrong `(N,)`."""
-    rows, wrong, person = [], [], OperatorProfile()
-    for it in watched:
-        for newest, trouble in it.troubles:
-            if trouble.reason == reason:
-                rows.append(
-                    RiskFeatures(trouble.margin, trouble.frame - newest, trouble.length).regression_terms
-                )
-                told = [tells(trouble, newest, failure, it.clip.fps, person) for failure in it.failures]
-                wrong.append(float(any(told)))
+def examples(tracked_clips: Sequence[TrackedClip], reason: RiskReason) -> tuple[Floats, Floats]:
+    """Return the features `(N, D)` of the risk events of a reason, and 1 where they went wrong `(N,)`."""
+    rows, wrong, profile = [], [], OperatorProfile()
+    for it in tracked_clips:
+        for newest, event in it.risk_events:
+            if event.reason == reason:
+                rows.append(RiskFeatures(event.margin, event.frame - newest, event.length).regression_terms)
+                is_about_failures = [
+                    is_about(event, newest, failure, it.clip.fps, profile) for failure in it.failures
+                ]
+                wrong.append(float(any(is_about_failures)))
     return np.array(rows).reshape(-1, len(RiskFeatures(0.0, 0.0, 0.0).regression_terms)), np.array(wrong)
 
 
 def main() -> None:
-    """Learn, and print."""
+    """Learn and print the weights."""
     options = parser(__doc__, "operator_assist.risk_weights")
     options.add_argument("--clips", type=int, default=50, help="how many")
     chosen = options.parse_args()
     kind = kinds()["school"]
     assist = replace(kind.setup.assist, swap_margin=_MARGIN, crossing_margin=_MARGIN, hidden_frames=_GONE)
     setup = replace(kind.setup, assist=assist)
-    watched = [watch(clip, setup) for clip in kind.clips(chosen.clips, first=0)]
+    tracked_clips = [track_clip(clip, setup) for clip in kind.clips(chosen.clips, first=0)]
     table = []
     for reason in get_args(RiskReason):
-        terms, wrong = examples(watched, reason)
+        terms, wrong = examples(tracked_clips, reason)
         if not len(wrong):
             continue
-        weights = [f"{it:.2f}" for it in fitted(terms, wrong)]
+        weights = [f"{it:.2f}" for it in fit_weights(terms, wrong)]
         table.append([reason, str(len(wrong)), f"{100.0 * wrong.mean():.0f} %", *weights])
     report = Report()
-    report.say(f"{len(watched)} clips, {sum(it.clip.minutes for it in watched):.1f} minutes")
+    report.say(f"{len(tracked_clips)} clips, {sum(it.clip.minutes for it in tracked_clips):.1f} minutes")
     report.table(
-        "What risks are told from",
-        ["reason", "troubles", "went wrong", "constant", "margin", "ahead", "lead / 10", "log(1 + length)"],
+        "Risk weights",
+        [
+            "reason",
+            "risk events",
+            "went wrong",
+            "constant",
+            "margin",
+            "ahead",
+            "lead / 10",
+            "log(1 + length)",
+        ],
         table,
     )
     report.save(chosen.out / "operator_assist-risk.txt")

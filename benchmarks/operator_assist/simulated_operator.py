@@ -1,6 +1,6 @@
-"""A simulated operator: sees to one flag at a time, looks after a while, and points as a hand can.
+"""A simulated operator, who handles one flag at a time, with a reaction time and pointing errors.
 
-What was over before they could turn to it they see again, from a moment before, as the page offers.
+Risk events that passed before the operator turned to them are replayed, as the page offers.
 """
 
 from __future__ import annotations
@@ -15,31 +15,31 @@ from benchmarks.paper_experiments.scene import ObjectTruth
 from tracking.boxes import Floats, iou
 from tracking.interactive import PositionCorrection, RiskEvent
 
-_SEEN = 0.15
-"""Share of a body that must be visible for anybody to point at it."""
+_MIN_VISIBLE = 0.15
+"""Visible share of a body from which the operator can point at it."""
 _CLEAR = 0.8
-"""Share of a body from which it stands alone again."""
+"""Visible share of a body from which it is alone again."""
 _TOUCH = 0.1
-"""Overlap (IoU) with another body up to which it does."""
+"""Overlap (IoU) with another body up to which it is alone."""
 _CLEAR_S = 0.3
-"""Seconds for which it must."""
+"""Seconds for which it must be alone."""
 _LONGEST_S = 5.0
-"""Seconds after which the operator lets go."""
+"""Seconds after which the operator gives up."""
 _BACK_S = 0.5
-"""Seconds before what is seen again, beside those until the hand is there."""
-_FOUND = 0.2
-"""Overlap (IoU) of a track's box with a body from which the operator knows who is meant."""
+"""Seconds of replay before a risk event, besides the reaction time."""
+_RECOGNIZED_IOU = 0.2
+"""Overlap (IoU) of a track's box with a body from which the operator recognizes it."""
 
 
 @dataclass(frozen=True, slots=True)
 class OperatorProfile:
-    """How an operator is.
+    """The properties of an operator.
 
     Attributes:
-        reaction_s: seconds from the flag to the first pointing.
-        error: how far off the pointing is, a body's size (the root of its box's area), root mean square.
-        delay_s: seconds by which the picture that is shown lags behind the newest frame that is tracked.
-        back_s: seconds back that they may see again, of what was over before they turned to it.
+        reaction_s: seconds from the flag to the first correction.
+        error: root mean square error of pointing, in body sizes (the root of a box's area).
+        delay_s: delay of the shown picture behind the newest tracked frame.
+        back_s: seconds that the operator can go back.
     """
 
     reaction_s: float = 0.5
@@ -50,40 +50,40 @@ class OperatorProfile:
 
 @dataclass(slots=True)
 class OperatorFlag:
-    """One flag.
+    """A flag and how the operator handled it.
 
     Attributes:
-        trouble: why.
-        object: whom the operator is asked to follow; the other one where only that is to be seen.
+        event: the risk event.
+        object: the track to follow; the other one where only that is visible.
         raised: the newest frame when it was raised.
         until: the frame on the screen up to which it lasts at least.
         begun: the newest frame when the operator turned to it; `None`: not yet, or never.
-        lag: frames that the picture lags behind in which they see to it.
-        fish: who was followed in truth; `None`: nobody, yet.
-        looks: the frames in which the operator pointed.
+        lag: delay of the operator's picture, frames.
+        fish: the fish that was followed; `None`: none yet.
+        pointing_frames: the frames in which the operator pointed.
         ended: the frame on the screen when it was over; `None`: not yet.
     """
 
-    trouble: RiskEvent
+    event: RiskEvent
     object: int
     raised: int
     until: int
     begun: int | None = None
     lag: int = 0
     fish: int | None = None
-    looks: list[int] = field(default_factory=list)
+    pointing_frames: list[int] = field(default_factory=list)
     ended: int | None = None
     clear: int = 0
     likely: dict[tuple[int, int], float] = field(default_factory=dict)
 
 
 class SimulatedOperator:
-    """Follows whom flags name, one at a time, on a picture that is late; never mistakes whom they follow."""
+    """Follows flagged fish, one at a time, on a delayed picture, and never loses them."""
 
     def __init__(
-        self, person: OperatorProfile, desk: FlagSelector, truth: ObjectTruth, fps: float, seed: int
+        self, person: OperatorProfile, selector: FlagSelector, truth: ObjectTruth, fps: float, seed: int
     ) -> None:
-        self._desk = desk
+        self._selector = selector
         self._person, self._truth, self._fps = person, truth, fps
         self._rng = np.random.default_rng(seed)
         self._delay = round(person.delay_s * fps)
@@ -92,73 +92,73 @@ class SimulatedOperator:
         self._before = round(_BACK_S * fps) + self._reaction
         self.flags: list[OperatorFlag] = []
         self._now: OperatorFlag | None = None
-        """Which the operator sees to."""
+        """The flag that the operator handles."""
 
     @property
     def after(self) -> int:
-        """Frames after the last one for which there is something to look at."""
+        """Frames after the last one in which the operator is still busy."""
         return max(self._delay, self._back)
 
-    def hear(self, newest: int, troubles: Sequence[RiskEvent]) -> None:
-        """Be told the troubles of a window, some of which raise flags."""
+    def receive(self, newest: int, risk_events: Sequence[RiskEvent]) -> None:
+        """Receive the risk events of a window, some of which raise flags."""
         now = self._now
         others = []
-        for it in troubles:
+        for it in risk_events:
             if now is not None and now.object in it.objects:
-                # Who is being followed is in trouble again before the picture is there.
+                # The followed fish has another risk event before the picture shows it.
                 now.until = max(now.until, it.frame)
             else:
                 others.append(it)
         self.flags += [
-            OperatorFlag(it, it.objects[0], newest, it.frame) for it in self._desk.raised(newest, others)
+            OperatorFlag(it, it.objects[0], newest, it.frame) for it in self._selector.raised(newest, others)
         ]
 
-    def look(self, newest: int, shown: Mapping[int, Mapping[int, Floats]]) -> PositionCorrection | None:
-        """Look at the screen and point at whom the flag names, if anybody can be seen there."""
-        flag = self._now = self._now or self._next(newest, newest - self._delay)
+    def point(self, newest: int, shown: Mapping[int, Mapping[int, Floats]]) -> PositionCorrection | None:
+        """Look at the screen, and point at the flagged fish if it is visible."""
+        flag = self._now = self._now or self._next_flag(newest, newest - self._delay)
         if flag is None or flag.begun is None or not 0 <= newest - flag.lag < self._truth.frames:
             return None
-        pointing = self._see_to(flag, flag.begun, newest, shown)
+        pointing = self._handle(flag, flag.begun, newest, shown)
         if flag.ended is not None:
             self._now = None
         return pointing
 
-    def _next(self, newest: int, screen: int) -> OperatorFlag | None:
-        """Turn to the flag that is due first; where none is ahead, back to what is over on the screen."""
+    def _next_flag(self, newest: int, screen: int) -> OperatorFlag | None:
+        """Turn to the flag that is due first; without any, to one that has passed on the screen."""
         waiting = [it for it in self.flags if it.begun is None and it.ended is None]
         over = {id(it) for it in waiting if it.until < screen}
         for it in waiting:
-            if id(it) in over and newest - it.trouble.frame + self._before > self._back:
+            if id(it) in over and newest - it.event.frame + self._before > self._back:
                 it.ended = screen
         left = (it for it in waiting if it.ended is None)
         flag = min(left, key=lambda it: (id(it) in over, it.until), default=None)
         if flag is not None:
             flag.begun = newest
-            again = newest - flag.trouble.frame + self._before if id(flag) in over else 0
+            again = newest - flag.event.frame + self._before if id(flag) in over else 0
             flag.lag = max(self._delay, again)
         return flag
 
-    def _see_to(
+    def _handle(
         self, flag: OperatorFlag, begun: int, newest: int, shown: Mapping[int, Mapping[int, Floats]]
     ) -> PositionCorrection | None:
         screen = newest - flag.lag
         if flag.fish is None:
-            self._recognise(flag, shown.get(screen, {}), screen)
+            self._recognize(flag, shown.get(screen, {}), screen)
             if newest < begun + self._reaction:
                 return None
             if not flag.likely:
-                # Nobody in particular: a piece of somebody who has a number, or a weed.
+                # No fish in particular: a part of a known fish, or a weed.
                 flag.ended = screen
                 return None
             flag.object, flag.fish = max(flag.likely, key=lambda it: (it[0] == flag.object, flag.likely[it]))
         self._follow(flag, newest, shown.get(screen, {}).get(flag.object))
-        if flag.ended is not None or self._truth.visible[flag.fish, screen] < _SEEN:
+        if flag.ended is not None or self._truth.visible[flag.fish, screen] < _MIN_VISIBLE:
             return None
-        flag.looks.append(screen)
+        flag.pointing_frames.append(screen)
         return self._pointing(flag, screen)
 
-    def _recognise(self, flag: OperatorFlag, boxes: Mapping[int, Floats], screen: int) -> None:
-        """See whose boxes the tracks' are on the screen, while the hand is on its way."""
+    def _recognize(self, flag: OperatorFlag, boxes: Mapping[int, Floats], screen: int) -> None:
+        """Accumulate the overlap of the flagged tracks' boxes with the fish on the screen."""
         numbers = list(boxes)
         if not numbers:
             return
@@ -168,18 +168,18 @@ class SimulatedOperator:
         overlaps *= self._truth.visible[:, screen, None]
         for fish, row in enumerate(overlaps):
             best = int(row.argmax())
-            if row[best] >= _FOUND and numbers[best] in flag.trouble.objects:
+            if row[best] >= _RECOGNIZED_IOU and numbers[best] in flag.event.objects:
                 it = numbers[best], fish
                 flag.likely[it] = flag.likely.get(it, 0.0) + float(row[best])
 
     def _follow(self, flag: OperatorFlag, newest: int, box: Floats | None) -> None:
-        """Let go once all is over: who is followed has been alone for a while, with the right box around."""
+        """End the flag once the followed fish has been alone for a while with the right box."""
         screen = newest - flag.lag
         if flag.fish is not None:
             boxes = self._truth.boxes[:, screen]
             touching = np.nan_to_num(iou(boxes, boxes[flag.fish])) > _TOUCH
             alone = self._truth.visible[flag.fish, screen] >= _CLEAR and touching.sum() <= 1
-            right = box is not None and iou(boxes[flag.fish], box) >= _FOUND
+            right = box is not None and iou(boxes[flag.fish], box) >= _RECOGNIZED_IOU
             flag.clear = flag.clear + 1 if alone and right else 0
         over = screen > flag.until and flag.clear >= _CLEAR_S * self._fps
         if over or newest - (flag.begun or 0) > _LONGEST_S * self._fps + flag.lag:

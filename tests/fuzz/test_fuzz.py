@@ -10,8 +10,8 @@ from random import Random
 
 import pytest
 
-from benchmarks.fuzz.__main__ import PARTS, side_by_side, targets_of
-from benchmarks.fuzz.engine.runner import Crash, FuzzPlan, InputFeeder, TargetRunner, numbered
+from benchmarks.fuzz.__main__ import PARTS, run_parallel, targets_of
+from benchmarks.fuzz.engine.runner import Crash, FuzzPlan, InputFeeder, TargetRunner, make_input
 from benchmarks.fuzz.engine.target import ScriptTarget, Target, UnclearError, refused
 from benchmarks.fuzz.http.unauthenticated import SECRETS, UnauthenticatedRequests
 from server.http.access import authorization
@@ -32,9 +32,9 @@ def _no_settings_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("target", ALL, ids=[it.name for it in ALL])
 def test_no_input_makes_it_crash(target: type[Target], tmp_path: Path) -> None:
-    tally = TargetRunner(target, target.name, FuzzPlan(INPUTS, SECONDS, seed=7, out=tmp_path)).run()
+    result = TargetRunner(target, target.name, FuzzPlan(INPUTS, SECONDS, seed=7, out=tmp_path)).run()
     found = "\n\n".join(it.read_text() for it in sorted(tmp_path.glob("*.txt")))
-    counts = tally.counts
+    counts = result.counts
     assert counts.crashes == 0, found
     assert counts.inputs > 0
     assert counts.messages > 0
@@ -45,8 +45,8 @@ def test_no_input_makes_it_crash(target: type[Target], tmp_path: Path) -> None:
 def test_its_inputs_are_the_same_in_every_run(target: type[Target]) -> None:
     one, other = target(), target()
     try:
-        inputs = [numbered(one, 1, index) for index in range(20)]
-        assert inputs == [numbered(other, 1, index) for index in range(20)]
+        inputs = [make_input(one, 1, index) for index in range(20)]
+        assert inputs == [make_input(other, 1, index) for index in range(20)]
         assert len(set(inputs)) > 1
     finally:
         one.close()
@@ -83,7 +83,7 @@ def test_whatever_a_reader_does_wrong_is_counted_and_saved(tmp_path: Path) -> No
     plan = FuzzPlan(INPUTS_OF_ALL_KINDS, seed=SEED, out=tmp_path, hang_s=0.7)
     counts = TargetRunner(Broken, Broken.name, plan).run().counts
     saved = {path.read_bytes() for path in tmp_path.glob("*.bin")}
-    given = [numbered(Broken(), SEED, index) for index in range(INPUTS_OF_ALL_KINDS)]
+    given = [make_input(Broken(), SEED, index) for index in range(INPUTS_OF_ALL_KINDS)]
     assert counts.inputs == counts.messages == INPUTS_OF_ALL_KINDS
     assert saved == set(given) - {b"right", b"wrong"}
     assert counts.accepted == given.count(b"right")
@@ -112,12 +112,12 @@ class Sound(Raising):
 
 def test_targets_side_by_side_count_as_they_do_one_by_one() -> None:
     plan = FuzzPlan(INPUTS_OF_ALL_KINDS, seed=SEED)
-    tallies = dict(side_by_side((Raising, Sound, Sound), plan, jobs=2))
+    results = dict(run_parallel((Raising, Sound, Sound), plan, jobs=2))
     alone = TargetRunner(Raising, Raising.name, plan).run().counts
-    assert sorted(tallies) == [0, 1, 2]
-    assert tallies[0].counts == alone
+    assert sorted(results) == [0, 1, 2]
+    assert results[0].counts == alone
     assert alone.crashes > 0
-    assert tallies[1].counts.accepted == tallies[2].counts.accepted == INPUTS_OF_ALL_KINDS
+    assert results[1].counts.accepted == results[2].counts.accepted == INPUTS_OF_ALL_KINDS
 
 
 class Talking(ScriptTarget):
@@ -139,7 +139,7 @@ class Talking(ScriptTarget):
 
 
 def test_messages_are_counted_that_were_handed_over_though_a_process_dies() -> None:
-    inputs = [numbered(Talking(), SEED, index).split() for index in range(INPUTS)]
+    inputs = [make_input(Talking(), SEED, index).split() for index in range(INPUTS)]
     handed = [it.index(b"over") + 1 if b"over" in it else len(it) for it in inputs]
     died = [it == [b"right"] * 5 for it in inputs]
     assert any(died)
@@ -151,18 +151,18 @@ def test_messages_are_counted_that_were_handed_over_though_a_process_dies() -> N
 def test_so_many_messages_end_it_and_it_goes_on_from_there() -> None:
     whole = TargetRunner(Talking, Talking.name, FuzzPlan(messages=300, seed=SEED)).run().counts
     assert 300 <= whole.messages < 305
-    begun = TargetRunner(Talking, Talking.name, FuzzPlan(20, seed=SEED)).run().counts
+    suffix = TargetRunner(Talking, Talking.name, FuzzPlan(20, seed=SEED)).run().counts
     rest = TargetRunner(Talking, Talking.name, FuzzPlan(whole.inputs - 20, seed=SEED, first=20)).run().counts
-    assert begun.messages + rest.messages == whole.messages
-    assert begun.accepted + rest.accepted == whole.accepted
+    assert suffix.messages + rest.messages == whole.messages
+    assert suffix.accepted + rest.accepted == whole.accepted
 
 
 def test_a_saved_input_says_again_what_it_did() -> None:
-    attempt = InputFeeder(Broken())
-    with attempt.watching():
-        assert attempt.feed(b"right") is True
-        assert attempt.feed(b"wrong") is False
-        found = attempt.feed(b"raises")
+    feeder = InputFeeder(Broken())
+    with feeder.watching():
+        assert feeder.feed(b"right") is True
+        assert feeder.feed(b"wrong") is False
+        found = feeder.feed(b"raises")
     assert isinstance(found, Crash)
     assert "KeyError" in found.text
 
@@ -207,7 +207,7 @@ def test_it_leaves_everything_else_as_it_was(target: type[Target]) -> None:
     before = dict(os.environ), dict(vars(floor_plan))
     one, other = target(), target()
     for it in (one, other):
-        it.hand_over(numbered(it, 1, 0))
+        it.hand_over(make_input(it, 1, 0))
     one.close()
     other.close()
     assert (dict(os.environ), dict(vars(floor_plan))) == before

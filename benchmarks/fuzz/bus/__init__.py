@@ -1,1 +1,1 @@
-"""Messages from the zenoh bus."""
+"""Fuzzing of messages from the zenoh bus."""

@@ -1,4 +1,4 @@
-"""Messages from the bus: one by one, and whole sessions of a site up to what its viewers are given."""
+"""Targets for messages from the bus: one by one, and whole sessions of a site up to its viewers' media."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from random import Random
 import msgspec
 from prometheus_client import generate_latest
 
-from benchmarks.fuzz.bus.damaged_messages import wrong
+from benchmarks.fuzz.bus.damaged_messages import damaged_message
 from benchmarks.fuzz.bus.retained_state import RetainedStates
 from benchmarks.fuzz.engine.fed_site import (
     CAMERAS,
@@ -18,6 +18,7 @@ from benchmarks.fuzz.engine.fed_site import (
     STRIDE,
     WIDTH,
     FedService,
+    make_tracks,
     pictures,
     site,
     sound,
@@ -25,7 +26,6 @@ from benchmarks.fuzz.engine.fed_site import (
     thumbnail,
     tracks,
     video,
-    word,
 )
 from benchmarks.fuzz.engine.target import ScriptTarget, Target
 from server.camera.operator_corrections import CorrectionInbox as PointedAt
@@ -49,8 +49,8 @@ from server.service.streaming.media_chunk import MediaChunk
 from server.service.streaming.subscriber_queue import Subscriber
 
 _EPOCHS = 3
-"""Two GOPs are decided, and one is looked ahead to."""
-_ASKED_EVERY = 8
+"""Two GOPs are decided, and one is look-ahead."""
+_API_EVERY = 8
 Script = list[tuple[str, bytes, bytes]]
 """Messages: key, payload, attachment. An empty key is the end of an epoch."""
 _script = msgspec.msgpack.Decoder(Script)
@@ -58,7 +58,7 @@ _packed = msgspec.msgpack.encode
 
 
 class IngestMessages(Target):
-    """One message to an ingest that has just begun."""
+    """One message to a new ingest."""
 
     name = "bus-messages"
 
@@ -72,17 +72,17 @@ class IngestMessages(Target):
         right = rng.choice(
             (
                 lambda: video("c0", self._pictures[pulse]),
-                lambda: tracks(word(rng, "c0", pulse)),
+                lambda: tracks(make_tracks(rng, "c0", pulse)),
                 lambda: status("c0", pulse),
                 lambda: thumbnail("c0", pulse),
                 lambda: sound(pulse),
             )
         )()
-        it = wrong(rng, right) if rng.random() < 0.95 else right
+        it = damaged_message(rng, right) if rng.random() < 0.95 else right
         return _packed([(it.key.encode("utf-8", "replace").decode(), it.payload, it.attachment)])
 
     def feed(self, data: bytes) -> bool:
-        """Take it in, and the epoch out that it may have made."""
+        """Handle the message, and take the epoch that it may complete."""
         stream_format = StreamFormat()
         frame_buffers = {camera: FrameBuffer(FPS, 50, stream_format) for camera in CAMERAS}
         aligner = EpochAligner(CAMERAS, STRIDE, grace=5)
@@ -102,7 +102,7 @@ class IngestMessages(Target):
 
 
 class PeerMessages(ScriptTarget):
-    """What cameras tell each other of a frame."""
+    """Detections that a camera receives from another one."""
 
     name = "bus-detections"
 
@@ -110,22 +110,22 @@ class PeerMessages(ScriptTarget):
         self._exchange = PeerDetectionExchange(site(), "c0", None, 50)
 
     def make(self, rng: Random) -> bytes:
-        """Return some words of the other camera."""
+        """Return some messages of the other camera."""
         script: Script = []
         for pulse in range(3):
             boxes = [(1.0, 2.0, 9.0, 30.0, 0.9)] * rng.randrange(3)
-            told = FrameDetections(camera="c1", boot=1, size=(WIDTH, HEIGHT), pulse=pulse, boxes=boxes)
-            message = Message(KEYS.camera("c1", "detections"), msgspec.json.encode(told), b"")
-            it = wrong(rng, message) if rng.random() < 0.7 else message
+            detections = FrameDetections(camera="c1", boot=1, size=(WIDTH, HEIGHT), pulse=pulse, boxes=boxes)
+            message = Message(KEYS.camera("c1", "detections"), msgspec.json.encode(detections), b"")
+            it = damaged_message(rng, message) if rng.random() < 0.7 else message
             script.append((it.key, it.payload, b""))
         return _packed(script)
 
     def feed(self, data: bytes) -> bool:
-        """Hear them."""
+        """Handle the messages."""
         buffer, bad = PeerDetectionBuffer(("c1",), 50, lambda _: True), self._exchange.bad_messages
         for pulse, (_, payload, _) in enumerate(_script.decode(data)):
             self.messages += 1
-            # The key is what was asked for: the bus hands nothing else on.
+            # The bus delivers only the subscribed key.
             heard = self._exchange._read(Message(KEYS.camera("c1", "detections"), payload, b""))
             if heard is not None and heard.camera == "c1":
                 buffer.put(heard, 0.0)
@@ -137,24 +137,24 @@ class PeerMessages(ScriptTarget):
 
 
 class OperatorPlaces(ScriptTarget):
-    """Where an operator points, as a camera hears it."""
+    """Position corrections of an operator that a camera receives."""
 
     name = "bus-operator-points"
 
     def make(self, rng: Random) -> bytes:
-        """Return some words of the best view."""
+        """Return some messages of the best view."""
         script: Script = []
         for pulse in range(3):
             place = CorrectedPosition(pulse=pulse, track=1, x=9.0, y=9.0, tolerance=rng.random() + 0.1)
             points = [place] * rng.randrange(3)
             payload = msgspec.json.encode(PositionCorrections(boot=1, corrections=points))
             message = Message(KEYS.camera("c0", "position_corrections"), payload, b"")
-            it = wrong(rng, message) if rng.random() < 0.7 else message
+            it = damaged_message(rng, message) if rng.random() < 0.7 else message
             script.append((it.key, it.payload, b""))
         return _packed(script)
 
     def feed(self, data: bytes) -> bool:
-        """Hear them."""
+        """Handle the messages."""
         heard = PointedAt("c0", 1)
         for key, payload, _ in _script.decode(data):
             self.messages += 1
@@ -164,7 +164,7 @@ class OperatorPlaces(ScriptTarget):
 
 
 class SiteSessions(ScriptTarget):
-    """A site over some epochs: messages wrong, lost, doubled and out of order; then all is asked of it."""
+    """A site over some epochs with damaged, lost, duplicated and reordered messages; its API is read, too."""
 
     name = "bus-sessions"
 
@@ -174,7 +174,7 @@ class SiteSessions(ScriptTarget):
         self._loop = asyncio.new_event_loop()
 
     def make(self, rng: Random) -> bytes:
-        """Return some hundred messages, of which some are wrong."""
+        """Return some hundred messages, some of them damaged."""
         script: Script = []
         share = rng.choice((0.0, 0.02, 0.02, 0.1, 0.5))
         only_one = rng.random() < 0.5
@@ -183,7 +183,7 @@ class SiteSessions(ScriptTarget):
             for seed, camera in enumerate(CAMERAS):
                 messages += [video(camera, it) for it in self._pictures[seed][epoch * STRIDE :][:STRIDE]]
                 messages += [
-                    tracks(word(rng, camera, epoch)),
+                    tracks(make_tracks(rng, camera, epoch)),
                     status(camera, epoch),
                     thumbnail(camera, epoch),
                 ]
@@ -191,7 +191,9 @@ class SiteSessions(ScriptTarget):
                 if rng.random() >= share or (only_one and "c1" not in message.key):
                     sent = [message]
                 else:
-                    sent = rng.choice(([], [message] * 2, [wrong(rng, message)], [wrong(rng, message)]))
+                    sent = rng.choice(
+                        ([], [message] * 2, [damaged_message(rng, message)], [damaged_message(rng, message)])
+                    )
                 script += [(_plain(it.key), it.payload, it.attachment) for it in sent]
             if rng.random() < share:
                 at = rng.randrange(len(script) + 1)
@@ -202,7 +204,7 @@ class SiteSessions(ScriptTarget):
         return _packed(script)
 
     def feed(self, data: bytes) -> bool:
-        """Play it."""
+        """Run the session."""
         return self._loop.run_until_complete(self._session(_script.decode(data)))
 
     async def _session(self, script: Script) -> bool:
@@ -223,8 +225,8 @@ class SiteSessions(ScriptTarget):
             service.decide()
         service.pulse += 2 * STRIDE
         service.decide()
-        if len(script) % _ASKED_EVERY == 0:
-            ask(service)
+        if len(script) % _API_EVERY == 0:
+            read_api(service)
         for viewer in viewers:
             drain(viewer)
         return service.dropped == 0
@@ -234,8 +236,8 @@ class SiteSessions(ScriptTarget):
         self._loop.close()
 
 
-def ask(service: FedService) -> None:
-    """Ask a service everything that its API tells."""
+def read_api(service: FedService) -> None:
+    """Read everything in a service's API."""
     facade = BestViewService(service)
     for content in (site_info(facade), objects_info(facade), cameras_info(facade)):
         msgspec.json.encode(content)

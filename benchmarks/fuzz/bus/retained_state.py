@@ -1,4 +1,4 @@
-"""What cameras remember of who is who, said to a best view that has just begun."""
+"""Target for identity snapshots of cameras, received by a new best view."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from random import Random
 
 import msgspec
 
-from benchmarks.fuzz.bus.damaged_messages import wrong
-from benchmarks.fuzz.engine.fed_site import CAMERAS, FPS, HEIGHT, KEYS, STRIDE, WIDTH, site, word
+from benchmarks.fuzz.bus.damaged_messages import damaged_message
+from benchmarks.fuzz.engine.fed_site import CAMERAS, FPS, HEIGHT, KEYS, STRIDE, WIDTH, make_tracks, site
 from benchmarks.fuzz.engine.target import ScriptTarget
 from server.messaging.epochs import end_of_epoch
 from server.messaging.identity_snapshot import IdentitySnapshot, PersonSnapshot
@@ -17,13 +17,13 @@ from server.service.identity.people import PersonTracker
 from server.service.identity.state_replication import StateReplication
 from server.service.ingest.epoch_aligner import Epoch
 
-_SAID = 12
+_SNAPSHOTS = 12
 _EPOCHS = 2
 _script = msgspec.msgpack.Decoder(tuple[int, list[tuple[str, bytes]]])
 
 
 class RetainedStates(ScriptTarget):
-    """What cameras say, again and again: memories that are right, wrong in something, or of somebody else."""
+    """Identity snapshots of cameras: valid, damaged, or of other people."""
 
     name = "bus-retained-state"
 
@@ -31,24 +31,24 @@ class RetainedStates(ScriptTarget):
         self._config = site()
 
     def make(self, rng: Random) -> bytes:
-        """Return some memories, and by what the people of the site walk."""
+        """Return some snapshots, and the seed of the people who follow."""
         script = []
-        for _ in range(_SAID):
+        for _ in range(_SNAPSHOTS):
             camera = rng.choice(CAMERAS)
-            said = IdentitySnapshot(
+            snapshot = IdentitySnapshot(
                 pulse=rng.randrange(40),
                 boot=rng.randrange(1, 3),
                 next_number=rng.randrange(1, 9),
                 numbered_since=rng.random(),
-                people=[self._somebody(rng) for _ in range(rng.randrange(4))],
+                people=[self._person_snapshot(rng) for _ in range(rng.randrange(4))],
             )
-            message = Message(KEYS.camera(camera, "retained_identities"), msgspec.json.encode(said), b"")
-            it = wrong(rng, message) if rng.random() < 0.5 else message
-            script.append((it.key, it.payload))
+            message = Message(KEYS.camera(camera, "retained_identities"), msgspec.json.encode(snapshot), b"")
+            replication = damaged_message(rng, message) if rng.random() < 0.5 else message
+            script.append((replication.key, replication.payload))
         return msgspec.msgpack.encode((rng.randrange(1000), script))
 
     @staticmethod
-    def _somebody(rng: Random) -> PersonSnapshot:
+    def _person_snapshot(rng: Random) -> PersonSnapshot:
         return PersonSnapshot(
             number=rng.randrange(1, 8),
             tracks=[rng.randrange(5) for _ in range(rng.randrange(3))],
@@ -58,32 +58,34 @@ class RetainedStates(ScriptTarget):
         )
 
     def feed(self, data: bytes) -> bool:
-        """Begin with them, follow people for a while, and tell the cameras."""
+        """Recover from the snapshots, track people for a while, and replicate to the cameras."""
         seed, script = _script.decode(data)
-        told: list[bytes] = []
+        published: list[bytes] = []
         people = PersonTracker(
             self._config.view.identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0, fps=FPS
         )
-        it = StateReplication(people, CAMERAS, FPS, lambda _, payload: told.append(payload))
+        replication = StateReplication(people, CAMERAS, FPS, lambda _, payload: published.append(payload))
         for camera in CAMERAS:
-            it.alive(KEYS.camera(camera, "alive"), is_present=True)
-        wrong = 0
+            replication.alive(KEYS.camera(camera, "alive"), is_present=True)
+        bad = 0
         for key, payload in script:
             self.messages += 1
             try:
-                it.snapshot_received(Message(key, payload, b""))
+                replication.snapshot_received(Message(key, payload, b""))
             except DECODE_ERRORS:
-                wrong += 1
+                bad += 1
         rng = Random(seed)
         for epoch in range(_EPOCHS):
             last = end_of_epoch(30 // STRIDE + epoch, STRIDE)
-            it.begin(last)
-            words = [word(rng, camera, last // STRIDE) for camera in CAMERAS]
-            people.update(Epoch(last // STRIDE, last, {said.camera: said for said in words}))
-            it.advance(last)
-            assert not set(people.registry.merged) & set(people.registry.everybody), (
-                "a number that is another's is somebody's"
+            replication.begin(last)
+            track_messages = [make_tracks(rng, camera, last // STRIDE) for camera in CAMERAS]
+            people.update(
+                Epoch(last // STRIDE, last, {snapshot.camera: snapshot for snapshot in track_messages})
             )
-        for payload in told:
+            replication.advance(last)
+            assert not set(people.registry.merged) & set(people.registry.everybody), (
+                "a merged number is still in use"
+            )
+        for payload in published:
             msgspec.json.decode(payload, type=IdentitySnapshot)
-        return not wrong
+        return not bad

@@ -1,8 +1,8 @@
-"""Event loops. One waits for nobody: where nothing is ready, its clock is put forward to what comes next.
+"""Event loops for fuzzing: one skips waiting times, one has no threads.
 
-A reader that waits two seconds before it gives somebody up is seen to do so at once, over real sockets, and
-as it would on any machine however busy. What threads do is waited for as ever, and what child processes do
-for a while. The other loop has no threads.
+The first advances its clock to the next timeout when nothing is ready. So timeouts of two seconds pass at
+once, over real sockets, regardless of the machine's load. Threads are waited for as usual, and child
+processes for a while.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ class _TimeSkippingSelector(selectors.DefaultSelector):
         super().__init__()
         self.skipped = 0.0
         self.threads = 0
-        """That are at work: they are waited for."""
+        """Running threads, which are waited for."""
         self.processes = 0
-        """That have not ended: they are waited for a while, since they may have nothing to do."""
+        """Running child processes, which are waited for a while, since they may be idle."""
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        """Return what is ready now; where nothing is, the time until something is due has passed.
+        """Return what is ready now; if nothing is, skip the timeout.
 
-        What is sent on this machine is there when it was sent.
+        Local data are readable as soon as they are sent.
         """
         ready = super().select(0)
         if ready or timeout == 0:
@@ -46,26 +46,26 @@ class _TimeSkippingSelector(selectors.DefaultSelector):
 
 
 class TimeSkippingLoop(asyncio.SelectorEventLoop):
-    """``time()`` is the only clock that goes with it."""
+    """An event loop that skips waiting times; only its ``time()`` includes them."""
 
     def __init__(self) -> None:
-        self._impatient = _TimeSkippingSelector()
-        super().__init__(self._impatient)
+        self._skipping_selector = _TimeSkippingSelector()
+        super().__init__(self._skipping_selector)
 
     def time(self) -> float:
-        """Return the time, seconds from anywhere, with what was skipped."""
-        return super().time() + self._impatient.skipped
+        """Return the monotonic time including the skipped time."""
+        return super().time() + self._skipping_selector.skipped
 
-    def pass_by(self, seconds: float) -> None:
-        """Let time pass."""
-        self._impatient.skipped += seconds
+    def skip(self, seconds: float) -> None:
+        """Skip some seconds."""
+        self._skipping_selector.skipped += seconds
 
-    def run_in_executor(  # type: ignore[override]  # whatever it takes
+    def run_in_executor(  # type: ignore[override]  # any arguments
         self, executor: Any, func: Callable[..., Any], *args: Any
     ) -> asyncio.Future[Any]:
-        """Do something in a thread, which is waited for."""
+        """Run a function in a thread, which is waited for."""
         future = super().run_in_executor(executor, func, *args)
-        self._impatient.threads += 1
+        self._skipping_selector.threads += 1
         future.add_done_callback(self._thread_done)
         return future
 
@@ -73,24 +73,24 @@ class TimeSkippingLoop(asyncio.SelectorEventLoop):
         """Start a process."""
         transport, protocol = await super().subprocess_exec(*args, **kwargs)
         started: Any = transport
-        self._impatient.processes += 1
+        self._skipping_selector.processes += 1
         asyncio.ensure_future(started._wait(), loop=self).add_done_callback(self._process_done)
         return transport, protocol
 
     def _thread_done(self, _: object) -> None:
-        self._impatient.threads -= 1
+        self._skipping_selector.threads -= 1
 
     def _process_done(self, _: object) -> None:
-        self._impatient.processes -= 1
+        self._skipping_selector.processes -= 1
 
 
 class InlineExecutorLoop(asyncio.SelectorEventLoop):
-    """Does what is meant for a thread at once, and waits for it."""
+    """An event loop that runs executor functions at once in its own thread."""
 
-    def run_in_executor(  # type: ignore[override]  # whatever it takes
+    def run_in_executor(  # type: ignore[override]  # any arguments
         self, _: Any, func: Callable[..., Any], *args: Any
     ) -> asyncio.Future[Any]:
-        """Do something; give a future that has it."""
+        """Run a function; return a future with its result."""
         future = self.create_future()
         try:
             future.set_result(func(*args))
@@ -99,6 +99,6 @@ class InlineExecutorLoop(asyncio.SelectorEventLoop):
         return future
 
 
-def leaves_no_trace(connection: socket.socket) -> None:
-    """Have a connection end at once when it is closed: a million of them would use up all ports."""
+def skip_time_wait(connection: socket.socket) -> None:
+    """Let a connection skip TIME_WAIT when closed: a million of them would use up all ports."""
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _AT_ONCE)

@@ -1,4 +1,4 @@
-"""A small site whose service is handed what cameras would send, without a bus: right, or damaged."""
+"""A small site whose service is fed with simulated messages of cameras, without a bus."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ _GROUND = [[0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.01, 0.1]]
 _SOUND_BYTES = 40
 _BINS = 8
 
-Word = Callable[[Random, str, int], CameraTracks]
-"""What a camera says of an epoch."""
+TracksMaker = Callable[[Random, str, int], CameraTracks]
+"""Makes a camera's track message of an epoch."""
 
 
 def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
-    """Return a site of two cameras that look at one floor; every epoch is a GOP."""
+    """Return the configuration of two cameras that share a floor; every epoch is a GOP."""
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
         "encode": {"gop": GOP, "codec": codec},
@@ -66,7 +66,7 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
 
 
 def pictures(seed: int, frames: int, codec: Literal["h264", "vp8"] = "h264") -> tuple[AccessUnit, ...]:
-    """Encode pictures that differ from camera to camera (by seed) and from frame to frame."""
+    """Encode pictures that differ by camera (seed) and by frame."""
     encoder = Encoder(SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop=GOP, codec=codec))
     rng = np.random.default_rng(seed)
     made = rng.integers(0, 255, (frames, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
@@ -77,7 +77,7 @@ def pictures(seed: int, frames: int, codec: Literal["h264", "vp8"] = "h264") -> 
 
 
 def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
-    """Return a frame as it comes from the bus."""
+    """Return a frame as a bus message."""
     head = FrameHeader(
         pulse=unit.pulse,
         key=unit.key,
@@ -90,8 +90,8 @@ def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
     return Message(KEYS.camera(camera, "video"), unit.data, msgspec.json.encode(head))
 
 
-def word(rng: Random, camera: str, epoch: int) -> CameraTracks:
-    """Return a camera's word on an epoch, in which up to three people walk."""
+def make_tracks(rng: Random, camera: str, epoch: int) -> CameraTracks:
+    """Return a camera's track message of an epoch, with up to three walking people."""
     first = epoch * STRIDE
     return CameraTracks(
         camera=camera,
@@ -119,7 +119,7 @@ def word(rng: Random, camera: str, epoch: int) -> CameraTracks:
 def _track(rng: Random, person: int, first: int) -> TrackMessage:
     left, top = rng.uniform(0, WIDTH - 16), rng.uniform(0, 16)
     boxes = [(left + step, top, left + step + 8.0, top + 24.0) for step in range(STRIDE)]
-    look = AppearanceHistogram(
+    appearance = AppearanceHistogram(
         first=first,
         last=first + STRIDE - 1,
         histogram=[float(place == person % _BINS) for place in range(_BINS)],
@@ -128,38 +128,38 @@ def _track(rng: Random, person: int, first: int) -> TrackMessage:
         id=person,
         boxes=[*boxes],
         confidence=1.0,
-        appearance=[look],
+        appearance=[appearance],
         sharpness=rng.choice((None, rng.random())),
     )
 
 
-def one_each(rng: Random, camera: str, epoch: int) -> CameraTracks:
-    """Let each camera see somebody of its own, in a place of their own."""
+def make_separate_tracks(rng: Random, camera: str, epoch: int) -> CameraTracks:
+    """Return a track message with one person, who is in view of this camera only."""
     number, first = CAMERAS.index(camera), epoch * STRIDE
     boxes = [(4.0 + 40 * number, 10.0 + 8 * number, 14.0 + 40 * number, 34.0 + 8 * number)] * STRIDE
-    looks = [
+    appearance = [
         AppearanceHistogram(
             first=first, last=first + STRIDE - 1, histogram=[float(it == number) for it in range(8)]
         )
     ]
-    track = TrackMessage(id=1, boxes=[*boxes], confidence=1.0, appearance=looks, sharpness=0.5)
-    return msgspec.structs.replace(word(rng, camera, epoch), tracks=[track], shed=[])
+    track = TrackMessage(id=1, boxes=[*boxes], confidence=1.0, appearance=appearance, sharpness=0.5)
+    return msgspec.structs.replace(make_tracks(rng, camera, epoch), tracks=[track], shed=[])
 
 
 def tracks(message: CameraTracks) -> Message:
-    """Return a word as it comes from the bus."""
+    """Return a track message as a bus message."""
     return Message(KEYS.camera(message.camera, "tracks"), msgspec.json.encode(message), b"")
 
 
 def thumbnail(camera: str, pulse: int) -> Message:
-    """Return a small picture as it comes from the bus."""
+    """Return a thumbnail as a bus message."""
     head = ThumbnailHeader(track=1, boot=1, pulse=pulse)
     return Message(KEYS.camera(camera, "thumbs/1"), b"\xff\xd8jpeg", msgspec.json.encode(head))
 
 
 def status(camera: str, pulse: int) -> Message:
-    """Return a status as it comes from the bus."""
-    told = CameraStatus(
+    """Return a status as a bus message."""
+    camera_status = CameraStatus(
         camera=camera,
         boot=1,
         state="live",
@@ -171,11 +171,11 @@ def status(camera: str, pulse: int) -> Message:
         clock_offset=0.0,
         round_trip=0.001,
     )
-    return Message(KEYS.camera(camera, "status"), msgspec.json.encode(told), b"")
+    return Message(KEYS.camera(camera, "status"), msgspec.json.encode(camera_status), b"")
 
 
 def sound(epoch: int) -> Message:
-    """Return the sound of an epoch as it comes from the bus."""
+    """Return the audio of an epoch as a bus message."""
     head = AudioHeader(first=epoch * 9, sizes=[_SOUND_BYTES] * 9)
     return Message(KEYS.sound, bytes(_SOUND_BYTES * 9), msgspec.json.encode(head))
 
@@ -191,15 +191,15 @@ class FedService(BestViewPipeline):
             "status": self.ingest.status,
             "thumbs": self.ingest.thumbnail,
         }
-        self.come(*CAMERAS)
+        self.connect(*CAMERAS)
 
-    def come(self, *cameras: str) -> None:
-        """Let cameras be there."""
+    def connect(self, *cameras: str) -> None:
+        """Mark cameras as present."""
         for camera in cameras:
             self.ingest.alive(KEYS.camera(camera, "alive"), is_present=True)
 
     def handle(self, message: Message) -> None:
-        """Take a message in as the bus hands it on, by what its key ends with."""
+        """Dispatch a message by its key, as the bus does."""
         if message.key == KEYS.sound:
             self.ingest.audio(message)
         parts = message.key.split("/")
@@ -211,16 +211,18 @@ class FedService(BestViewPipeline):
 
     @property
     def dropped(self) -> int:
-        """Messages that were counted and dropped."""
+        """The number of dropped messages."""
         return sum(it.bad_messages for it in self.ingest.states.values())
 
 
-def feed_epoch(service: FedService, rng: Random, epoch: int, epochs: int, word: Word = word) -> None:
-    """Hand a service one of some epochs, right in everything, and have it decide."""
+def feed_epoch(
+    service: FedService, rng: Random, epoch: int, epochs: int, make_tracks: TracksMaker = make_tracks
+) -> None:
+    """Feed a service with the valid messages of an epoch, and let it decide."""
     for seed, camera in enumerate(CAMERAS):
         for unit in pictures(seed, epochs * STRIDE)[epoch * STRIDE :][:STRIDE]:
             service.handle(video(camera, unit))
-        service.handle(tracks(word(rng, camera, epoch)))
+        service.handle(tracks(make_tracks(rng, camera, epoch)))
         service.handle(status(camera, epoch))
         service.handle(thumbnail(camera, epoch))
     service.handle(sound(epoch))

@@ -1,6 +1,6 @@
-"""Damage to inputs: to their bytes, and to the values that JSON and YAML are made of.
+"""Mutations of inputs: of bytes, and of JSON and YAML values.
 
-All randomness is the caller's ``rng``, so that an input can be made again from its number.
+All randomness is from the caller's ``rng``, so that an input can be reproduced from its number.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ WORDS = (
     b"\xff\xff\xff\xff",
     b"\x00\x00\x00\x01",
 )
-"""What readers stumble over: bytes that are no text, numbers that are none or fit nowhere, nesting."""
+"""Typical troublemakers: invalid text, invalid and huge numbers, nesting."""
 
 _DIGIT = re.compile(rb"[0-9]")
 _SPAN = 24
@@ -70,46 +70,46 @@ _ODD: tuple[Callable[[Random], Any], ...] = (
 )
 
 
-def damaged(rng: Random, data: bytes, words: Sequence[bytes] = WORDS) -> bytes:
-    """Return the bytes with one to four pieces of damage: flipped, cut, doubled, moved, said otherwise."""
+def mutate_bytes(rng: Random, data: bytes, words: Sequence[bytes] = WORDS) -> bytes:
+    """Return the bytes with one to four mutations."""
     for _ in range(rng.choice((1, 1, 1, 2, 2, 3, 4))):
-        data = rng.choice(_DAMAGES)(rng, data, words)
+        data = rng.choice(_BYTE_MUTATIONS)(rng, data, words)
     return data[:_MOST_BYTES]
 
 
 def odd(rng: Random) -> Any:
-    """Return a value that is seldom what is expected."""
+    """Return an unexpected value."""
     return rng.choice(_ODD)(rng)
 
 
 def nested(depth: int) -> Any:
-    """Return lists in lists."""
+    """Return nested lists."""
     value: Any = []
     for _ in range(depth):
         value = [value]
     return value
 
 
-def otherwise(rng: Random, value: Any) -> Any:
-    """Return a copy of a value with something in it changed: odd, gone, doubled or of another kind."""
+def mutate_value(rng: Random, value: Any) -> Any:
+    """Return a copy of a value with one mutation: an odd value, a missing, doubled or retyped part."""
     if isinstance(value, dict) and value and rng.random() < _DESCEND:
         key = rng.choice(list(value))
-        return {**value, key: otherwise(rng, value[key])}
+        return {**value, key: mutate_value(rng, value[key])}
     if isinstance(value, list) and value and rng.random() < _DESCEND:
         at = rng.randrange(len(value))
-        return [*value[:at], otherwise(rng, value[at]), *value[at + 1 :]]
-    return rng.choice(_changes(value))(rng)
+        return [*value[:at], mutate_value(rng, value[at]), *value[at + 1 :]]
+    return rng.choice(_mutations(value))(rng)
 
 
 _DESCEND = 0.85
 
 
-def _changes(value: Any) -> Sequence[Callable[[Random], Any]]:
+def _mutations(value: Any) -> Sequence[Callable[[Random], Any]]:
     if isinstance(value, dict):
         return (
             odd,
             lambda rng: {**value, odd_key(rng): odd(rng)},
-            lambda rng: _without(rng, value),
+            lambda rng: _without_key(rng, value),
             lambda _: list(value.items()),
         )
     if isinstance(value, list):
@@ -133,17 +133,17 @@ def _changes(value: Any) -> Sequence[Callable[[Random], Any]]:
 
 
 def odd_key(rng: Random) -> str:
-    """Return a key that nobody waits for."""
+    """Return an unexpected key."""
     return rng.choice(("", "x", "0", "camera", "\ud800", "a" * 300, "id"))
 
 
-def _without(rng: Random, value: dict[str, Any]) -> dict[str, Any]:
+def _without_key(rng: Random, value: dict[str, Any]) -> dict[str, Any]:
     gone = rng.choice(list(value)) if value else ""
     return {key: it for key, it in value.items() if key != gone}
 
 
 def as_json(value: Any) -> bytes:
-    """Return a value as JSON, numbers that JSON does not know as Python writes them."""
+    """Encode a value as JSON, including Python's non-standard numbers."""
     return json.dumps(value).encode()
 
 
@@ -166,7 +166,7 @@ def _cut(rng: Random, data: bytes, _: Sequence[bytes]) -> bytes:
     return data[:at]
 
 
-def _leave_out(rng: Random, data: bytes, _: Sequence[bytes]) -> bytes:
+def _delete(rng: Random, data: bytes, _: Sequence[bytes]) -> bytes:
     at = rng.randrange(len(data) + 1)
     return data[:at] + data[at + rng.randrange(1, _SPAN) :]
 
@@ -177,21 +177,21 @@ def _double(rng: Random, data: bytes, _: Sequence[bytes]) -> bytes:
     return data[:end] + data[at:end] * rng.choice((1, 1, 2, 20)) + data[end:]
 
 
-def _put_in(rng: Random, data: bytes, _: Sequence[bytes]) -> bytes:
+def _insert_bytes(rng: Random, data: bytes, _: Sequence[bytes]) -> bytes:
     at = rng.randrange(len(data) + 1)
     return data[:at] + rng.randbytes(rng.randrange(1, 9)) + data[at:]
 
 
-def _say(rng: Random, data: bytes, words: Sequence[bytes]) -> bytes:
+def _insert_word(rng: Random, data: bytes, words: Sequence[bytes]) -> bytes:
     at = rng.randrange(len(data) + 1)
     return data[:at] + rng.choice(words) + data[at + rng.choice((0, 0, 1, 4)) :]
 
 
 def _renumber(rng: Random, data: bytes, words: Sequence[bytes]) -> bytes:
-    """Take another number where there is one written in digits."""
+    """Replace a decimal number."""
     digits = [it.start() for it in _DIGIT.finditer(data, 0, 2000)]
     if not digits:
-        return _say(rng, data, words)
+        return _insert_word(rng, data, words)
     at = end = rng.choice(digits)
     while end < len(data) and 48 <= data[end] <= 57:
         end += 1
@@ -215,16 +215,16 @@ _NUMBERS: tuple[bytes, ...] = (
     b"1e300",
     b"9" * 40,
 )
-_DAMAGES = (
+_BYTE_MUTATIONS = (
     _flip,
     _flip,
     _replace,
     _cut,
-    _leave_out,
+    _delete,
     _double,
-    _put_in,
-    _say,
-    _say,
+    _insert_bytes,
+    _insert_word,
+    _insert_word,
     _renumber,
     _renumber,
     _move,

@@ -1,4 +1,4 @@
-"""Running a target over many inputs, in a process of its own, which may hang, grow or die."""
+"""Runs a target over many inputs in a child process, which may hang, grow or die."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from benchmarks.fuzz.engine.shared_counts import ROOM, InputCounts, SharedCounts
 from benchmarks.fuzz.engine.target import Target
 
 HANG_S = 2.0
-"""Processor time that one input may take."""
+"""Processor seconds that one input may take."""
 STUCK_S = 60.0
-"""The same by the clock, however busy the machine: then the process is killed."""
+"""Wall-clock seconds after which the process is killed."""
 GROWTH_MB = 200
 """Megabytes that the process may grow by within one input."""
 DEAD, MOST_MB = "died", 4096
 _KEPT = 3
-"""Inputs that are saved of each kind of crash."""
+"""Saved inputs of each kind of crash."""
 
 
 class HangError(BaseException):
-    """An input took too long. No Exception: the code under test may not swallow it."""
+    """An input took too long. Not an Exception, so that the code under test does not swallow it."""
 
 
 class GrowthError(Exception):
@@ -43,24 +43,24 @@ class GrowthError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class TargetResult:
-    """What came of a target's inputs, in which time."""
+    """The result of running a target."""
 
     counts: InputCounts
     seconds: float
     kinds: int
-    """Of crashes, by the place in the code."""
+    """Different crashes, by their place in the code."""
 
 
 @dataclass(frozen=True, slots=True)
 class Crash:
-    """What happened, and where."""
+    """A crash: its kind, with the place in the code, and its traceback."""
 
     kind: str
     text: str
 
 
 class _TracebackHandler(logging.Handler):
-    """Keeps the last traceback that was logged."""
+    """Keeps the last logged traceback."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -72,22 +72,22 @@ class _TracebackHandler(logging.Handler):
 
 
 class InputFeeder:
-    """Feeds inputs one by one, and tells what is wrong: what is raised, logged, too slow or too large."""
+    """Feeds inputs to a target, and detects crashes: exceptions, logged tracebacks, hangs, memory growth."""
 
     def __init__(self, target: Target, hang_s: float = HANG_S) -> None:
         self.target, self._hang_s = target, hang_s
         self._log = _TracebackHandler()
-        self._most = _most_mb()
+        self._peak_mb = _read_peak_mb()
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Watch the log and the time meanwhile."""
+        """Watch the log and the processor time inside the context."""
         root = logging.getLogger()
-        level, handlers, before = root.level, root.handlers[:], signal.signal(signal.SIGPROF, _hung)
+        level, handlers, before = root.level, root.handlers[:], signal.signal(signal.SIGPROF, _raise_hang)
         root.handlers[:] = [self._log]
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", RuntimeWarning)  # numbers that are too large, and told so
+                warnings.simplefilter("ignore", RuntimeWarning)  # of numbers that are too large
                 yield
         finally:
             root.handlers[:] = handlers
@@ -95,7 +95,7 @@ class InputFeeder:
             signal.signal(signal.SIGPROF, before)
 
     def feed(self, data: bytes) -> bool | Crash:
-        """Return whether an input was taken; a crash where there was one."""
+        """Feed an input; return whether it was accepted, or the crash."""
         self._log.last = None
         signal.setitimer(signal.ITIMER_PROF, self._hang_s)
         try:
@@ -103,31 +103,31 @@ class InputFeeder:
             signal.setitimer(signal.ITIMER_PROF, 0)
             if self._log.last is not None:
                 return Crash(_logged(self._log.last), self._log.last)
-            self._weigh()
-        except (Exception, HangError) as error:  # noqa: BLE001 — whatever it is, it is a crash
+            self._check_growth()
+        except (Exception, HangError) as error:  # noqa: BLE001 — anything is a crash
             signal.setitimer(signal.ITIMER_PROF, 0)
-            self._most = _most_mb()
+            self._peak_mb = _read_peak_mb()
             return Crash(_kind(error), "".join(traceback.format_exception(error)))
         return taken
 
-    def _weigh(self) -> None:
-        most = _most_mb()
-        grown, self._most = most - self._most, most
-        if grown > GROWTH_MB:
-            raise GrowthError(f"{grown} MB more")
+    def _check_growth(self) -> None:
+        most = _read_peak_mb()
+        growth, self._peak_mb = most - self._peak_mb, most
+        if growth > GROWTH_MB:
+            raise GrowthError(f"{growth} MB more")
 
 
-def _most_mb() -> int:
-    """Return the most megabytes that the process has had."""
+def _read_peak_mb() -> int:
+    """Return the peak resident memory of the process, megabytes."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
 
 
-def _hung(_: int, __: FrameType | None) -> None:
+def _raise_hang(_: int, __: FrameType | None) -> None:
     raise HangError("took too long")
 
 
 def _kind(error: BaseException) -> str:
-    """Name a crash by what was raised and where: crashes of one kind are one mistake."""
+    """Name a crash by its exception and place, so that crashes of one kind have one cause."""
     frames = traceback.extract_tb(error.__traceback__)
     ours = [it for it in frames if "site-packages" not in it.filename and "fuzz_" not in it.filename]
     place = ours[-1] if ours else frames[-1] if frames else None
@@ -136,7 +136,7 @@ def _kind(error: BaseException) -> str:
 
 
 def _logged(text: str) -> str:
-    """Name a crash whose traceback was not raised, but logged."""
+    """Name a crash by a logged traceback."""
     places = re.findall(r'File ".*/([^/"]+)\.py", line \d+, in (\w+)', text)
     where = "-".join(places[-1]) if places else ""
     return f"logged-{where}"
@@ -144,40 +144,40 @@ def _logged(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class FuzzPlan:
-    """How many inputs and which; whichever bound is reached first is the end."""
+    """Which inputs to run, and the bounds; the first one that is reached ends the run."""
 
     inputs: int | None = None
     seconds: float | None = None
     seed: int = 1
     out: Path | None = None
-    """Where crashes are saved; None: nowhere."""
+    """The folder for crashes; None: they are not saved."""
     hang_s: float = HANG_S
     messages: int | None = None
     first: int = 0
     """The number of the first input."""
 
     def done(self, counts: InputCounts) -> bool:
-        """Return whether these are as many as there were to be."""
+        """Return whether a bound is reached."""
         return any(
             most is not None and so_far >= most
             for so_far, most in ((counts.inputs, self.inputs), (counts.messages, self.messages))
         )
 
 
-def numbered(target: Target, seed: int, index: int) -> bytes:
-    """Return the input of this number: the same in every run."""
+def make_input(target: Target, seed: int, index: int) -> bytes:
+    """Return the input of this number, the same in every run."""
     return target.make(Random(seed << 48 | index))
 
 
 class TargetRunner:
-    """Counts and saves what comes of a target's inputs."""
+    """Runs a target, counts the outcomes and saves the crashes."""
 
     def __init__(self, make: Callable[[], Target], name: str, plan: FuzzPlan) -> None:
         self._make, self._name, self._plan = make, name, plan
         self._kinds: dict[str, int] = {}
 
     def run(self) -> TargetResult:
-        """Run it in processes of its own; one that dies or grows is followed by another."""
+        """Run the target in child processes; one that dies or grows is replaced."""
         began = time.monotonic()
         shared, fork, counts = SharedCounts(), multiprocessing.get_context("fork"), InputCounts()
         until = None if self._plan.seconds is None else began + self._plan.seconds
@@ -187,20 +187,20 @@ class TargetRunner:
             kinds = fork.SimpleQueue()
             child = fork.Process(target=self._child, args=(shared, until, kinds))
             child.start()
-            died = self._wait(child, shared)
+            death = self._wait(child, shared)
             while not kinds.empty():
                 self._count(kinds.get())
             counts = shared.counts
-            if died is not None:
-                self._save(Crash(f"{DEAD}-{died}", f"the process {died}"), counts.inputs, shared.data)
+            if death is not None:
+                self._save(Crash(f"{DEAD}-{death}", f"the process {death}"), counts.inputs, shared.data)
                 counts.inputs, counts.messages, counts.crashes = (
                     it + 1 for it in (counts.inputs, counts.messages, counts.crashes)
                 )
-                shared.keep(counts)
+                shared.store(counts)
         return TargetResult(counts, time.monotonic() - began, len(self._kinds))
 
     def _wait(self, child: multiprocessing.process.BaseProcess, shared: SharedCounts) -> str | None:
-        """Wait for a process; say how it died, None where it did not."""
+        """Wait for a process; return how it died, None: it did not."""
         last, since = -1, time.monotonic()
         while child.is_alive():
             child.join(1.0)
@@ -223,29 +223,29 @@ class TargetRunner:
         counts = shared.counts
         resource.setrlimit(resource.RLIMIT_AS, (MOST_MB << 20, MOST_MB << 20))
         target = self._make()
-        attempt, begun, grown = InputFeeder(target, self._plan.hang_s), counts.inputs, False
+        feeder, first, growth = InputFeeder(target, self._plan.hang_s), counts.inputs, False
         before = counts.messages - target.messages
         gc.freeze()
-        with attempt.watching():
-            while not grown and not self._plan.done(counts):
-                if until is not None and time.monotonic() > until and counts.inputs > begun:
+        with feeder.watching():
+            while not growth and not self._plan.done(counts):
+                if until is not None and time.monotonic() > until and counts.inputs > first:
                     break
-                data = numbered(target, self._plan.seed, self._plan.first + counts.inputs)[:ROOM]
-                shared.keep(counts, data)
-                match attempt.feed(data):
+                data = make_input(target, self._plan.seed, self._plan.first + counts.inputs)[:ROOM]
+                shared.store(counts, data)
+                match feeder.feed(data):
                     case Crash() as crash:
                         counts.crashes += 1
                         self._save(crash, counts.inputs, data)
                         if self._kinds[crash.kind] <= _KEPT:
                             kinds.put(crash.kind)
-                        grown = crash.kind.startswith(GrowthError.__name__)  # what it had it keeps
+                        growth = crash.kind.startswith(GrowthError.__name__)  # its memory is not freed
                     case True:
                         counts.accepted += 1
                     case _:
                         counts.refused += 1
                 counts.inputs += 1
                 counts.messages = before + target.messages
-        shared.keep(counts)
+        shared.store(counts)
         target.close()
 
     def _count(self, kind: str) -> int:
@@ -253,7 +253,7 @@ class TargetRunner:
         return count
 
     def _save(self, crash: Crash, place: int, data: bytes) -> None:
-        """Save what crashed, some of each kind, by the input's number."""
+        """Save a crash, up to a limit for each kind, by the input's number."""
         count = self._count(crash.kind)
         if self._plan.out is not None and count <= _KEPT:
             self._plan.out.mkdir(parents=True, exist_ok=True)

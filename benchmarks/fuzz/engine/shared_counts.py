@@ -1,4 +1,4 @@
-"""What came of a target's inputs, kept where it outlives the process that feeds them."""
+"""Counts of a target's inputs in shared memory, which outlives the feeding process."""
 
 from __future__ import annotations
 
@@ -7,41 +7,41 @@ import struct
 from dataclasses import dataclass
 
 ROOM = 1 << 20
-"""Bytes of an input."""
+"""Largest size of an input, bytes."""
 _HEAD = struct.Struct("<6Q")
 
 
 @dataclass(slots=True)
 class InputCounts:
-    """What came of a target's inputs so far."""
+    """The counts of a target's inputs so far."""
 
     inputs: int = 0
     messages: int = 0
-    """That they were made of. Of an input that a process died of one is counted: nobody knows how many."""
+    """Messages in the inputs; an input that killed its process counts as one."""
     refused: int = 0
     accepted: int = 0
     crashes: int = 0
 
 
 class SharedCounts:
-    """Memory that a process and its children have in common: counts, and the input that is being fed."""
+    """Memory shared with child processes: the counts, and the current input."""
 
     def __init__(self) -> None:
         self._memory = mmap.mmap(-1, _HEAD.size + ROOM)
 
-    def keep(self, counts: InputCounts, data: bytes = b"") -> None:
-        """Keep what has come of the inputs before this one."""
+    def store(self, counts: InputCounts, data: bytes = b"") -> None:
+        """Store the counts before an input, and the input."""
         self._memory[_HEAD.size : _HEAD.size + len(data)] = data
-        told = (counts.inputs, counts.messages, counts.refused, counts.accepted, counts.crashes)
-        _HEAD.pack_into(self._memory, 0, *told, len(data))
+        counters = (counts.inputs, counts.messages, counts.refused, counts.accepted, counts.crashes)
+        _HEAD.pack_into(self._memory, 0, *counters, len(data))
 
     @property
     def counts(self) -> InputCounts:
-        """Return what was kept last."""
+        """Return the stored counts."""
         return InputCounts(*_HEAD.unpack_from(self._memory)[:-1])
 
     @property
     def data(self) -> bytes:
-        """Return the input that was kept last."""
+        """Return the stored input."""
         size = _HEAD.unpack_from(self._memory)[-1]
         return self._memory[_HEAD.size : _HEAD.size + size]

@@ -1,4 +1,4 @@
-"""What is fuzzed: something that makes inputs, and hands them to code that reads bytes from outside."""
+"""The base class of targets, which make inputs and feed them to the code under test."""
 
 from __future__ import annotations
 
@@ -9,39 +9,39 @@ from tempfile import TemporaryDirectory
 from typing import ClassVar
 
 _LONGEST = 2000
-"""Characters of a message that is still one that somebody reads."""
+"""Longest readable message, characters."""
 
 
-_IN_MEMORY = Path("/dev/shm")  # noqa: S108 — a folder of ours is made in it
+_IN_MEMORY = Path("/dev/shm")  # noqa: S108 — a temporary folder is created in it
 
 
 def folder() -> TemporaryDirectory[str]:
-    """Make a folder for files that are written a million times: in memory, where the system has such."""
+    """Create a temporary folder, in memory where possible, for files that are written a million times."""
     return TemporaryDirectory(dir=_IN_MEMORY if _IN_MEMORY.is_dir() else None)
 
 
 class UnclearError(AssertionError):
-    """An input was refused, but not in one readable line."""
+    """An input was refused without one readable line."""
 
 
 class Target(ABC):
-    """One reader. Made in the process that runs it, once for many inputs."""
+    """A reader under test, created once in the process that runs it."""
 
     name: ClassVar[str]
     messages = 0
-    """That the reader was given so far: lines, messages, requests, access units, files; whatever it reads one
-    by one. Here an input is one."""
+    """Messages fed so far: lines, requests, access units, files, or whatever is read one by one. Here one per
+    input."""
 
     @abstractmethod
     def make(self, rng: Random) -> bytes:
-        """Return an input: most are nearly right, some are right, some are anything."""
+        """Return an input: mostly slightly damaged, some valid, some arbitrary."""
 
     @abstractmethod
     def feed(self, data: bytes) -> bool:
-        """Hand an input to the reader; say whether it was taken, or refused as it should be.
+        """Feed an input to the reader; return whether it was accepted, or refused properly.
 
         Raises:
-            Exception: anything at all, which is a crash.
+            Exception: any exception is a crash.
         """
 
     def hand_over(self, data: bytes) -> bool:
@@ -49,12 +49,12 @@ class Target(ABC):
         self.messages += 1
         return self.feed(data)
 
-    def close(self) -> None:  # noqa: B027 — most have opened nothing
-        """Let go of what was opened."""
+    def close(self) -> None:  # noqa: B027 — most have nothing to close
+        """Release resources."""
 
 
 class ScriptTarget(Target):
-    """A reader whose inputs are several messages each: ``feed`` counts them as it hands them over."""
+    """A target whose inputs have several messages each, which ``feed`` counts."""
 
     def hand_over(self, data: bytes) -> bool:
         """Feed an input."""
@@ -62,10 +62,10 @@ class ScriptTarget(Target):
 
 
 def refused(error: BaseException | str) -> bool:
-    """Return that an input was refused, having seen that a person can read why.
+    """Return False for a refused input, after checking its error message.
 
     Raises:
-        UnclearError: it is no line, or none that can be read.
+        UnclearError: the message is not one readable line.
     """
     text = str(error)
     if not text or len(text) > _LONGEST or len(text.splitlines()) > 1 or "Traceback" in text:

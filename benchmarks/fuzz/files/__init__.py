@@ -1,1 +1,1 @@
-"""Files: configurations, calibrations, MOTChallenge files, recordings."""
+"""Fuzzing of files: configurations, calibrations, MOTChallenge files, recordings."""

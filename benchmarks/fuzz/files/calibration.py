@@ -14,7 +14,7 @@ from unittest.mock import patch
 import numpy as np
 from matplotlib.cbook import is_math_text
 
-from benchmarks.fuzz.engine.mutations import as_json, damaged, otherwise
+from benchmarks.fuzz.engine.mutations import as_json, mutate_bytes, mutate_value
 from benchmarks.fuzz.engine.target import Target, folder, refused
 from bestview.calibration import CalibrationError, fit_cameras
 from server.cli.calibrate import calibration
@@ -32,13 +32,13 @@ WORDS = (
 )  # fmt: skip
 _DRAWN_EVERY = 8192
 _FEW, _MORE = (4, 4, 5, 6), (3, 8, 16)
-"""Pairs of points. Of more than five it is tried which four agree with most, which takes long of many."""
+"""Pairs of points; with more than five, all choices of four are tried, which is slow for many."""
 _SELDOM = 1 / 32
 _TRUE = np.array([[0.012, 0.001, -3.0], [0.0004, 0.03, -2.0], [0.00001, 0.002, 0.2]])
 
 
 def _pairs(rng: Random) -> list[dict[str, Any]]:
-    """Return points of a camera that looks down at a floor, and where on it they are."""
+    """Return picture points of a camera above a floor, with their floor points."""
     pairs = []
     for _ in range(rng.choice(_MORE if rng.random() < _SELDOM else _FEW)):
         x, y = rng.uniform(0, 640), rng.uniform(100, 360)
@@ -57,16 +57,16 @@ def _as_csv(cameras: dict[str, list[dict[str, Any]]]) -> bytes:
 def _points(rng: Random, cameras: dict[str, list[dict[str, Any]]]) -> bytes:
     if rng.random() < 0.4:
         data = _as_csv(cameras)
-        return damaged(rng, data, WORDS) if rng.random() < 0.9 else data
+        return mutate_bytes(rng, data, WORDS) if rng.random() < 0.9 else data
     content: Any = {"unit": "m", "cameras": cameras}
     if rng.random() < 0.6:
-        return as_json(otherwise(rng, content))
+        return as_json(mutate_value(rng, content))
     data = as_json(content)
-    return damaged(rng, data, WORDS) if rng.random() < 0.9 else data
+    return mutate_bytes(rng, data, WORDS) if rng.random() < 0.9 else data
 
 
 class _GroundFiles(Target):
-    """Files in a folder of their own, and a site that goes by them."""
+    """Calibration files in a temporary folder, and a site that uses them."""
 
     def __init__(self) -> None:
         self._folder = folder()
@@ -76,24 +76,24 @@ class _GroundFiles(Target):
         self._site = self._site.model_copy(update={"ground": Path("ground.json")})
 
     def lay_out(self) -> None:
-        """Read ground.json as a site does, and lay its floor out."""
+        """Read ground.json as a site does, and lay out its floor plan."""
         for camera in resolve_paths(self._site, where="site", folder=self._path).cameras:
             if camera.ground is not None:
                 floor_coverage(np.array(camera.ground, dtype=np.float64), (640, 360), (640, 360))
 
     def written(self, data: bytes) -> Path:
-        """Write a file of points, named by what it looks like."""
+        """Write a file of points, as JSON or CSV by its content."""
         path = self._path / ("points.json" if data[:1] in {b"{", b"[", b'"'} else "points.csv")
         path.write_bytes(data)
         return path
 
     def close(self) -> None:
-        """Take the folder away."""
+        """Remove the folder."""
         self._folder.cleanup()
 
 
 class MarkedPoints(_GroundFiles):
-    """Marked points are read and fitted."""
+    """Target for files of marked points, which are read and fitted."""
 
     name = "calibration-points"
 
@@ -107,7 +107,7 @@ class MarkedPoints(_GroundFiles):
         return _points(rng, rng.choice(self._right))
 
     def feed(self, data: bytes) -> bool:
-        """Read it, and fit the cameras."""
+        """Read the file, and fit the cameras."""
         try:
             fits = fit_cameras(read_points(self.written(data)).cameras)
         except (UserError, CalibrationError) as error:
@@ -117,7 +117,7 @@ class MarkedPoints(_GroundFiles):
 
 
 class CalibrationCommand(_GroundFiles):
-    """The whole command: homographies that the configuration takes, a plan, lines that can be printed.
+    """Target for the calibrate command: homographies that the configuration accepts, a plan, printable lines.
 
     Drawing the plan takes hundreds of times as long as all else: for most it is seen that it could be drawn.
     """
@@ -125,16 +125,16 @@ class CalibrationCommand(_GroundFiles):
     name = "calibration-plans"
 
     def make(self, rng: Random) -> bytes:
-        """Return a file of points that is nearly right."""
+        """Return a slightly damaged file of points."""
         cameras = {f"c{number}": _pairs(rng) for number in range(rng.choice((1, 2)))}
         content: Any = {"unit": rng.choice(("m", "$x", "", "\n", "\ud800", "$\\frac$")), "cameras": cameras}
         if rng.random() < 0.5:
             strange = rng.choice(("_c", "$\\frac{", "\ud800", "a\nb", "", "c" * 500, "é"))
             content["cameras"][strange] = _pairs(rng)
-        return as_json(otherwise(rng, content) if rng.random() < 0.3 else content)
+        return as_json(mutate_value(rng, content) if rng.random() < 0.3 else content)
 
     def feed(self, data: bytes) -> bool:
-        """Calibrate, and read what was written as a site's configuration does."""
+        """Calibrate, and read the result as a site's configuration does."""
         out = self._path / "ground.json"
         drawn = zlib.crc32(data) % _DRAWN_EVERY == 0
         try:
@@ -150,7 +150,7 @@ class CalibrationCommand(_GroundFiles):
 
 
 def _laid_out(views: Sequence[FloorPlanCamera], unit: str, _: object) -> None:
-    """Lay out what is to be drawn, and see that no word of it would be read as a formula."""
+    """Lay out the plan, and check that no label would be parsed as a formula."""
     for view in views:
         floor_plan._area(view)
     for text in (unit, *(view.camera for view in views)):
@@ -158,7 +158,7 @@ def _laid_out(views: Sequence[FloorPlanCamera], unit: str, _: object) -> None:
 
 
 class GroundFile(_GroundFiles):
-    """The file of homographies, as a site's configuration reads it."""
+    """Target for the file of homographies, as a site's configuration reads it."""
 
     name = "calibration-ground"
 
@@ -166,12 +166,12 @@ class GroundFile(_GroundFiles):
         """Return a ground.json."""
         content: Any = {"unit": "m", "homography": {"c0": _TRUE.tolist(), "c1": (_TRUE * 0.5).tolist()}}
         if rng.random() < 0.6:
-            return as_json(otherwise(rng, content))
+            return as_json(mutate_value(rng, content))
         data = json.dumps(content).encode()
-        return damaged(rng, data, WORDS) if rng.random() < 0.95 else data
+        return mutate_bytes(rng, data, WORDS) if rng.random() < 0.95 else data
 
     def feed(self, data: bytes) -> bool:
-        """Read a site with it, and lay its floor out."""
+        """Load a site with the file, and lay out its floor plan."""
         (self._path / "ground.json").write_bytes(data)
         try:
             self.lay_out()

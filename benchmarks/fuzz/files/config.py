@@ -1,4 +1,4 @@
-"""Configurations: as text, as values, from the environment; and what an operator tries out."""
+"""Targets for configurations: as text, as values, from the environment; and an operator's trial settings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import msgspec
 from pydantic import TypeAdapter
 
 from benchmarks.fuzz.engine.fed_site import site
-from benchmarks.fuzz.engine.mutations import as_json, damaged, odd, otherwise
+from benchmarks.fuzz.engine.mutations import as_json, mutate_bytes, mutate_value, odd
 from benchmarks.fuzz.engine.target import Target, folder, refused
 from server.config.loader import build_config, change_view_settings, load_config
 from server.config.site_config import Config
@@ -54,19 +54,19 @@ _SELDOM = 256
 
 
 class _IsolatedConfig(Target):
-    """A configuration that the machine's own environment, which is read with it, has no part in."""
+    """A target that reads configurations without the machine's own environment variables."""
 
     def __init__(self) -> None:
         self._surroundings = patch.dict(os.environ, clear=True)
 
     def hand_over(self, data: bytes) -> bool:
-        """Feed an input, and give the environment back."""
+        """Feed an input, and restore the environment."""
         with self._surroundings:
             return super().hand_over(data)
 
 
 def _looked_at(config: Config, *, seldom: bool) -> None:
-    """Do with a configuration what is done with every one."""
+    """Use a configuration as every process does."""
     if seldom:
         for setting in settings_of(config):
             msgspec.json.encode(setting)
@@ -86,7 +86,7 @@ class ConfigFile(_IsolatedConfig):
 
     def make(self, rng: Random) -> bytes:
         """Return a file."""
-        return damaged(rng, _PLAIN, WORDS) if rng.random() < 0.99 else _PLAIN
+        return mutate_bytes(rng, _PLAIN, WORDS) if rng.random() < 0.99 else _PLAIN
 
     def feed(self, data: bytes) -> bool:
         """Load it."""
@@ -99,12 +99,12 @@ class ConfigFile(_IsolatedConfig):
         return True
 
     def close(self) -> None:
-        """Take the folder away."""
+        """Remove the folder."""
         self._folder.cleanup()
 
 
 class TokenStore(Target):
-    """The file that says who may come."""
+    """Target for the file of access tokens."""
 
     name = "config-tokens"
 
@@ -114,7 +114,7 @@ class TokenStore(Target):
 
     def make(self, rng: Random) -> bytes:
         """Return a file."""
-        return damaged(rng, _TOKENS, WORDS) if rng.random() < 0.99 else _TOKENS
+        return mutate_bytes(rng, _TOKENS, WORDS) if rng.random() < 0.99 else _TOKENS
 
     def feed(self, data: bytes) -> bool:
         """Read it."""
@@ -126,12 +126,12 @@ class TokenStore(Target):
         return True
 
     def close(self) -> None:
-        """Take the folder away."""
+        """Remove the folder."""
         self._folder.cleanup()
 
 
 class ConfigValues(_IsolatedConfig):
-    """Sections of the reference, some keys of a few, one value changed; sometimes from the environment."""
+    """Target for configuration values: sections with one changed value, also from the environment."""
 
     name = "config-values"
 
@@ -142,7 +142,7 @@ class ConfigValues(_IsolatedConfig):
         self._sections: dict[str, Any] = sections
 
     def make(self, rng: Random) -> bytes:
-        """Return sections, and variables of the environment."""
+        """Return sections, and environment variables."""
         names, whole = rng.sample(sorted(self._sections), 2), rng.random() < _WHOLE
         content: Any = {name: self._sections[name] for name in names} | {"cameras": self._cameras}
         if not whole:
@@ -157,7 +157,7 @@ class ConfigValues(_IsolatedConfig):
             said = as_json(value).decode() if rng.random() < 0.5 else str(value)
             variables[f"{section}__{key}".upper() if key else section.upper()] = said.replace("\x00", "")
         else:
-            content = otherwise(rng, content)
+            content = mutate_value(rng, content)
         return as_json([content, variables])
 
     def feed(self, data: bytes) -> bool:
@@ -182,7 +182,7 @@ class ConfigValues(_IsolatedConfig):
 
 
 class TrialSettings(Target):
-    """Settings that an operator tries out: what a service would choose by."""
+    """Target for an operator's trial settings of view selection."""
 
     name = "config-preview"
 
@@ -200,10 +200,10 @@ class TrialSettings(Target):
             "min_shot_s": 0.0,
             "quality": {"relative": 1.0},
         }
-        return as_json(otherwise(rng, changes))
+        return as_json(mutate_value(rng, changes))
 
     def feed(self, data: bytes) -> bool:
-        """Choose by them."""
+        """Select views with the settings."""
         changes = json.loads(data)
         if not isinstance(changes, dict):
             return False
@@ -216,7 +216,7 @@ class TrialSettings(Target):
 
 
 def _some(rng: Random, section: Any, needed: tuple[str, ...] = ()) -> Any:
-    """Return some of a section's keys, and those that it cannot be without."""
+    """Return some keys of a section, including the required ones."""
     if not isinstance(section, dict):
         return section
     names = {*needed, *rng.sample(list(section), min(len(section), rng.randrange(1, 5)))}
@@ -224,7 +224,7 @@ def _some(rng: Random, section: Any, needed: tuple[str, ...] = ()) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return a section as YAML has it."""
+    """Return a section as YAML types."""
     return json.loads(TypeAdapter(Any).dump_json(value))
 
 

@@ -1,4 +1,4 @@
-"""MOTChallenge files: detections, tracks and ground truth, packed or not, and what is made of them."""
+"""Targets for MOTChallenge files: detections, tracks and ground truth, compressed or not."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from random import Random
 
 import numpy as np
 
-from benchmarks.fuzz.engine.mutations import damaged
+from benchmarks.fuzz.engine.mutations import mutate_bytes
 from benchmarks.fuzz.engine.target import Target, folder, refused
 from server.cli.calibrate.walk_input import VideoFormat, walks_from_tracks
 from server.system.errors import UserError
@@ -40,7 +40,7 @@ def _rows(rng: Random, least_id: int) -> bytes:
 
 
 class _MotFiles(Target):
-    """Files in a folder of their own."""
+    """MOTChallenge files in a temporary folder."""
 
     least_id = -1
 
@@ -51,23 +51,23 @@ class _MotFiles(Target):
         self._right = [_rows(rng, self.least_id) for _ in range(200)]
 
     def file(self, rng: Random) -> bytes:
-        """Return a file that is nearly right."""
+        """Return a slightly damaged file."""
         data = rng.choice(self._right)
-        return damaged(rng, data, WORDS) if rng.random() < 0.9 else data
+        return mutate_bytes(rng, data, WORDS) if rng.random() < 0.9 else data
 
     def written(self, data: bytes) -> Path:
-        """Write a file; what begins as packed files do is named like one."""
+        """Write a file, with the suffix of a compressed one if it starts like one."""
         path = self._path / ("c0.txt.gz" if data.startswith(_PACKED) else "c0.txt")
         path.write_bytes(data)
         return path
 
     def close(self) -> None:
-        """Take the folder away."""
+        """Remove the folder."""
         self._folder.cleanup()
 
 
 class MotRoundTrip(_MotFiles):
-    """What is read is written and read again as the same."""
+    """Target for the round trip: rows that are read, written and read again stay the same."""
 
     name = "mot-text"
 
@@ -76,7 +76,7 @@ class MotRoundTrip(_MotFiles):
         data = self.file(rng)
         if rng.random() < 0.05:
             data = gzip.compress(data, 1)
-            data = damaged(rng, data) if rng.random() < 0.8 else data
+            data = mutate_bytes(rng, data) if rng.random() < 0.8 else data
         return data
 
     def feed(self, data: bytes) -> bool:
@@ -93,12 +93,12 @@ class MotRoundTrip(_MotFiles):
 
 
 def _readable(text: str) -> list[str]:
-    """Leave out boxes that are so small that two decimals make nothing of them."""
+    """Drop boxes that are too small for two decimals."""
     return [line for line in text.splitlines() if "0.00" not in line.split(",")[4:6]]
 
 
 class DetectionFile(_MotFiles):
-    """As the detections of a camera, frame by frame."""
+    """Target for a camera's detections, read frame by frame."""
 
     name = "mot-detections"
 
@@ -111,7 +111,7 @@ class DetectionFile(_MotFiles):
         return self.file(rng)
 
     def feed(self, data: bytes) -> bool:
-        """Ask for its first frames."""
+        """Read the first frames."""
         try:
             detector = MotFileDetector(self.written(data))
         except ValueError as error:
@@ -124,7 +124,7 @@ class DetectionFile(_MotFiles):
 
 
 class TrackFile(_MotFiles):
-    """As the tracks of a walk, from which cameras are calibrated."""
+    """Target for tracks of a walk, from which cameras are calibrated."""
 
     name = "mot-trajectories"
     least_id = 1
@@ -134,7 +134,7 @@ class TrackFile(_MotFiles):
         return self.file(rng)
 
     def feed(self, data: bytes) -> bool:
-        """Take it for a walk."""
+        """Read the file as a walk."""
         try:
             walks_from_tracks([self.written(data)], VideoFormat(None, None))
         except UserError as error:

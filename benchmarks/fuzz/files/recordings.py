@@ -1,4 +1,4 @@
-"""A recorded run, read by the next service after somebody has damaged it."""
+"""Target for damaged recording sessions, read by the next service."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import msgspec
 
 from benchmarks.fuzz.engine.event_loops import InlineExecutorLoop
 from benchmarks.fuzz.engine.fed_site import CAMERAS, FedService, feed_epoch, site
-from benchmarks.fuzz.engine.mutations import as_json, damaged, otherwise
+from benchmarks.fuzz.engine.mutations import as_json, mutate_bytes, mutate_value
 from benchmarks.fuzz.engine.target import ScriptTarget, folder
 from benchmarks.fuzz.media.damaged_media import WORDS as MEDIA
 from server.service.recording.recorder import Recorder
@@ -49,7 +49,7 @@ _files = msgspec.msgpack.Decoder(_Files)
 
 
 class RecordedRuns(ScriptTarget):
-    """A recorded run: what is told and played of it, and that it is taken away, and nothing else."""
+    """Target for a recording session: its listing, playback and removal, which removes nothing else."""
 
     name = "recordings-sessions"
 
@@ -91,19 +91,19 @@ class RecordedRuns(ScriptTarget):
             (self._run / name).write_bytes(data)
 
     def make(self, rng: Random) -> bytes:
-        """Return files that are not as they were."""
+        """Return damaged files."""
         files: _Files = []
         for kind in rng.sample(sorted(self._kinds), rng.choice((1, 1, 1, 2))):
             name = rng.choice(self._kinds[kind])
             data = self._right[name]
             if name.endswith(".json") and rng.random() < 0.6:
-                files.append((name, as_json(otherwise(rng, msgspec.json.decode(data)))))
+                files.append((name, as_json(mutate_value(rng, msgspec.json.decode(data)))))
             else:
-                files.append((name, damaged(rng, data, MEDIA if name.endswith(".mp4") else WORDS)))
+                files.append((name, mutate_bytes(rng, data, MEDIA if name.endswith(".mp4") else WORDS)))
         return msgspec.msgpack.encode(files)
 
     def feed(self, data: bytes) -> bool:
-        """Find the run, ask it what a viewer would, and take it away."""
+        """Find the session, play it as a viewer would, and remove it."""
         files = _files.decode(data)
         for name, content in files:
             self.messages += 1
@@ -145,7 +145,7 @@ class RecordedRuns(ScriptTarget):
 
     @staticmethod
     async def _asked(recorder: Recorder, lot: int) -> int:
-        """Ask what is told of all; play one camera and one person: to play everybody takes twice as long."""
+        """List everything; play one camera and one person only, which halves the time."""
         assert recorder.session is not None
         lines = [it async for it in read_decision_lines(recorder, 0, _FAR)]
         sources: tuple[PlaybackSource, ...] = (
@@ -167,7 +167,7 @@ class RecordedRuns(ScriptTarget):
         return len(lines)
 
     def close(self) -> None:
-        """Take the folder away."""
+        """Remove the folder."""
         self._loop.close()
         self._folder.cleanup()
 

@@ -1,1 +1,1 @@
-"""HTTP requests to a served site."""
+"""Fuzzing of HTTP requests to a served site."""

@@ -1,11 +1,11 @@
-"""What may be asked of the application: its own addresses, with values that are nearly right or odd."""
+"""The application's addresses, with valid, nearly valid or odd values."""
 
 from __future__ import annotations
 
 from random import Random
 from urllib.parse import quote
 
-from benchmarks.fuzz.engine.mutations import damaged, odd
+from benchmarks.fuzz.engine.mutations import mutate_bytes, odd
 
 WORDS = (
     b"\r\n", b"\n", b"\r", b"\x00", b"\xff", b" ", b"%", b"%00", b"%2e%2e%2f", b"../", b"/..//", b"%ff",
@@ -33,7 +33,7 @@ _NAMES = {
 
 
 def address(rng: Random, path: str, queries: tuple[str, ...]) -> str:
-    """Return an address by its pattern, and some of what can be asked for."""
+    """Fill an address pattern, and add some query parameters."""
     for name, values in _NAMES.items():
         while "{" + name + "}" in path:
             value = rng.choice(values) if rng.random() < 0.8 else quote(str(odd(rng)), errors="replace")[:300]
@@ -47,7 +47,7 @@ def address(rng: Random, path: str, queries: tuple[str, ...]) -> str:
 
 
 def some_range(rng: Random) -> str:
-    """Return the head that asks for a part."""
+    """Return a Range header."""
     return f"Range: {rng.choice(('bytes', 'bytes', 'items', ''))}={rng.choice(_RANGES)}"
 
 
@@ -62,11 +62,11 @@ def _value(rng: Random, name: str) -> str:
 
 
 def _moment(rng: Random) -> str:
-    """Return a moment that is known, far away, or none."""
+    """Return a time: recorded, far away, or invalid."""
     way = rng.random()
     if way < 0.5:
         return quote(rng.choice(_MOMENTS), safe="+")
     if way < 0.8:
         return f"p{rng.randrange(-3, 40)}"
-    hurt = damaged(rng, rng.choice(_MOMENTS).encode(), WORDS)
+    hurt = mutate_bytes(rng, rng.choice(_MOMENTS).encode(), WORDS)
     return quote(hurt, safe="+")[:300]

@@ -1,11 +1,11 @@
-"""What an operator sends: bodies that are nearly right, to every address that takes one."""
+"""Target for operator requests: nearly valid bodies to every address that takes one."""
 
 from __future__ import annotations
 
 from random import Random
 from typing import Any
 
-from benchmarks.fuzz.engine.mutations import as_json, damaged, otherwise
+from benchmarks.fuzz.engine.mutations import as_json, mutate_bytes, mutate_value
 from benchmarks.fuzz.http.served_site import OpenSiteTarget
 from server.http.access.csrf import CSRF_HEADER
 
@@ -33,20 +33,20 @@ _ASKED: tuple[tuple[str, str, Any], ...] = (
     ("GET", "/api/operator/walk", None),
     ("GET", "/api/operator/view_selection", None),
 )
-"""To finish a walk starts a process: that is for other tests."""
+"""Finishing a walk starts a process, which is left to other tests."""
 
 
 class OperatorRequests(OpenSiteTarget):
-    """One thing that is asked by somebody who may; what the one before did holds."""
+    """One request of an authorized operator; the effects of previous ones stay."""
 
     name = "http-operator"
 
     def make(self, rng: Random) -> bytes:
         """Return the bytes of a request."""
         method, path, right = rng.choice(_ASKED)
-        body = b"" if right is None else as_json(otherwise(rng, right) if rng.random() < 0.85 else right)
+        body = b"" if right is None else as_json(mutate_value(rng, right) if rng.random() < 0.85 else right)
         if rng.random() < 0.15:
-            body = damaged(rng, body)
+            body = mutate_bytes(rng, body)
         head = (
             f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n{CSRF_HEADER}: 1\r\nConnection: close\r\n"
             f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"

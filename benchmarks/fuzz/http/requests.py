@@ -1,10 +1,10 @@
-"""Requests by the application's own description, and raw bytes, to a site that is open to all."""
+"""Target for requests by the OpenAPI description, and raw bytes, to a site without access control."""
 
 from __future__ import annotations
 
 from random import Random
 
-from benchmarks.fuzz.engine.mutations import as_json, damaged, otherwise
+from benchmarks.fuzz.engine.mutations import as_json, mutate_bytes, mutate_value
 from benchmarks.fuzz.http.addresses import METHODS, WORDS, address, some_range
 from benchmarks.fuzz.http.served_site import OpenSiteTarget
 from server.http.access.csrf import CSRF_HEADER
@@ -19,7 +19,7 @@ _BODIES = (
     {"boxes": [[1.0, 2.0, 3.0, 4.0]]},
 )
 _SELDOM = (".mjpeg", ".jpg", "/stills", "overlay")
-"""What starts a process that decodes: a hundred times as slow."""
+"""Addresses that start a render worker, which is a hundred times slower."""
 _HEADERS = (
     "Range: bytes=0-",
     "Accept-Encoding: gzip, \x01",
@@ -37,13 +37,13 @@ _HEADERS = (
 
 
 class AnonymousRequests(OpenSiteTarget):
-    """One request on a connection of its own."""
+    """One request on its own connection."""
 
     name = "http-requests"
 
     def __init__(self) -> None:
         super().__init__()
-        self._paths = self._served.described
+        self._paths = self._served.documented_addresses
 
     def make(self, rng: Random) -> bytes:
         """Return the bytes of a request."""
@@ -54,8 +54,8 @@ class AnonymousRequests(OpenSiteTarget):
         method = rng.choice(METHODS)
         body = b""
         if method in {"POST", "PUT", "PATCH"}:
-            body = as_json(otherwise(rng, rng.choice(_BODIES)))
-            body = damaged(rng, body) if rng.random() < 0.2 else body
+            body = as_json(mutate_value(rng, rng.choice(_BODIES)))
+            body = mutate_bytes(rng, body) if rng.random() < 0.2 else body
         lines = [f"{method} {asked} HTTP/1.1", "Host: 127.0.0.1"]
         if rng.random() < 0.1:
             lines.append(rng.choice(_HEADERS) if rng.random() < 0.7 else some_range(rng))
@@ -64,4 +64,4 @@ class AnonymousRequests(OpenSiteTarget):
         if body:
             lines += [f"Content-Length: {len(body)}", "Content-Type: application/json"]
         request = "\r\n".join([*lines, "Connection: close", "", ""]).encode("utf-8", "replace") + body
-        return damaged(rng, request, WORDS) if rng.random() < 0.3 else request
+        return mutate_bytes(rng, request, WORDS) if rng.random() < 0.3 else request

@@ -1,4 +1,4 @@
-"""A small site that is served, and somebody who sends it bytes."""
+"""A small served site, and the base of its targets."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from typing import Any
 
 from aiohttp import web
 
-from benchmarks.fuzz.engine.event_loops import TimeSkippingLoop, leaves_no_trace
-from benchmarks.fuzz.engine.fed_site import FedService, Word, feed_epoch, site, word
+from benchmarks.fuzz.engine.event_loops import TimeSkippingLoop, skip_time_wait
+from benchmarks.fuzz.engine.fed_site import FedService, TracksMaker, feed_epoch, make_tracks, site
 from benchmarks.fuzz.engine.target import Target
 from server.http.api.openapi import describe
 from server.http.app import make_app, serving
@@ -25,13 +25,13 @@ from server.service.service import BestViewService
 _WELL_EVERY = 100
 EPOCHS = 6
 _WAIT_S = 10.0
-"""Then an answer is not waited for; by a clock that hurries."""
+"""Seconds to wait for a response, by the time-skipping clock."""
 _MOST = 65_536
 _HEALTH = b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
 
 
 class ServedSite:
-    """A site that has run for some epochs, and stands still. ``sections`` are its configuration's.
+    """A site that has run for some epochs and is then idle; ``sections`` are added to its configuration.
 
     ``before`` is given the application before it is served.
     """
@@ -39,7 +39,7 @@ class ServedSite:
     def __init__(
         self,
         sections: Mapping[str, Any] | None = None,
-        word: Word = word,
+        make_tracks: TracksMaker = make_tracks,
         loop: AbstractEventLoop | None = None,
         before: Callable[[web.Application], None] = lambda _: None,
     ) -> None:
@@ -47,16 +47,16 @@ class ServedSite:
         self._folder = TemporaryDirectory()
         self._stack = AsyncExitStack()
         self._before = before
-        self.loop.run_until_complete(self._serve(dict(sections or {}), word))
+        self.loop.run_until_complete(self._serve(dict(sections or {}), make_tracks))
 
-    async def _serve(self, sections: dict[str, Any], word: Word) -> None:
+    async def _serve(self, sections: dict[str, Any], make_tracks: TracksMaker) -> None:
         config = site(record={"folder": str(Path(self._folder.name) / "kept")}, **sections)
         self.service, rng = FedService(config), Random(1)
         self.service.recorder.open()
         self._stack.callback(self.service.close)
         self.service.pulse0 = 1_700_000_000.0
         for epoch in range(EPOCHS):
-            feed_epoch(self.service, rng, epoch, EPOCHS, word)
+            feed_epoch(self.service, rng, epoch, EPOCHS, make_tracks)
         self.app = make_app(BestViewService(self.service))
         self._before(self.app)
         self.port = await self._stack.enter_async_context(
@@ -64,8 +64,8 @@ class ServedSite:
         )
 
     @property
-    def described(self) -> list[tuple[str, tuple[str, ...]]]:
-        """Return the addresses that the application tells of, each with what can be asked for."""
+    def documented_addresses(self) -> list[tuple[str, tuple[str, ...]]]:
+        """Return the addresses in the OpenAPI description, with their query parameters."""
         found = [("/", ("object",)), ("/operator", ()), ("/api", ()), ("/api/openapi.json", ())]
         for path, item in describe(self.app)["paths"].items():
             for operation in item.values():
@@ -73,16 +73,16 @@ class ServedSite:
                 found.append((path, named))
         return found
 
-    def ask(self, data: bytes, address: str = "127.0.0.1") -> bytes:
-        """Send bytes on a connection of their own; give what is answered, of streams the beginning."""
+    def send(self, data: bytes, address: str = "127.0.0.1") -> bytes:
+        """Send bytes on a new connection; return the response, of streams the beginning."""
         return self.loop.run_until_complete(self._ask(data, address))
 
     async def _ask(self, data: bytes, address: str) -> bytes:
         answer = b""
         with socket.socket() as asking:
-            leaves_no_trace(asking)
+            skip_time_wait(asking)
             asking.bind((address, 0))
-            asking.connect(("127.0.0.1", self.port))  # whoever listens need not take it up yet
+            asking.connect(("127.0.0.1", self.port))  # the server need not accept it yet
             asking.settimeout(0)
             with contextlib.suppress(TimeoutError, ConnectionError):
                 async with asyncio.timeout(_WAIT_S):
@@ -91,19 +91,19 @@ class ServedSite:
                         answer += more
         return answer
 
-    def is_well(self) -> bool:
-        """Return whether it still answers others."""
-        return self.ask(_HEALTH).startswith(b"HTTP/1.1 200")
+    def is_healthy(self) -> bool:
+        """Return whether the site still answers other clients."""
+        return self.send(_HEALTH).startswith(b"HTTP/1.1 200")
 
     def close(self) -> None:
-        """End the server."""
+        """Stop the server."""
         self.loop.run_until_complete(self._stack.aclose())
         self.loop.close()
         self._folder.cleanup()
 
 
-def judged(data: bytes, answer: bytes) -> bool:
-    """Return whether a request was granted; an answer is one line of JSON where it was not."""
+def check_response(data: bytes, answer: bytes) -> bool:
+    """Return whether a request succeeded, after checking that a refusal is one line of JSON."""
     assert b"Traceback" not in answer, answer[:2000].decode("utf-8", "replace")
     code = answer[9:12]
     assert code != b"500", answer[:2000].decode("utf-8", "replace")
@@ -115,20 +115,20 @@ def judged(data: bytes, answer: bytes) -> bool:
 
 
 class OpenSiteTarget(Target):
-    """Requests to a site that is open to all: what the one before has chosen goes on."""
+    """Requests to a site without access control; the effects of previous ones stay."""
 
     def __init__(self) -> None:
         self._served = ServedSite()
         self._fed = 0
 
     def feed(self, data: bytes) -> bool:
-        """Ask, and read what is answered."""
-        granted = judged(data, self._served.ask(data))
+        """Send the request, and check the response."""
+        granted = check_response(data, self._served.send(data))
         self._fed += 1
         if self._fed % _WELL_EVERY == 0:
-            assert self._served.is_well()
+            assert self._served.is_healthy()
         return granted
 
     def close(self) -> None:
-        """End the server."""
+        """Stop the server."""
         self._served.close()

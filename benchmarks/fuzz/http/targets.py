@@ -1,4 +1,4 @@
-"""The served application: what anybody asks, what an operator sends, and what strangers get."""
+"""The targets of the served application: anonymous, operator and unauthenticated requests."""
 
 from __future__ import annotations
 

@@ -16,11 +16,11 @@ from urllib.parse import unquote_to_bytes
 import yaml
 from aiohttp import web
 
-from benchmarks.fuzz.engine.fed_site import STRIDE, one_each, pictures
-from benchmarks.fuzz.engine.mutations import as_json, damaged
+from benchmarks.fuzz.engine.fed_site import STRIDE, make_separate_tracks, pictures
+from benchmarks.fuzz.engine.mutations import as_json, mutate_bytes
 from benchmarks.fuzz.engine.target import Target, folder
 from benchmarks.fuzz.http.addresses import WORDS, address, some_range
-from benchmarks.fuzz.http.served_site import EPOCHS, ServedSite, judged
+from benchmarks.fuzz.http.served_site import EPOCHS, ServedSite, check_response
 from server.config.tokens_file import token_digest
 from server.http.access.authorization import ACCESS
 from server.http.access.sessions import _Session
@@ -39,31 +39,31 @@ _RIGHTS: dict[str, dict[str, object]] = {
 _NAMES = {1: "Ada Lovelace", 2: "Charles Babbage"}
 _OPEN = {"/", "/operator", "/page/{file}", "/api", "/api/openapi.json", "/healthz", "/readyz", "/api/session"}
 _NARROW = {"/api/site", "/api/objects", "/api/cameras", "/api/events", "/api/flags", "/api/past"}
-"""What answers everybody who has a token, each with what that is for."""
+"""Addresses that answer every token, with the content of its scope."""
 _ADDRESSES = ("127.0.0.1", "127.0.0.1", "127.0.0.1", "127.0.0.1", "127.0.0.2", "127.0.0.9")
-"""From the last too many wrong tokens have come."""
+"""Client addresses; the last one is blocked after too many wrong tokens."""
 _WINDOW = 24
 _MADE = (".mjpeg", "best.jpg", "live.jpg")
-"""What starts a process that decodes."""
+"""Addresses that start a render worker."""
 
 
 @dataclass(frozen=True, slots=True)
 class _AnsweredRequest:
-    """What an answer was one to."""
+    """The request that a response belongs to."""
 
     status: int
     method: str
     path: str
-    """The address's pattern."""
+    """The pattern of the address."""
     object: int | None
-    """Whoever is asked for, by the number that they have now."""
+    """The requested person, by their current number."""
     camera: str | None
     held: bool
-    """The view was to be of a camera."""
+    """Whether the view is fixed to a camera."""
 
 
 class UnauthenticatedRequests(Target):
-    """One request, of somebody or nobody."""
+    """Target for requests with and without tokens, which must only reveal what the token grants."""
 
     name = "http-unauthenticated"
 
@@ -77,7 +77,9 @@ class UnauthenticatedRequests(Target):
         tokens.write_text(yaml.safe_dump({"tokens": listed}))
         self._answered: list[_AnsweredRequest] = []
         self._served = ServedSite(
-            {"access": {"tokens": str(tokens)}, "http": {"hls_segment_s": 0.2}}, one_each, before=self._watch
+            {"access": {"tokens": str(tokens)}, "http": {"hls_segment_s": 0.2}},
+            make_separate_tracks,
+            before=self._watch,
         )
         for number, name in _NAMES.items():
             self._served.service.decider.people.registry.set_name(number, name)
@@ -86,14 +88,14 @@ class UnauthenticatedRequests(Target):
         self._sessions = {
             token_digest(_COOKIES[who]): _Session(token_digest(SECRETS[who]), ends) for who in _WHO
         }
-        self._paths = [it for it in self._served.described if not it[0].endswith(_MADE)]
+        self._paths = [it for it in self._served.documented_addresses if not it[0].endswith(_MADE)]
         self._pictures = {
             "c0": _windows(0, 0.5) - _windows(1, 0.0),
             "c1": _windows(1, 0.5) - _windows(0, 0.0),
         }
 
     def _watch(self, app: web.Application) -> None:
-        """Note what every answer is one to."""
+        """Record the request of every response."""
         app.on_response_prepare.append(self._note)
 
     async def _note(self, request: web.Request, response: web.StreamResponse) -> None:
@@ -113,7 +115,7 @@ class UnauthenticatedRequests(Target):
         )
 
     def make(self, rng: Random) -> bytes:
-        """Return the bytes of a request, and first from which address."""
+        """Return the client address and the bytes of a request."""
         path, queries = rng.choice(self._paths)
         asked = address(rng, path, queries)
         lines = ["Host: 127.0.0.1"]
@@ -143,18 +145,18 @@ class UnauthenticatedRequests(Target):
             lines.append("X-MyView-Changes: 1")
         head = "\r\n".join([f"{method} {asked} HTTP/1.1", *lines, "Connection: close", "", ""])
         request = head.encode("utf-8", "surrogateescape") + body
-        request = damaged(rng, request, WORDS) if rng.random() < 0.25 else request
+        request = mutate_bytes(rng, request, WORDS) if rng.random() < 0.25 else request
         return bytes([rng.randrange(len(_ADDRESSES))]) + request
 
     def feed(self, data: bytes) -> bool:
-        """Ask, and look at what was answered to whom."""
+        """Send the request, and check that the response reveals only what is granted."""
         came_from = _ADDRESSES[data[0] % len(_ADDRESSES)] if data else _ADDRESSES[0]
         self._authenticator.sessions._sessions = dict(self._sessions)
         self._authenticator._rate_limit._until = {_ADDRESSES[-1]: time.monotonic() + 1e9}
         self._authenticator._valid.clear()
         self._answered.clear()
-        answer = self._served.ask(data[1:], came_from)
-        granted = judged(data[1:], answer)
+        answer = self._served.send(data[1:], came_from)
+        granted = check_response(data[1:], answer)
         said = data + unquote_to_bytes(data)
         who = {it for it in _WHO if SECRETS[it].encode() in said or _COOKIES[it].encode() in said}
         for one in self._answered:
@@ -172,13 +174,13 @@ class UnauthenticatedRequests(Target):
             assert name.encode() not in answer or (number == 1 and "family" in who), f"{sorted(who)}: {name}"
 
     def close(self) -> None:
-        """End the server."""
+        """Stop the server."""
         self._served.close()
         self._folder.cleanup()
 
 
 def _may(who: set[str], one: _AnsweredRequest) -> bool:
-    """Return whether somebody who knows these secrets may have been given this answer."""
+    """Return whether a client with these secrets may get this response."""
     if one.path in _OPEN or one.method == "OPTIONS" or "night" in who:
         return True
     if "hall" in who:
@@ -191,17 +193,17 @@ def _may(who: set[str], one: _AnsweredRequest) -> bool:
 
 
 def _nearly(rng: Random, secret: str) -> str:
-    """Return a secret, mostly whole."""
+    """Return a secret, sometimes damaged."""
     if rng.random() < 0.5:
         return secret
     if rng.random() < 0.2:
         return token_digest(secret)
-    hurt = damaged(rng, secret.encode()).decode("utf-8", "surrogateescape")
+    hurt = mutate_bytes(rng, secret.encode()).decode("utf-8", "surrogateescape")
     return hurt.replace("\r", "").replace("\n", "") if rng.random() < 0.8 else hurt
 
 
 def _windows(seed: int, begin: float) -> frozenset[bytes]:
-    """Return all pieces of a camera's pictures, in each from such a share of it on."""
+    """Return pieces of all pictures of a camera, each from a share of its length on."""
     found: set[bytes] = set()
     for unit in pictures(seed, EPOCHS * STRIDE):
         begins = range(round(begin * len(unit.data)), len(unit.data) - _WINDOW)

@@ -1,1 +1,1 @@
-"""Media with damaged packets: from cameras through the splice, in files, and as a client reads them."""
+"""Fuzzing of media: packets of cameras, splicing, files, and streams to clients."""

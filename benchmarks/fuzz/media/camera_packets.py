@@ -1,4 +1,4 @@
-"""What cameras and their recordings give: packets, and files."""
+"""Targets for packets and recordings of cameras."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.fuzz.engine.fed_site import FPS, HEIGHT, STRIDE, WIDTH, pictures
 from benchmarks.fuzz.engine.target import Target, folder, refused
-from benchmarks.fuzz.media.damaged_media import wrong
+from benchmarks.fuzz.media.damaged_media import damage_media
 from server.camera.passthrough.access_units import parse_packing
 from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
 from server.camera.passthrough.recording_source import PassthroughRecording
@@ -23,7 +23,7 @@ from server.system.errors import UserError
 
 
 def _take(source: PictureSource) -> None:
-    """Take the first frames of a recording, and close it."""
+    """Read the first frames of a recording, and close it."""
     try:
         for pulse in range(12):
             source.take(pulse)
@@ -34,7 +34,7 @@ def _take(source: PictureSource) -> None:
 
 
 class PassthroughPackets(Target):
-    """What a camera's own H.264 is packed in."""
+    """Target for packets of a camera's own H.264."""
 
     name = "media-packets"
 
@@ -46,14 +46,14 @@ class PassthroughPackets(Target):
         self._right = ((avcc, lengths), (units[0].data[:40], units[1].data), (b"", units[0].data))
 
     def make(self, rng: Random) -> bytes:
-        """Return what stands beside a stream, and a packet of it."""
+        """Return the extradata of a stream, and a packet."""
         beside, packet = rng.choice(self._right)
-        beside = wrong(rng, beside) if rng.random() < 0.6 else beside
-        packet = wrong(rng, packet) if rng.random() < 0.6 else packet
+        beside = damage_media(rng, beside) if rng.random() < 0.6 else beside
+        packet = damage_media(rng, packet) if rng.random() < 0.6 else packet
         return msgspec.msgpack.encode((beside, packet))
 
     def feed(self, data: bytes) -> bool:
-        """Unpack it."""
+        """Parse the packet."""
         beside, packet = msgspec.msgpack.decode(data, type=tuple[bytes, bytes])
         try:
             parse_packing(beside).annex_b(packet)
@@ -63,7 +63,7 @@ class PassthroughPackets(Target):
 
 
 class RecordingFile(Target):
-    """A recording, opened as a camera's source: each frame in its place however damaged the file is."""
+    """Target for recordings as a camera's source: frames keep their places in damaged files."""
 
     name = "media-files"
 
@@ -85,10 +85,10 @@ class RecordingFile(Target):
 
     def make(self, rng: Random) -> bytes:
         """Return a file."""
-        return wrong(rng, self._file)
+        return damage_media(rng, self._file)
 
     def feed(self, data: bytes) -> bool:
-        """Take its frames; then those that are passed on as they are."""
+        """Read its frames, decoded and passed through."""
         self._path.write_bytes(data)
         wanted = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
         try:
@@ -104,6 +104,6 @@ class RecordingFile(Target):
         return True
 
     def close(self) -> None:
-        """Take the folders away."""
+        """Remove the folders."""
         self._folder.cleanup()
         self._memory.cleanup()

@@ -1,4 +1,4 @@
-"""What a client reads: films in both containers, and events."""
+"""Targets for the client: media streams in both containers, and events."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 from random import Random
 from typing import ClassVar, Literal
 
-from benchmarks.fuzz.engine.mutations import damaged
+from benchmarks.fuzz.engine.mutations import mutate_bytes
 from benchmarks.fuzz.engine.target import Target, folder, refused
-from benchmarks.fuzz.media.damaged_media import stream, wrong
+from benchmarks.fuzz.media.damaged_media import damage_media, stream
 from client.media_stream import MediaStreamError
 from client.recording import Recording
 from client.remux import remux
@@ -17,7 +17,7 @@ from client.sse_parser import EventStreamError, SseParser
 
 
 class _ClientStream(Target):
-    """A stream that a client reads in pieces, and makes a file of."""
+    """Target for a stream that the client reads in pieces, records and remuxes."""
 
     codec: ClassVar[Literal["h264", "vp8"]]
     container: ClassVar[Literal["mp4", "webm"]]
@@ -29,10 +29,10 @@ class _ClientStream(Target):
 
     def make(self, rng: Random) -> bytes:
         """Return a stream."""
-        return wrong(rng, self._stream)
+        return damage_media(rng, self._stream)
 
     def feed(self, data: bytes) -> bool:
-        """Read it in pieces, record it, and remux the recording."""
+        """Read the stream in pieces, record it, and remux the recording."""
         part = self._path / "film.part"
         try:
             with part.open("wb") as file:
@@ -53,7 +53,7 @@ class _ClientStream(Target):
 
 
 class ClientMp4(_ClientStream):
-    """What `myview watch` is sent, and makes a file of."""
+    """MP4, as `myview watch` reads it."""
 
     name = "media-mp4"
     codec = "h264"
@@ -61,7 +61,7 @@ class ClientMp4(_ClientStream):
 
 
 class ClientWebm(_ClientStream):
-    """The same of WebM."""
+    """WebM, likewise."""
 
     name = "media-webm"
     codec = "vp8"
@@ -76,10 +76,10 @@ class ClientEvents(Target):
 
     def make(self, rng: Random) -> bytes:
         """Return a stream of events."""
-        return damaged(rng, self._SENT)
+        return mutate_bytes(rng, self._SENT)
 
     def feed(self, data: bytes) -> bool:
-        """Read it in pieces."""
+        """Read the events in pieces."""
         whole, pieces = SseParser(), SseParser()
         try:
             events = whole.feed(data)

@@ -1,4 +1,4 @@
-"""What media is damaged with, and streams as viewers are sent them."""
+"""Damage to media, and valid streams to damage."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from random import Random
 from typing import Literal
 
 from benchmarks.fuzz.engine.fed_site import FPS, HEIGHT, WIDTH, pictures
-from benchmarks.fuzz.engine.mutations import damaged
+from benchmarks.fuzz.engine.mutations import mutate_bytes
 from server.media.audio.audio_format import AudioFormat
 from server.media.containers.mp4_audio import audio_fragment
 from server.media.stream_format import StreamFormat
@@ -21,13 +21,13 @@ WORDS = (
 )  # fmt: skip
 
 
-def wrong(rng: Random, data: bytes) -> bytes:
-    """Return the bytes with damage that media stumbles over."""
-    return damaged(rng, data, WORDS)
+def damage_media(rng: Random, data: bytes) -> bytes:
+    """Return the bytes with damage typical for media."""
+    return mutate_bytes(rng, data, WORDS)
 
 
 def stream(codec: Literal["h264", "vp8"], frames: int = 10) -> bytes:
-    """Return a stream of some GOPs as a viewer is sent it."""
+    """Return a viewer's stream of some GOPs."""
     stream_format = Vp8StreamFormat(WIDTH, HEIGHT) if codec == "vp8" else None
     form, units = AudioFormat(48_000, 2), pictures(0, frames, codec)
     if stream_format is None:

@@ -1,4 +1,4 @@
-"""What a camera sends that is watched live: any of three forms, with sound or without."""
+"""Target for live streams of cameras in three container formats, with and without audio."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from av.video.stream import VideoStream
 
 from benchmarks.fuzz.engine.fed_site import FPS, HEIGHT, STRIDE, WIDTH
 from benchmarks.fuzz.engine.target import ScriptTarget, folder, refused
-from benchmarks.fuzz.media.damaged_media import wrong
+from benchmarks.fuzz.media.damaged_media import damage_media
 from server.camera.audio.live_source import LiveAudioSource
 from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
 from server.camera.passthrough.stream_source import PassthroughStream
@@ -24,22 +24,22 @@ from server.config.sections import SoundSettings
 from server.system.errors import UserError
 
 _FRAMES = 2 * STRIDE + 3
-"""What is looked at before it is passed on, and what waits meanwhile."""
+"""Options of FFmpeg for probing."""
 _FORMS = {"mpegts": "libx264", "h264": "libx264", "mpjpeg": "mjpeg"}
 
 
 class _SingleRead(LiveStream):
-    """Reads until what the camera sends ends; what its thread raises is kept."""
+    """A live stream that is read once to its end, and keeps the exception of its thread."""
 
     failure: BaseException | None = None
     units = 0
-    """That came out of what the camera sends."""
+    """Frames read from the stream."""
 
     def _run(self, opened: OpenedVideo | None) -> None:
         try:
             if opened is not None:
                 self._read(opened)
-        except BaseException as error:  # noqa: BLE001 — in a thread nobody would see it
+        except BaseException as error:  # noqa: BLE001 — it would be lost in a thread
             self.failure = error
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
@@ -48,7 +48,7 @@ class _SingleRead(LiveStream):
 
 
 class _SinglePassthroughRead(PassthroughStream, _SingleRead):
-    """The same where its access units are passed on."""
+    """The same for passthrough."""
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
         self.units += bool(packet.size)
@@ -56,7 +56,7 @@ class _SinglePassthroughRead(PassthroughStream, _SingleRead):
 
 
 class LiveIngest(ScriptTarget):
-    """A camera that sends whatever it likes. How it is reached is FFmpeg's: here it is in a file."""
+    """Live streams of a camera, read from a file; network protocols are FFmpeg's."""
 
     name = "media-live"
     _wanted = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
@@ -68,11 +68,11 @@ class LiveIngest(ScriptTarget):
         self._sent = [_sent(form, codec) for form, codec in _FORMS.items()]
 
     def make(self, rng: Random) -> bytes:
-        """Return what is to be done with it, and what is sent."""
-        return rng.choice((b"D", b"P")) + wrong(rng, rng.choice(self._sent))
+        """Return the mode, and the stream."""
+        return rng.choice((b"D", b"P")) + damage_media(rng, rng.choice(self._sent))
 
     def feed(self, data: bytes) -> bool:
-        """Decode it, or pass its access units on."""
+        """Decode the stream, or pass it through."""
         self._path.write_bytes(data[1:])
         sound = LiveAudioSource(SoundSettings(source="c0"), FPS)
         try:
@@ -96,13 +96,13 @@ class LiveIngest(ScriptTarget):
             raise stream.failure
 
     def close(self) -> None:
-        """Take the folders away."""
+        """Remove the folders."""
         self._folder.cleanup()
         self._memory.cleanup()
 
 
 def _sent(form: str, codec: str) -> bytes:
-    """Return some GOPs as a camera sends them, with sound where the form has any."""
+    """Return some GOPs as a camera sends them, with audio where the format has it."""
     sent = io.BytesIO()
     with av.open(sent, "w", format=form) as out:
         stream = out.add_stream(codec, rate=FPS)

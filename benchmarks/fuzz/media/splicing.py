@@ -1,4 +1,4 @@
-"""Access units of two cameras, some damaged, through a site's streams in every form."""
+"""Targets for splicing: access units of two cameras, some damaged, in every stream format."""
 
 from __future__ import annotations
 
@@ -9,10 +9,19 @@ from typing import Literal
 
 import msgspec
 
-from benchmarks.fuzz.bus.messages import ask, drain
-from benchmarks.fuzz.engine.fed_site import CAMERAS, STRIDE, FedService, pictures, site, tracks, video, word
+from benchmarks.fuzz.bus.messages import drain, read_api
+from benchmarks.fuzz.engine.fed_site import (
+    CAMERAS,
+    STRIDE,
+    FedService,
+    make_tracks,
+    pictures,
+    site,
+    tracks,
+    video,
+)
 from benchmarks.fuzz.engine.target import ScriptTarget
-from benchmarks.fuzz.media.damaged_media import wrong
+from benchmarks.fuzz.media.damaged_media import damage_media
 from server.camera.encoding.encoder import AccessUnit
 from server.config.site_config import Config
 from server.messaging.epochs import end_of_epoch
@@ -23,16 +32,16 @@ _EPOCHS = 4
 _FRAMES = _EPOCHS * STRIDE
 _PEOPLE = (1, 2)
 _WHOLE = 1 / 64
-"""Of the inputs, so many are decided on by the service itself, which takes ten times as long."""
+"""Every so many inputs one is decided by the service itself, which is ten times slower."""
 _Cuts = list[tuple[int | None, int | None]]
-"""For each GOP: the camera that shows each of two people. Of none the service decides itself."""
+"""For each GOP: the cameras of two people; empty: the service decides itself."""
 _Units = list[tuple[int, int, bytes]]
 """Camera, pulse, access unit."""
 _script = msgspec.msgpack.Decoder(tuple[_Cuts, _Units])
 
 
 class _Splice(ScriptTarget):
-    """Two cameras' frames, and where the streams of people are cut from one to the other."""
+    """Frames of two cameras, and the cuts between them in people's streams."""
 
     codec: Literal["h264", "vp8"] = "h264"
     parameters = "equal"
@@ -54,7 +63,7 @@ class _Splice(ScriptTarget):
         return site(codec=self.codec, encode=encode)
 
     def make(self, rng: Random) -> bytes:
-        """Return two cameras' frames in the order of their pulses."""
+        """Return frames of two cameras in the order of their pulses."""
         share = rng.choice((0.05, 0.1, 0.3))
         whole = rng.random() < _WHOLE
         gops = _EPOCHS if whole else rng.choice((2, 2, 3))
@@ -65,18 +74,18 @@ class _Splice(ScriptTarget):
             for camera, units in enumerate(self._pictures):
                 data = units[pulse].data
                 if rng.random() < share:
-                    data = wrong(rng, data) if rng.random() < 0.9 else b""
+                    data = damage_media(rng, data) if rng.random() < 0.9 else b""
                 if rng.random() > share / 4:
                     script.append((camera, pulse, data))
         return msgspec.msgpack.encode((cuts, script))
 
     def feed(self, data: bytes) -> bool:
-        """Splice them."""
+        """Splice the frames."""
         cuts, units = _script.decode(data)
         return self._loop.run_until_complete(self._cut(cuts, units) if cuts else self._whole(units))
 
     async def _whole(self, units: _Units) -> bool:
-        """Decide by what cameras say of people, and ask everything that the API tells."""
+        """Decide by track messages, and read the whole API."""
         service, rng = FedService(self._config), Random(1)
         published, self._decided = service._publish, []
 
@@ -89,16 +98,16 @@ class _Splice(ScriptTarget):
         for epoch in range(_EPOCHS):
             self._show(service, units, epoch)
             for name in CAMERAS:
-                service.handle(tracks(word(rng, name, epoch)))
+                service.handle(tracks(make_tracks(rng, name, epoch)))
             service.pulse = end_of_epoch(epoch, STRIDE)
             service.decide()
-        ask(service)
+        read_api(service)
         for viewer in viewers:
             drain(viewer)
         return not any(it.refused for it in service.ingest.states.values())
 
     async def _cut(self, cuts: _Cuts, units: _Units) -> bool:
-        """Cut where the input says, as it may come to anybody's mind: to pictures that never came, too."""
+        """Cut where the input says, also to pictures that never arrived."""
         service = FedService(self._config)
         viewers = [broadcaster.subscribe() for broadcaster in _broadcasters(service)]
         before: dict[int, str | None] = dict.fromkeys(_PEOPLE)
@@ -138,13 +147,13 @@ def _broadcasters(service: FedService) -> list[Broadcaster]:
 
 
 class Splice(_Splice):
-    """H.264 of one set of parameters."""
+    """H.264 with shared parameter sets."""
 
     name = "media-splice"
 
 
 class SplicePassthrough(_Splice):
-    """H.264 whose parameter sets are each camera's own."""
+    """H.264 with each camera's own parameter sets."""
 
     name = "media-splice-own"
     parameters = "own"

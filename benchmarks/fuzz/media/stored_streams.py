@@ -1,4 +1,4 @@
-"""What is read of the service's own films: where they are drawn on, and where they were kept."""
+"""Targets for the service's own streams: rendering, and stored media."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from random import Random
 
 from benchmarks.fuzz.engine.fed_site import FPS, HEIGHT, STRIDE, WIDTH
 from benchmarks.fuzz.engine.target import Target, folder
-from benchmarks.fuzz.media.damaged_media import stream, wrong
+from benchmarks.fuzz.media.damaged_media import damage_media, stream
 from server.media.audio.audio_format import AudioFormat
 from server.media.rendering_messages import RenderRequest, RenderSettings
 from server.service.recording.media_files import read_gops
@@ -17,13 +17,13 @@ from server.service.rendering.worker.stream_renderer import StreamRenderer
 from server.service.time_shift.playback_audio import read_audio_frames
 
 _DRAWN = STRIDE + 1
-"""Frames: a GOP, and the beginning of the next."""
+"""Frames of a GOP and the beginning of the next."""
 _FILMED_EVERY = 8
-"""Half of the time goes into opening an encoder, which knows nothing of what pictures were decoded from."""
+"""The encoder is shared: opening one takes half of the time."""
 
 
 class RenderedStreams(Target):
-    """Streams whose pictures are decoded and drawn on."""
+    """Fragments that are decoded and rendered."""
 
     name = "media-drawing"
 
@@ -32,10 +32,10 @@ class RenderedStreams(Target):
 
     def make(self, rng: Random) -> bytes:
         """Return fragments."""
-        return wrong(rng, self._fragments)
+        return damage_media(rng, self._fragments)
 
     def feed(self, data: bytes) -> bool:
-        """Draw them."""
+        """Render the fragments."""
         settings = RenderSettings(
             width=WIDTH,
             height=HEIGHT,
@@ -55,7 +55,7 @@ class RenderedStreams(Target):
 
 
 class StoredMedia(Target):
-    """What was recorded, read again after somebody has damaged it."""
+    """Damaged recordings: playlists and media files."""
 
     name = "media-recorded"
     _LIST = (
@@ -70,11 +70,11 @@ class StoredMedia(Target):
         self._form = AudioFormat(48_000, 2)
 
     def make(self, rng: Random) -> bytes:
-        """Return a playlist, or a file of pictures and sound."""
-        return wrong(rng, rng.choice((self._LIST, self._stream)))
+        """Return a playlist, or a media file."""
+        return damage_media(rng, rng.choice((self._LIST, self._stream)))
 
     def feed(self, data: bytes) -> bool:
-        """Find pictures and sound in it."""
+        """Parse the file."""
         path = self._path / "0.mp4"
         path.write_bytes(data)
         playlist = RecordingPlaylist(path, "../cameras/", "init.mp4", FPS, 0.0, 60.0)
@@ -86,5 +86,5 @@ class StoredMedia(Target):
         return bool(found)
 
     def close(self) -> None:
-        """Take the folder away."""
+        """Remove the folder."""
         self._folder.cleanup()

@@ -1,4 +1,4 @@
-"""Media with damaged packets: from cameras through the splice, in files, and as a client reads them."""
+"""Fuzzing of media: packets of cameras, splicing, files, and streams to clients."""
 
 from __future__ import annotations
 

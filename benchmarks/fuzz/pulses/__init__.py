@@ -1,1 +1,1 @@
-"""The pulse protocol: its lines, whole sessions without sockets, and over real ones."""
+"""Fuzzing of the pulse protocol: lines, sessions without sockets, and real sockets."""

@@ -1,4 +1,4 @@
-"""A connection without sockets, and a clock that goes where it is put."""
+"""A fake connection without sockets, and a manual clock."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 class ManualClock:
-    """Unix seconds."""
+    """A clock that is set by hand, unix seconds."""
 
     def __init__(self) -> None:
         self.now = 1000.0
@@ -18,7 +18,7 @@ class ManualClock:
 
 
 class FakeWriter(asyncio.Transport):
-    """Keeps what is written instead of sending it."""
+    """A transport that stores what is written."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -27,34 +27,34 @@ class FakeWriter(asyncio.Transport):
 
     @property
     def lines(self) -> list[bytes]:
-        """What was written, all of it whole lines."""
+        """The written lines."""
         *lines, rest = self.written.split(b"\n")
         assert not rest, rest
         return lines
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
-        """Keep it."""
+        """Store the data."""
         self.written += bytes(data)
 
     def get_write_buffer_size(self) -> int:
-        """Return what waits: nothing."""
+        """Return 0: nothing is buffered."""
         return 0
 
     def is_closing(self) -> bool:
-        """Return whether it was closed."""
+        """Return whether the transport was closed."""
         return self.closed
 
     def close(self) -> None:
-        """Be closed."""
+        """Close the transport."""
         self.closed = True
 
     abort = close
 
     def get_extra_info(self, name: str, default: Any = None) -> Any:
-        """Be somebody of an address of their own."""
+        """Return a unique peer address, and a socket without options."""
         return _NoSocket() if name == "socket" else ("client", id(self)) if name == "peername" else default
 
 
 class _NoSocket:
     def setsockopt(self, *_: object) -> None:
-        """Have no options."""
+        """Ignore socket options."""

@@ -1,11 +1,11 @@
-"""Lines of the pulse protocol: right, damaged, and as both sides read them."""
+"""Target for lines of the pulse protocol, valid and damaged, as both sides read them."""
 
 from __future__ import annotations
 
 from random import Random
 from typing import Any, cast
 
-from benchmarks.fuzz.engine.mutations import damaged
+from benchmarks.fuzz.engine.mutations import mutate_bytes
 from benchmarks.fuzz.engine.target import Target, refused
 from camsync.messages import (
     ClientList,
@@ -58,23 +58,23 @@ WORDS = (
 
 
 def some_line(rng: Random, lines: tuple[bytes, ...]) -> bytes:
-    """Return a line of these; most are damaged."""
+    """Return one of the lines, mostly damaged."""
     line = rng.choice(lines)
-    return line if rng.random() < 0.3 else damaged(rng, line, WORDS)
+    return line if rng.random() < 0.3 else mutate_bytes(rng, line, WORDS)
 
 
 class ProtocolLines(Target):
-    """One line, as both sides read it."""
+    """One line, read by both sides."""
 
     name = "pulse-lines"
 
     def make(self, rng: Random) -> bytes:
-        """Return a line without its end."""
+        """Return a line without its newline."""
         line = some_line(rng, CLIENT_LINES + SERVER_LINES)
         return line.rstrip(b"\n") if rng.random() < 0.9 else rng.randbytes(rng.randrange(60))
 
     def feed(self, data: bytes) -> bool:
-        """Read it as the server does, and as the client does; what is read can be said again."""
+        """Parse the line as the server and as the client; parsed messages can be encoded again."""
         taken = False
         for parse in (parse_client_line, parse_server_line):
             try:

@@ -1,4 +1,4 @@
-"""Whole sessions of the pulse server and client, without sockets."""
+"""Targets for sessions of the pulse server and client, without sockets."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from server.messaging.number_types import Pulse
 
 _pulse = msgspec.json.Decoder(Pulse)
 Script = list[tuple[int, bytes]]
-"""Who says what: the number of a connection, and bytes in one piece."""
+"""The number of a connection, and bytes that it sends in one piece."""
 _script = msgspec.msgpack.Decoder(Script)
 
 
@@ -32,7 +32,7 @@ def _scripted(rng: Random, lines: tuple[bytes, ...], connections: int) -> bytes:
 
 
 class ServerSessions(ScriptTarget):
-    """Three connections to a server, which must go on to speak its own protocol to them all."""
+    """Three connections to a server, which must keep to its protocol with all of them."""
 
     name = "pulse-server"
 
@@ -40,11 +40,11 @@ class ServerSessions(ScriptTarget):
         self._loop = asyncio.new_event_loop()
 
     def make(self, rng: Random) -> bytes:
-        """Return who says what."""
+        """Return a script of messages."""
         return _scripted(rng, CLIENT_LINES, 3)
 
     def feed(self, data: bytes) -> bool:
-        """Let them say it; then let a second pass."""
+        """Send the messages, then let a second pass."""
         return self._loop.run_until_complete(self._session(_script.decode(data)))
 
     async def _session(self, script: Script) -> bool:
@@ -68,7 +68,7 @@ class ServerSessions(ScriptTarget):
         for wire in wires:
             self._spoken(wire)
         if server.pulse is not None:
-            _pulse.decode(str(server.pulse).encode())  # a number that cameras can say in turn
+            _pulse.decode(str(server.pulse).encode())  # a number that cameras can send back
         await server.stop()
         for peer in peers:
             peer.connection_lost(None)
@@ -85,7 +85,7 @@ class ServerSessions(ScriptTarget):
 
 
 class ClientSessions(ScriptTarget):
-    """A client that is told anything by its server: numbers rise, and it ends in words or goes on."""
+    """A client with a hostile server: pulse numbers rise, and it ends with a clear error or continues."""
 
     name = "pulse-client"
 
@@ -93,7 +93,7 @@ class ClientSessions(ScriptTarget):
         self._loop = asyncio.new_event_loop()
 
     def make(self, rng: Random) -> bytes:
-        """Return what the server says, mostly after a greeting that is right."""
+        """Return the server's messages, mostly after a valid greeting."""
         if rng.random() < 0.8:
             first: Script = [(0, rng.choice(SERVER_LINES[:2]))]
             return msgspec.msgpack.encode([*first, *_script.decode(_scripted(rng, SERVER_LINES, 1))])

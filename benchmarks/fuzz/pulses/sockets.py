@@ -1,4 +1,4 @@
-"""The pulse protocol over TCP: a real server, which answers others meanwhile, and a real client."""
+"""Target for the pulse protocol over TCP: a real server, which keeps serving others, and a real client."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 from random import Random
 
-from benchmarks.fuzz.engine.event_loops import TimeSkippingLoop, leaves_no_trace
+from benchmarks.fuzz.engine.event_loops import TimeSkippingLoop, skip_time_wait
 from benchmarks.fuzz.engine.target import ScriptTarget, refused
 from benchmarks.fuzz.pulses.protocol_lines import CLIENT_LINES, SERVER_LINES, some_line
 from camsync import PulseClient, PulseServer, SyncError, query_clients
@@ -15,13 +15,13 @@ from camsync.protocol import parse_server_line
 
 _OTHERS_EVERY = 20
 _LISTENS_S = 0.25
-"""So long a client hears what it was told, and comes again for more."""
+"""Seconds for which a client reads, and reconnects."""
 _SELDOM = 8
-"""Who says that nothing more will come leaves a port that is taken for a minute."""
+"""Half-closed connections occupy a port for a minute."""
 
 
 class SocketBytes(ScriptTarget):
-    """What somebody says to the server, or to a client."""
+    """Bytes that are sent to the server, or to a client."""
 
     name = "pulse-sockets"
 
@@ -30,11 +30,13 @@ class SocketBytes(ScriptTarget):
         self._server = PulseServer(25.0, clock=self._loop.time)
         self._loop.run_until_complete(self._server.start())
         self._said = b""
-        self._stranger = self._loop.run_until_complete(asyncio.start_server(self._say, "127.0.0.1", 0))
+        self._stranger = self._loop.run_until_complete(
+            asyncio.start_server(self._insert_word, "127.0.0.1", 0)
+        )
         self._fed = 0
 
     def make(self, rng: Random) -> bytes:
-        """Return what a connection says, to the server or to a client."""
+        """Return the receiver, and the bytes of a connection."""
         lines = rng.choice((CLIENT_LINES, SERVER_LINES))
         said = b"".join(some_line(rng, lines) for _ in range(rng.randrange(1, 6)))
         return (b"C" if lines is CLIENT_LINES else b"S") + said
@@ -46,13 +48,13 @@ class SocketBytes(ScriptTarget):
 
     async def _to_server(self, data: bytes) -> bool:
         reader, writer = await asyncio.open_connection("127.0.0.1", self._server.port)
-        leaves_no_trace(writer.get_extra_info("socket"))
+        skip_time_wait(writer.get_extra_info("socket"))
         said = data + b"\n"
         self.messages += said.count(b"\n")
         writer.write(said + b"WHO\n")
         heard = []
         with contextlib.suppress(ConnectionError, TimeoutError):
-            # Who has left too much unread is not told who is there.
+            # A client that has left too much unread is not served.
             async with asyncio.timeout(0.3):
                 while line := await reader.readline():
                     heard.append(parse_server_line(line.rstrip(b"\n")))
@@ -64,8 +66,8 @@ class SocketBytes(ScriptTarget):
             await query_clients("127.0.0.1", self._server.port)
         return not any(isinstance(it, ErrorMessage) for it in heard)
 
-    async def _say(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        leaves_no_trace(writer.get_extra_info("socket"))
+    async def _insert_word(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        skip_time_wait(writer.get_extra_info("socket"))
         with contextlib.suppress(OSError):
             writer.write(self._said)
             await writer.drain()
@@ -76,7 +78,7 @@ class SocketBytes(ScriptTarget):
 
     async def _to_client(self, data: bytes) -> bool:
         self._said = data
-        self.messages += data.count(b"\n")  # once, however often the client comes again for more
+        self.messages += data.count(b"\n")  # once, however often the client reconnects
         port = self._stranger.sockets[0].getsockname()[1]
         client = PulseClient("127.0.0.1", port, "c0", clock=self._loop.time)
         client.start()

@@ -1,4 +1,4 @@
-"""The pulse protocol: its lines, whole sessions of server and client without sockets, and over real ones."""
+"""The targets of the pulse protocol: lines, sessions without sockets, and real sockets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A pulse server with users: clients that have not logged in send anything."""
+"""Target for a pulse server with access control: clients without a login send arbitrary bytes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from random import Random
 
 import msgspec
 
-from benchmarks.fuzz.engine.mutations import damaged
+from benchmarks.fuzz.engine.mutations import mutate_bytes
 from benchmarks.fuzz.engine.target import ScriptTarget
 from benchmarks.fuzz.pulses.fake_connection import FakeWriter, ManualClock
 from benchmarks.fuzz.pulses.protocol_lines import CLIENT_LINES, WORDS, some_line
@@ -22,14 +22,14 @@ _said = msgspec.msgpack.Decoder(_Said)
 
 
 def _guessed_login(rng: Random) -> bytes:
-    """Return the login of a client that guesses, and what it says next."""
+    """Return the login of a guessing client, and its next message."""
     user = rng.choice(("c0", "c1", "bestview"))
     wrong = [word for word in (*_USERS.values(), "wrong", _LOGIN.password[:-1]) if word != _USERS.get(user)]
     return encode(LoginMessage(user, rng.choice(wrong))) + rng.choice(CLIENT_LINES)
 
 
 class UnauthenticatedClients(ScriptTarget):
-    """Two strangers learn nothing, and the client that has logged in notices nothing."""
+    """Two unauthenticated clients learn nothing, and do not disturb an authenticated one."""
 
     name = "pulse-unauthenticated"
 
@@ -37,16 +37,16 @@ class UnauthenticatedClients(ScriptTarget):
         self._loop = asyncio.new_event_loop()
 
     def make(self, rng: Random) -> bytes:
-        """Make what they send in turn."""
+        """Return the messages that they send in turn."""
         ways = (
             lambda: some_line(rng, CLIENT_LINES),
             lambda: _guessed_login(rng),
-            lambda: damaged(rng, _guessed_login(rng), WORDS),
+            lambda: mutate_bytes(rng, _guessed_login(rng), WORDS),
         )
         return msgspec.msgpack.encode([rng.choice(ways)() for _ in range(rng.randrange(1, 6))])
 
     def feed(self, data: bytes) -> bool:
-        """Send it, with pulses in between."""
+        """Send the messages, with pulses in between."""
         return self._loop.run_until_complete(self._session(_said.decode(data)))
 
     async def _session(self, script: _Said) -> bool:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from benchmarks.operator_assist.assisted_tracking import FISH, TrackedClip, watch
+from benchmarks.operator_assist.assisted_tracking import FISH, TrackedClip, track_clip
 from benchmarks.operator_assist.clips import Clip
-from benchmarks.operator_assist.fish_school import school
+from benchmarks.operator_assist.fish_school import simulate_school
 from benchmarks.operator_assist.flag_outcomes import Outcome, count
 from benchmarks.operator_assist.flag_selection import FlagSelector
 from benchmarks.operator_assist.identity_failures import Kind, failures, matches
@@ -64,8 +64,8 @@ def test_the_operator_points_at_what_was_on_the_late_screen_once_they_have_react
     operator = SimulatedOperator(
         OperatorProfile(reaction_s=0.4, error=0.0, delay_s=1.0), FlagSelector(ALL, FPS), truth, FPS, seed=1
     )
-    operator.hear(60, [RiskEvent("id_switch", (2, 1), 55, 0.1, 5, 0.5)])
-    said = {newest: operator.look(newest, shown) for newest in range(60, 100)}
+    operator.receive(60, [RiskEvent("id_switch", (2, 1), 55, 0.1, 5, 0.5)])
+    said = {newest: operator.point(newest, shown) for newest in range(60, 100)}
     assert all(said[newest] is None for newest in range(60, 70))
     first = said[70]
     assert first is not None
@@ -78,9 +78,9 @@ def test_who_is_under_the_wrong_box_when_the_operator_looks_is_followed_wrongly(
     truth = _truth()
     shown = _tracks(truth, [[2] * FRAMES, [1] * FRAMES])
     operator = SimulatedOperator(OperatorProfile(delay_s=0.0), FlagSelector(ALL, FPS), truth, FPS, seed=1)
-    operator.hear(60, [RiskEvent("id_switch", (2, 1), 55, 0.1, 5, 0.5)])
+    operator.receive(60, [RiskEvent("id_switch", (2, 1), 55, 0.1, 5, 0.5)])
     for newest in range(60, 80):
-        operator.look(newest, shown)
+        operator.point(newest, shown)
     assert operator.flags[0].fish == 0
 
 
@@ -90,9 +90,9 @@ def test_a_second_flag_waits_until_the_first_is_over_and_is_let_be_if_all_is_ove
     for due, seen_to in ((150, True), (61, False)):
         person = OperatorProfile(delay_s=0.0, back_s=0.0)
         operator = SimulatedOperator(person, FlagSelector(ALL, FPS), truth, FPS, seed=1)
-        operator.hear(60, [_trouble((1, 8), 60, 0.9), _trouble((2, 7), due, 0.5)])
-        pointings = [operator.look(newest, shown) for newest in range(60, 200)]
-        assert [flag.trouble.objects for flag in operator.flags] == [(1, 8), (2, 7)]
+        operator.receive(60, [_event((1, 8), 60, 0.9), _event((2, 7), due, 0.5)])
+        pointings = [operator.point(newest, shown) for newest in range(60, 200)]
+        assert [flag.event.objects for flag in operator.flags] == [(1, 8), (2, 7)]
         first, second = operator.flags
         assert first.fish == 0
         assert (second.fish == 1) == seen_to
@@ -105,13 +105,13 @@ def test_what_is_over_when_the_first_is_over_is_seen_again_from_a_moment_before(
     operator = SimulatedOperator(
         OperatorProfile(delay_s=0.0, back_s=8.0), FlagSelector(ALL, FPS), truth, FPS, seed=1
     )
-    operator.hear(60, [_trouble((1, 8), 60, 0.9), _trouble((2, 7), 61, 0.5)])
-    pointings = [operator.look(newest, shown) for newest in range(60, 200)]
+    operator.receive(60, [_event((1, 8), 60, 0.9), _event((2, 7), 61, 0.5)])
+    pointings = [operator.point(newest, shown) for newest in range(60, 200)]
     second = operator.flags[1]
     assert second.fish == 1
     assert second.begun is not None
     assert second.begun > 61
-    assert second.looks[0] in range(40, 61)
+    assert second.pointing_frames[0] in range(40, 61)
     assert {it.object for it in pointings if it} == {1, 2}
 
 
@@ -119,21 +119,21 @@ def test_who_was_lost_long_ago_is_seen_again_when_they_were_still_there() -> Non
     truth = _truth()
     shown = _tracks(truth, [[1] * 60 + [0] * 140, [2] * FRAMES])
     operator = SimulatedOperator(OperatorProfile(delay_s=1.0), FlagSelector(ALL, FPS), truth, FPS, seed=1)
-    operator.hear(120, [_trouble((1,), 60, 0.9)])
-    first = next(it for newest in range(120, 200) if (it := operator.look(newest, shown)) is not None)
+    operator.receive(120, [_event((1,), 60, 0.9)])
+    first = next(it for newest in range(120, 200) if (it := operator.point(newest, shown)) is not None)
     assert (first.object, operator.flags[0].fish) == (1, 0)
     assert first.frame in range(45, 60)
 
 
 def test_flags_go_to_the_riskiest_and_once_to_the_same_two() -> None:
-    desk = FlagSelector(FlagSettings(per_minute=2), FPS)
-    desk.begin()
-    first = desk.raised(10, [_trouble((1, 2), 10, 0.2), _trouble((3, 4), 10, 0.8), _trouble((5, 6), 10, 0.5)])
+    selector = FlagSelector(FlagSettings(per_minute=2), FPS)
+    selector.begin()
+    first = selector.raised(10, [_event((1, 2), 10, 0.2), _event((3, 4), 10, 0.8), _event((5, 6), 10, 0.5)])
     assert [it.objects for it in first] == [(3, 4), (5, 6)]
-    assert desk.raised(15, [_trouble((4, 3), 15, 0.9), _trouble((1, 2), 15, 0.2)]) == []
+    assert selector.raised(15, [_event((4, 3), 15, 0.9), _event((1, 2), 15, 0.2)]) == []
 
 
-def _trouble(objects: tuple[int, int], frame: int, risk: float) -> RiskEvent:
+def _event(objects: tuple[int, int], frame: int, risk: float) -> RiskEvent:
     return RiskEvent("id_switch", objects, frame, 0.1, 5, risk)
 
 
@@ -164,9 +164,9 @@ def test_what_a_flag_was_good_for_is_told_by_the_fish_that_its_tracks_were_on(
     alone: list[list[int]], helped: list[list[int]], outcome: Outcome, followed: int | None
 ) -> None:
     truth = _truth()
-    flag = OperatorFlag(_trouble((1, 2), 105, 0.5), 1, raised=90, until=105, fish=followed)
-    cases = count([(_watched(truth, alone), _watched(truth, helped, [flag]))], OperatorProfile())
-    assert {it for _, it in cases.flags} == {outcome}
+    flag = OperatorFlag(_event((1, 2), 105, 0.5), 1, raised=90, until=105, fish=followed)
+    outcome_counts = count([(_watched(truth, alone), _watched(truth, helped, [flag]))], OperatorProfile())
+    assert {it for _, it in outcome_counts.flags} == {outcome}
 
 
 def test_a_flag_about_others_than_those_who_fail_was_not_needed() -> None:
@@ -174,9 +174,9 @@ def test_a_flag_about_others_than_those_who_fail_was_not_needed() -> None:
     still = np.tile([500.0, 600.0, 560.0, 620.0], (1, FRAMES, 1))
     truth = ObjectTruth(np.concatenate([truth.boxes, still]), np.ones((3, FRAMES)))
     numbers = [*EXCHANGED, [3] * FRAMES]
-    flag = OperatorFlag(_trouble((3, 9), 100, 0.5), 3, raised=100, until=100)
-    cases = count([(_watched(truth, numbers), _watched(truth, numbers, [flag]))], OperatorProfile())
-    assert dict(cases.flags) == {("alone", "not needed"): 1}
+    flag = OperatorFlag(_event((3, 9), 100, 0.5), 3, raised=100, until=100)
+    outcome_counts = count([(_watched(truth, numbers), _watched(truth, numbers, [flag]))], OperatorProfile())
+    assert dict(outcome_counts.flags) == {("alone", "not needed"): 1}
 
 
 @pytest.mark.parametrize("reason", ["crossing", "track_loss"])
@@ -194,42 +194,44 @@ def test_whether_others_were_in_the_way_is_told_by_where_they_were_and_not_by_th
     numbers[0] = [1] * 100 + [9] * 100
     flag = OperatorFlag(RiskEvent(reason, (1,), 100, 0.1, 5, 0.5), 1, raised=99, until=100)
     watched = _watched(truth, numbers, [flag])
-    cases = count([(watched, watched)], OperatorProfile())
-    assert dict(cases.flags) == {(kind, "no help"): 1}
-    assert dict(cases.kinds) == {kind: 1}, "of the failure and of its flag, the same"
+    outcome_counts = count([(watched, watched)], OperatorProfile())
+    assert dict(outcome_counts.flags) == {(kind, "no help"): 1}
+    assert dict(outcome_counts.kinds) == {kind: 1}, "of the failure and of its flag, the same"
 
 
 def test_who_meets_others_long_before_or_after_its_flag_was_alone() -> None:
     boxes = _truth().boxes
     rises = np.abs(np.arange(FRAMES) - 30)[:, None] * [0.0, 10.0, 0.0, 10.0]
     truth = ObjectTruth(np.concatenate([boxes, (boxes[0] + rises)[None]]), np.ones((3, FRAMES)))
-    flag = OperatorFlag(_trouble((1, 3), 100, 0.5), 1, raised=99, until=100)
+    flag = OperatorFlag(_event((1, 3), 100, 0.5), 1, raised=99, until=100)
     watched = _watched(truth, [*RIGHT, [3] * FRAMES], [flag])
     assert dict(count([(watched, watched)], OperatorProfile()).flags) == {("alone", "not needed"): 1}
 
 
 def test_the_table_has_the_thesis_beside_it_for_as_many_minutes() -> None:
     truth = _truth()
-    flag = OperatorFlag(_trouble((1, 2), 100, 0.5), 1, raised=99, until=100)
-    cases = count([(_watched(truth, RIGHT), _watched(truth, EXCHANGED, [flag]))], OperatorProfile())
-    rows = {it[0].strip(): it[1:] for it in texts(cases, thesis=True)}
+    flag = OperatorFlag(_event((1, 2), 100, 0.5), 1, raised=99, until=100)
+    outcome_counts = count([(_watched(truth, RIGHT), _watched(truth, EXCHANGED, [flag]))], OperatorProfile())
+    rows = {it[0].strip(): it[1:] for it in texts(outcome_counts, thesis=True)}
     as_56_clips = str(56 * 20 * 25 // FRAMES)
     assert rows["flagged, tracked rightly"] == ["0", "0", "53"]
     assert rows["flagged, tracked wrongly"] == ["1", as_56_clips, "-"]
     assert rows["failures with help"] == ["1", as_56_clips, "39"]
-    assert {len(it) for it in texts(cases, thesis=False)} == {2}
+    assert {len(it) for it in texts(outcome_counts, thesis=False)} == {2}
 
 
 @pytest.mark.slow
 def test_a_school_is_played_again_from_its_seed_and_helped_it_fails_no_more_than_alone() -> None:
-    clip = school(8, seconds=18.0)
-    again = school(8, seconds=18.0)
-    assert all((one.boxes == other.boxes).all() for one, other in zip(clip.seen, again.seen, strict=True))
-    alone, helped = watch(clip, FISH), watch(clip, FISH, OperatorProfile())
+    clip = simulate_school(8, seconds=18.0)
+    again = simulate_school(8, seconds=18.0)
+    assert all(
+        (one.boxes == other.boxes).all() for one, other in zip(clip.detections, again.detections, strict=True)
+    )
+    alone, helped = track_clip(clip, FISH), track_clip(clip, FISH, OperatorProfile())
     assert alone.failures
     assert len(helped.failures) < len(alone.failures)
-    cases = count([(alone, helped)], OperatorProfile())
-    assert cases.unaided.total() == len(alone.failures)
-    assert cases.left.total() == len(helped.failures)
-    assert cases.flags.total() == len(helped.flags)
-    assert cases.minutes == pytest.approx(0.3)
+    outcome_counts = count([(alone, helped)], OperatorProfile())
+    assert outcome_counts.unaided.total() == len(alone.failures)
+    assert outcome_counts.left.total() == len(helped.failures)
+    assert outcome_counts.flags.total() == len(helped.flags)
+    assert outcome_counts.minutes == pytest.approx(0.3)

@@ -21,14 +21,14 @@ def _picture(weed: int, fish: int, color: tuple[int, int, int] = FISH) -> Image:
 
 def _taught(pale: bool) -> ForegroundColors:
     """A weed that sways by its own width in front of half of the pictures, and a fish that swims by."""
-    seen: list[tuple[Image, Mask]] = []
+    detections: list[tuple[Image, Mask]] = []
     for n in range(12):
         image = _picture(20 + 3 * (n % 2), 5 * n, PALE if pale and n % 3 == 0 else FISH)
         mask = np.zeros((60, 80), dtype=np.uint8)
         mask[10:22, 5 * n : 5 * n + 20] = 255
         mask[30:, 32:35] = 255 * (n % 2)
-        seen.append((image, mask))
-    return ForegroundColors(seen)
+        detections.append((image, mask))
+    return ForegroundColors(detections)
 
 
 def test_what_swims_has_familiar_colors_and_what_sways_has_not() -> None:

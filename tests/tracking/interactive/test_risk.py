@@ -8,7 +8,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from benchmarks.operator_assist.risk_weights import fitted
+from benchmarks.operator_assist.risk_weights import fit_weights
 from tracking.interactive import RiskFeatures, RiskReason
 from tracking.interactive.risk import WEIGHTS, failure_probability
 
@@ -36,7 +36,7 @@ def test_the_weights_that_made_the_examples_are_found_again() -> None:
     truth = np.array([-1.0, 2.0])
     terms = np.stack([np.ones(20_000), rng.normal(size=20_000)], axis=1)
     wrong = rng.random(20_000) < 1.0 / (1.0 + np.exp(-(terms @ truth)))
-    np.testing.assert_allclose(fitted(terms, wrong.astype(np.float64)), truth, atol=0.1)
+    np.testing.assert_allclose(fit_weights(terms, wrong.astype(np.float64)), truth, atol=0.1)
 
 
 def test_every_reason_has_weights() -> None:
