@@ -169,11 +169,11 @@ def test_a_number_of_many_digits_is_not_repeated_whole(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damaged", [b"", b"\x00\x00\x01", b"\x00\x00\x01\x41", b"\x00\x00\x01\x09\xf0"])
-async def test_an_access_unit_without_a_picture_is_counted_and_dropped(mutate_bytes: bytes) -> None:
+async def test_an_access_unit_without_a_picture_is_counted_and_dropped(damaged: bytes) -> None:
     service, units = FedService(site()), pictures(0, STRIDE)
     service.handle(video("c0", units[0]))
     right = video("c0", units[1])
-    service.handle(Message(right.key, mutate_bytes, right.attachment))
+    service.handle(Message(right.key, damaged, right.attachment))
     service.handle(video("c0", units[2]))
     assert service.ingest.states["c0"].bad_messages == 1
     assert not service.frame_buffers["c0"].has(1)

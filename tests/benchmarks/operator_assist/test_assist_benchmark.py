@@ -214,7 +214,7 @@ def test_the_table_has_the_thesis_beside_it_for_as_many_minutes() -> None:
     outcome_counts = count([(_watched(truth, RIGHT), _watched(truth, EXCHANGED, [flag]))], OperatorProfile())
     rows = {it[0].strip(): it[1:] for it in texts(outcome_counts, thesis=True)}
     as_56_clips = str(56 * 20 * 25 // FRAMES)
-    assert rows["flagged, tracked rightly"] == ["0", "0", "53"]
+    assert rows["flagged, tracked correctly"] == ["0", "0", "53"]
     assert rows["flagged, tracked wrongly"] == ["1", as_56_clips, "-"]
     assert rows["failures with help"] == ["1", as_56_clips, "39"]
     assert {len(it) for it in texts(outcome_counts, thesis=False)} == {2}
