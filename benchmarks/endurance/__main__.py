@@ -2,8 +2,9 @@
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.endurance --out out/bench
 
-The tracker follows an endless synthetic crowd (nobody who left comes back; objects are born and forgotten all
-the time). The pipeline draws, encodes, searches and tracks the embedded scene. Neither may grow.
+The tracker follows an endless synthetic crowd (people who leave never return, so tracks are initiated and
+forgotten all the time). The pipeline renders, encodes, searches and tracks the synthetic room. Neither may
+grow.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ STAGES = {
     "take": "the recording's H.264 to a picture of the site's size",
     "encode": "the picture to H.264, once",
     "detect": "background, silhouettes, appearance",
-    "witness": "rescoring by the detections of other cameras",
+    "rescore": "rescoring by the detections of other cameras",
     "track": "networks, initiation, templates",
     "solve": "the network programs",
     "report": "tracks to messages",
@@ -128,8 +128,8 @@ def time_camera(folder: str, camera: str) -> None:
     watch.wrap(CameraPipeline, "encode", "encode")
     watch.wrap(CameraPipeline, "detect", "report")
     watch.wrap(CameraPipeline, "track_detections", "report")
-    watch.wrap(CrossViewScorer, "build_message", "witness")
-    watch.wrap(CrossViewScorer, "rescore", "witness")
+    watch.wrap(CrossViewScorer, "build_message", "rescore")
+    watch.wrap(CrossViewScorer, "rescore", "rescore")
     watch.wrap(BackgroundDetector, "detect", "detect")
     watch.wrap(OnlineTracker, "push", "track")
     watch.wrap(type(create_solver(DEFAULT_SOLVER)), "solve", "solve")

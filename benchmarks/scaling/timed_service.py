@@ -33,17 +33,17 @@ from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 LISTS = "lists"
 STAGES = {
-    "tracks in": "decoding, validation and alignment of the cameras' windows",
-    "frames in": "access units to fragments in the frame buffers; thumbnails",
-    "align": "epochs taken out",
-    "who is who": "identities across cameras",
+    "ingest tracks": "decoding, validation and alignment of the cameras' windows",
+    "ingest frames": "access units to fragments in the frame buffers; thumbnails",
+    "align": "completed epochs",
+    "identities": "identities across cameras",
     "people": "messages to tracks, boxes by person",
-    "quality": "of every view",
-    "costs": "quality by frame, camera and person",
-    "choose": "the selection program, and the decision",
-    "board": "content for the page, the API and the bus",
+    "quality": "quality of every view",
+    "costs": "selection costs by frame, camera and person",
+    "select": "the selection program, and the decision",
+    "state": "content for the page, the API and the bus",
     "publish": "encoding as JSON, and publishing",
-    "splice": "everybody's chosen GOP",
+    "splice": "the selected GOP of each person",
     LISTS: "lists of people and cameras for the page, every second",
 }
 REST = "rest"
@@ -81,7 +81,7 @@ def watch(path: Path) -> None:
     watched = ThreadStopwatch(STAGES)
     count = {"epochs": 0, "messages": 0, "size": 0}
 
-    def told() -> None:
+    def write_times() -> None:
         count["epochs"] += 1
         part = path.with_suffix(".part")
         used = {"seconds": watched.seconds, "process": time.process_time()}
@@ -92,22 +92,22 @@ def watch(path: Path) -> None:
     for name in ("tracks", "video", "thumbnail"):
         _count(name, count)
     for owner, method, stage in (
-        (Ingest, "tracks", "tracks in"),
-        (Ingest, "video", "frames in"),
-        (Ingest, "thumbnail", "frames in"),
+        (Ingest, "tracks", "ingest tracks"),
+        (Ingest, "video", "ingest frames"),
+        (Ingest, "thumbnail", "ingest frames"),
         (EpochAligner, "next_ready", "align"),
-        (IdentityRegistry, "update", "who is who"),
+        (IdentityRegistry, "update", "identities"),
         (PersonTracker, "update", "people"),
         (ViewQualityBuffer, "put", "quality"),
         (LookaheadWindow, "__init__", "costs"),
-        (DecisionState, "put", "board"),
+        (DecisionState, "put", "state"),
         (BestViewPipeline, "_publish", "publish"),
         (Bus, "publish", "publish"),
         (Splicer, "publish_decision", "splice"),
         (Events, "_lists", LISTS),
     ):
         watched.wrap(owner, method, stage)
-    watched.wrap(ViewDecider, "step", "choose", told)
+    watched.wrap(ViewDecider, "step", "select", write_times)
 
 
 def _count(name: str, count: dict[str, int]) -> None:

@@ -172,9 +172,11 @@ def _hls_rows(segments: HlsLatency, parts: HlsLatency) -> list[list[str]]:
 
 
 def _watched_rows(watched: WatchingCost) -> list[list[str]]:
-    how = f"cores: {watched.all:.3f}, {watched.one:.3f}, nobody {watched.nobody:.3f}; {watched.rounds} rounds"
+    how = (
+        f"cores: {watched.all:.3f}, {watched.one:.3f}, none {watched.unwatched:.3f}; {watched.rounds} rounds"
+    )
     rows = [[f"watching {watched.objects} objects against 1", f"{watched.ratio:.2f}x", "1.10x", how]]
-    how = f"computed: {watched.nobody + watched.encoded:.2f} cores with an encoder for each"
+    how = f"computed: {watched.unwatched + watched.encoded:.2f} cores with an encoder for each"
     rows.append(["re-encoding each against that", f"{watched.against_encoding:.1f}x", "14x", how])
     return rows
 

@@ -34,7 +34,7 @@ class WatchingCost:
     """Cores of the best-view process by number of watched objects; medians over rounds."""
 
     objects: int
-    nobody: float
+    unwatched: float
     one: float
     all: float
     encoded: float
@@ -49,7 +49,7 @@ class WatchingCost:
     @property
     def against_encoding(self) -> float:
         """Computed cores with an encoder for each object divided by the measured ones."""
-        return (self.nobody + self.encoded) / self.all
+        return (self.unwatched + self.encoded) / self.all
 
 
 def watch_objects(
@@ -71,9 +71,9 @@ def watch_objects(
         for count, found in cores.items():
             viewers.watch([_path(number) for number in numbers[:count]], _SETTLE_S)
             found.append(_used(site, viewers, seconds)[0])
-    nobody, one, everybody = (statistics.median(found) for found in cores.values())
+    unwatched, one, all_watched = (statistics.median(found) for found in cores.values())
     encoded = len(numbers) * statistics.median(again)
-    return WatchingCost(len(numbers), nobody, one, everybody, encoded, rounds)
+    return WatchingCost(len(numbers), unwatched, one, all_watched, encoded, rounds)
 
 
 @dataclass(frozen=True, slots=True)

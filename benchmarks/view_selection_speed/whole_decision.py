@@ -88,7 +88,7 @@ class StageSeconds:
     rest: float
     """Whose each shot is, and what is said of it."""
     people: float
-    """Who is who, with the numbers given: only the keeping of them."""
+    """Identity bookkeeping, with given ids."""
     publishing: float
     """Boxes and choices written down as messages."""
 

@@ -1,4 +1,4 @@
-"""The benchmarks of accuracy: what they compute and print, on a recording of a few frames."""
+"""The accuracy benchmarks on a recording of a few frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the benchmarks compute, without running anything that takes long."""
+"""Computations of the benchmarks, without long measurements."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The calibration benchmark: what two cameras have in common is told by the truth, whoever looks for it."""
+"""The calibration benchmark: the overlap of two cameras by the ground truth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The benchmark of codecs runs a real camera: what passes through is the same and costs no encoding."""
+"""The codec benchmark on a real camera pipeline: passthrough is lossless and needs no encoding."""
 
 from __future__ import annotations
 

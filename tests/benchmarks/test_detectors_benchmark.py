@@ -1,4 +1,4 @@
-"""The parts of the benchmark of observations, on boxes and pictures made by hand."""
+"""The detector benchmark on hand-made boxes and pictures."""
 
 from __future__ import annotations
 

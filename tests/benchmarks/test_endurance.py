@@ -1,4 +1,4 @@
-"""Nothing grows: a short run of what `python -m benchmarks.endurance` does for 50 000 frames."""
+"""The endurance benchmark in a short run: memory does not grow."""
 
 from __future__ import annotations
 

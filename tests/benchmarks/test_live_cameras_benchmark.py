@@ -1,4 +1,4 @@
-"""The live run's parts: what it reads from a site, and how it times a camera's stages."""
+"""The live camera benchmark: the counters of a site, and the timing of a camera's stages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The benchmark of pictures measures a real process, and what is not wanted costs less."""
+"""The overlay benchmark on a real render worker."""
 
 from __future__ import annotations
 

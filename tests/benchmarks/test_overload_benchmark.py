@@ -1,4 +1,4 @@
-"""The load's benchmark: what it sums up, and a real site that has too much to do."""
+"""The overload benchmark: its summaries, and a real overloaded site."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The paper's experiments on scenes of a few frames: what is played, how it is judged, what is printed."""
+"""The paper's experiments on scenes of a few frames: simulation, label errors and tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The scaling run's parts: the simulated hall and its cameras, and, slowly, a whole small site."""
+"""The scaling benchmark: the simulated hall and its cameras, and (slow) a small site."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_process_that_has_said_nothing_yet_has_no_times(tmp_path: Path) -> Non
 def test_a_small_site_is_carried_in_time(tmp_path: Path) -> None:
     load = carry(SimulatedHall(3, 5), 25.0, tmp_path / "site", settle=6, epochs=6)
     assert set(load.stages) == {*STAGES, REST}
-    assert load.stages["who is who"] > 0
+    assert load.stages["identities"] > 0
     assert load.stages["splice"] > 0
     assert load.messages == pytest.approx(3 * (25 + 5), rel=0.3)
     assert 0 < load.milliseconds < 40

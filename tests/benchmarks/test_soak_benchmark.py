@@ -1,4 +1,4 @@
-"""The soak's judgement: what grows is found, what trembles is not; and the site that it runs."""
+"""The soak test: growth is detected and noise is not; and its accelerated site."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The parts of the stream's benchmark: what they count is what was sent."""
+"""The streaming benchmark: its counts match what was sent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Merges are counted as the report has them, and the room from above is played as it is."""
+"""The temporal consistency benchmark: counting of merges, and rendering of the overhead room."""
 
 from __future__ import annotations
 

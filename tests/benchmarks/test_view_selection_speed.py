@@ -1,4 +1,4 @@
-"""The benchmark of choosing decides what it says it decides."""
+"""The benchmark of view selection speed: it runs complete decisions."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""A site with tokens: nobody gets anything but by a whole one, and by it nothing that it is not for.
+"""Target for a site with access tokens: only a valid token grants access, and only to its scope.
 
-What is right is read off an input's bytes, not asked of the server: whose secret is in it, and which address
-the application took it for. Object 1 is seen by camera c0 alone, object 2 by c1.
+The expected result is derived from an input's bytes, not from the server: the secrets in it, and the address
+that the application matched. Object 1 is in view of camera c0 only, object 2 of c1.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The benchmark of best views: what stands in for MyView's stages, on boxes whose truth is plain."""
+"""The best-view benchmark: baselines and ground-truth stages on simple boxes."""
 
 from __future__ import annotations
 

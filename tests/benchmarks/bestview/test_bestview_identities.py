@@ -1,4 +1,4 @@
-"""The benchmark's table of who is who, and the parts of tracks: on boxes whose truth is plain."""
+"""Identity scores and tracklets of the best-view benchmark, on simple boxes."""
 
 from __future__ import annotations
 

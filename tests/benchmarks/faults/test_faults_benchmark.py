@@ -1,4 +1,4 @@
-"""The faults' judge: it sees what is right, and each thing that is wrong."""
+"""The checks of the fault benchmark: they accept correct pictures and detect each kind of error."""
 
 from __future__ import annotations
 

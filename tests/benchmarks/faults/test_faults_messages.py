@@ -1,4 +1,4 @@
-"""What the faults' benchmark does to messages, and that all kinds of them meet it."""
+"""The lossy bus of the fault benchmark, for all kinds of messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which processes the faults' benchmark breaks."""
+"""The sets of processes that fail in the fault benchmark."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The benchmark of the help: what counts as a failure, and what the simulated operator can know."""
+"""The operator assistance benchmark: identity failures, and the simulated operator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The colors of what moves, told from those of what only sways."""
+"""The color model that separates moving objects from swaying background."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The reference for best views: occupancy maps and shortest paths, against all possibilities."""
+"""The occupancy reference tracker: occupancy maps and shortest paths, checked by brute force."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The reference for best views: the grid, walks over it, and who is who after a meeting."""
+"""The occupancy reference tracker: the grid, trajectories over it, and identities after a meeting."""
 
 from __future__ import annotations
 
