@@ -28,7 +28,7 @@ class BestViewService:
         streams: live streams.
         recordings: recorded streams.
         rendering: JPEG pictures, and video with boxes burnt in.
-        assist: flags for the operator, and corrections by pointing.
+        assist: flags for the operator, and position corrections.
         calibration: the calibration walk.
         operations: readiness, pulse clients, view settings.
     """

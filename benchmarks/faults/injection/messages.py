@@ -1,7 +1,7 @@
 """Lost, duplicated and reordered messages, and a router that is killed.
 
 The process :mod:`benchmarks.faults.site.lossy_bus` forwards all messages between the cameras and the other
-processes. All kinds of messages occur: the cameras share the ground, and an operator keeps pointing at the
+processes. All kinds of messages occur: the cameras share the ground, and an operator keeps correcting the
 watched people.
 """
 
@@ -20,7 +20,7 @@ import aiohttp
 from benchmarks.common.environment import one_thread_environment
 from benchmarks.faults.injection.separate_processes import run_separately
 from benchmarks.faults.site.fault_site import Fault, FaultSite, Inject
-from benchmarks.faults.site.lossy_bus import FOUND, POINTING
+from benchmarks.faults.site.lossy_bus import CORRECTIONS, FOUND
 from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews
 from client import Gop
 from server.cli.generated_config import free_port
@@ -28,7 +28,8 @@ from server.http.access.csrf import CSRF_HEADER
 
 _GONE_S = 30.0
 _FAULTY_S = 8.0
-_KINDS = ("tracks", "status", FOUND, POINTING)
+_CORRECTIONS = "/api/operator/position_corrections"
+_KINDS = ("tracks", "status", FOUND, CORRECTIONS)
 """Kinds of which some messages must have been altered; thumbnails are too rare."""
 _POLL_S = 0.05
 
@@ -89,21 +90,23 @@ async def with_lossy_bus(views: StampedViews, folder: Path) -> AsyncIterator[Fau
 
 async def _operate(fault_site: FaultSite) -> None:
     """Send an operator correction for each watched person, once a GOP, until cancelled."""
-    pointed = 0
+    answered = 0
     async with aiohttp.ClientSession(fault_site.url, headers={CSRF_HEADER: "1"}) as session:
         while True:
             gops = fault_site.events.gops
-            if len(gops) > pointed:
-                pointed, gop = len(gops), gops[-1][1]
+            if len(gops) > answered:
+                answered, gop = len(gops), gops[-1][1]
                 for viewer in fault_site.viewers:
-                    request = _pointing(gop, viewer.number)
+                    request = _correction(gop, viewer.number)
                     if request is not None:
                         with contextlib.suppress(aiohttp.ClientError):
-                            await (await session.post("/api/operator/pointing", json=request)).read()
+                            await (
+                                await session.post("/api/operator/position_corrections", json=request)
+                            ).read()
             await asyncio.sleep(_POLL_S)
 
 
-def _pointing(gop: Gop, number: int) -> dict[str, Any] | None:
+def _correction(gop: Gop, number: int) -> dict[str, Any] | None:
     """Return the correction at a person's box in the last frame of a GOP; None: they have no box."""
     camera = gop.choices.get(number)
     boxes = gop.boxes.get(camera, ()) if camera else ()
@@ -111,7 +114,7 @@ def _pointing(gop: Gop, number: int) -> dict[str, Any] | None:
         if box.object == number:
             x, y = (box.left + box.right) / 2, (box.top + box.bottom) / 2
             point = {"pulse": gop.first + len(boxes) - 1, "x": x, "y": y}
-            return {"object": number, "camera": camera, "points": [point]}
+            return {"object": number, "camera": camera, "corrections": [point]}
     return None
 
 

@@ -29,7 +29,7 @@ SITE = "faults"
 SHARE = 0.3
 PICTURES = "video"
 FOUND = "detections"
-POINTING = "position_corrections"
+CORRECTIONS = "position_corrections"
 _FROM_CAMERAS = (PICTURES, "tracks", "status", "thumbs/*", FOUND)
 _LATER = 2
 """A delayed message is sent after so many others of its key."""
@@ -94,7 +94,7 @@ class MessageRouter:
     def _receivers(self, camera: str, kind: str) -> list[MessageSink]:
         if kind == FOUND:
             return [bus for other, bus in self._cameras.items() if other != camera]
-        return [self._cameras[camera] if kind == POINTING else self._bestview]
+        return [self._cameras[camera] if kind == CORRECTIONS else self._bestview]
 
 
 class _BestViewLiveliness:
@@ -139,7 +139,7 @@ async def _run() -> None:
         others = [bus for other, bus in near.items() if other != camera]
         router.watch_alive(keys.camera(camera, "peer_listener"), _RouterLiveliness(*others).update)
         router.watch_alive(keys.camera(camera, "alive"), liveliness.update)
-    far.subscribe(keys.camera("*", POINTING), link.forward)
+    far.subscribe(keys.camera("*", CORRECTIONS), link.forward)
     far.watch_alive(keys.bestview("alive"), _RouterLiveliness(*near.values()).update)
     reader = asyncio.StreamReader()
     await asyncio.get_running_loop().connect_read_pipe(

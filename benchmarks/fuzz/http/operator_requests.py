@@ -15,8 +15,8 @@ _ASKED: tuple[tuple[str, str, Any], ...] = (
     ("POST", "/api/operator/people", {"object": 1, "split": ["c0", "c1"]}),
     (
         "POST",
-        "/api/operator/pointing",
-        {"object": 1, "camera": "c0", "points": [{"pulse": 12, "x": 9.5, "y": 20.0, "tolerance": 3.0}]},
+        "/api/operator/position_corrections",
+        {"object": 1, "camera": "c0", "corrections": [{"pulse": 12, "x": 9.5, "y": 20.0, "tolerance": 3.0}]},
     ),
     ("PUT", "/api/operator/view_selection", {"switch_cost_s": 0.2, "extrapolate_s": 0.5, "lookahead": 10}),
     (

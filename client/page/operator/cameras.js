@@ -4,16 +4,16 @@ import { ask } from './requests.js';
 import { element, make, put, Repeated } from './section.js';
 import { Stills } from './stills.js';
 
-/** @import {OperatorCamera, Pulses, Spread} from './contract.js' */
+/** @import {CameraDiagnostics, Pulses, Spread} from './contract.js' */
 /** @import {Section, Tell} from './section.js' */
 /** @import {Palette} from '../people/palette.js' */
 
 const EVERY_MS = 1000; // cameras say how they are once a second
 const NOTHING = '–';
-/** @type {Record<OperatorCamera['state'], string>} */
+/** @type {Record<CameraDiagnostics['state'], string>} */
 const STATES = { live: 'Live', gone: 'Gone', ended: 'Ended', starting: 'Starting', refused: 'Refused' };
 
-/** @type {[string, string, (camera: OperatorCamera) => string][]} what a tile says: name, what it means, value */
+/** @type {[string, string, (camera: CameraDiagnostics) => string][]} what a tile says: name, what it means, value */
 const ROWS = [
   ['Rate', 'Frames taken per second', (it) => `${it.fps.toFixed(1)} fps`],
   ['Behind the pulse', 'From a pulse to its frame: median, worst', (it) => spread(it.sync_error)],
@@ -54,7 +54,7 @@ export class CameraTiles {
 
   async #look() {
     const [{ cameras }, pulses] = await Promise.all([ask('cameras'), ask('pulses')]);
-    for (const camera of /** @type {OperatorCamera[]} */ (cameras)) this.#tile(camera.camera).show(camera);
+    for (const camera of /** @type {CameraDiagnostics[]} */ (cameras)) this.#tile(camera.camera).show(camera);
     showPulses(pulses);
   }
 
@@ -92,7 +92,7 @@ class Tile {
     );
   }
 
-  /** @param {OperatorCamera} camera */
+  /** @param {CameraDiagnostics} camera */
   show(camera) {
     this.item.dataset.state = camera.state;
     put(this.state, STATES[camera.state] ?? camera.state);
@@ -101,7 +101,7 @@ class Tile {
   }
 }
 
-/** @param {OperatorCamera} camera */
+/** @param {CameraDiagnostics} camera */
 function past({ last_error: last }) {
   if (!last) return '';
   const at = new Date(last.at * 1000);
@@ -121,7 +121,7 @@ function seconds(value) {
   return Math.abs(value) < 1 ? `${(value * 1000).toFixed(0)} ms` : `${value.toFixed(2)} s`;
 }
 
-/** @param {OperatorCamera} camera */
+/** @param {CameraDiagnostics} camera */
 function certified(camera) {
   if (camera.certified === null) return NOTHING;
   return `${Math.floor(camera.certified * 1000) / 10} % of ${camera.windows}`; // 100 % only where all are

@@ -10,7 +10,7 @@
  * @property {number} left
  * @property {number} top
  *
- * @typedef {object} OperatorCamera an entry of /api/operator/cameras
+ * @typedef {object} CameraDiagnostics an entry of /api/operator/cameras
  * @property {string} camera
  * @property {'live' | 'gone' | 'ended' | 'starting' | 'refused'} state
  * @property {string} message

@@ -8,7 +8,7 @@ import { load } from './stills.js';
 import { copy } from '../shared/tools.js';
 
 /** @import {Site} from '../shared/contract.js' */
-/** @import {OperatorCamera, OwnPicture, Setting} from './contract.js' */
+/** @import {CameraDiagnostics, OwnPicture, Setting} from './contract.js' */
 /** @import {Pair, Place} from './drawing.js' */
 /** @import {Section, Tell} from './section.js' */
 
@@ -80,7 +80,7 @@ export class ZoneEditor {
   async #learn() {
     try {
       const [{ cameras }, { settings }] = await Promise.all([ask('cameras'), ask('config')]);
-      for (const { camera, picture } of /** @type {OperatorCamera[]} */ (cameras)) this.#pictures.set(camera, picture);
+      for (const { camera, picture } of /** @type {CameraDiagnostics[]} */ (cameras)) this.#pictures.set(camera, picture);
       for (const { key, value } of /** @type {Setting[]} */ (settings)) {
         const [section, camera, name] = key.split('.');
         const known = section === 'cameras' && name === 'ignore' && !this.#learned;

@@ -68,7 +68,7 @@ _UNAVAILABLE = {
     "/api/events",
     "/api/past",
 } | {path for path in _OTHER if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))}
-_OF_PEOPLE = {"/api/operator/people", "/api/operator/pointing"}
+_OF_PEOPLE = {"/api/operator/people", "/api/operator/position_corrections"}
 _FROM_IS_NEEDED = {"/api/past", *OPERATOR_FILES}
 _SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}

@@ -1,4 +1,4 @@
-"""Scope filter: of an answer about the whole site, what a token for one person or one camera may see."""
+"""Scope filter: limits answers about the whole site to the person or the camera that a token permits."""
 
 from __future__ import annotations
 
@@ -8,43 +8,46 @@ import msgspec
 
 from server.http.access.permissions import Scope
 from server.http.api.schema import Cameras, Objects, SiteInfo
+from server.http.streams.time_range import RecordedChoices
 from server.messaging.messages import GopChoices
 from server.service.facade.assist import Flag
 
 Resolve = Callable[[int], int]
-"""Returns the number that a merged one goes by now."""
+"""Returns the current number of a person whose number may have been merged."""
 
 
 def filter_site(site: SiteInfo, scope: Scope) -> SiteInfo:
-    """Keep the camera of the scope; a person may be seen by any camera."""
+    """Keep only the camera of the scope; for one person keep all, since any camera may see them."""
     if scope.camera is None:
         return site
-    return msgspec.structs.replace(site, cameras=[it for it in site.cameras if it == scope.camera])
+    return msgspec.structs.replace(
+        site, cameras=[camera for camera in site.cameras if camera == scope.camera]
+    )
 
 
 def filter_objects(objects: Objects, scope: Scope, resolve: Resolve) -> Objects:
-    """Keep the person of the scope."""
+    """Keep only the person of the scope."""
     if scope.is_all:
         return objects
     person = None if scope.object is None else resolve(scope.object)
-    return Objects([it for it in objects.objects if it.object == person], [])
+    return Objects([info for info in objects.objects if info.object == person], [])
 
 
 def filter_cameras(cameras: Cameras, scope: Scope) -> Cameras:
-    """Keep the camera of the scope; for one person keep all cameras, without their error messages."""
+    """Keep only the camera of the scope; for one person keep all cameras, without their error messages."""
     if scope.is_all:
         return cameras
     if scope.camera is not None:
-        return Cameras([it for it in cameras.cameras if it.camera == scope.camera])
-    return Cameras([msgspec.structs.replace(it, message="") for it in cameras.cameras])
+        return Cameras([info for info in cameras.cameras if info.camera == scope.camera])
+    return Cameras([msgspec.structs.replace(info, message="") for info in cameras.cameras])
 
 
 def filter_choices(choices: GopChoices, scope: Scope, resolve: Resolve) -> GopChoices:
-    """Keep what is about the person of the scope, or the boxes in its camera."""
+    """Keep the decisions about the person of the scope, or the boxes in its camera."""
     if scope.is_all:
         return choices
     if scope.object is None:
-        boxes = {camera: it for camera, it in choices.boxes.items() if camera == scope.camera}
+        boxes = {camera: frames for camera, frames in choices.boxes.items() if camera == scope.camera}
         return GopChoices(first=choices.first, frames=choices.frames, choices={}, boxes=boxes, cuts=[])
     person = resolve(scope.object)
     numbers = {scope.object, person}  # decisions from before a merge have the old number
@@ -56,14 +59,14 @@ def filter_choices(choices: GopChoices, scope: Scope, resolve: Resolve) -> GopCh
             camera: [[box for box in frame if box[0] in numbers] for frame in frames]
             for camera, frames in choices.boxes.items()
         },
-        cuts=[it for it in choices.cuts if it.object in numbers],
-        merged=[it for it in choices.merged if it.kept in numbers],
-        split=[it for it in choices.split if it.kept in numbers],
+        cuts=[cut for cut in choices.cuts if cut.object in numbers],
+        merged=[merge for merge in choices.merged if merge.kept in numbers],
+        split=[split for split in choices.split if split.kept in numbers],
     )
 
 
 def filter_flag(flag: Flag, scope: Scope, resolve: Resolve) -> Flag | None:
-    """Keep what a flag says about the person or the camera of the scope; None: it is not about them."""
+    """Limit a flag to the person or the camera of the scope; None: it concerns neither."""
     if scope.is_all:
         return flag
     if scope.object is not None:
@@ -71,25 +74,20 @@ def filter_flag(flag: Flag, scope: Scope, resolve: Resolve) -> Flag | None:
         return msgspec.structs.replace(flag, objects=[person]) if person in flag.objects else None
     if scope.camera not in flag.cameras:
         return None
-    return msgspec.structs.replace(flag, cameras=[it for it in flag.cameras if it == scope.camera])
+    return msgspec.structs.replace(flag, cameras=[scope.camera])
 
 
 async def filter_decisions(
     lines: AsyncIterator[bytes], scope: Scope, resolve: Resolve
 ) -> AsyncIterator[bytes]:
-    """Filter recorded decisions, a line of JSON each.
+    """Filter recorded decisions, one line of JSON each.
 
-    A limited scope sees nothing of an earlier run, in which its number may be another person's.
+    For a limited scope, drop decisions of earlier runs, in which its number may be another person's.
     """
     async for line in lines:
         if scope.is_all:
             yield line
             continue
-        choices = msgspec.json.decode(line, type=_RecordedChoices)
+        choices = msgspec.json.decode(line, type=RecordedChoices)
         if not choices.run:
             yield msgspec.json.encode(filter_choices(choices, scope, resolve)) + b"\n"
-
-
-class _RecordedChoices(GopChoices, frozen=True, kw_only=True):
-    run: str = ""
-    """The earlier run that it is of; empty: of this one."""

@@ -1,15 +1,49 @@
-"""All of the operator's addresses."""
+"""The operator's routes: the page, cameras, pulse clients and floor here; the others from their modules."""
 
 from __future__ import annotations
 
-from server.http.operator import cameras, downloads, page, people, pointing, settings, walk
+from aiohttp import web
+
+from server.http.access.permissions import OPERATOR_PATH
+from server.http.app_keys import SERVICE
+from server.http.json_responses import json_response
+from server.http.operator import downloads, people, position_corrections, settings, walk
+from server.http.operator.schema import CameraDiagnosticsList
+from server.http.static_files import page_file
+
+_status_routes = web.RouteTableDef()
+
+
+@_status_routes.get("/operator")
+async def get_operator_page(request: web.Request) -> web.StreamResponse:
+    """Return the operator's page; its data is fetched separately."""
+    del request
+    return page_file("operator.html")
+
+
+@_status_routes.get(f"{OPERATOR_PATH}/cameras")
+async def get_cameras(request: web.Request) -> web.Response:
+    """Return every camera's diagnostics: state, frame rate, sync error, tracking delay, last error."""
+    return json_response(CameraDiagnosticsList(request.app[SERVICE].cameras.diagnose_cameras()))
+
+
+@_status_routes.get(f"{OPERATOR_PATH}/pulses")
+async def get_pulses(request: web.Request) -> web.Response:
+    """Query the pulse server for its clients."""
+    return json_response(await request.app[SERVICE].operations.list_pulse_clients())
+
+
+@_status_routes.get(f"{OPERATOR_PATH}/floor")
+async def get_floor(request: web.Request) -> web.Response:
+    """Return the coverage of the shared floor by the cameras."""
+    return json_response(request.app[SERVICE].cameras.map_floor())
+
 
 routes = [
-    *page.routes,
-    *cameras.routes,
+    *_status_routes,
     *settings.routes,
     *people.routes,
-    *pointing.routes,
+    *position_corrections.routes,
     *downloads.routes,
     *walk.routes,
 ]

@@ -1,38 +1,38 @@
-"""Answers of the operator's API; ``/api/openapi.json`` is built from them, too."""
+"""Schemas of the operator API's answers, also the source of ``/api/openapi.json``."""
 
 from __future__ import annotations
 
 import msgspec
 
-from server.service.facade.calibration import OperatorWalk
-from server.service.facade.cameras import Floor, OperatorCamera
+from server.service.facade.calibration import WalkStatus
+from server.service.facade.cameras import CameraDiagnostics, Floor
 from server.service.facade.operations import Pulses
 
 
-class OperatorCameras(msgspec.Struct, frozen=True):
+class CameraDiagnosticsList(msgspec.Struct, frozen=True):
     """All cameras of the site."""
 
-    cameras: list[OperatorCamera]
+    cameras: list[CameraDiagnostics]
 
 
 class Setting(msgspec.Struct, frozen=True):
-    """One setting that is in force. Values are as the configuration writes them."""
+    """One setting in force; values are written as in the configuration file."""
 
     key: str
-    """Such as view.switch_cost_s, or cameras.c0.offset."""
+    """For example view.switch_cost_s or cameras.c0.offset."""
     value: str
     default: str | None
-    """Null: it has none."""
+    """Null: the setting has no default."""
     differs: bool
-    """From the default."""
+    """Whether the value differs from the default."""
 
 
 class Settings(msgspec.Struct, frozen=True):
-    """The configuration that is in force."""
+    """The configuration in force."""
 
     settings: list[Setting]
     error: str
-    """Why the file, as it is on the disk now, cannot be in force; empty: it can."""
+    """Why the configuration file on the disk is invalid; empty: it is valid."""
     pending_restart: list[str]
     """Keys in which the file differs from the configuration in force."""
 
@@ -41,18 +41,18 @@ class SelectionSettings(msgspec.Struct, frozen=True):
     """View-selection settings by key, such as switch_cost_s and quality.size."""
 
     values: dict[str, float | bool]
-    """In force now."""
+    """The values in force."""
     file: dict[str, float | bool]
-    """In the configuration file."""
+    """The values of the configuration file."""
     lines: str
     """Configuration lines (YAML) for values that differ from their default or from the file."""
     min_lookahead: int
-    """Frames; the tracking window needs as many."""
+    """The fewest frames, which the tracking window needs."""
     max_lookahead: int
-    """Frames; the service's buffers allow no more."""
+    """The most frames, which the service's buffers hold."""
 
 
-class PeopleByHand(msgspec.Struct, frozen=True):
+class IdentityOverrides(msgspec.Struct, frozen=True):
     """Manual overrides of people's identities."""
 
     names: dict[int, str]
@@ -64,37 +64,37 @@ class PeopleByHand(msgspec.Struct, frozen=True):
     """Why people cannot be edited here; empty: they can."""
 
 
-class Pointing(msgspec.Struct, frozen=True):
-    """Corrections of position: whether they are accepted, and the result of the last request."""
+class CorrectionStatus(msgspec.Struct, frozen=True):
+    """Position corrections: whether they are accepted, and the result of the last request."""
 
     memory_frames: int
-    """How many frames back a person can be pointed at."""
-    max_points: int
-    """Points in one request at most."""
+    """How many frames back a position can be corrected."""
+    max_corrections: int
+    """The most corrections in one request."""
     unavailable: str
-    """Why corrections are not possible here; empty: they are."""
+    """Why corrections are not accepted; empty: they are."""
     accepted: int
-    """Points of this request that were sent to the camera's tracker."""
+    """Corrections of this request that were sent to the camera's tracker."""
     too_old: int
-    """Points of this request that are too far back."""
+    """Corrections of this request that are too far back."""
     flags: list[int]
-    """Ids of the flags that these points follow."""
+    """Ids of the flags that these corrections follow."""
 
 
 OPERATOR: dict[str, type[msgspec.Struct]] = {
-    "/api/operator/cameras": OperatorCameras,
+    "/api/operator/cameras": CameraDiagnosticsList,
     "/api/operator/pulses": Pulses,
     "/api/operator/floor": Floor,
-    "/api/operator/walk": OperatorWalk,
-    "/api/operator/people": PeopleByHand,
-    "/api/operator/pointing": Pointing,
+    "/api/operator/walk": WalkStatus,
+    "/api/operator/people": IdentityOverrides,
+    "/api/operator/position_corrections": CorrectionStatus,
     "/api/operator/config": Settings,
     "/api/operator/view_selection": SelectionSettings,
 }
 """The answer to GET of each path; POST, PUT and DELETE answer with the new state."""
 
 OPERATOR_FILES = {"/api/operator/tracks.csv": "text/csv", "/api/operator/choices.csv": "text/csv"}
-"""Downloads of a time range, from= and to=."""
+"""Downloads of a time range, given by from= and to=."""
 
 OPERATOR_RESULTS = {
     "/api/operator/walk/ground.json": "application/octet-stream",

@@ -1,4 +1,4 @@
-"""``/api/operator/walk``: the operator starts, watches and finishes the calibration walk."""
+"""``/api/operator/walk``: start, follow and finish the calibration walk."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class WalkCommand(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     action: Literal["start", "resume", "finish"]
     person: Annotated[float, msgspec.Meta(ge=0.1, le=1000)] = 1.75
-    """For finish: the person's height, meters."""
+    """With finish: the height of the person who walked, in meters."""
 
 
 @routes.get(f"{OPERATOR_PATH}/walk")
@@ -53,13 +53,13 @@ async def delete_walk(request: web.Request) -> web.Response:
 
 @routes.get(f"{OPERATOR_PATH}/walk/ground.json")
 async def get_ground(request: web.Request) -> web.Response:
-    """Return the ground file that the calibration walk yielded."""
+    """Return the ground file computed from the calibration walk."""
     return _file(request.app[SERVICE].calibration.ground_file(), "application/octet-stream", "ground.json")
 
 
 @routes.get(f"{OPERATOR_PATH}/walk/plan.png")
 async def get_plan(request: web.Request) -> web.Response:
-    """Return the floor plan that the calibration walk yielded."""
+    """Return the floor plan computed from the calibration walk."""
     return _file(request.app[SERVICE].calibration.floor_plan(), "image/png", "ground.png")
 
 

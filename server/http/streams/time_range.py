@@ -8,8 +8,16 @@ from collections.abc import AsyncIterator
 from aiohttp import web
 
 from server.http.json_responses import error_response, unavailable
+from server.messaging.messages import GopChoices
 from server.service.facade.recordings import PlaybackRange, RecordedStream, TimeReferenceError
 from server.service.service import BestViewService
+
+
+class RecordedChoices(GopChoices, frozen=True, kw_only=True):
+    """The recorded decisions about a GOP: one line of the decision log."""
+
+    run: str = ""
+    """The folder of an earlier run of the service that decided; empty: this run."""
 
 
 def is_time_shifted(request: web.Request) -> bool:

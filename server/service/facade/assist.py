@@ -1,4 +1,4 @@
-"""Operator assistance: flags for predicted tracking failures, and corrections by pointing."""
+"""Operator assistance: flags for predicted tracking failures, and position corrections."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from server.service.facade.errors import (
     UnknownCameraError,
     UnknownObjectError,
 )
-from server.service.operator_assist.corrections import PointedPosition
+from server.service.operator_assist.corrections import MarkedPosition
 from server.service.operator_assist.flags import Flag
 from server.service.pipeline import BestViewPipeline
 
 __all__ = [
     "CORRECTIONS_MAX",
     "AssistService",
+    "CorrectPositions",
+    "CorrectionResult",
     "Flag",
-    "PointAtPerson",
-    "Pointed",
-    "PointedPlace",
+    "OperatorPosition",
 ]
 
 _DEFAULT_TOLERANCE = 0.02
@@ -31,33 +31,33 @@ _MAX_TOLERANCE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class PointedPlace:
+class OperatorPosition:
     """A position in a frame, in pixels of the site's picture."""
 
     pulse: int
     x: float
     y: float
-    reach: float | None
+    tolerance: float | None
     """Tolerance in pixels; None: a fiftieth of the picture's width."""
 
 
 @dataclass(frozen=True, slots=True)
-class PointAtPerson:
+class CorrectPositions:
     """Command: a person is at these positions in a camera's picture."""
 
     number: int
     camera: str
-    places: Sequence[PointedPlace]
+    positions: Sequence[OperatorPosition]
 
 
 @dataclass(frozen=True, slots=True)
-class Pointed:
-    """The result of a :class:`PointAtPerson`."""
+class CorrectionResult:
+    """The result of a :class:`CorrectPositions`."""
 
     accepted: int
     """The number of positions that were sent to the camera's tracker."""
     flags: list[int]
-    """The flags that this responds to."""
+    """The flags that these corrections respond to."""
 
 
 class AssistService:
@@ -81,13 +81,13 @@ class AssistService:
         self._flags.on_flag.append(callback)
 
     @property
-    def memory(self) -> int:
-        """How many frames back a person can be pointed at."""
+    def memory_frames(self) -> int:
+        """How many frames back a position can be corrected."""
         return self._pipeline.config.track.assist.memory_frames
 
     @property
-    def blocked(self) -> str:
-        """Why people cannot be pointed at here; empty: they can."""
+    def unavailable(self) -> str:
+        """Why positions cannot be corrected here; empty: they can."""
         config = self._pipeline.config
         if config.view.share.of > 1:
             return "several services share this site (view.share), and their person numbers must stay equal"
@@ -95,42 +95,46 @@ class AssistService:
             return "cameras take no corrections: track.assist.enabled is off"
         return ""
 
-    def point_at_person(self, command: PointAtPerson) -> Pointed:
+    def correct_positions(self, command: CorrectPositions) -> CorrectionResult:
         """Send a person's positions to a camera's tracker, which corrects its tracks, also past ones.
 
         Raises:
-            ConflictError: people cannot be pointed at here, or the camera did not show the person then.
+            ConflictError: positions cannot be corrected here, or the camera did not show the person then.
             UnknownCameraError: there is no such camera.
             UnknownObjectError: no person has this number.
             InvalidCommandError: a position is outside the picture, or its frame has not come yet.
         """
         pipeline, camera = self._pipeline, command.camera
-        if self.blocked:
-            raise ConflictError(self.blocked)
+        if self.unavailable:
+            raise ConflictError(self.unavailable)
         if camera not in pipeline.frame_buffers:
             raise UnknownCameraError(camera, pipeline.frame_buffers)
         number = pipeline.decider.people.registry.current(command.number)
         if number not in pipeline.decider.people.known:
             is_recovering = pipeline.state_replication.may_recover(command.number)
             raise UnknownObjectError(command.number, is_recovering=is_recovering)
-        for place in command.places:
-            self._check(place)
-        accepted, flags = pipeline.assist.point(number, camera, [self._position(it) for it in command.places])
+        for position in command.positions:
+            self._check(position)
+        positions = [self._marked(position) for position in command.positions]
+        accepted, flags = pipeline.assist.correct(number, camera, positions)
         if not accepted:
             raise ConflictError(f"camera {camera} did not show object {number} then, or it is too long ago")
-        return Pointed(accepted, flags)
+        return CorrectionResult(accepted, flags)
 
-    def _check(self, place: PointedPlace) -> None:
+    def _check(self, position: OperatorPosition) -> None:
         site = self._pipeline.config.site
-        if not (0 <= place.x <= site.width and 0 <= place.y <= site.height):
-            position = f"{place.x:g}, {place.y:g}"
-            raise InvalidCommandError(f"points: {position} is not in a picture of {site.width}x{site.height}")
-        if place.pulse > self._pipeline.pulse:
-            raise InvalidCommandError(f"points: pulse {place.pulse} has not come yet")
+        if not (0 <= position.x <= site.width and 0 <= position.y <= site.height):
+            place = f"{position.x:g}, {position.y:g}"
+            raise InvalidCommandError(
+                f"corrections: {place} is not in a picture of {site.width}x{site.height}"
+            )
+        if position.pulse > self._pipeline.pulse:
+            raise InvalidCommandError(f"corrections: pulse {position.pulse} has not come yet")
 
-    def _position(self, place: PointedPlace) -> PointedPosition:
+    def _marked(self, position: OperatorPosition) -> MarkedPosition:
         width = self._pipeline.config.site.width
-        tolerance = (
-            _DEFAULT_TOLERANCE * width if place.reach is None else min(place.reach, _MAX_TOLERANCE * width)
-        )
-        return PointedPosition(place.pulse, place.x, place.y, max(tolerance, TOLERANCE_MIN))
+        if position.tolerance is None:
+            tolerance = _DEFAULT_TOLERANCE * width
+        else:
+            tolerance = min(position.tolerance, _MAX_TOLERANCE * width)
+        return MarkedPosition(position.pulse, position.x, position.y, max(tolerance, TOLERANCE_MIN))

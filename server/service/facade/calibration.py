@@ -33,7 +33,7 @@ class WalkPair(msgspec.Struct, frozen=True):
     seconds: float
 
 
-class OperatorWalk(msgspec.Struct, frozen=True):
+class WalkStatus(msgspec.Struct, frozen=True):
     """The calibration walk: its coverage so far, and its result."""
 
     state: str
@@ -62,7 +62,7 @@ class CalibrationService:
     def __init__(self, pipeline: BestViewPipeline) -> None:
         self._walk = pipeline.walk_session
 
-    def status(self) -> OperatorWalk:
+    def status(self) -> WalkStatus:
         """Return the coverage of the walk so far, and the result of the calibration."""
         walk = self._walk
         result = walk.result or CalibrationResult()
@@ -72,7 +72,7 @@ class CalibrationService:
             for camera in covered.cameras
             for gap in coverage_gaps(camera.camera, camera.thirds, camera.depth_ratio or float("inf"))
         ]
-        return OperatorWalk(
+        return WalkStatus(
             state=walk.state.value,
             seconds=walk.seconds,
             max_seconds=MAX_WALK_S,

@@ -43,7 +43,7 @@ class OwnPicture(msgspec.Struct, frozen=True):
     top: float
 
 
-class OperatorCamera(CameraInfo, frozen=True):
+class CameraDiagnostics(CameraInfo, frozen=True):
     """One camera's diagnostics: the fields of /api/cameras, and more."""
 
     bad_messages: int
@@ -105,7 +105,7 @@ class CameraService:
         """Return each camera's state, as far as any viewer may know it."""
         return [self._info(*it) for it in self._pipeline.ingest.states.items()]
 
-    def diagnose_cameras(self) -> list[OperatorCamera]:
+    def diagnose_cameras(self) -> list[CameraDiagnostics]:
         """Return each camera's diagnostics, for the operator."""
         return [self._diagnostics(*it) for it in self._pipeline.ingest.states.items()]
 
@@ -136,9 +136,9 @@ class CameraService:
             message=state.message,
         )
 
-    def _diagnostics(self, camera: str, state: CameraState) -> OperatorCamera:
+    def _diagnostics(self, camera: str, state: CameraState) -> CameraDiagnostics:
         status, metrics = state.status, state.metrics
-        return OperatorCamera(
+        return CameraDiagnostics(
             **msgspec.structs.asdict(self._info(camera, state)),
             bad_messages=state.bad_messages,
             clock_offset=status.clock_offset if status else None,

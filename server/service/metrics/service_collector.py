@@ -80,7 +80,9 @@ class ServiceCollector(Collector):
             "myview_flags_open", "Flags that can be answered now.", value=len(assist.flags.open)
         )
         yield CounterMetricFamily(
-            "myview_position_corrections", "Positions that the operator pointed at.", value=assist.points
+            "myview_position_corrections",
+            "Position corrections sent to cameras.",
+            value=assist.corrections_sent,
         )
 
     def _recording(self) -> Iterable[Metric]:

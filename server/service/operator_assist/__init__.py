@@ -1,1 +1,1 @@
-"""Operator assistance: flags of predicted tracking failures, and corrections by pointing."""
+"""Operator assistance: flags of predicted tracking failures, and position corrections."""

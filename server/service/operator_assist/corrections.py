@@ -10,7 +10,7 @@ from server.service.identity.people import PersonTracker
 
 
 @dataclass(frozen=True, slots=True)
-class PointedPosition:
+class MarkedPosition:
     """A position in a frame, in pixels of the site's picture.
 
     Attributes:
@@ -27,7 +27,7 @@ class PointedPosition:
 
 
 def corrections_for_tracker(
-    people: PersonTracker, camera: str, number: int, positions: Sequence[PointedPosition]
+    people: PersonTracker, camera: str, number: int, positions: Sequence[MarkedPosition]
 ) -> PositionCorrections | None:
     """Return an operator's clicks on a person as corrections of the camera's track of that person.
 

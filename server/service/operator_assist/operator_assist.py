@@ -9,7 +9,7 @@ import msgspec
 from server.config.site_config import Config
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.operator_assist.corrections import PointedPosition, corrections_for_tracker
+from server.service.operator_assist.corrections import MarkedPosition, corrections_for_tracker
 from server.service.operator_assist.flags import FlagQueue, RiskEvent
 
 
@@ -21,7 +21,7 @@ class OperatorAssist:
 
     def __init__(self, config: Config, people: PersonTracker, send: Callable[[str, bytes], None]) -> None:
         self.flags = FlagQueue(config.view.flags, config.site.fps)
-        self.points = 0
+        self.corrections_sent = 0
         """The number of positions sent to cameras."""
         self._people, self._send = people, send
 
@@ -31,7 +31,7 @@ class OperatorAssist:
         people.published.frames = assist.memory_frames if assist.enabled else 0
         self.flags.step(epoch.last, self._risk_events(epoch), people.registry.current)
 
-    def point(self, number: int, camera: str, positions: Sequence[PointedPosition]) -> tuple[int, list[int]]:
+    def correct(self, number: int, camera: str, positions: Sequence[MarkedPosition]) -> tuple[int, list[int]]:
         """Send an operator's clicks on a person to a camera; its tracker corrects present and past tracks.
 
         Returns:
@@ -42,7 +42,7 @@ class OperatorAssist:
         if corrections is None:
             return 0, []
         self._send(camera, msgspec.json.encode(corrections))
-        self.points += len(corrections.corrections)
+        self.corrections_sent += len(corrections.corrections)
         return len(corrections.corrections), self.flags.pointed(
             number, camera, [it.pulse for it in corrections.corrections]
         )

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from benchmarks.faults.injection.messages import _pointing
+from benchmarks.faults.injection.messages import _correction
 from benchmarks.faults.site.lossy_bus import LossyLink, MessageRouter
 from client import Box, Gop
 from server.messaging.inbox import Message
@@ -65,8 +65,8 @@ def test_messages_go_to_whom_they_are_for() -> None:
 def test_an_operator_points_at_the_middle_of_whom_they_watch() -> None:
     box = Box(1, 10.0, 20.0, 30.0, 60.0)
     gop = Gop(first=30, frames=2, choices={1: "c0", 2: "c0"}, boxes={"c0": ((), (box,))}, cuts=())
-    correction = _pointing(gop, 1)
+    correction = _correction(gop, 1)
     assert correction is not None
-    assert correction == {"object": 1, "camera": "c0", "points": [{"pulse": 31, "x": 20.0, "y": 40.0}]}
-    assert _pointing(gop, 2) is None, "they are in no box"
-    assert _pointing(gop, 3) is None, "they are shown by no camera"
+    assert correction == {"object": 1, "camera": "c0", "corrections": [{"pulse": 31, "x": 20.0, "y": 40.0}]}
+    assert _correction(gop, 2) is None, "they are in no box"
+    assert _correction(gop, 3) is None, "they are shown by no camera"

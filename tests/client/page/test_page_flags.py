@@ -24,7 +24,7 @@ def flag(site: FakeSite, seconds: float = 60.0, **changes: Any) -> dict[str, Any
 
 
 def points(site: FakeSite) -> list[dict[str, float]]:
-    return [point for said in site.pointed for point in said["points"]]
+    return [point for said in site.pointed for point in said["corrections"]]
 
 
 async def middle(visit: Visit, person: int) -> tuple[float, float, float, float]:

@@ -257,8 +257,8 @@ class SiteServer:
         app.router.add_get("/page/{name:.+}", _file)
         app.router.add_get("/api/site", self._site)
         app.router.add_get("/api/session", self._session)
-        app.router.add_get("/api/operator/pointing", self._pointing)
-        app.router.add_post("/api/operator/pointing", self._pointing)
+        app.router.add_get("/api/operator/position_corrections", self._pointing)
+        app.router.add_post("/api/operator/position_corrections", self._pointing)
         app.router.add_get("/api/events", self._events)
         app.router.add_get("/api/objects/{k}/choice", self._choice)
         app.router.add_get("/api/objects/{k}/past", self._past)
@@ -306,7 +306,7 @@ class SiteServer:
         if request.method == "POST":
             said = await request.json()
             self.site.pointed.append(said)
-            accepted = len(said["points"])
+            accepted = len(said["corrections"])
         return web.json_response({"unavailable": "", "accepted": accepted, "too_old": 0, "flags": []})
 
     async def _choice(self, request: web.Request) -> web.Response:

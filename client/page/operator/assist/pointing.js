@@ -58,7 +58,7 @@ export class Pointing {
 
   /** Ask whether the server would take it. */
   async look() {
-    this.possible = await ask('pointing').then(({ unavailable }) => unavailable === '', () => false);
+    this.possible = await ask('position_corrections').then(({ unavailable }) => unavailable === '', () => false);
     if (!this.possible) this.end();
   }
 
@@ -147,7 +147,7 @@ export class Pointing {
     this.#sending = true;
     try {
       for (let said = this.#samples.take(); said; said = this.#samples.take()) {
-        const { accepted } = await ask('pointing', 'POST', said);
+        const { accepted } = await ask('position_corrections', 'POST', said);
         this.taken += accepted;
         this.tell(null);
       }

@@ -1,4 +1,4 @@
-/** Where the operator points, frame by frame: kept until it is sent, and sent by camera. No element. */
+/** Where the operator corrections, frame by frame: kept until it is sent, and sent by camera. No element. */
 
 /**
  * @typedef {object} Point
@@ -10,13 +10,13 @@
  * @typedef {object} Said
  * @property {number} object
  * @property {string} camera
- * @property {Point[]} points
+ * @property {Point[]} corrections
  */
 
 const KEPT = 250; // of what could not be sent, the newest: a server that was away is not overrun
 
 export class Samples {
-  /** @type {(Said & {points: [Point]})[]} one for each frame, in order */
+  /** @type {(Said & {corrections: [Point]})[]} one for each frame, in order */
   #waiting = [];
 
   /**
@@ -28,9 +28,9 @@ export class Samples {
    */
   add(object, camera, point) {
     const last = this.#waiting.at(-1);
-    const same = last?.points[0].pulse === point.pulse && last.camera === camera && last.object === object;
+    const same = last?.corrections[0].pulse === point.pulse && last.camera === camera && last.object === object;
     if (same) this.#waiting.pop();
-    this.#waiting.push({ object, camera, points: [point] });
+    this.#waiting.push({ object, camera, corrections: [point] });
     if (this.#waiting.length > KEPT) this.#waiting.shift();
   }
 
@@ -41,6 +41,6 @@ export class Samples {
     const { object, camera } = first;
     const end = this.#waiting.findIndex((it) => it.object !== object || it.camera !== camera);
     const taken = this.#waiting.splice(0, end < 0 ? this.#waiting.length : end);
-    return { object, camera, points: taken.map(({ points: [point] }) => point) };
+    return { object, camera, corrections: taken.map(({ corrections: [point] }) => point) };
   }
 }

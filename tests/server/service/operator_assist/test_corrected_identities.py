@@ -13,7 +13,7 @@ from server.camera.track_messages import TrackMessageBuilder
 from server.messaging.messages import CameraTracks
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.operator_assist.corrections import PointedPosition, corrections_for_tracker
+from server.service.operator_assist.corrections import MarkedPosition, corrections_for_tracker
 from tracking import CostSettings, Detections, WindowSettings, create_solver
 from tracking.interactive import InteractiveSettings, InteractiveTracker, PositionCorrection
 
@@ -79,7 +79,7 @@ def played(
         if frame == corrected_at:
             [left] = [number for number, where in positions[20].items() if where < 300]
             request = corrections_for_tracker(
-                people, "c0", left, [PointedPosition(it, places(it)[0] + 20, 160, 10) for it in of]
+                people, "c0", left, [MarkedPosition(it, places(it)[0] + 20, 160, 10) for it in of]
             )
             assert request is not None
             marked = [
@@ -148,7 +148,7 @@ def test_points_after_a_correction_still_refer_to_the_same_person() -> None:
     assert before is not None
     assert after is not None
     assert before.track == after.track, "the tracker's own number stays with the person"
-    assert corrections_for_tracker(people, "c0", left, [PointedPosition(-1, 0, 0, 1)]) is None
-    assert corrections_for_tracker(people, "c0", 99, [PointedPosition(120, 0, 0, 1)]) is None
-    assert corrections_for_tracker(people, "c1", left, [PointedPosition(120, 0, 0, 1)]) is None
+    assert corrections_for_tracker(people, "c0", left, [MarkedPosition(-1, 0, 0, 1)]) is None
+    assert corrections_for_tracker(people, "c0", 99, [MarkedPosition(120, 0, 0, 1)]) is None
+    assert corrections_for_tracker(people, "c1", left, [MarkedPosition(120, 0, 0, 1)]) is None
     assert right != left
