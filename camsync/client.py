@@ -19,8 +19,7 @@ from camsync.client_types import (
     SyncStatus,
     VersionError,
 )
-from camsync.clock import Clock, steady_unix_clock
-from camsync.clock_offset import ClockOffset
+from camsync.clock import Clock, ClockOffset, steady_unix_clock
 from camsync.login import Credentials
 from camsync.messages import (
     ErrorMessage,
@@ -34,7 +33,7 @@ from camsync.messages import (
 )
 from camsync.persistent_connection import PersistentConnection
 from camsync.protocol import VERSION, is_name
-from camsync.pulse_counter import PulseCounter
+from camsync.pulse_schedule import PulseCounter
 from logthrottle import LogThrottle
 
 _log = logging.getLogger(__name__)
@@ -51,9 +50,9 @@ class PulseClient:
                 ...
 
     Connecting sends HELLO, which means: ready for frame 0. Open the source first. Before the server's first
-    pulse there are none (see ``ClientSettings.free_run_after``). Afterwards, while the server is away or
-    silent, the client makes pulses at the server's rate by its own clock (``Pulse.own``), reconnects, and
-    takes up the server's count again. A slow consumer loses the oldest pulses; ``Pulse.missed`` counts them.
+    pulse the iterator yields none (see ``ClientSettings.free_run_after``). Afterwards, while the server is
+    away or silent, the client generates pulses at the server's rate (``Pulse.local``), reconnects, and
+    continues with the server's count. A slow consumer loses the oldest pulses; ``Pulse.missed`` counts them.
 
     With ``credentials``, whose user is ``name``, it logs in to a server that requires it; with ``tls`` it
     checks the server's certificate.
@@ -96,7 +95,7 @@ class PulseClient:
             port,
             self._hello,
             self._receive,
-            self._schedule,
+            self._set_timer,
             self._settings,
             self._clock,
             credentials,
@@ -108,7 +107,7 @@ class PulseClient:
         self._closed = False
         self._last_number: int | None = None
         self._started_at = self._greeted_at = self._clock()
-        self._missed = self._own = 0
+        self._missed = self._local_pulses = 0
         self._waiting_for: tuple[str, ...] = ()
         self._server_errors = LogThrottle(self._clock)
 
@@ -118,7 +117,7 @@ class PulseClient:
         return self._missed
 
     def now(self) -> float:
-        """Return the clock of ``Pulse.due`` and ``Pulse.received``: unix seconds that never step."""
+        """Return the time on the clock of ``Pulse.due`` and ``Pulse.received``, in unix seconds."""
         return self._clock()
 
     def status(self) -> SyncStatus:
@@ -130,7 +129,7 @@ class PulseClient:
             offset=self._offset.offset,
             round_trip=self._offset.round_trip,
             missed=self._missed,
-            own=self._own,
+            local_pulses=self._local_pulses,
             connections=self._server.greetings,
             waiting_for=self._waiting_for,
         )
@@ -141,7 +140,7 @@ class PulseClient:
             self._started_at = self._clock()
             self._task = asyncio.create_task(self._server.run(), name=f"pulses of {self._name}")
             self._task.add_done_callback(self._on_connecting_ended)
-            self._schedule()
+            self._set_timer()
 
     async def close(self) -> None:
         """Disconnect and end the iteration."""
@@ -179,7 +178,7 @@ class PulseClient:
         missed = 0 if self._last_number is None else pulse.number - self._last_number - 1
         self._last_number = pulse.number
         self._missed += missed
-        return Pulse(pulse.number, pulse.due, pulse.received, missed, pulse.own)
+        return Pulse(pulse.number, pulse.due, pulse.received, missed, pulse.local)
 
     def _hello(self) -> Hello:
         return Hello(self._name, self._counter.known(self._clock()))
@@ -200,7 +199,7 @@ class PulseClient:
                 if (more := self._server_errors.record(text)) is not None:
                     _log.warning("pulse server: %s%s", text, more)
                 if code == "replaced":
-                    self._fail(ReplacedError(f"{self._name} has given way: {text}"))
+                    self._fail(ReplacedError(f"{self._name} was replaced: {text}"))
                 elif code == "version":
                     self._fail(VersionError(text))
 
@@ -219,22 +218,22 @@ class PulseClient:
     def _accept_pulse(self, number: int, due: float, now: float) -> None:
         self._waiting_for = ()
         for missing, was_due in self._counter.fill_gap(number, due):
-            self._put(missing, was_due, now, own=True)
+            self._put(missing, was_due, now, local=True)
         if self._counter.accept(number, due):
-            self._put(number, due, now, own=False)
-        elif self._axis_lost(now):
+            self._put(number, due, now, local=False)
+        elif self._schedule_lost(now):
             self._fail(
                 ScheduleLostError(f"the server is at pulse {number}, {self._name} at {self._counter.last}")
             )
-        self._schedule()
+        self._set_timer()
 
-    def _axis_lost(self, now: float) -> bool:
+    def _schedule_lost(self, now: float) -> bool:
         settled = now - self._greeted_at > self._settings.settle
         return settled and self._counter.ahead(now) > self._settings.ahead_most
 
-    def _put(self, number: int, due: float, now: float, *, own: bool) -> None:
-        self._queue.append(Pulse(number, due, now, 0, own))
-        self._own += own
+    def _put(self, number: int, due: float, now: float, *, local: bool) -> None:
+        self._queue.append(Pulse(number, due, now, 0, local))
+        self._local_pulses += local
         self._wake.set()
 
     def _on_connecting_ended(self, task: asyncio.Task[None]) -> None:
@@ -254,30 +253,30 @@ class PulseClient:
             self._timer.cancel()
             self._timer = None
 
-    def _schedule(self) -> None:
-        """Set the timer for the next own pulse; each pulse from the server sets it anew."""
+    def _set_timer(self) -> None:
+        """Set the timer for the next local pulse; each pulse from the server resets it."""
         self._cancel_timer()
         if self._closed or self._failure is not None:
             return
         now = self._clock()
         due = self._counter.next_due()
         if due is not None:
-            due += self._settings.own_after if self._server.connected else 0.0
+            due += self._settings.local_after if self._server.connected else 0.0
         elif self._settings.free_run_after is not None and not self._server.connected:
             due = self._started_at + self._settings.free_run_after
         if due is not None:
             wait = max(0.0, due - now)
-            self._timer = asyncio.get_running_loop().call_later(wait, self._make_own_pulses, now + wait)
+            self._timer = asyncio.get_running_loop().call_later(wait, self._make_local_pulses, now + wait)
 
-    def _make_own_pulses(self, planned: float) -> None:
+    def _make_local_pulses(self, planned: float) -> None:
         now = self._clock()
         if now - planned > _STALLED and self._server.connected:
             # The process was stalled, and pulses may wait unread in the socket: read them first.
-            self._timer = asyncio.get_running_loop().call_later(0.0, self._make_own_pulses, now)
+            self._timer = asyncio.get_running_loop().call_later(0.0, self._make_local_pulses, now)
             return
         if self._counter.next_due() is None:
             self._counter.start_at(now)
-        late = self._settings.own_after if self._server.connected else 0.0
-        for number, due in self._counter.count_own(now - late):
-            self._put(number, due, now, own=True)
-        self._schedule()
+        late = self._settings.local_after if self._server.connected else 0.0
+        for number, due in self._counter.count_local(now - late):
+            self._put(number, due, now, local=True)
+        self._set_timer()

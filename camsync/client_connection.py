@@ -26,9 +26,8 @@ from camsync.messages import (
 from camsync.protocol import MAX_LINE, ProtocolError, encode, parse_client_line
 
 _log = logging.getLogger(__name__)
-_SEND_BUFFER = (
-    4096  # bytes in the kernel: a slow client is noticed within seconds, not after an hour of pulses
-)
+# In the kernel: a slow client is noticed within seconds, not after an hour of pulses.
+_SEND_BUFFER = 4096  # bytes
 _KEEPALIVE = 5  # seconds of silence before TCP keepalive probes
 
 
@@ -37,7 +36,7 @@ class ClientInfo:
     """State of one client."""
 
     name: str | None
-    """The name of its HELLO; None before that."""
+    """The name in its HELLO; None before that."""
     address: str
     """``host:port``."""
     joined: float
@@ -45,11 +44,11 @@ class ClientInfo:
     sent: int
     """Pulses handed to its connection."""
     dropped: int
-    """Pulses it lost because it did not read."""
+    """Pulses dropped because it did not read."""
     behind: int
-    """Pulses lost in a row until now: 0 for a client that keeps up."""
+    """Pulses dropped since the last one sent: 0 for a client that keeps up."""
     errors: int
-    """Lines of it that could not be parsed."""
+    """Lines received from it that could not be parsed."""
 
 
 class ConnectionOwner(Protocol):
@@ -65,7 +64,7 @@ class ConnectionOwner(Protocol):
         """Return all clients in the order in which they joined."""
 
     def hello(self, client: ClientConnection, hello: Hello) -> None:
-        """Take a client's name; raise ProtocolError if it may not have it."""
+        """Register a client's name; raise ProtocolError if it may not use it."""
 
 
 class ClientConnection(asyncio.Protocol):
@@ -90,7 +89,7 @@ class ClientConnection(asyncio.Protocol):
         self._lines = LineBuffer(MAX_LINE)
         self._joined_at = clock()
         self._rate = RateLimit(limits.line_burst, limits.line_rate, self._joined_at)
-        self._last_sent_at = self._joined_at  # when a pulse last went out to it
+        self._last_sent_at = self._joined_at
         self._transport: asyncio.Transport | None = None
         self._handshake: asyncio.Task[None] | None = None
         self._sent = self._dropped = self._behind = self._errors = 0
@@ -148,8 +147,8 @@ class ClientConnection(asyncio.Protocol):
     def eof_received(self) -> bool:
         """Keep sending to a client that closed its sending side, such as ``nc`` (called by asyncio).
 
-        A client that has sent HELLO has left: else a camera that is gone would still count as present. TLS
-        closes both directions at once.
+        A client that has sent HELLO is closed: otherwise a camera that is gone would still count as
+        connected. TLS closes both directions at once.
         """
         return self.name is None and self._tls is None
 
@@ -164,7 +163,7 @@ class ClientConnection(asyncio.Protocol):
         self._owner.left(self)
 
     def send(self, line: bytes) -> bool:
-        """Send a line unless too much waits already; return whether it was sent."""
+        """Send a line unless ``limits.backlog`` bytes are waiting; return whether it was sent."""
         transport = self._transport
         if transport is None or transport.is_closing():
             return False
@@ -188,7 +187,7 @@ class ClientConnection(asyncio.Protocol):
         self._dropped += 1
         self._behind += 1
         if now - self._last_sent_at > self._limits.cut_off:
-            _log.warning("client %s (%s) does not read its pulses: cut off", self.name, self.address)
+            _log.warning("client %s (%s) does not read its pulses: disconnected", self.name, self.address)
             self.end("slow", "pulses were not read")
 
     def end(self, code: str, text: str) -> None:
@@ -217,14 +216,14 @@ class ClientConnection(asyncio.Protocol):
             encrypted = await asyncio.get_running_loop().start_tls(
                 plain, self, tls, server_side=True, ssl_handshake_timeout=self._limits.login_within
             )
-        except OSError as error:  # ssl.SSLError is one
+        except OSError as error:  # includes ssl.SSLError
             _log.debug("client %s: no TLS: %s", self.address, error)
             self._transport = None
             gate.refuse(self, "TLS failed")
             return
         if encrypted is not None:
             self._transport = encrypted
-            asyncio.get_running_loop().call_soon(self._request_login, gate)  # then the handshake is done
+            asyncio.get_running_loop().call_soon(self._request_login, gate)  # by then the handshake is done
 
     def _request_login(self, gate: LoginGate) -> None:
         self._handshake = None
@@ -264,8 +263,12 @@ class ClientConnection(asyncio.Protocol):
 
     def _send_clients(self) -> None:
         """Send the list of the other clients: a long line, so only to a client that has read everything."""
-        others = [client for client in self._owner.clients() if client.address != self.address]
-        line = encode(ClientList(tuple(ListedClient(client.name, client.behind) for client in others)))
+        listed = tuple(
+            ListedClient(client.name, client.behind)
+            for client in self._owner.clients()
+            if client.address != self.address
+        )
+        line = encode(ClientList(listed))
         if self._transport is not None and not self._transport.get_write_buffer_size():
             self._transport.write(line)
 

@@ -24,7 +24,7 @@ class ClientRegistry:
     A place is reserved for each of the ``reserved`` names. All other connections share ``limits.clients``
     places, those of one login no more than ``limits.login_places`` of them.
 
-    ``gate`` holds connections back until they have logged in; ``greet`` makes the first lines for a new
+    ``gate`` holds connections back until they have logged in; ``greet`` returns the first lines for a new
     client; ``on_hello`` is called with every HELLO that was accepted, ``on_change`` when a client got a name
     or left.
     """
@@ -62,16 +62,16 @@ class ClientRegistry:
         return tuple(client.info() for client in self._connections.values())
 
     def names(self) -> frozenset[str]:
-        """Return the names of the clients that have said HELLO and are connected."""
+        """Return the names of the connected clients that have sent HELLO."""
         return frozenset(client.name for client in self._connections.values() if client.name is not None)
 
     def send_pulse(self, line: bytes) -> None:
-        """Send a pulse to all clients, waiting for none."""
+        """Send a pulse to all clients without waiting."""
         for client in tuple(self._connections.values()):
             client.send_pulse(line)
 
     def broadcast(self, line: bytes) -> None:
-        """Send another line to all clients that keep up."""
+        """Send a line to all clients that keep up."""
         for client in tuple(self._connections.values()):
             client.send(line)
 
@@ -84,7 +84,7 @@ class ClientRegistry:
             client.end("stopped", "the server stops")
 
     def joined(self, client: ClientConnection) -> None:
-        """Greet a new connection; where there are too many, the oldest of the busiest origin is closed."""
+        """Greet a new connection; if there are too many, close the oldest of the origin that has the most."""
         if self._closed:
             client.end("stopped", "the server stops")
             return
@@ -98,7 +98,7 @@ class ClientRegistry:
             self._on_change()
 
     def hello(self, client: ClientConnection, hello: Hello) -> None:
-        """Name a client; an older client of the same name is replaced, so that a restart is never locked out.
+        """Name a client; an older client of the same name is replaced, so that a restarted one can connect.
 
         Raises:
             ProtocolError: the connection has another name or user.
@@ -134,7 +134,7 @@ class ClientRegistry:
         evicted.end("full", f"too many connections of {evicted.origin}")
 
     def _log_arrival(self, client: ClientConnection, name: str) -> None:
-        """Log an arrival, throttled: two clients of one name may replace each other for ever."""
+        """Log an arrival, throttled: two clients of one name may replace each other endlessly."""
         if client.name is not None:  # a repeated HELLO
             return
         before = next((other for other in self._connections.values() if other.name == name), None)

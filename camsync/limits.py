@@ -13,33 +13,34 @@ class ServerLimits:
     """Limits and timeouts of a `PulseServer`."""
 
     catch_up: float = 0.5
-    """Seconds that the server may be late and still send every pulse; later, it skips to the current one."""
+    """Seconds of delay up to which the server still sends every pulse; beyond, it skips to the current
+    one."""
     adopt_for: float = 30.0
-    """Seconds after the first pulse in which clients that have counted further may move the axis forward: the
-    expected ones, or all where none is expected. Afterwards claims are ignored."""
+    """Seconds after the first pulse in which clients that have counted further may move the schedule forward:
+    the expected ones, or all where none is expected. Afterwards claims are ignored."""
     claims_for: float = 2.5
-    """Seconds from when enough clients have claimed a count until the axis continues there, so that the
-    others can claim too: all reconnect within two seconds, and count by themselves meanwhile."""
+    """Seconds from when enough clients have claimed a count until the schedule continues there. The remaining
+    clients can claim meanwhile: all reconnect within two seconds, and count by themselves until then."""
     counted_for: float = 10 * 365.25 * 86400.0
-    """Seconds that a client can have counted for: ten years. Claims beyond that are ignored."""
+    """Longest plausible count, in seconds: ten years. Claims beyond that are ignored."""
     backlog: int = 4096
     """Bytes waiting for one client before pulses are dropped for it (a pulse has about 30)."""
     cut_off: float = 10.0
-    """Seconds a client may stay behind, or not acknowledge what was sent, before it is cut off."""
+    """Seconds a client may stay behind, or leave data unacknowledged, before its connection is closed."""
     clients: int = 256
     """Connections at once, beside one for each expected name or user; a new one then replaces the oldest one
     of the address, or of the login, that has the most."""
     login_places: int = 8
-    """Connections of one login at once, beside the one that has said HELLO."""
+    """Connections of one login at once, beside the one that has sent HELLO."""
     pending_logins: int = 256
     """Connections that have not logged in; a new one then replaces the oldest one of the address that has the
     most."""
     login_within: float = 5.0
-    """Seconds from connecting until TLS is ready and the login has come."""
+    """Seconds from connecting until TLS is ready and the login was received."""
     line_burst: float = 100.0
     """Lines that a client may send at once."""
     line_rate: float = 20.0
-    """Lines per second that a client may send in the long run; beyond, it is cut off."""
+    """Lines per second that a client may send in the long run; beyond that, its connection is closed."""
 
 
 class HasOrigin(Protocol):
@@ -56,7 +57,8 @@ Connection = TypeVar("Connection", bound=HasOrigin)
 def select_evicted(connections: Sequence[Connection]) -> Connection:
     """Return the oldest connection of the origin that has the most; ``connections`` are oldest first.
 
-    So a client that opens very many connections evicts its own. Ties go to the oldest.
+    A client that opens very many connections evicts its own. Of equal origins the one of the oldest
+    connection counts.
     """
     counts = Counter(connection.origin for connection in connections)
     most = max(counts.values())

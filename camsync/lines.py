@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 
 class OverlongLineError(ValueError):
-    """A line is longer than the limit; the stream cannot be parsed any further."""
+    """A line is longer than the limit; the rest of the stream cannot be parsed."""
 
 
 class LineBuffer:

@@ -1,7 +1,7 @@
 """Login to a pulse server that has users: TLS first, then one line with a name and a password.
 
 TLS keeps the password and the pulses private, and authenticates the server by its certificate. A server
-without TLS can have users too, but its logins can be overheard.
+without TLS can have users too, but its passwords can be read on the network.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ class LoginGate:
     """Holds connections back until their TLS handshake and their login are done.
 
     ``users`` maps names to passwords; None: no login, the gate bounds TLS handshakes alone. An unknown name
-    is refused as a wrong password is. Where too many connections are pending, the oldest of the address that
-    has the most is closed: a client that knows its password needs no longer than an answer takes.
+    is refused like a wrong password. If too many connections are pending, the oldest of the address that has
+    the most is closed: a legitimate client logs in within one round trip.
     """
 
     def __init__(self, users: Mapping[str, str] | None, limits: ServerLimits, clock: Clock) -> None:
@@ -88,7 +88,7 @@ class LoginGate:
         self._pending[id(connection)] = _Pending(connection, timer)
 
     def request(self, connection: PendingConnection) -> bool:
-        """Send the login request, once TLS is ready; return False where no login is needed."""
+        """Send the login request, once TLS is ready; return False if no login is needed."""
         if self._users is None:
             self.forget(connection)
             return False
@@ -96,7 +96,7 @@ class LoginGate:
         return True
 
     def check(self, connection: PendingConnection, line: bytes) -> str | None:
-        """Check the login line of a connection; return the user's name, or None where it was refused."""
+        """Check the login line of a connection; return the user's name, or None if it was refused."""
         try:
             message = parse_client_line(line)
         except ProtocolError as error:
@@ -104,14 +104,14 @@ class LoginGate:
             return None
         if self._users is None or not isinstance(message, LoginMessage):
             self.refuse(connection, "a login has to come first")
-        elif not self._knows(message):
+        elif not self._is_correct(message):
             self.refuse(connection, "unknown user or wrong password")
         else:
             self.forget(connection)
             return message.user
         return None
 
-    def _knows(self, message: LoginMessage) -> bool:
+    def _is_correct(self, message: LoginMessage) -> bool:
         expected = (self._users or {}).get(message.user)  # an unknown name takes as long as a wrong password
         same = hmac.compare_digest((expected or "").encode(), message.password.encode())
         return same and expected is not None
@@ -123,7 +123,7 @@ class LoginGate:
             pending.timer.cancel()
 
     def close(self) -> None:
-        """Close all pending connections: the server stops."""
+        """Close all pending connections."""
         for pending in tuple(self._pending.values()):
             self.forget(pending.connection)
             pending.connection.end("stopped", "the server stops")

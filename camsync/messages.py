@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class CountedPulse:
-    """The last pulse that a client has counted: ``number``, due ``ago`` seconds before the line was sent."""
+    """The last pulse a client has counted: ``number``, due ``ago`` seconds before the line was sent."""
 
     number: int
     ago: float
@@ -26,14 +26,14 @@ class Hello:
 
 @dataclass(frozen=True, slots=True)
 class Ping:
-    """A client asks for the server clock; ``sent`` is its own clock."""
+    """A client requests the server clock; ``sent`` is the client's clock."""
 
     sent: float
 
 
 @dataclass(frozen=True, slots=True)
 class ClientsRequest:
-    """A client asks for the list of clients."""
+    """A client requests the list of clients."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ class Pong:
 
 @dataclass(frozen=True, slots=True)
 class ListedClient:
-    """A client of the server: ``name`` is None before HELLO; ``behind`` is how many pulses it just lost."""
+    """A client of the server: ``name`` is None before HELLO; ``behind`` counts its last dropped pulses."""
 
     name: str | None
     behind: int

@@ -21,8 +21,8 @@ _log = logging.getLogger(__name__)
 class PersistentConnection:
     """Connects to the pulse server at ``host:port``, and again after each loss.
 
-    ``hello`` makes the line that opens a connection, ``receive`` gets every message with its time of arrival,
-    and ``on_lost`` is called after every connection and every failed attempt.
+    ``hello`` builds the line that opens a connection, ``receive`` gets every message with its time of
+    arrival, and ``on_lost`` is called after every connection and every failed attempt.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class PersistentConnection:
             _log.info("pulse server %s: %s", self.address, rate)
 
     def stop(self, reason: str) -> None:
-        """Close the connection and make no other."""
+        """Close the connection and do not reconnect."""
         self._stopped = True
         if self._connection is not None:
             self._connection.end(reason)

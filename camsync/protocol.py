@@ -1,6 +1,6 @@
-r"""The wire format: one ASCII line per message, readable and writable by hand with ``nc HOST PORT``.
+r"""The wire format: one ASCII line per message, readable, and usable with ``nc HOST PORT``.
 
-The server speaks first and needs no answer::
+The server sends first and expects no answer::
 
     MYVIEW-SYNC 1 fps=25 now=1732159200.000000 pulse=-     greeting: version, rate, server clock, last pulse
     WAIT c0,c1                                             no pulse yet: these have not sent HELLO
@@ -10,7 +10,7 @@ A client may send, and the server answers::
 
     HELLO 1 c0                                             ready for pulse 0, under this name
     HELLO 1 c0 last=123 ago=0.52                           has counted to pulse 123, due 0.52 seconds ago
-    PING 1732159201.5      PONG 1732159201.500000 1732159201.502000      its own text, the server clock
+    PING 1732159201.5      PONG 1732159201.500000 1732159201.502000      the time sent, the server clock
     WHO                    CLIENTS c0:0,-:7       the other clients, and how many pulses each is behind
     anything else          ERROR malformed ...                           a code, then a sentence
 
@@ -19,8 +19,8 @@ A server with users requires a login first, over TLS (``login``), and then sends
     LOGIN-REQUIRED 1 now=1732159200.000000
     LOGIN c0 <password>    MYVIEW-SYNC 1 fps=25 now=1732159200.250000 pulse=-
 
-All times are unix seconds. ``ago`` is a span, not a time, so that it means the same on a server whose clock
-differs. Unknown ``key=value`` words and unknown server lines are ignored: room for later versions.
+All times are unix seconds. ``ago`` is a duration, not a time, so that a difference between the clocks does
+not matter. Unknown ``key=value`` words and unknown server lines are ignored, for later versions.
 """
 
 from __future__ import annotations
@@ -53,20 +53,23 @@ _GREETING = "MYVIEW-SYNC"
 _LOGIN_REQUIRED = "LOGIN-REQUIRED"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 LAST_PULSE = 2**40
-"""Centuries at any camera's rate; times in clock ticks stay within 64 bits, and numbers are exact."""
+"""Centuries at any camera's rate. Times in clock ticks fit into 64 bits, and the numbers are exact as
+floats."""
 _NUMBER = re.compile(r"\d{1,13}")
 _TIME = re.compile(r"-?\d{1,12}(\.\d{1,20})?")  # seconds
-_PASSWORD = re.compile(r"[!-~]{1,128}")  # printable ASCII without a space: a line has to hold it
+_PASSWORD = re.compile(
+    r"[!-~]{1,128}"
+)  # printable ASCII without a space, since spaces separate the words of a line
 _CODE = re.compile(r"[a-z]{1,20}")
 _FPS = re.compile(r"\d{1,6}(\.\d{1,20})?")  # pulses per second; no exponent: people read it
-_UNNAMED = "-"  # stands for a client without a name, which no name can be
+_UNNAMED = "-"  # a client without a name; no valid name
 _PASSWORD_SYNTAX = "a password has 1 to 128 printable ASCII characters, none of them a space"  # noqa: S105
-_SHOWN = 40  # characters of a wrong word that an error repeats
-MIN_FPS, MAX_FPS = 1e-6, 10_000.0  # pulses per second that a server may have as its rate
+_SHOWN = 40  # characters of a wrong word quoted in an error
+MIN_FPS, MAX_FPS = 1e-6, 10_000.0  # pulses per second
 
 
 class ProtocolError(ValueError):
-    """A line is not of this protocol; ``code`` is that of the ERROR line that answers it."""
+    """A line violates the protocol; ``code`` is that of the ERROR line to answer."""
 
     def __init__(self, code: str, text: str) -> None:
         super().__init__(text)
@@ -116,7 +119,9 @@ def _server_text(message: ServerLine) -> str:  # noqa: PLR0911 — one return pe
         case Pong(sent, now):
             return f"PONG {sent:.6f} {now:.6f}"
         case ClientList(clients):
-            return " ".join(["CLIENTS", ",".join(f"{it.name or _UNNAMED}:{it.behind}" for it in clients)])
+            return " ".join(
+                ["CLIENTS", ",".join(f"{client.name or _UNNAMED}:{client.behind}" for client in clients)]
+            )
         case ErrorMessage(code, text):
             return f"ERROR {code} {text}"
 
@@ -125,7 +130,7 @@ def parse_client_line(line: bytes) -> ClientLine:
     """Parse a line that a client sent, without its line end.
 
     Raises:
-        ProtocolError: the line is none of HELLO, PING, WHO and LOGIN, or its words are wrong.
+        ProtocolError: the line is none of HELLO, PING, WHO and LOGIN, or its arguments are wrong.
     """
     match _words(line):
         case ["HELLO", version, name, *rest]:
@@ -144,7 +149,7 @@ def parse_client_line(line: bytes) -> ClientLine:
             return LoginMessage(_match(_NAME, user, "name"), password)
         case _:
             raise ProtocolError(
-                "malformed", "say HELLO 1 <name> [last=<pulse> ago=<seconds>], PING <time> or WHO"
+                "malformed", "expected HELLO 1 <name> [last=<pulse> ago=<seconds>], PING <time> or WHO"
             )
 
 
@@ -152,7 +157,7 @@ def parse_server_line(line: bytes) -> ServerLine | None:
     """Parse a line that the server sent, without its line end; None for a word of a later version.
 
     Raises:
-        ProtocolError: a known word with wrong words after it.
+        ProtocolError: the arguments of a known word are wrong.
     """
     words = _words(line)
     parse = _SERVER_WORDS.get(words[0]) if words else None
@@ -172,7 +177,7 @@ def _login_request(words: list[str]) -> LoginRequest:
 def _greeting(words: list[str]) -> Greeting:
     version = int(_match(_NUMBER, words[0] if words else "", "version"))
     keys = _keys(words[1:])
-    if version != VERSION:  # only the version itself is sure to mean the same in all versions
+    if version != VERSION:  # only the version has the same meaning in all versions
         return Greeting(version, 1.0, 0.0, None)
     fps = float(_match(_FPS, keys["fps"], "rate"))
     if not MIN_FPS <= fps <= MAX_FPS:
@@ -197,7 +202,7 @@ def _pong(words: list[str]) -> Pong:
 
 
 def _clients(words: list[str]) -> ClientList:
-    return ClientList(tuple(_listed_client(it) for it in "".join(words).split(",") if it))
+    return ClientList(tuple(_listed_client(text) for text in "".join(words).split(",") if text))
 
 
 def _listed_client(text: str) -> ListedClient:
@@ -224,7 +229,7 @@ _SERVER_WORDS: dict[str, Callable[[list[str]], ServerLine]] = {
 def _known(keys: dict[str, str]) -> CountedPulse:
     ago = _time(keys.get("ago", "0"))
     if ago < 0.0:
-        raise ProtocolError("malformed", "ago is a span in seconds, not below zero")
+        raise ProtocolError("malformed", "ago is a duration in seconds, not below zero")
     return CountedPulse(_number(keys["last"]), ago)
 
 

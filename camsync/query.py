@@ -57,7 +57,7 @@ async def query_clients(
 
 
 class _ClientQuery:
-    """One request for the list of clients, over a connection of its own."""
+    """One request for the list of clients, over a separate connection."""
 
     def __init__(self, address: str, credentials: Credentials | None) -> None:
         self._address = address

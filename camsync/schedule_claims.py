@@ -1,6 +1,6 @@
-"""The pulse axis that a restarted server continues: the median of what its clients claim to have counted.
+"""The pulse schedule that a restarted server continues: the median of its clients' claimed counts.
 
-Where several clients are connected, no single one decides. Of two claims the lower counts.
+If several clients are connected, no single one decides. Of two claims the lower one counts.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ _HEADROOM = 2
 _SMALL_SITE = 2
 """Expected clients up to which a single claim is enough."""
 MEASUREMENT_ERROR = 2
-"""Pulses by which two claims of the same axis may differ."""
+"""Pulses by which two claims of the same schedule may differ."""
 
 
 class ScheduleClaims:
     """The newest claim of each client of one server.
 
-    ``expect`` names the clients whose claims count; empty: all do. ``fps`` is in pulses per second.
+    ``expect`` names the clients whose claims count; empty: all clients. ``fps`` is in pulses per second.
     """
 
     def __init__(self, fps: float, expect: Collection[str], limits: ServerLimits, clock: Clock) -> None:
@@ -35,34 +35,34 @@ class ScheduleClaims:
         self._required_claims = 1 if len(self._expect) <= _SMALL_SITE else 2
         self._max_number = min(LAST_PULSE // _HEADROOM, round(limits.counted_for * fps))
         self._epochs: dict[str, float] = {}
-        """By client name: when pulse 0 was due on the claimed axis."""
+        """By client name: when pulse 0 was due on the claimed schedule."""
         self._connected: frozenset[str] = frozenset()
         self._implausible, self._minorities = LogThrottle(clock), LogThrottle(clock)
 
     def record(self, hello: Hello) -> bool:
-        """Record a client's claim; return whether it made a plausible one."""
+        """Record a client's claim; return whether it is plausible."""
         self._epochs.pop(hello.name, None)
         if hello.known is None or (self._expect and hello.name not in self._expect):
             return False
         now = self._clock()
-        axis = PulseSchedule.through(hello.known.number, now - hello.known.ago, self._fps)
-        number = axis.number_at(now)
+        schedule = PulseSchedule.through(hello.known.number, now - hello.known.ago, self._fps)
+        number = schedule.number_at(now)
         if number >= self._max_number:
             if (more := self._implausible.record()) is not None:
-                _log.warning("%s claims to have counted to %d%s: not believed", hello.name, number, more)
+                _log.warning("%s claims to have counted to %d%s: claim ignored", hello.name, number, more)
             return False
-        self._epochs[hello.name] = axis.epoch
+        self._epochs[hello.name] = schedule.epoch
         return True
 
     def keep_only(self, connected: Collection[str]) -> None:
-        """Drop the claims of clients that are not connected any more."""
+        """Drop the claims of clients that are no longer connected."""
         self._connected = self._expect.intersection(connected) if self._expect else frozenset(connected)
         self._epochs = {name: epoch for name, epoch in self._epochs.items() if name in self._connected}
 
-    def agreed_axis(self, current: PulseSchedule | None = None) -> PulseSchedule | None:
-        """Return the axis of the median claim; None: too few clients claim one.
+    def agreed_schedule(self, current: PulseSchedule | None = None) -> PulseSchedule | None:
+        """Return the schedule of the median claim; None: too few claims.
 
-        Connected clients without a claim count for the server's ``current`` axis, where it has one.
+        Connected clients without a claim count for the server's ``current`` schedule, if there is one.
         """
         epochs = list(self._epochs.values())
         if len(epochs) < self._required_claims:
@@ -71,10 +71,10 @@ class ScheduleClaims:
             epochs += [current.epoch] * (len(self._connected) - len(epochs))
         return PulseSchedule(sorted(epochs)[len(epochs) // 2], self._fps)
 
-    def log_minority(self, axis: PulseSchedule) -> None:
-        """Log the clients that claim to have counted further than ``axis``."""
+    def log_minority(self, schedule: PulseSchedule) -> None:
+        """Log the clients that claim to have counted further than ``schedule``."""
         now = self._clock()
-        number = axis.number_at(now)
+        number = schedule.number_at(now)
         ahead = [
             name
             for name, epoch in self._epochs.items()

@@ -26,20 +26,20 @@ _log = logging.getLogger(__name__)
 class PulseServer:
     """Sends pulse n to every client when it is due, at ``epoch + n / fps``, and waits for no client.
 
-    Pulse 0 is sent once all clients named in ``expect`` have said HELLO, or ``start_timeout`` seconds after
-    ``start()`` (at once where that is 0 or no client is expected). A client that joins later gets the current
-    pulse next.
+    Pulse 0 is sent once all clients named in ``expect`` have sent HELLO, or ``start_timeout`` seconds after
+    ``start()`` (at once where that is 0 or no client is expected). A client that joins later gets the next
+    pulse.
 
-    The numbers only rise. They skip when the machine slept or stalled for more than ``limits.catch_up``
-    (no burst of old pulses), and when clients that have counted further reconnect to a restarted server: when
-    enough have, the server stops waiting and continues their count. No single client decides that
-    (``axis_claims``).
+    The numbers only rise. They skip after the machine was suspended or stalled for more than
+    ``limits.catch_up`` (no burst of old pulses), and when enough clients that have counted further reconnect
+    to a restarted server, which then continues their count. No single client decides that
+    (``schedule_claims``).
 
     With ``users``, passwords by name, a client has to log in first, and its HELLO must carry its user's name.
-    With ``tls`` connections are encrypted; without, a login can be overheard.
+    With ``tls`` connections are encrypted; without, passwords can be read on the network.
 
-    ``host`` None listens on all interfaces; ``port`` 0 takes a free one (see ``port``). With ``max_pulses``
-    the server sends no pulse from that number on. Not thread-safe: one event loop.
+    ``host`` None listens on all interfaces; ``port`` 0 selects a free one (see ``port``). With ``max_pulses``
+    the server stops before that number. Not thread-safe: one event loop.
 
     Raises:
         ValueError: a rate out of range or an expected name that the protocol cannot carry.
@@ -89,7 +89,7 @@ class PulseServer:
         self._server: asyncio.Server | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._claims_timer: asyncio.TimerHandle | None = None
-        self._axis: PulseSchedule | None = None
+        self._schedule: PulseSchedule | None = None
         self._started_at = 0.0
         self._next = 0
         self._pulse: int | None = None
@@ -117,11 +117,11 @@ class PulseServer:
     @property
     def epoch(self) -> float | None:
         """When pulse 0 was due (unix seconds, server clock); None before the first pulse."""
-        return self._axis.epoch if self._axis else None
+        return self._schedule.epoch if self._schedule else None
 
     @property
     def skipped(self) -> int:
-        """Pulse numbers never sent because the server was stalled or moved its axis forward."""
+        """Pulse numbers never sent because the server was stalled or moved its schedule forward."""
         return self._skipped
 
     @property
@@ -187,20 +187,20 @@ class PulseServer:
 
     def _greet(self) -> bytes:
         greeting = encode(Greeting(VERSION, self._fps, self._clock(), self._pulse))
-        return greeting if self._axis else greeting + self._wait_line()
+        return greeting if self._schedule else greeting + self._wait_line()
 
     def _wait_line(self) -> bytes:
         missing = self.missing()
         return encode(WaitMessage(missing)) if missing else b""
 
     def _on_hello(self, hello: Hello) -> None:
-        """Continue the count that clients have from before this server was started."""
+        """Continue the clients' count from before this server was started."""
         if not self._claims.record(hello):
             return
         self._claims.keep_only(self._registry.names())
-        if self._axis is not None:
-            self._move_forward(self._axis)
-        elif self._claims_timer is None and self._claims.agreed_axis() is not None:
+        if self._schedule is not None:
+            self._move_forward(self._schedule)
+        elif self._claims_timer is None and self._claims.agreed_schedule() is not None:
             loop = asyncio.get_running_loop()
             self._claims_timer = loop.call_later(self._limits.claims_for, self._end_claims)
 
@@ -208,25 +208,25 @@ class PulseServer:
         now = self._clock()
         if now - self._started_at > self._limits.adopt_for:
             return
-        axis = self._claims.agreed_axis(before) or before
-        first = axis.number_at(now) + 1
+        schedule = self._claims.agreed_schedule(before) or before
+        first = schedule.number_at(now) + 1
         if first > before.number_at(now) + MEASUREMENT_ERROR:
             _log.warning("clients have counted to %d: moving forward to that pulse", first - 1)
             self._skipped += max(0, first - self._next)
-            self._axis, self._next = axis, first
-            self._schedule()
-        self._claims.log_minority(self._axis or before)
+            self._schedule, self._next = schedule, first
+            self._set_timer()
+        self._claims.log_minority(self._schedule or before)
 
     def _end_claims(self) -> None:
-        """Continue from the clients' count, if they are still connected."""
+        """Begin with the clients' count, if they are still connected."""
         self._claims_timer = None
         self._claims.keep_only(self._registry.names())
-        if self._claims.agreed_axis() is not None:
+        if self._claims.agreed_schedule() is not None:
             self._begin()
 
     def _on_change(self) -> None:
-        """Begin if all expected clients are connected; else tell the clients which are missing."""
-        if self._axis is not None or self._ended.is_set():
+        """Begin if all expected clients are connected; otherwise send the missing names to the clients."""
+        if self._schedule is not None or self._ended.is_set():
             return
         line = self._wait_line()
         if line:
@@ -239,18 +239,18 @@ class PulseServer:
         self._begin()
 
     def _begin(self) -> None:
-        """Begin with pulse 0, or where the clients have counted to."""
+        """Begin with pulse 0, or after the pulse that the clients have counted to."""
         self._cancel_claims_timer()
         self._started_at = now = self._clock()
         self._claims.keep_only(self._registry.names())
-        agreed = self._claims.agreed_axis()
-        self._axis = agreed or PulseSchedule(now, self._fps)
+        agreed = self._claims.agreed_schedule()
+        self._schedule = agreed or PulseSchedule(now, self._fps)
         if agreed is not None:
             self._next = agreed.number_at(now) + 1
-            _log.info("clients have counted to %d: going on from there", self._next - 1)
-        self._claims.log_minority(self._axis)
+            _log.info("clients have counted to %d: continuing from there", self._next - 1)
+        self._claims.log_minority(self._schedule)
         self._begun.set()
-        self._schedule()
+        self._set_timer()
 
     def _cancel_claims_timer(self) -> None:
         if self._claims_timer is not None:
@@ -262,29 +262,29 @@ class PulseServer:
             self._timer.cancel()
             self._timer = None
 
-    def _schedule(self) -> None:
+    def _set_timer(self) -> None:
         self._cancel_timer()
-        if self._axis is None or self._ended.is_set():
+        if self._schedule is None or self._ended.is_set():
             return
-        wait = self._axis.due(self._next) - self._clock()
+        wait = self._schedule.due(self._next) - self._clock()
         self._timer = asyncio.get_running_loop().call_later(max(0.0, wait), self._tick)
 
     def _tick(self) -> None:
         """Send the pulses that are due; skip those overdue by more than ``limits.catch_up``."""
-        if self._axis is None:
+        if self._schedule is None:
             return
         now = self._clock()
-        current = self._axis.number_at(now)
-        if now - self._axis.due(self._next) > self._limits.catch_up:
+        current = self._schedule.number_at(now)
+        if now - self._schedule.due(self._next) > self._limits.catch_up:
             if (more := self._stalls.record()) is not None:
                 _log.warning("late by %d pulses: skipping to %d%s", current - self._next, current, more)
             self._skipped += current - self._next
             self._next = current
         while self._next <= current and not self._reached_end():
-            self._registry.send_pulse(encode(PulseMessage(self._next, self._axis.due(self._next))))
+            self._registry.send_pulse(encode(PulseMessage(self._next, self._schedule.due(self._next))))
             self._pulse = self._next
             self._next += 1
-        self._schedule()
+        self._set_timer()
 
     def _reached_end(self) -> bool:
         if self._max_pulses is not None and self._next >= self._max_pulses:

@@ -1,4 +1,4 @@
-"""A client's connection to the pulse server: logs in, parses lines, sends PING, notices silence."""
+"""A client's connection to the pulse server: logs in, parses lines, sends PING, detects silence."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from camsync.login import Credentials
 from camsync.messages import ClientLine, ErrorMessage, Greeting, LoginMessage, LoginRequest, Ping, ServerLine
 from camsync.protocol import MAX_SERVER_LINE, ProtocolError, encode, parse_server_line
 
-_QUICK_PINGS = 5  # at the beginning, so that the offset is good within a fraction of a second
-_QUICK_INTERVAL = 0.05  # seconds between those
+_QUICK_PINGS = 5  # at the beginning, for an accurate offset within a fraction of a second
+_QUICK_INTERVAL = 0.05  # seconds between them
 
 
 class ServerConnection(asyncio.Protocol):
     """One connection. ``receive`` gets every message from the greeting on, with its time of arrival.
 
     With ``credentials`` it answers the server's login request; without, ``receive`` gets the request.
-    ``hello`` makes the line that opens the connection: at once, or after the greeting where there is a login.
-    Every ``ping_interval`` seconds it sends PING, and after ``silence`` seconds without a byte it ends;
-    an infinite interval means neither.
+    ``hello`` builds the line that opens the connection: at once, or after the greeting if a login is needed.
+    It sends PING every ``ping_interval`` seconds, and closes after ``silence`` seconds without a byte;
+    with an infinite interval it does neither.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class ServerConnection(asyncio.Protocol):
         """Done when the connection has ended; the result is the reason."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Send HELLO unless a login comes first, and begin to ping (called by asyncio)."""
+        """Send HELLO unless a login is needed first, and start sending PING (called by asyncio)."""
         self._transport = cast("asyncio.Transport", transport)
         self._last_byte_at = self._clock()
         if self._credentials is None:
@@ -70,7 +70,7 @@ class ServerConnection(asyncio.Protocol):
                 if self.lost.done():
                     return
         except (ProtocolError, OverlongLineError) as error:
-            self.end(f"it does not speak the pulse protocol ({error})")
+            self.end(f"not the pulse protocol ({error})")
 
     def connection_lost(self, exc: Exception | None) -> None:
         """End the connection (called by asyncio)."""

@@ -1,4 +1,4 @@
-"""The delays between attempts at what fails: exponential backoff."""
+"""Exponential backoff: delays between repeated attempts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["Backoff"]
 
 
 class Backoff:
-    """Delays that double from ``first_s`` to ``max_s`` seconds, one per failure in a row."""
+    """Delays that double from ``first_s`` to ``max_s`` seconds, one per consecutive failure."""
 
     def __init__(self, first_s: float, max_s: float) -> None:
         self._wait = wait_exponential(multiplier=first_s, max=max_s)
@@ -17,7 +17,7 @@ class Backoff:
 
     @property
     def failures(self) -> int:
-        """Failures in a row: the calls of :meth:`next` since the last :meth:`reset`."""
+        """Consecutive failures: the calls of :meth:`next` since the last :meth:`reset`."""
         return self._attempts.attempt_number
 
     def next(self) -> float:
@@ -26,5 +26,5 @@ class Backoff:
         return self._wait(self._attempts)
 
     def reset(self) -> None:
-        """Begin with ``first_s`` again, after an attempt that has succeeded."""
+        """Start with ``first_s`` again, after a successful attempt."""
         self._attempts.attempt_number = 0

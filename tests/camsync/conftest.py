@@ -9,7 +9,7 @@ from contextlib import AsyncExitStack
 
 import pytest
 
-from fakes.camsync.pulse_clients import ByHand, Connect, JumpingClock
+from fakes.camsync.pulse_clients import Connect, JumpingClock, RawConnection
 
 
 async def _close(writer: asyncio.StreamWriter) -> None:
@@ -18,14 +18,16 @@ async def _close(writer: asyncio.StreamWriter) -> None:
 
 
 @pytest.fixture
-async def by_hand() -> AsyncIterator[Connect]:
+async def connect() -> AsyncIterator[Connect]:
     """Yield a function that connects to a port.
 
-    It takes ``receive`` bytes of kernel buffer, and ``source``, the address to come from, where given.
+    Optional: ``receive``, the bytes of the kernel's receive buffer; ``source``, the local address.
     """
     async with AsyncExitStack() as stack:
 
-        async def connect(port: int, receive: int | None = None, source: str | None = None) -> ByHand:
+        async def open_connection(
+            port: int, receive: int | None = None, source: str | None = None
+        ) -> RawConnection:
             connection = socket.socket()
             if source is not None:
                 connection.bind((source, 0))
@@ -35,9 +37,9 @@ async def by_hand() -> AsyncIterator[Connect]:
             await asyncio.get_running_loop().sock_connect(connection, ("127.0.0.1", port))
             reader, writer = await asyncio.open_connection(sock=connection, limit=4096)
             stack.push_async_callback(_close, writer)
-            return ByHand(reader, writer)
+            return RawConnection(reader, writer)
 
-        yield connect
+        yield open_connection
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The client with a real server: iterating, counting what is missed, measuring the clock."""
+"""The client with a real server: iterating, counting missed pulses, measuring the clock offset."""
 
 from __future__ import annotations
 
@@ -26,28 +26,28 @@ from camsync.clock import steady_unix_clock
 from camsync.messages import Greeting, PulseMessage
 from camsync.protocol import encode
 from camsync.pulse_schedule import PulseSchedule
-from fakes.camsync.pulse_clients import BUSY, FPS, QUICK, JumpingClock, pretended_server, take
+from fakes.camsync.pulse_clients import BUSY, FPS, QUICK, JumpingClock, fake_server, take
 from fakes.timeouts import PATIENCE
 
 
-async def counted(client: PulseClient, number: int) -> None:
-    """Return when the client has counted to ``number``, taking nothing from it."""
+async def wait_counted(client: PulseClient, number: int) -> None:
+    """Wait until the client has counted to ``number``, without consuming pulses."""
     async with asyncio.timeout(PATIENCE):
-        while (client.status().pulse or 0) < number:  # noqa: ASYNC110 — only taking pulses would be an event
+        while (client.status().pulse or 0) < number:  # noqa: ASYNC110 — consuming pulses is the only event
             await asyncio.sleep(0)
 
 
 async def test_clients_that_are_expected_all_get_every_pulse_from_the_first_on() -> None:
     names = ["c0", "c1", "bestview"]
-    patient = ClientSettings(own_after=PATIENCE, queue=200)
+    patient = ClientSettings(local_after=PATIENCE, queue=200)
     async with PulseServer(FPS, expect=names, limits=ServerLimits(catch_up=PATIENCE)) as server:
         clients = [PulseClient("127.0.0.1", server.port, name, settings=patient) for name in names]
-        heard = await asyncio.gather(*(take(client, 100) for client in clients))
-        for pulses in heard:
+        received = await asyncio.gather(*(take(client, 100) for client in clients))
+        for pulses in received:
             assert [pulse.number for pulse in pulses] == list(range(100))
-            assert not any(pulse.missed or pulse.own for pulse in pulses)
-        for same in zip(*heard, strict=True):
-            dues = [pulse.due for pulse in same]
+            assert not any(pulse.missed or pulse.local for pulse in pulses)
+        for same_number in zip(*received, strict=True):
+            dues = [pulse.due for pulse in same_number]
             assert max(dues) - min(dues) < BUSY
         assert {info.name for info in server.clients()} == set(names)
         for client in clients:
@@ -55,15 +55,15 @@ async def test_clients_that_are_expected_all_get_every_pulse_from_the_first_on()
             await client.close()
 
 
-async def test_dues_are_a_frame_apart_and_pulses_come_after_them() -> None:
+async def test_due_times_are_one_frame_apart_and_before_arrival() -> None:
     async with PulseServer(FPS) as server, PulseClient("127.0.0.1", server.port, "c0") as client:
         pulses = await take(client, 200)
         first = pulses[0]
         for pulse in pulses:
             assert pulse.due == pytest.approx(first.due + (pulse.number - first.number) / FPS, abs=BUSY)
             assert pulse.received > pulse.due - BUSY
-        offs = [pulse.due - pulse.number / FPS for pulse in pulses]
-        assert np.median(np.abs(np.diff(offs))) < 0.1 / FPS, "the offset to the server's clock is kept"
+        epochs = [pulse.due - pulse.number / FPS for pulse in pulses]
+        assert np.median(np.abs(np.diff(epochs))) < 0.1 / FPS, "the offset to the server's clock is stable"
 
 
 async def test_the_offset_of_the_servers_clock_is_measured(jumping_clock: JumpingClock) -> None:
@@ -90,7 +90,7 @@ async def test_a_slow_consumer_gets_the_number_of_missed_pulses() -> None:
         PulseClient("127.0.0.1", server.port, "c0", settings=settings) as client,
     ):
         (first,) = await take(client, 1)
-        await counted(client, first.number + 30)
+        await wait_counted(client, first.number + 30)
         newest = client.status().pulse
         (late,) = await take(client, 1)
         assert late.number == newest
@@ -105,7 +105,7 @@ async def test_a_short_stall_of_the_consumer_costs_nothing() -> None:
         PulseClient("127.0.0.1", server.port, "c0", settings=settings) as client,
     ):
         (first,) = await take(client, 1)
-        await counted(client, first.number + 40)
+        await wait_counted(client, first.number + 40)
         numbers = [pulse.number for pulse in await take(client, 60)]
         assert numbers == list(range(first.number + 1, first.number + 61))
         assert client.missed == 0
@@ -117,11 +117,11 @@ async def test_a_stalled_process_reads_the_waiting_pulses_first() -> None:
     )
     assert server.stdout is not None
     port = int(await server.stdout.readline())
-    settings = ClientSettings(catch_up=0.1)  # what is not read is lost
+    settings = ClientSettings(catch_up=0.1)  # pulses that are not read first are lost
     try:
         async with PulseClient("127.0.0.1", port, "c0", settings=settings) as client:
             (first,) = await take(client, 1)
-            time.sleep(0.7)  # noqa: ASYNC251 — this stall is what is tested
+            time.sleep(0.7)  # noqa: ASYNC251 — the stall under test
             numbers = [pulse.number for pulse in await take(client, 40)]
             assert numbers == list(range(first.number + 1, first.number + 41))
     finally:
@@ -154,7 +154,7 @@ async def test_skipped_numbers_are_counted_as_missed(jumping_clock: JumpingClock
         assert client.missed == pulse.missed
 
 
-async def test_the_newer_client_of_a_name_stays_and_the_older_gives_up() -> None:
+async def test_the_newer_client_of_a_name_stays_and_the_older_ends() -> None:
     async with PulseServer(FPS) as server, PulseClient("127.0.0.1", server.port, "c0") as older:
         await take(older, 1)
         async with PulseClient("127.0.0.1", server.port, "c0") as newer:
@@ -165,9 +165,9 @@ async def test_the_newer_client_of_a_name_stays_and_the_older_gives_up() -> None
 
 
 async def test_without_a_server_it_waits() -> None:
-    with socket.socket() as held:  # bound and not listening: nobody can be there
-        held.bind(("127.0.0.1", 0))
-        port = held.getsockname()[1]
+    with socket.socket() as bound:  # bound and not listening
+        bound.bind(("127.0.0.1", 0))
+        port = bound.getsockname()[1]
         async with PulseClient("127.0.0.1", port, "c0", fps_hint=FPS, settings=QUICK) as client:
             with pytest.raises(TimeoutError):
                 async with asyncio.timeout(0.2):
@@ -177,19 +177,19 @@ async def test_without_a_server_it_waits() -> None:
 
 async def test_without_a_server_it_free_runs_if_configured_and_a_server_continues_the_count() -> None:
     settings = ClientSettings(backoff_first=0.01, backoff_most=0.05, free_run_after=0.05)
-    with socket.socket() as held:
-        held.bind(("127.0.0.1", 0))
-        port = held.getsockname()[1]
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))
+        port = bound.getsockname()[1]
         client = PulseClient("127.0.0.1", port, "c0", fps_hint=FPS, settings=settings)
         pulses = await take(client, 50)
     assert [pulse.number for pulse in pulses] == list(range(50))
-    assert all(pulse.own for pulse in pulses)
+    assert all(pulse.local for pulse in pulses)
     async with PulseServer(FPS, expect={"c0"}, port=port), asyncio.timeout(PATIENCE):
         number = pulses[-1].number
         async for pulse in client:
             assert pulse.number > number
             number = pulse.number
-            if not pulse.own:
+            if not pulse.local:
                 break
     await client.close()
 
@@ -199,12 +199,12 @@ async def test_closing_ends_the_iteration() -> None:
         client = PulseClient("127.0.0.1", server.port, "c0")
         waiting = asyncio.create_task(take_all(client))
         async with asyncio.timeout(PATIENCE):
-            while not client.status().waiting_for:  # noqa: ASYNC110 — the client tells no event of this
+            while not client.status().waiting_for:  # noqa: ASYNC110 — the client has no event for this
                 await asyncio.sleep(0)
         assert "c1" in client.status().waiting_for
         await client.close()
         assert await waiting == []
-        await client.close()  # a second time is harmless
+        await client.close()  # closing twice is harmless
 
 
 async def take_all(client: PulseClient) -> list[Pulse]:
@@ -213,39 +213,39 @@ async def take_all(client: PulseClient) -> list[Pulse]:
 
 async def test_a_silent_server_is_disconnected_and_reconnected() -> None:
     clock = steady_unix_clock()
-    axis = PulseSchedule.through(7, clock(), FPS)
+    schedule = PulseSchedule.through(7, clock(), FPS)
 
     def one_pulse() -> bytes:
-        number = axis.number_at(clock())
-        beat = PulseMessage(number, axis.due(number))
-        return encode(Greeting(1, FPS, clock(), None)) + encode(beat)
+        number = schedule.number_at(clock())
+        pulse = PulseMessage(number, schedule.due(number))
+        return encode(Greeting(1, FPS, clock(), None)) + encode(pulse)
 
     async with (
-        pretended_server(one_pulse) as (port, _),
+        fake_server(one_pulse) as (port, _),
         PulseClient("127.0.0.1", port, "c0", settings=QUICK) as client,
     ):
         numbers = []
         while client.status().connections < 3:
             numbers += [pulse.number for pulse in await take(client, 1)]
         assert numbers == sorted(set(numbers))
-        assert client.status().own > 0
+        assert client.status().local_pulses > 0
 
 
 @pytest.mark.parametrize("noise", [b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\x00\xff" * 10, b"x" * 50_000])
 async def test_another_service_on_the_port_is_not_a_server(noise: bytes) -> None:
     async with (
-        pretended_server(lambda: noise) as (port, calls),
+        fake_server(lambda: noise) as (port, calls),
         PulseClient("127.0.0.1", port, "c0", settings=QUICK) as client,
     ):
         async with asyncio.timeout(PATIENCE):
             await calls.acquire()
-            await calls.acquire()  # it has hung up and tried again
+            await calls.acquire()  # it has disconnected and tried again
         assert client.status().connections == 0
 
 
 async def test_a_server_of_another_version_is_an_error() -> None:
     async with (
-        pretended_server(lambda: b"MYVIEW-SYNC 3 rate:25\n") as (port, _),
+        fake_server(lambda: b"MYVIEW-SYNC 3 rate:25\n") as (port, _),
         PulseClient("127.0.0.1", port, "c0") as client,
     ):
         with pytest.raises(VersionError, match="version 3"):

@@ -1,4 +1,4 @@
-"""What fails for every attempt, line or stall is one event of the log, and not a line for each."""
+"""Repeated failures are one log line, not one for each attempt, line or stall."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from camsync.clock import steady_unix_clock
 from camsync.messages import Greeting, Pong, PulseMessage
 from camsync.protocol import encode
 from camsync.pulse_schedule import PulseSchedule
-from fakes.camsync.pulse_clients import FPS, QUICK, Connect, JumpingClock, pretended_server, take
+from fakes.camsync.pulse_clients import FPS, QUICK, Connect, JumpingClock, fake_server, take
 from fakes.timeouts import PATIENCE
 
 
-async def test_a_server_that_comes_and_goes_is_one_event_of_the_log(
+async def test_repeated_absences_of_the_server_are_few_lines_of_the_log(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level(logging.INFO, "camsync")
     clock = steady_unix_clock()
-    axis = PulseSchedule.through(7, clock(), FPS)
+    schedule = PulseSchedule.through(7, clock(), FPS)
 
     def one_pulse() -> bytes:
-        number = axis.number_at(clock())
-        return encode(Greeting(1, FPS, clock(), None)) + encode(PulseMessage(number, axis.due(number)))
+        number = schedule.number_at(clock())
+        return encode(Greeting(1, FPS, clock(), None)) + encode(PulseMessage(number, schedule.due(number)))
 
     async with (
-        pretended_server(one_pulse) as (port, _),
+        fake_server(one_pulse) as (port, _),
         PulseClient("127.0.0.1", port, "c0", settings=QUICK) as client,
     ):
         while client.status().connections < 6:
@@ -39,40 +39,40 @@ async def test_a_server_that_comes_and_goes_is_one_event_of_the_log(
 
 
 async def test_repeated_hellos_are_one_line_of_the_log(
-    by_hand: Connect, caplog: pytest.LogCaptureFixture
+    connect: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "camsync")
     async with PulseServer(FPS) as server:
-        client = await by_hand(server.port)
-        client.say(b"HELLO 1 c0\n" * 10 + b"PING 1\n")
+        client = await connect(server.port)
+        client.send(b"HELLO 1 c0\n" * 10 + b"PING 1\n")
         while not isinstance(await client.message(), Pong):
             pass
     assert caplog.messages == ["c0 connected"]
 
 
 async def test_repeated_implausible_claims_are_one_line_of_the_log(
-    by_hand: Connect, caplog: pytest.LogCaptureFixture
+    connect: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with PulseServer(FPS) as server:
-        liar = await by_hand(server.port)
-        liar.say(b"HELLO 1 c0 last=500000000000\n" * 10 + b"PING 1\n")
-        while not isinstance(await liar.message(), Pong):
+        lying = await connect(server.port)
+        lying.send(b"HELLO 1 c0 last=500000000000\n" * 10 + b"PING 1\n")
+        while not isinstance(await lying.message(), Pong):
             pass
     assert len(caplog.messages) == 1
-    assert caplog.messages[0].endswith(": not believed")
+    assert caplog.messages[0].endswith(": claim ignored")
 
 
 async def test_repeated_stalls_are_one_line_of_the_log(
-    by_hand: Connect, jumping_clock: JumpingClock, caplog: pytest.LogCaptureFixture
+    connect: Connect, jumping_clock: JumpingClock, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with PulseServer(FPS, clock=jumping_clock) as server:
-        listener = await by_hand(server.port)
-        number = (await listener.beat()).number
+        listener = await connect(server.port)
+        number = (await listener.pulse()).number
         for _ in range(5):
             skipped = server.skipped
             jumping_clock.jumped += 2.0
             while server.skipped == skipped:
-                number = (await listener.beat()).number
+                number = (await listener.pulse()).number
     assert number < PATIENCE * FPS
     assert len(caplog.messages) == 1
     assert "late by " in caplog.messages[0]

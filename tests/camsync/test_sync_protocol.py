@@ -1,4 +1,4 @@
-"""The wire format: what is written is read again, and nothing else breaks the reader."""
+"""The wire format: messages survive encoding and parsing, and any other bytes are an error."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from camsync.protocol import MAX_LINE, ProtocolError, encode, is_name, parse_cli
 
 names = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", fullmatch=True)
 numbers = st.integers(0, 10**12)
-# Microseconds are what a line carries; whole ones up to this size survive a float.
+# A line carries microseconds; whole ones up to this size are exact in a float.
 times = st.integers(-(10**15), 10**15).map(lambda micro: micro / 1e6)
-spans = st.integers(0, 10**12).map(lambda micro: micro / 1e6)
+durations = st.integers(0, 10**12).map(lambda micro: micro / 1e6)
 rates = st.floats(0.01, 10_000).map(lambda fps: float(f"{fps:.12f}"))
 client_lines = st.one_of(
-    st.builds(Hello, names, st.none() | st.builds(CountedPulse, numbers, spans)),
+    st.builds(Hello, names, st.none() | st.builds(CountedPulse, numbers, durations)),
     st.builds(Ping, times),
     st.just(ClientsRequest()),
 )
@@ -72,11 +72,11 @@ words = st.sampled_from(
     [b"HELLO", b"PING", b"WHO", b"PULSE", b"MYVIEW-SYNC", b"WAIT", b"PONG", b"CLIENTS", b"ERROR", b"1", b"-1"]
 )
 tails = st.sampled_from([b"last=3", b"ago=-1", b"fps=0", b"fps=25", b"now=nan", b"pulse=-", b"1e400", b"inf"])
-nearly = st.lists(words | tails | st.binary(max_size=8), max_size=6).map(b" ".join)
+almost_lines = st.lists(words | tails | st.binary(max_size=8), max_size=6).map(b" ".join)
 
 
 @settings(deadline=None, max_examples=300)
-@given(nearly | st.binary(max_size=MAX_LINE))
+@given(almost_lines | st.binary(max_size=MAX_LINE))
 def test_any_bytes_are_a_message_or_a_protocol_error(line: bytes) -> None:
     for parse in (parse_client_line, parse_server_line):
         with contextlib.suppress(ProtocolError):
@@ -84,7 +84,7 @@ def test_any_bytes_are_a_message_or_a_protocol_error(line: bytes) -> None:
 
 
 @settings(deadline=None, max_examples=60)
-@given(nearly | st.binary(max_size=MAX_LINE))
+@given(almost_lines | st.binary(max_size=MAX_LINE))
 def test_the_answer_to_any_bytes_is_one_readable_line(line: bytes) -> None:
     try:
         parse_client_line(line)
@@ -122,10 +122,8 @@ def test_an_impossible_rate_in_a_greeting_is_refused(fps: bytes) -> None:
 
 def test_unknown_words_of_a_later_version_are_ignored() -> None:
     assert parse_server_line(b"TEMPERATURE 21") is None
-    assert parse_client_line(b"HELLO 1 c0 colour=blue") == Hello("c0")
-    assert parse_server_line(b"MYVIEW-SYNC 1 fps=25 now=0 pulse=- colour=blue") == Greeting(
-        1, 25.0, 0.0, None
-    )
+    assert parse_client_line(b"HELLO 1 c0 color=blue") == Hello("c0")
+    assert parse_server_line(b"MYVIEW-SYNC 1 fps=25 now=0 pulse=- color=blue") == Greeting(1, 25.0, 0.0, None)
 
 
 def test_a_greeting_of_another_version_keeps_its_version() -> None:
@@ -134,7 +132,7 @@ def test_a_greeting_of_another_version_keeps_its_version() -> None:
     assert greeting.version == 7
 
 
-def test_names_are_words() -> None:
+def test_a_name_is_one_word_of_at_most_64_characters() -> None:
     assert is_name("c0")
     assert not is_name("")
     assert not is_name("two words")
@@ -144,11 +142,11 @@ def test_names_are_words() -> None:
 
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.binary(max_size=20).filter(lambda line: b"\n" not in line)), st.integers(1, 7))
-def test_lines_are_the_same_however_the_bytes_arrive(lines: list[bytes], step: int) -> None:
+def test_lines_do_not_depend_on_how_the_bytes_are_split(lines: list[bytes], step: int) -> None:
     data = b"".join(line + b"\r\n" for line in lines)
     buffer = LineBuffer(limit=32)
-    heard = [line for at in range(0, len(data), step) for line in buffer.feed(data[at : at + step])]
-    assert heard == lines
+    received = [line for at in range(0, len(data), step) for line in buffer.feed(data[at : at + step])]
+    assert received == lines
 
 
 @settings(deadline=None, max_examples=60)

@@ -23,22 +23,22 @@ class ManualClock:
 def logged_at(
     throttle: LogThrottle, clock: ManualClock, *, until: float, every: float, reason: str = ""
 ) -> list[float]:
-    """Record an event every ``every`` seconds; return when one was logged."""
-    moments = []
+    """Record an event every ``every`` seconds; return the times of the logged ones."""
+    times = []
     while clock.now < until:
         if throttle.record(reason) is not None:
-            moments.append(clock.now)
+            times.append(clock.now)
         clock.now += every
-    return moments
+    return times
 
 
 def test_the_first_event_is_logged_and_then_one_after_pauses_that_double_up_to_an_hour() -> None:
     clock = ManualClock()
-    moments = logged_at(LogThrottle(clock), clock, until=4 * HOUR, every=10.0)
-    assert [moment / MINUTE for moment in moments] == [0, 1, 3, 7, 15, 31, 63, 123, 183]
+    times = logged_at(LogThrottle(clock), clock, until=4 * HOUR, every=10.0)
+    assert [moment / MINUTE for moment in times] == [0, 1, 3, 7, 15, 31, 63, 123, 183]
 
 
-def test_a_line_says_how_many_events_were_not_logged_before_it() -> None:
+def test_a_line_states_how_many_events_were_not_logged_before_it() -> None:
     clock = ManualClock()
     throttle = LogThrottle(clock)
     assert throttle.record() == ""
@@ -75,7 +75,7 @@ def test_a_series_ends_once_and_only_after_its_quiet_time() -> None:
     clock.now = 5.0
     throttle.record()
     clock.now = 24.0
-    assert throttle.end() is None, "it may go on"
+    assert throttle.end() is None, "it may continue"
     clock.now = 25.0
     assert throttle.end() == EndedEvents(count=2, seconds=5.0)
     assert throttle.end() is None
@@ -96,7 +96,7 @@ def test_the_end_is_logged_only_where_the_beginning_was() -> None:
     assert lines[:4] == ["", EndedEvents(1, 0.5), ", and 59 times before", EndedEvents(1, 0.5)]
 
 
-def test_a_series_lasts_until_the_moment_at_which_all_is_well() -> None:
+def test_a_series_lasts_until_the_first_success() -> None:
     clock = ManualClock()
     throttle = LogThrottle(clock, quiet_s=0.0)
     logged_at(throttle, clock, until=HOUR, every=10.0)
@@ -104,13 +104,13 @@ def test_a_series_lasts_until_the_moment_at_which_all_is_well() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 100.0), st.booleans()), max_size=200))
-def test_no_event_is_left_out_of_the_counts(steps: list[tuple[float, bool]]) -> None:
+def test_every_event_is_counted(steps: list[tuple[float, bool]]) -> None:
     clock = ManualClock()
     throttle = LogThrottle(clock, quiet_s=0.0)
     events = counted = 0
-    for wait, well in steps:
+    for wait, succeeded in steps:
         clock.now += wait
-        if well:
+        if succeeded:
             throttle.end()
             continue
         events += 1
@@ -121,6 +121,6 @@ def test_no_event_is_left_out_of_the_counts(steps: list[tuple[float, bool]]) -> 
 
 
 def _unlogged(more: str) -> int:
-    """Parse how many events a line says were not logged before it."""
+    """Parse from a line how many events were not logged before it."""
     number = more.removeprefix(", and ").removesuffix(" before").removesuffix(" times")
     return {"": 0, "once": 1}.get(number) or int(number or 0)

@@ -117,7 +117,7 @@ class ClientSessions(ScriptTarget):
             clock.now += 0.01
         for _ in range(3):
             clock.now += 0.2
-            client._make_own_pulses(clock.now)
+            client._make_local_pulses(clock.now)
         for line in wire.written.splitlines():
             parse_client_line(line)
         client.status()

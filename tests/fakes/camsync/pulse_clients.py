@@ -1,4 +1,4 @@
-"""What the tests of the pulses share: a client that speaks by hand, as with `nc`; a clock that jumps."""
+"""Raw connections to a pulse server, a clock that jumps, and a fake pulse server."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from camsync.protocol import parse_server_line
 from fakes.timeouts import PATIENCE
 
 BUSY = 0.5
-"""Seconds by which a busy machine may measure a clock wrongly."""
+"""Error of clock measurements on a busy machine, in seconds."""
 
 
 @dataclass
-class ByHand:
+class RawConnection:
     """A bare TCP connection to a pulse server."""
 
     reader: asyncio.StreamReader
@@ -35,36 +35,36 @@ class ByHand:
 
     async def message(self) -> ServerLine | None:
         line = await self.line()
-        assert line.endswith(b"\n"), f"the server hung up after {line!r}"
+        assert line.endswith(b"\n"), f"the server disconnected after {line!r}"
         return parse_server_line(line.removesuffix(b"\n"))
 
-    async def beat(self) -> PulseMessage:
+    async def pulse(self) -> PulseMessage:
         while True:
             message = await self.message()
             if isinstance(message, PulseMessage):
                 return message
 
-    async def other(self) -> ServerLine | None:
-        """Return the next message that is no pulse."""
+    async def non_pulse(self) -> ServerLine | None:
+        """Return the next message that is not a pulse."""
         while True:
             message = await self.message()
             if not isinstance(message, PulseMessage):
                 return message
 
-    async def ended(self) -> bytes:
-        """Read until the server hangs up; give all it said."""
+    async def read_to_end(self) -> bytes:
+        """Read until the server disconnects; return all bytes."""
         async with asyncio.timeout(PATIENCE):
             try:
                 return await self.reader.read(-1)
             except ConnectionError:
                 return b""
 
-    def say(self, data: bytes) -> None:
+    def send(self, data: bytes) -> None:
         self.writer.write(data)
 
 
 class JumpingClock:
-    """The steady clock, plus the jumps it was told to make."""
+    """The steady clock plus ``jumped`` seconds."""
 
     def __init__(self) -> None:
         self._clock: Clock = steady_unix_clock()
@@ -74,7 +74,7 @@ class JumpingClock:
         return self._clock() + self.jumped
 
 
-Connect = Callable[..., Awaitable[ByHand]]
+Connect = Callable[..., Awaitable[RawConnection]]
 
 
 FPS = 400.0
@@ -87,8 +87,8 @@ async def take(client: PulseClient, count: int) -> list[Pulse]:
 
 
 @asynccontextmanager
-async def pretended_server(answer: Callable[[], bytes]) -> AsyncIterator[tuple[int, asyncio.Semaphore]]:
-    """Answer every connection with ``answer()`` alone; return the port and a semaphore of connections."""
+async def fake_server(answer: Callable[[], bytes]) -> AsyncIterator[tuple[int, asyncio.Semaphore]]:
+    """Send ``answer()`` to every connection; yield the port and a semaphore released once per connection."""
     loop = asyncio.get_running_loop()
     calls = asyncio.Semaphore(0)
     with ExitStack() as stack:

@@ -112,6 +112,6 @@ async def _pulses_come(config: Config) -> None:
             tls=pulse_client_tls(config),
         )
         async with client:
-            assert not (await anext(client)).own
+            assert not (await anext(client)).local
 
     await asyncio.gather(*(first(name) for name in pulse_clients(config)))

@@ -1,4 +1,4 @@
-"""Asking a pulse server who is there."""
+"""Querying a pulse server for its clients."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from fakes.timeouts import PATIENCE
 FPS = 50.0
 
 
-async def test_all_other_clients_are_listed_in_the_order_of_joining(by_hand: Connect) -> None:
+async def test_all_other_clients_are_listed_in_the_order_of_joining(connect: Connect) -> None:
     async with PulseServer(FPS, expect={"c0", "c1"}) as server:
         assert await query_clients("127.0.0.1", server.port) == ()
         for line in (b"HELLO 1 c0\n", b"", b"HELLO 1 bestview\n"):
-            client = await by_hand(server.port)
+            client = await connect(server.port)
             assert isinstance(await client.message(), Greeting)
-            client.say(line + b"PING 1\n")
-            while not isinstance(await client.other(), Pong):
+            client.send(line + b"PING 1\n")
+            while not isinstance(await client.non_pulse(), Pong):
                 pass
-        told = await query_clients("127.0.0.1", server.port)
-        assert told == (ListedClient("c0", 0), ListedClient(None, 0), ListedClient("bestview", 0))
+        clients = await query_clients("127.0.0.1", server.port)
+        assert clients == (ListedClient("c0", 0), ListedClient(None, 0), ListedClient("bestview", 0))
 
 
 async def test_the_list_of_a_full_server_with_long_names_fits_a_line() -> None:
-    most = ClientList(tuple(ListedClient(f"{place:064d}", 10**6) for place in range(256)))
-    line = encode(most)
+    clients = ClientList(tuple(ListedClient(f"{place:064d}", 10**6) for place in range(256)))
+    line = encode(clients)
     assert len(line) <= MAX_SERVER_LINE
-    assert parse_server_line(line[:-1]) == most
+    assert parse_server_line(line[:-1]) == clients
 
 
 async def test_querying_a_closed_port_is_a_clear_error() -> None:
@@ -46,7 +46,7 @@ async def test_querying_a_closed_port_is_a_clear_error() -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "error"),
+    ("answer", "error"),
     [
         (b"", "does not answer"),
         (b"HTTP/1.1 400 Bad Request\r\n", "is no pulse server"),
@@ -55,21 +55,21 @@ async def test_querying_a_closed_port_is_a_clear_error() -> None:
         (b"MYVIEW-SYNC 7 rate:25\n", "speaks version 7"),
     ],
 )
-async def test_querying_something_else_is_a_clear_error(said: bytes, error: str) -> None:
-    over = asyncio.Event()
+async def test_querying_something_else_is_a_clear_error(answer: bytes, error: str) -> None:
+    closed = asyncio.Event()
 
-    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if said:
-            writer.write(said)
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if answer:
+            writer.write(answer)
         with suppress(ConnectionError):
             await reader.read()
         writer.close()
         with suppress(ConnectionError):
             await writer.wait_closed()
-        over.set()
+        closed.set()
 
-    async with await asyncio.start_server(answer, "127.0.0.1", 0) as server:
+    async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
         with pytest.raises(SyncError, match=error):
             await query_clients("127.0.0.1", port, timeout_s=0.3 if error == "does not answer" else PATIENCE)
-        await over.wait()
+        await closed.wait()
