@@ -76,8 +76,12 @@ class InputSequence:
 
 def input_sequences(recordings: list[Recording]) -> list[InputSequence]:
     """Return each sequence, and once more with its video (needed for appearance) where there is one."""
-    alone = [InputSequence(it) for it in recordings]
-    return alone + [InputSequence(it, pictures=True) for it in recordings if it.video and it.video.is_file()]
+    alone = [InputSequence(recording) for recording in recordings]
+    return alone + [
+        InputSequence(recording, pictures=True)
+        for recording in recordings
+        if recording.video and recording.video.is_file()
+    ]
 
 
 def score(ablation: Ablation, sequence: InputSequence) -> Scores:

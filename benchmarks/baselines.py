@@ -51,9 +51,11 @@ class SearchedView:
     def detections(self) -> list[MotRow]:
         """All detections, as rows without a track."""
         return [
-            MotRow(it.number + 1, -1, box[0], box[1], box[2] - box[0], box[3] - box[1], score)
-            for it in self.frames
-            for box, score in zip(it.detections.boxes.tolist(), it.detections.scores.tolist(), strict=True)
+            MotRow(frame.number + 1, -1, box[0], box[1], box[2] - box[0], box[3] - box[1], score)
+            for frame in self.frames
+            for box, score in zip(
+                frame.detections.boxes.tolist(), frame.detections.scores.tolist(), strict=True
+            )
         ]
 
 
@@ -86,7 +88,7 @@ def follow(name: str, view: SearchedView) -> tuple[list[MotRow], float]:
         name, WindowSettings(), CostSettings(), lambda: create_solver(DEFAULT_SOLVER), fps=view.fps
     )
     if isinstance(tracker, PrescanTracker):  # as a recording is looked at ahead
-        tracker.prepare(it.image for it in frames[:_AHEAD:_AHEAD_EVERY] if it.image is not None)
+        tracker.prepare(frame.image for frame in frames[:_AHEAD:_AHEAD_EVERY] if frame.image is not None)
     rows: list[MotRow] = []
     began = time.perf_counter()
     for frame in frames:

@@ -127,9 +127,9 @@ def _config(variant: StreamVariant, recording: Path, site: SiteSettings) -> Conf
 def median_cost(costs: Sequence[StreamCost]) -> StreamCost:
     """Return the median of each number."""
     return StreamCost(
-        statistics.median(it.capture_ms for it in costs),
-        statistics.median(it.encode_ms for it in costs),
-        statistics.median(it.track_ms for it in costs),
+        statistics.median(cost.capture_ms for cost in costs),
+        statistics.median(cost.encode_ms for cost in costs),
+        statistics.median(cost.track_ms for cost in costs),
         costs[0].kbps,
         costs[0].quality,
     )

@@ -113,8 +113,10 @@ def plot(parts: Sequence[StartupStep], path: Path) -> None:
     figure = Figure(figsize=(8, 3), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    names = [it.name for it in parts]
-    axes.barh(names, [it.seconds for it in parts], left=[it.done_after - it.seconds for it in parts])
+    names = [part.name for part in parts]
+    axes.barh(
+        names, [part.seconds for part in parts], left=[part.done_after - part.seconds for part in parts]
+    )
     axes.invert_yaxis()
     axes.set_xlabel("seconds since `make demo`")
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -129,7 +131,7 @@ def main() -> None:
         clone = Path(folder) / "clone"
         subprocess.run(["git", "clone", "--quiet", "--local", str(ROOT), str(clone)], check=True)
         parts = measure(clone)
-    rows = [[it.name, f"{it.seconds:.1f}", f"{it.done_after:.1f}"] for it in parts]
+    rows = [[part.name, f"{part.seconds:.1f}", f"{part.done_after:.1f}"] for part in parts]
     report.table("From a fresh clone to the first picture, seconds", ["step", "took", "done after"], rows)
     plot(parts, chosen.out / "startup.png")
     report.save(chosen.out / "startup.txt")

@@ -59,7 +59,7 @@ def main() -> None:
     outcomes = run_slow(asked.may_skip) if asked.slow else run_fast(asked.may_skip)
     _print_table(outcomes)
     print("", closing_line(outcomes), sep="\n", flush=True)
-    sys.exit(any(it.failed for it in outcomes))
+    sys.exit(any(outcome.failed for outcome in outcomes))
 
 
 def run_often(command: Sequence[str], runs: int, at_once: int) -> bool:
@@ -147,7 +147,7 @@ def run_pytest(
             sys.exit(_INTERRUPTED)
         reported = report.exists()
         cases = list(ET.parse(report).iter("testcase")) if reported else []  # noqa: S314 — our own
-    failed = sum(it.find("failure") is not None or it.find("error") is not None for it in cases)
+    failed = sum(case.find("failure") is not None or case.find("error") is not None for case in cases)
     skipped = Counter(it.get("message", "") for case in cases for it in case.iter("skipped"))
     refused = {reason: n for reason, n in skipped.items() if may_skip is not None and may_skip not in reason}
     for reason, n in refused.items():
@@ -167,22 +167,24 @@ def run_pytest(
 
 def closing_line(outcomes: Sequence[Outcome]) -> str:
     """Return the sum of all parts in pytest's words: ``= 1 failed, 3 passed in 259.15s (0:04:19) =``."""
-    failed = sum(it.failed for it in outcomes)
-    skipped = sum(it.skipped.total() for it in outcomes)
-    counts = [f"{sum(it.passed for it in outcomes)} passed"]
+    failed = sum(outcome.failed for outcome in outcomes)
+    skipped = sum(outcome.skipped.total() for outcome in outcomes)
+    counts = [f"{sum(outcome.passed for outcome in outcomes)} passed"]
     counts = [f"{failed} failed"] * (failed > 0) + counts + [f"{skipped} skipped"] * (skipped > 0)
-    seconds = sum(it.seconds for it in outcomes)
+    seconds = sum(outcome.seconds for outcome in outcomes)
     return f" {', '.join(counts)} in {seconds:.2f}s ({timedelta(seconds=int(seconds))}) ".center(80, "=")
 
 
 def _print_table(outcomes: Sequence[Outcome]) -> None:
     print(f"\n{'part':<28}{'passed':>8}{'failed':>8}{'skipped':>9}{'time':>10}")
-    for it in outcomes:
-        if it.left_out is not None:
-            print(f"{it.name:<28}left out: {it.left_out}")
+    for outcome in outcomes:
+        if outcome.left_out is not None:
+            print(f"{outcome.name:<28}left out: {outcome.left_out}")
             continue
-        time_taken = str(timedelta(seconds=int(it.seconds)))
-        print(f"{it.name:<28}{it.passed:>8}{it.failed:>8}{it.skipped.total():>9}{time_taken:>10}")
+        time_taken = str(timedelta(seconds=int(outcome.seconds)))
+        print(
+            f"{outcome.name:<28}{outcome.passed:>8}{outcome.failed:>8}{outcome.skipped.total():>9}{time_taken:>10}"
+        )
 
 
 if __name__ == "__main__":

@@ -155,7 +155,7 @@ def test_every_command_and_option_is_described() -> None:
     for name, command in group.commands.items():
         assert f"`myview {name}" in reference("cli")
         rows = option_rows(name)
-        for option in (flag for it in command.params for flag in it.opts if flag.startswith("--")):
+        for option in (flag for param in command.params for flag in param.opts if flag.startswith("--")):
             assert option == "--help" or f"`{option}`" in rows, f"myview {name} {option}"
 
 

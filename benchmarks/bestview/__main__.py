@@ -75,7 +75,7 @@ IDENTITY_COLUMNS = [
     "",
     "recall",
     "precision",
-    *(word for it in LATER_S for word in (f"{it:g} s: recall", "precision")),
+    *(word for seconds in LATER_S for word in (f"{seconds:g} s: recall", "precision")),
 ]
 LOSS_COLUMNS = ["", "Visible", "selection", "identity", "detection"]
 
@@ -113,7 +113,7 @@ def score_row(it: MethodScores) -> list[str]:
         it.name,
         *idf1,
         *(f"{100 * share:.1f}" for share in shares),
-        *(f"{it:.1f}" for it in cuts),
+        *(f"{cut:.1f}" for cut in cuts),
         str(views.shortest_shot or "-"),
     ]
 
@@ -128,7 +128,10 @@ def identity_row(scene: BenchmarkScene, result: MethodResult) -> list[str]:
     matched = MatchedBoxes.of(result.rendering.tracks, scene.gt, LEAST_IOU)
     fps = float(scene.content["site"]["fps"])
     scores = (matched.across_cameras(), *(matched.over_time(round(seconds * fps)) for seconds in LATER_S))
-    return [result.name, *(f"{100 * share:.1f}" for it in scores for share in (it.recall, it.precision))]
+    return [
+        result.name,
+        *(f"{100 * share:.1f}" for score in scores for share in (score.recall, score.precision)),
+    ]
 
 
 def find_other_trackers(options: argparse.Namespace, report: Report) -> OtherTrackerEnvironment | None:
@@ -191,7 +194,7 @@ def measure(options: argparse.Namespace) -> None:
             report.table(
                 f"{scene.name}: why people are not visible in the selected view",
                 LOSS_COLUMNS,
-                [loss_row(name, it) for name, it in loss_rows],
+                [loss_row(name, row) for name, row in loss_rows],
             )
             if not options.no_sweeps:
                 swept[scene.name] = sweep(scene, truth, quick=options.quick)

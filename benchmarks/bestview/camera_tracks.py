@@ -87,9 +87,9 @@ def sure_rows(frames: CameraDetections) -> list[MotRow]:
 
 def followed(config: Config, frames: Mapping[str, CameraDetections]) -> dict[str, list[CameraTracks]]:
     """Track people in all cameras, in step, as `myview render` does; return each camera's messages."""
-    cameras = {camera: _Camera(config, camera, it) for camera, it in frames.items()}
+    cameras = {camera: _Camera(config, camera, frame) for camera, frame in frames.items()}
     messages: dict[str, list[CameraTracks]] = {camera: [] for camera in frames}
-    for pulse in range(max(len(it.detections) for it in frames.values())):
+    for pulse in range(max(len(frame.detections) for frame in frames.values())):
         there = {camera: it for camera, it in cameras.items() if pulse < len(frames[camera].detections)}
         shared = {
             camera: it.scorer.build_message(pulse, it.shared(pulse))

@@ -220,7 +220,7 @@ def _peer_tracks(peers: OtherTrackerEnvironment, boxes: Rows) -> dict[str, list[
     Raises:
         OtherTrackersUnavailableError: the tracker failed.
     """
-    peer = next(it for it in PEERS if it.name == PEER)
+    peer = next(peer for peer in PEERS if peer.name == PEER)
     tracks = {}
     with tempfile.TemporaryDirectory() as folder:
         for camera, rows in boxes.items():

@@ -122,15 +122,15 @@ def sweep_tables(report: Report, swept: Mapping[str, Sequence[SweepResult]]) -> 
             ],
             [
                 [
-                    "all" if it.setting.lookahead is None else str(it.setting.lookahead),
-                    str(it.setting.gop),
-                    f"{it.setting.switch_cost_s:g}",
-                    f"{it.setting.extrapolate_s:g}",
-                    "-" if it.setting.lookahead is None else f"{it.delay_s:.2f}",
-                    *(f"{100 * share:.2f}" for share in (it.score.regret, it.score.visible)),
-                    f"{it.score.cuts_per_minute:.1f}",
-                    f"{it.score.optimum_cuts_per_minute:.1f}",
+                    "all" if result.setting.lookahead is None else str(result.setting.lookahead),
+                    str(result.setting.gop),
+                    f"{result.setting.switch_cost_s:g}",
+                    f"{result.setting.extrapolate_s:g}",
+                    "-" if result.setting.lookahead is None else f"{result.delay_s:.2f}",
+                    *(f"{100 * share:.2f}" for share in (result.score.regret, result.score.visible)),
+                    f"{result.score.cuts_per_minute:.1f}",
+                    f"{result.score.optimum_cuts_per_minute:.1f}",
                 ]
-                for it in results
+                for result in results
             ],
         )

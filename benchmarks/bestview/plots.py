@@ -24,13 +24,15 @@ def plot_methods(scores: Mapping[str, Sequence[MethodScores]], out: Path) -> Non
     figure = new_figure((12.0, 0.8 + (0.8 + 0.2 * most) * len(scores)))
     axes = figure.subplots(len(scores), 3, squeeze=False)
     for line, (name, outcomes) in zip(axes, scores.items(), strict=True):
-        names = [it.name for it in outcomes]
+        names = [outcome.name for outcome in outcomes]
         places = np.arange(len(names))[::-1]
-        joint = [np.nan if it.tracks is None else 100 * it.tracks.joint.idf1 for it in outcomes]
+        joint = [
+            np.nan if outcome.tracks is None else 100 * outcome.tracks.joint.idf1 for outcome in outcomes
+        ]
         columns = {
             "joint IDF1": joint,
-            "agreement with the optimum": [100 * it.views.agreement for it in outcomes],
-            "visible in the chosen view": [100 * it.views.visible for it in outcomes],
+            "agreement with the optimum": [100 * outcome.views.agreement for outcome in outcomes],
+            "visible in the chosen view": [100 * outcome.views.visible for outcome in outcomes],
         }
         for axis, (title, values) in zip(line, columns.items(), strict=True):
             axis.barh(places, values, color="#2a7f3f")
@@ -46,7 +48,9 @@ def plot_sweeps(swept: Mapping[str, Sequence[SweepResult]], out: Path) -> None:
     figure = new_figure((12.0, 0.8 + 3.0 * len(swept)))
     axes = figure.subplots(len(swept), 3, squeeze=False)
     for line, (name, scores) in zip(axes, swept.items(), strict=True):
-        default_extrapolation = [it for it in scores if it.setting.extrapolate_s == DEFAULT_EXTRAPOLATE_S]
+        default_extrapolation = [
+            score for score in scores if score.setting.extrapolate_s == DEFAULT_EXTRAPOLATE_S
+        ]
         default_cost = [
             it for it in default_extrapolation if it.setting.switch_cost_s == DEFAULT_SWITCH_COST_S
         ]
@@ -70,9 +74,9 @@ def plot_sweeps(swept: Mapping[str, Sequence[SweepResult]], out: Path) -> None:
             ),
             key=lambda it: it.setting.switch_cost_s,
         )
-        values = [it.setting.switch_cost_s for it in costs]
-        line[2].plot(values, [it.score.cuts_per_minute for it in costs], "o-", label="MyView's choice")
-        line[2].plot(values, [it.score.optimum_cuts_per_minute for it in costs], "s--", label="optimum")
+        values = [cost.setting.switch_cost_s for cost in costs]
+        line[2].plot(values, [cost.score.cuts_per_minute for cost in costs], "o-", label="MyView's choice")
+        line[2].plot(values, [cost.score.optimum_cuts_per_minute for cost in costs], "s--", label="optimum")
         line[2].set_xlabel("switch cost, seconds of not seeing a person")
         line[2].set_ylabel("cuts a minute")
         line[2].legend(fontsize="x-small")

@@ -77,7 +77,7 @@ class BenchmarkScene:
                 {camera: read_rows(files[camera]) for camera in self.gt},
             )
         frames = {camera: in_pictures(config, camera) for camera in self.gt}
-        return SceneDetections(frames, {camera: sure_rows(it) for camera, it in frames.items()})
+        return SceneDetections(frames, {camera: sure_rows(frame) for camera, frame in frames.items()})
 
 
 def terrace(data: Path) -> BenchmarkScene:

@@ -42,7 +42,7 @@ class GroundTruthRegistry:
     ) -> IdentityUpdate:
         """Return the id of every tracklet."""
         del last_frame, pictures
-        numbers = {TrackletKey(*it.key, 0): self._people[it.key.local_id - 1] for it in tracks}
+        numbers = {TrackletKey(*track.key, 0): self._people[track.key.local_id - 1] for track in tracks}
         return IdentityUpdate(numbers, created=(), returned=(), departed=(), merged=(), split=())
 
 

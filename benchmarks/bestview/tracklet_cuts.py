@@ -33,7 +33,7 @@ def own_tracklets(config: Config, messages: Messages) -> dict[str, list[MotRow]]
             tracks = [it for window in reader.read(epoch) for it in window.local_tracks()]
             seen = align_tracks(tracks, ground, error, config.overhead)
             # No tracklet is ever settled here, so that a row stays the same tracklet.
-            rows, _ = tracklets.update(seen, {it.key: it.appearance for it in tracks})
+            rows, _ = tracklets.update(seen, {track.key: track.appearance for track in tracks})
             for track, column in zip(*np.nonzero(rows >= 0), strict=True):
                 camera = seen.keys[track].camera
                 left, top, right, bottom = (

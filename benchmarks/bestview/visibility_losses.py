@@ -56,7 +56,7 @@ def losses(scene: BenchmarkScene, truth: SceneTruth, result: MethodResult) -> Vi
     by_identity = lost & ~own & others
     frames = max(int(np.count_nonzero(truth.views.evaluated)), 1)
     counts = (truth.views.evaluated & shown, by_selection, by_identity, lost & ~own & ~others)
-    return VisibilityLosses(*(np.count_nonzero(it) / frames for it in counts))
+    return VisibilityLosses(*(np.count_nonzero(count) / frames for count in counts))
 
 
 def _matched(

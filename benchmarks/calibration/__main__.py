@@ -76,7 +76,9 @@ def _tracked(views: RecordedViews, out: Path, config: Path | None) -> Path:
 def out_of_step(walk: Walk) -> Walk:
     """Shift a camera's walk by its time offset."""
     late = _MOVED.get(walk.camera, 0)
-    return replace(walk, tracks=tuple(WalkTrack(it.first_frame - late, it.boxes) for it in walk.tracks))
+    return replace(
+        walk, tracks=tuple(WalkTrack(track.first_frame - late, track.boxes) for track in walk.tracks)
+    )
 
 
 def room_rows(report: Report, folder: Path, out: Path) -> None:
@@ -86,16 +88,19 @@ def room_rows(report: Report, folder: Path, out: Path) -> None:
         room = draw(folder / f"room{people}", people)
         for name, walks in (("true boxes", room.from_boxes), ("own tracks", room.from_tracks)):
             found = calibrate_from_walks(
-                [out_of_step(it) for it in walks], walk_settings(_ROOM_FPS, _SHIFT_S), _PERSON
+                [out_of_step(walk) for walk in walks], walk_settings(_ROOM_FPS, _SHIFT_S), _PERSON
             )
-            off = error_of_known(found, room.truth, [out_of_step(it) for it in walks])
+            off = error_of_known(found, room.truth, [out_of_step(walk) for walk in walks])
             rows.append(
                 [
                     f"{people} walking, {name}",
                     f"{found.heights.median:.2f}",
                     f"{np.median(off):.2f}",
                     f"{np.quantile(off, 0.9):.2f}",
-                    *(f"{it.offset:+.1f} ± {2 * it.offset_error:.1f}" for it in found.cameras[1:]),
+                    *(
+                        f"{camera.offset:+.1f} ± {2 * camera.offset_error:.1f}"
+                        for camera in found.cameras[1:]
+                    ),
                 ]
             )
             _plot(found, out / f"calibration_room{people}_{name.split()[0]}.png")
@@ -121,7 +126,7 @@ def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
     found = calibrate_from_walks(walked.walks, walk_settings(walked.fps, _SHIFT_S), _PERSON)
     _plot(found, out / "calibration_terrace.png")
     ours = folder / "terrace.json"
-    ours.write_text(ground_file_text("m", {it.camera: it.homography for it in found.cameras}))
+    ours.write_text(ground_file_text("m", {camera.camera: camera.homography for camera in found.cameras}))
     assert views.ground is not None  # noqa: S101 — the recording has one
     rows: list[list[str]] = []
     for name, ground in (("published", views.ground), ("from its own tracks", ours)):
@@ -136,7 +141,9 @@ def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
         rows.append([name, *_cells(seen), f"{100 * joint.idf1:.1f}"])
     heading = ["terrace, two views", "feet distance, heights", "90 %", "nearest correct, %", "joint IDF1"]
     report.table("Against the published calibration, at the true boxes", heading, rows)
-    moved = ", ".join(f"{it.camera} {it.offset:+.1f} ± {2 * it.offset_error:.1f}" for it in found.cameras)
+    moved = ", ".join(
+        f"{camera.camera} {camera.offset:+.1f} ± {2 * camera.offset_error:.1f}" for camera in found.cameras
+    )
     report.say(f"terrace: offsets in frames: {moved}")
 
 
@@ -163,7 +170,7 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
     found = calibrate_from_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON)
     _plot(found, out / "calibration_auditorium.png")
     ground = folder / "auditorium.json"
-    ground.write_text(ground_file_text("m", {it.camera: it.homography for it in found.cameras}))
+    ground.write_text(ground_file_text("m", {camera.camera: camera.homography for camera in found.cameras}))
     rows = [
         [f"{one}, {other}", *_cells(seen)]
         for (one, other), seen in agreement(ground, source / "gt", size).items()

@@ -56,10 +56,10 @@ class CameraOverlap:
 def error_of_known(found: WalkCalibration, truth: Mapping[str, Floats], walks: Sequence[Walk]) -> Floats:
     """Return the errors of all foot points, meters, after the best rotation and shift of the floor."""
     ours, theirs = [], []
-    matrices = {it.camera: it.homography for it in found.cameras}
+    matrices = {camera.camera: camera.homography for camera in found.cameras}
     for walk in walks:
         if walk.camera in matrices:
-            image = np.concatenate([foot_points(it.boxes) for it in walk.tracks])
+            image = np.concatenate([foot_points(track.boxes) for track in walk.tracks])
             ours.append(to_ground(matrices[walk.camera], image) @ np.array([1, 1j]))
             theirs.append(to_ground(truth[walk.camera], image) @ np.array([1, 1j]))
     x, y = np.concatenate(ours), np.concatenate(theirs)

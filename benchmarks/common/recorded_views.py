@@ -33,7 +33,7 @@ class RecordedViews:
     def cameras(self) -> list[dict[str, Any]]:
         """The section `cameras` of the configuration."""
         ignore = {"ignore": [_WATERMARK]} if self.name in _WATERMARKED else {}
-        return [{"id": it.stem, "source": str(it.absolute()), **ignore} for it in self.videos]
+        return [{"id": video.stem, "source": str(video.absolute()), **ignore} for video in self.videos]
 
     @property
     def site(self) -> dict[str, Any]:

@@ -75,7 +75,7 @@ def rows_of(
     Raises:
         OtherTrackersUnavailableError: another tracker failed.
     """
-    hypotheses = {name: it.hypotheses for name, it in runs.items()}
+    hypotheses = {name: run.hypotheses for name, run in runs.items()}
     yield ScoreRow(detector_spec.name, hypotheses, tracks=False)
     if detector_spec is DETECTORS[0]:
         confident = {
@@ -83,7 +83,7 @@ def rows_of(
         }
         hypotheses = confident
         yield ScoreRow(f"  score from {CONFIDENT:g}", confident, tracks=False)
-    yield ScoreRow("  MyView's tracks", {name: it.tracks for name, it in runs.items()}, tracks=True)
+    yield ScoreRow("  MyView's tracks", {name: run.tracks for name, run in runs.items()}, tracks=True)
     if other_trackers is None or not detector_spec.with_other_trackers:
         return
     for tracker in PEERS:
@@ -135,8 +135,8 @@ def _cells(row: ScoreRow, truths: dict[str, list[MotRow]], runs: list[DetectorRu
         (scores_of_tracks if row.tracks else scores_of_boxes)(truth, row.boxes[name])
         for name, truth in truths.items()
     ]
-    seconds = sum(it.detect_s + (it.track_s if row.tracks else 0.0) for it in runs)
-    frames = sum(it.frames for it in runs)
+    seconds = sum(run.detect_s + (run.track_s if row.tracks else 0.0) for run in runs)
+    frames = sum(run.frames for run in runs)
     idf1 = f"{100 * sum(it.idf1 for it in scored) / len(scored):.0f}" if row.tracks else ""
     shares = [f"{share:.2f}" for it in scored for share in (it.recall, it.precision)]
     joint = f"{100 * oracle(truths, row.boxes):.0f}"

@@ -81,8 +81,8 @@ async def with_containers(views: StampedViews, folder: Path) -> AsyncIterator[Fa
 def _site(views: StampedViews) -> dict[str, Any]:
     """Return the configuration, with the paths of the films inside the containers."""
     cameras = [
-        {**it, **{key: f"{_FILMS}/{Path(it[key]).name}" for key in ("source", "detections")}}
-        for it in views.cameras
+        {**camera, **{key: f"{_FILMS}/{Path(camera[key]).name}" for key in ("source", "detections")}}
+        for camera in views.cameras
     ]
     return {
         "site": views.site,

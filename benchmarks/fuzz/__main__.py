@@ -52,7 +52,7 @@ def run_parallel(
 ) -> Iterator[tuple[int, TargetResult]]:
     """Run targets, `jobs` at a time; yield each one's place and result, as they end."""
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("fork")) as pool:
-        running = {pool.submit(_run, it, plan): place for place, it in enumerate(targets)}
+        running = {pool.submit(_run, target, plan): place for place, target in enumerate(targets)}
         for done in as_completed(running):
             yield running[done], done.result()
 
@@ -126,11 +126,11 @@ def main() -> None:
     for place, result in run_parallel(targets, plan, max(1, chosen.jobs)):
         results[place] = result
         print("  ".join(row(targets[place].name, result)), file=sys.stderr, flush=True)
-    rows = [row(it.name, results[place]) for place, it in enumerate(targets)]
+    rows = [row(target.name, results[place]) for place, target in enumerate(targets)]
     report.table("Fuzzing", _COLUMNS, rows)
     suffix = [str(chosen.first)] if chosen.first else []
     report.save(chosen.out / f"fuzz-{'-'.join([*(chosen.target or chosen.part or ['all']), *suffix])}.txt")
-    sys.exit(any(it.counts.crashes for it in results.values()))
+    sys.exit(any(result.counts.crashes for result in results.values()))
 
 
 if __name__ == "__main__":

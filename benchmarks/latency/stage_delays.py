@@ -61,14 +61,14 @@ def split(marks: BusTimestamps, shown: ShownFrames) -> StageDelays:
     if not rows:
         raise ValueError("no shown frame has all timestamps")
     first, last = min(shown.at), max(shown.at)
-    decisions = [it for it in marks.decisions if first <= it.first <= last]
+    decisions = [decision for decision in marks.decisions if first <= decision.first <= last]
     return StageDelays(
         pulses=np.array([pulse for pulse, _ in rows]),
         stages=np.array([stages for _, stages in rows]),
         shown_share=len(shown.at) / (last - first + 1),
         unknown=len(shown.at) - len(rows),
         gops=len(decisions),
-        late=sum(_solved(marks, it, shown.lookahead).late for it in decisions),
+        late=sum(_solved(marks, decision, shown.lookahead).late for decision in decisions),
     )
 
 

@@ -36,7 +36,7 @@ class FrameCounts:
     @property
     def dropped(self) -> int:
         """Frames that were missed or not searched, of all cameras."""
-        return sum(it["missed"] + it["shed"] for it in self.cameras.values())
+        return sum(camera["missed"] + camera["shed"] for camera in self.cameras.values())
 
 
 def counts_in(metrics: str, late: int) -> FrameCounts:

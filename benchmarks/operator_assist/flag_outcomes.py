@@ -76,7 +76,7 @@ def count(pairs: Sequence[tuple[TrackedClip, TrackedClip]], person: OperatorProf
             flags[_kind(flag, about, helped), _outcome(flag, about, alone, helped)] += 1
         for failure in alone.failures:
             unaided[failure.kind] += 1
-            foreseen += any(is_about(it, at, failure, fps, person) for at, it in alone.risk_events)
+            foreseen += any(is_about(event, at, failure, fps, person) for at, event in alone.risk_events)
             avoided += not _in_other_run(failure, helped.failures, fps)
         for failure in helped.failures:
             kinds[failure.kind] += 1
@@ -113,7 +113,8 @@ def _outcome(flag: OperatorFlag, about: set[int], alone: TrackedClip, helped: Tr
 
     def failed(clip_result: TrackedClip) -> bool:
         return any(
-            about & {*it.fish} and it.before <= last and it.frame >= first for it in clip_result.failures
+            about & {*failure.fish} and failure.before <= last and failure.frame >= first
+            for failure in clip_result.failures
         )
 
     without, with_help = failed(alone), failed(helped)
@@ -133,8 +134,10 @@ def is_about(
 def _in_other_run(failure: IdentityFailure, others: Sequence[IdentityFailure], fps: float) -> bool:
     """Return whether a failure also occurs in the other run: the same fish at about the same time."""
     return any(
-        {*failure.fish} & {*it.fish} and it.before <= failure.frame + fps and it.frame >= failure.before - fps
-        for it in others
+        {*failure.fish} & {*other.fish}
+        and other.before <= failure.frame + fps
+        and other.frame >= failure.before - fps
+        for other in others
     )
 
 
@@ -143,23 +146,23 @@ def _cause(failure: IdentityFailure, helped: TrackedClip, matched: NDArray[np.in
     fps, own_tracks = helped.clip.fps, {*failure.tracks}
     first, last = failure.before - _BEFORE_S * fps, failure.frame + fps
     flags = [
-        it
-        for it in helped.flags
-        if (own_tracks & {*it.event.objects} or it.fish in failure.fish) and first <= it.raised <= last
+        flag
+        for flag in helped.flags
+        if (own_tracks & {*flag.event.objects} or flag.fish in failure.fish) and first <= flag.raised <= last
     ]
-    handled = [it for it in flags if it.fish is not None and it.pointing_frames]
+    handled = [flag for flag in flags if flag.fish is not None and flag.pointing_frames]
     if any(_right(it, matched) and it.pointing_frames[0] <= failure.frame for it in handled):
         return "pointed in vain"
     if handled:
         return "late" if any(_right(it, matched) for it in handled) else "followed wrongly"
     if flags:
-        return "busy" if any(it.begun is None for it in flags) else "late"
+        return "busy" if any(flag.begun is None for flag in flags) else "late"
     if any(
         it.frame < failure.before and {*it.tracks} & own_tracks for it in helped.failures if it is not failure
     ):
         return "earlier failure"
     was_foreseen = any(
-        own_tracks & {*it.objects} and first <= newest <= last for newest, it in helped.risk_events
+        own_tracks & {*event.objects} and first <= newest <= last for newest, event in helped.risk_events
     )
     return "no flag" if was_foreseen else "not foreseen"
 

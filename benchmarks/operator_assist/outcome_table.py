@@ -91,10 +91,10 @@ def _split(
     outcome_counts: OutcomeCounts, parts: Sequence[_FlagGroup], outcomes: tuple[Outcome, Outcome]
 ) -> Iterator[OutcomeRow]:
     """Yield the rows of flags with these outcomes, by group and by outcome."""
-    for it in parts:
-        yield OutcomeRow(it.name, _sum(outcome_counts, outcomes, it.kinds), it.thesis)
-        for outcome, theirs in zip(outcomes, it.theirs, strict=True):
-            yield OutcomeRow(f"    {_WORDS[outcome]}", _sum(outcome_counts, (outcome,), it.kinds), theirs)
+    for part in parts:
+        yield OutcomeRow(part.name, _sum(outcome_counts, outcomes, part.kinds), part.thesis)
+        for outcome, theirs in zip(outcomes, part.theirs, strict=True):
+            yield OutcomeRow(f"    {_WORDS[outcome]}", _sum(outcome_counts, (outcome,), part.kinds), theirs)
 
 
 def _sum(

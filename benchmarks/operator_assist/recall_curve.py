@@ -60,24 +60,26 @@ def _point(
 ) -> RecallPoint:
     flags = foreseen = 0
     selector = FlagSelector(settings, tracked_clips[0].clip.fps)
-    for it in tracked_clips:
+    for clip in tracked_clips:
         selector.begin()
-        raised = _raised(it, selector)
+        raised = _raised(clip, selector)
         flags += len(raised)
-        for failure in it.failures:
-            about = [k for k in raised if is_about(k[1], k[0], failure, it.clip.fps, person)]
+        for failure in clip.failures:
+            about = [k for k in raised if is_about(k[1], k[0], failure, clip.clip.fps, person)]
             foreseen += bool(about)
             for matched_flag in about[:1]:
                 raised.remove(matched_flag)
-    failures = sum(len(it.failures) for it in tracked_clips)
-    return RecallPoint(settings.risk, flags, foreseen, failures, sum(it.clip.minutes for it in tracked_clips))
+    failures = sum(len(clip.failures) for clip in tracked_clips)
+    return RecallPoint(
+        settings.risk, flags, foreseen, failures, sum(clip.clip.minutes for clip in tracked_clips)
+    )
 
 
 def _raised(tracked_clips: TrackedClip, selector: FlagSelector) -> list[tuple[int, RiskEvent]]:
     """Return the flags of a clip, each with the newest frame when it was raised."""
     windows: dict[int, list[RiskEvent]] = {}
-    for newest, it in tracked_clips.risk_events:
-        windows.setdefault(newest, []).append(it)
+    for newest, event in tracked_clips.risk_events:
+        windows.setdefault(newest, []).append(event)
     return [(newest, it) for newest, events in windows.items() for it in selector.raised(newest, events)]
 
 
@@ -85,14 +87,14 @@ def rows(points: Sequence[RecallPoint]) -> list[list[str]]:
     """Return the points as rows of a table: flags, failures, foreseen, upper bound."""
     return [
         [
-            f"{it.risk:.2f}" if it.risk else "all",
-            f"{it.flags / it.minutes:.1f}",
-            f"{it.failures / it.minutes:.1f}",
-            f"{it.flags / it.failures:.2f}" if it.failures else "-",
-            f"{100.0 * it.share:.0f} %",
-            f"{100.0 * it.bound:.0f} %",
+            f"{point.risk:.2f}" if point.risk else "all",
+            f"{point.flags / point.minutes:.1f}",
+            f"{point.failures / point.minutes:.1f}",
+            f"{point.flags / point.failures:.2f}" if point.failures else "-",
+            f"{100.0 * point.share:.0f} %",
+            f"{100.0 * point.bound:.0f} %",
         ]
-        for it in points
+        for point in points
     ]
 
 
@@ -100,9 +102,11 @@ def plot(points: Sequence[RecallPoint], path: Path) -> None:
     """Draw the share of foreseen failures over flags a minute, with its upper bound."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure, axes = plt.subplots(figsize=(7, 4))
-    flags = [it.flags / it.minutes for it in points]
-    axes.plot(flags, [100.0 * it.bound for it in points], color="0.6", label="one failure for each flag")
-    axes.plot(flags, [100.0 * it.share for it in points], marker="o", label="foreseen")
+    flags = [point.flags / point.minutes for point in points]
+    axes.plot(
+        flags, [100.0 * point.bound for point in points], color="0.6", label="one failure for each flag"
+    )
+    axes.plot(flags, [100.0 * point.share for point in points], marker="o", label="foreseen")
     axes.axvline(
         points[0].failures / points[0].minutes, color="0.6", linestyle=":", label="failures a minute"
     )

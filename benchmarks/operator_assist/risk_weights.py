@@ -46,12 +46,12 @@ def fit_weights(terms: Floats, wrong: Floats) -> Floats:
 def examples(tracked_clips: Sequence[TrackedClip], reason: RiskReason) -> tuple[Floats, Floats]:
     """Return the features `(N, D)` of the risk events of a reason, and 1 where they went wrong `(N,)`."""
     rows, wrong, profile = [], [], OperatorProfile()
-    for it in tracked_clips:
-        for newest, event in it.risk_events:
+    for clip in tracked_clips:
+        for newest, event in clip.risk_events:
             if event.reason == reason:
                 rows.append(RiskFeatures(event.margin, event.frame - newest, event.length).regression_terms)
                 is_about_failures = [
-                    is_about(event, newest, failure, it.clip.fps, profile) for failure in it.failures
+                    is_about(event, newest, failure, clip.clip.fps, profile) for failure in clip.failures
                 ]
                 wrong.append(float(any(is_about_failures)))
     return np.array(rows).reshape(-1, len(RiskFeatures(0.0, 0.0, 0.0).regression_terms)), np.array(wrong)
@@ -74,7 +74,7 @@ def main() -> None:
         weights = [f"{it:.2f}" for it in fit_weights(terms, wrong)]
         table.append([reason, str(len(wrong)), f"{100.0 * wrong.mean():.0f} %", *weights])
     report = Report()
-    report.say(f"{len(tracked_clips)} clips, {sum(it.clip.minutes for it in tracked_clips):.1f} minutes")
+    report.say(f"{len(tracked_clips)} clips, {sum(clip.clip.minutes for clip in tracked_clips):.1f} minutes")
     report.table(
         "Risk weights",
         [

@@ -103,12 +103,12 @@ class SimulatedOperator:
         """Receive the risk events of a window, some of which raise flags."""
         now = self._now
         others = []
-        for it in risk_events:
-            if now is not None and now.object in it.objects:
+        for event in risk_events:
+            if now is not None and now.object in event.objects:
                 # The followed fish has another risk event before the picture shows it.
-                now.until = max(now.until, it.frame)
+                now.until = max(now.until, event.frame)
             else:
-                others.append(it)
+                others.append(event)
         self.flags += [
             OperatorFlag(it, it.objects[0], newest, it.frame) for it in self._selector.raised(newest, others)
         ]
@@ -125,7 +125,7 @@ class SimulatedOperator:
 
     def _next_flag(self, newest: int, screen: int) -> OperatorFlag | None:
         """Turn to the flag that is due first; without any, to one that has passed on the screen."""
-        waiting = [it for it in self.flags if it.begun is None and it.ended is None]
+        waiting = [flag for flag in self.flags if flag.begun is None and flag.ended is None]
         over = {id(it) for it in waiting if it.until < screen}
         for it in waiting:
             if id(it) in over and newest - it.event.frame + self._before > self._back:

@@ -98,10 +98,10 @@ def lead(table: Table) -> list[list[str]]:
         if peers:
             ours = found[OURS]
             shares = [
-                f"{100 * (getattr(ours, name) - max(getattr(it, name) for it in peers)):+.1f}"
+                f"{100 * (getattr(ours, name) - max(getattr(peer, name) for peer in peers)):+.1f}"
                 for name in ("hota", "mota", "idf1")
             ]
-            rows.append([sequence, *shares, f"{ours.switches - min(it.switches for it in peers):+d}"])
+            rows.append([sequence, *shares, f"{ours.switches - min(peer.switches for peer in peers):+d}"])
     return rows
 
 

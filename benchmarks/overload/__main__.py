@@ -74,10 +74,10 @@ class SiteSampler:
         delays = tuple(person.delays)
         person.delays.clear()
         camera.delays.clear()
-        sums = {what: sum(it[what] for it in cameras) for what in ("pulse", "shed", "missed", "late")}
+        sums = {what: sum(camera[what] for camera in cameras) for what in ("pulse", "shed", "missed", "late")}
         return SiteSample(
             at=self.now,
-            levels=tuple(it["load_level"] for it in cameras),
+            levels=tuple(camera["load_level"] for camera in cameras),
             pulses=sums["pulse"],
             shed=sums["shed"],
             missed=sums["missed"],
@@ -91,8 +91,8 @@ def summarize_step(cameras: int, before: Sequence[SiteSample], samples: Sequence
     """Summarize the samples of a number of cameras; ``before`` are those of the settling time."""
     first, last = samples[0], samples[-1]
     frames = max(last.pulses - first.pulses, 1)
-    delays = [it for sample in samples[1:] for it in sample.delays] or [np.nan]
-    levels = [it for sample in samples for it in sample.levels] or [0]
+    delays = [delay for sample in samples[1:] for delay in sample.delays] or [np.nan]
+    levels = [level for sample in samples for level in sample.levels] or [0]
     return LoadStep(
         cameras=cameras,
         levels=(float(np.median(levels)), max(levels)),

@@ -29,12 +29,12 @@ def describe(report: Report, result: OverloadResult) -> None:
         ],
         [
             [
-                *(str(it.cameras), f"{it.levels[0]:g}", str(it.levels[1])),
-                *(f"{100 * share:.1f} %" for share in (it.searched, it.missed, it.late)),
-                *(f"{delay:.0f}" for delay in it.delays),
-                str(it.missing_frames),
+                *(str(step.cameras), f"{step.levels[0]:g}", str(step.levels[1])),
+                *(f"{100 * share:.1f} %" for share in (step.searched, step.missed, step.late)),
+                *(f"{delay:.0f}" for delay in step.delays),
+                str(step.missing_frames),
             ]
-            for it in result.steps
+            for step in result.steps
         ],
     )
     report.say(f"cameras carried without load shedding: {result.cameras_carried}")
@@ -48,18 +48,21 @@ def plot(result: OverloadResult, path: Path) -> None:
     """Draw levels and delay over time."""
     figure = Figure(figsize=(9, 6))
     levels, delay = figure.subplots(2, 1, sharex=True)
-    times = [it.at for it in result.samples]
+    times = [sample.at for sample in result.samples]
     levels.step(
         *zip(*result.started, (times[-1], 1), strict=True), where="post", label="cameras", color="gray"
     )
-    means = [float(np.mean(it.levels)) if it.levels else 0.0 for it in result.samples]
+    means = [float(np.mean(sample.levels)) if sample.levels else 0.0 for sample in result.samples]
     levels.plot(times, means, label="shed level, mean of the cameras")
     levels.plot(
-        times, [max(it.levels, default=0) for it in result.samples], label="highest shed level", linewidth=0.7
+        times,
+        [max(sample.levels, default=0) for sample in result.samples],
+        label="highest shed level",
+        linewidth=0.7,
     )
     levels.set(ylabel="cameras; shed level", ylim=(0, None))
     levels.legend(fontsize="small")
-    middles = [float(np.median(it.delays)) if it.delays else np.nan for it in result.samples]
+    middles = [float(np.median(sample.delays)) if sample.delays else np.nan for sample in result.samples]
     delay.plot(times, middles, marker=".", linewidth=0.7)
     delay.set(ylabel="delay of a person's view, ms", xlabel="seconds", ylim=(0, None))
     for axis in (levels, delay):

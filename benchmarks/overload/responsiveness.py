@@ -69,8 +69,8 @@ class Responsiveness:
     def response_time(self, percent: float) -> float:
         """Return a percentile of the response times, seconds, after the first response."""
         took = [
-            self.seconds - at if it is None else it
-            for at, it in self.response_times
+            self.seconds - at if time is None else time
+            for at, time in self.response_times
             if at >= self.first_response_s
         ]
         return float(np.percentile(took, percent)) if took else np.inf
@@ -78,7 +78,7 @@ class Responsiveness:
     @property
     def rate(self) -> float:
         """Frames per second of all cameras in the last part of the time."""
-        late = [it for it in self.frames if it[0] >= _SETTLED * self.seconds]
+        late = [frame for frame in self.frames if frame[0] >= _SETTLED * self.seconds]
         if not late or late[0] == late[-1]:
             return np.nan
         return (late[-1][1] - late[0][1]) / (late[-1][0] - late[0][0])
@@ -140,11 +140,11 @@ async def _metrics(session: aiohttp.ClientSession, url: str, measured: Responsiv
             async with session.get(f"{url}metrics") as answer:
                 lines = (await answer.text()).splitlines()
             measured.lags = [
-                (float(it.partition('le="')[2].partition('"')[0]), _value(it))
-                for it in lines
-                if it.startswith("myview_loop_lag_seconds_bucket")
+                (float(line.partition('le="')[2].partition('"')[0]), _value(line))
+                for line in lines
+                if line.startswith("myview_loop_lag_seconds_bucket")
             ]
-            frames = sum(_value(it) for it in lines if it.startswith("myview_camera_frames_total"))
+            frames = sum(_value(line) for line in lines if line.startswith("myview_camera_frames_total"))
             measured.frames.append((time.monotonic() - began, frames))
         await asyncio.sleep(_METRICS_EVERY_S)
 
@@ -162,7 +162,7 @@ def memory(supervisor: int) -> tuple[float, float]:
             if int((folder / "stat").read_text().rpartition(")")[2].split()[1]) != supervisor:
                 continue
             lines = (folder / "smaps_rollup").read_text().splitlines()
-            size = next(float(it.split()[1]) / 1e3 for it in lines if it.startswith("Pss:"))
+            size = next(float(line.split()[1]) / 1e3 for line in lines if line.startswith("Pss:"))
             if "camera" in words:
                 cameras.append(size)
             elif "bestview" in words:
@@ -192,13 +192,17 @@ def write_site(folder: Path, films: Path, cameras: int) -> tuple[Path, int]:
 def row(cameras: int, niceness: int, measured: Responsiveness) -> list[str]:
     """Return a row of the table."""
     [family] = measured.own_lag.histogram.collect()
-    own_lag = [(float(it.labels["le"]), it.value) for it in family.samples if it.name.endswith("_bucket")]
+    own_lag = [
+        (float(sample.labels["le"]), sample.value)
+        for sample in family.samples
+        if sample.name.endswith("_bucket")
+    ]
     seconds = [measured.first_response_s, *(measured.response_time(it) for it in (50, 95, 100))]
     bounds = [lag_below(0.95, measured.lags), lag_below(1.0, measured.lags), lag_below(0.95, own_lag)]
     return [
         *(str(cameras), str(niceness)),
-        *(f"{it:.2f}" for it in seconds),
-        *(f"{it:g}" for it in bounds),
+        *(f"{second:.2f}" for second in seconds),
+        *(f"{bound:g}" for bound in bounds),
         *(f"{it:.0f}" for it in (measured.rate, measured.camera_mb, measured.service_mb)),
     ]
 

@@ -72,4 +72,4 @@ class OverloadResult:
     @property
     def cameras_carried(self) -> int:
         """How many cameras the machine carries; 0: not one."""
-        return max((it.cameras for it in self.steps if it.searched >= _CARRIED_SHARE), default=0)
+        return max((step.cameras for step in self.steps if step.searched >= _CARRIED_SHARE), default=0)

@@ -113,7 +113,7 @@ async def _reading(page: Page, tools: CDPSession) -> tuple[float, float, float, 
         await page.evaluate("performance.now()") / 1e3,
         heap,
         float(await page.evaluate(_BUFFERED)),
-        float(np.median([it for it in delays if it is not None] or [np.nan])),
+        float(np.median([delay for delay in delays if delay is not None] or [np.nan])),
     )
 
 

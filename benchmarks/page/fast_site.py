@@ -126,7 +126,7 @@ class FastSite:
                 "reason": "It sees the person best.",
                 "costs": some,
                 "seen": some,
-                "terms": {it: {"size": 0.5} for it in _CAMERAS},
+                "terms": {camera: {"size": 0.5} for camera in _CAMERAS},
                 "weights": {"size": 1.0},
                 "before": shown,
                 "stay": 0.0,
@@ -153,8 +153,8 @@ class FastSite:
     async def _events(self, request: web.Request) -> web.StreamResponse:
         response = web.StreamResponse(headers={"Content-Type": "text/event-stream"})
         cameras = [
-            {"camera": it, "state": "live", "pulse": 0, "late": 0, "fps": _FPS, "message": ""}
-            for it in _CAMERAS
+            {"camera": camera, "state": "live", "pulse": 0, "late": 0, "fps": _FPS, "message": ""}
+            for camera in _CAMERAS
         ]
         with contextlib.suppress(ConnectionError):
             await response.prepare(request)

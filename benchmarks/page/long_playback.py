@@ -152,11 +152,17 @@ def describe(report: Report, readings: list[BrowserSample], speed: float) -> Non
         ],
         [
             [
-                *(f"{it.hours:.2f}", f"{it.heap:.2f}", str(it.nodes), str(it.listeners), str(it.ranges)),
-                *(f"{it.buffered:.0f}", f"{it.behind / 1000:.1f}", f"{it.stood:.1f}"),
-                *(str(it.shown), f"{it.load:.0f}"),
+                *(
+                    f"{reading.hours:.2f}",
+                    f"{reading.heap:.2f}",
+                    str(reading.nodes),
+                    str(reading.listeners),
+                    str(reading.ranges),
+                ),
+                *(f"{reading.buffered:.0f}", f"{reading.behind / 1000:.1f}", f"{reading.stood:.1f}"),
+                *(str(reading.shown), f"{reading.load:.0f}"),
             ]
-            for it in readings
+            for reading in readings
         ],
     )
     half = len(readings) // 2

@@ -49,14 +49,14 @@ def attempt(scene: ExperimentScene, setting: TrackerSetting, solver: str) -> Sol
 
 def row(setting: TrackerSetting, solver: str, outcomes: list[SolverOutcome]) -> list[str]:
     """Return a row of the table."""
-    labels = [it.labels for it in outcomes]
-    windows = sum(len(it.followed.reports) for it in outcomes)
-    integral = sum(it.integral for it in outcomes)
+    labels = [outcome.labels for outcome in outcomes]
+    windows = sum(len(outcome.followed.reports) for outcome in outcomes)
+    integral = sum(outcome.integral for outcome in outcomes)
     return [
         f"{setting.name}: {solver}",
-        _spread([per_frame(it.wrong) for it in labels]),
-        _spread([per_frame(it.unlike) for it in labels]),
-        _spread([per_frame(it.missing) for it in labels]),
+        _spread([per_frame(label.wrong) for label in labels]),
+        _spread([per_frame(label.unlike) for label in labels]),
+        _spread([per_frame(label.missing) for label in labels]),
         f"{integral} of {windows}" if solver == "columns" else "",
     ]
 

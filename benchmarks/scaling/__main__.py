@@ -60,36 +60,36 @@ def describe(report: Report, loads: Sequence[SiteLoad]) -> None:
         ],
         [
             [
-                f"{it.cameras}",
-                f"{it.people}",
-                f"{it.fps:g}",
-                f"{it.milliseconds:.1f}",
-                f"{it.milliseconds * _FPS / 1e3:.2f}",
-                f"{it.messages:.0f}",
-                f"{it.megabytes:.1f}",
-                f"{it.memory:.0f}",
-                f"{it.late}",
-                f"of {it.epochs * it.cameras * it.services} windows",
+                f"{load.cameras}",
+                f"{load.people}",
+                f"{load.fps:g}",
+                f"{load.milliseconds:.1f}",
+                f"{load.milliseconds * _FPS / 1e3:.2f}",
+                f"{load.messages:.0f}",
+                f"{load.megabytes:.1f}",
+                f"{load.memory:.0f}",
+                f"{load.late}",
+                f"of {load.epochs * load.cameras * load.services} windows",
             ]
-            for it in loads
+            for load in loads
         ],
     )
     names = {**STAGES, REST: _ABOUT_REST}
-    cameras = [it.cameras for it in loads]
+    cameras = [load.cameras for load in loads]
     rows = [
         [
             stage,
-            *(f"{it.stages[stage]:.2f}" for it in loads),
-            f"{exponent(cameras, [max(it.stages[stage], 1e-6) for it in loads]):.2f}",
+            *(f"{load.stages[stage]:.2f}" for load in loads),
+            f"{exponent(cameras, [max(load.stages[stage], 1e-6) for load in loads]):.2f}",
             about,
         ]
         for stage, about in names.items()
     ]
-    total = [it.milliseconds for it in loads]
+    total = [load.milliseconds for load in loads]
     rows.append(["total", *(f"{it:.1f}" for it in total), f"{exponent(cameras, total):.2f}", ""])
     report.table(
         "processor ms a frame, by cameras, and the exponent of growth",
-        ["stage", *(f"{it}" for it in cameras), "grows", "what"],
+        ["stage", *(f"{camera}" for camera in cameras), "grows", "what"],
         rows,
     )
     report.say("messages and bytes: at 25 pulses a second; late: windows decided without their camera")
@@ -106,14 +106,14 @@ def plot(loads: Sequence[SiteLoad], path: Path) -> None:
 
     figure = Figure(figsize=(9, 5), layout="constrained")
     axis = figure.subplots()
-    cameras = [it.cameras for it in loads]
+    cameras = [load.cameras for load in loads]
     for stage in (*STAGES, REST):
-        axis.plot(cameras, [it.stages[stage] for it in loads], marker=".", label=stage)
-    axis.plot(cameras, [it.milliseconds for it in loads], marker="o", color="black", label="together")
+        axis.plot(cameras, [load.stages[stage] for load in loads], marker=".", label=stage)
+    axis.plot(cameras, [load.milliseconds for load in loads], marker="o", color="black", label="together")
     axis.axhline(1e3 / _FPS, color="black", linestyle="--", linewidth=1, label="one core at 25 a second")
     axis.set(xscale="log", yscale="log", xlabel="cameras", ylabel="processor ms a frame")
     axis.set_title(f"{_services(loads)}, about {loads[0].per_camera} people in each camera's view")
-    axis.set_xticks(cameras, [f"{it}" for it in cameras])
+    axis.set_xticks(cameras, [f"{camera}" for camera in cameras])
     axis.legend(ncols=2, fontsize="small")
     figure.savefig(path, dpi=110)
 

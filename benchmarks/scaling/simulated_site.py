@@ -87,7 +87,7 @@ def carry(
         late = sum(_late(it.url) for it in running) - late
         memory = sum(_resident(it.process.pid) for it in running) / services
     loads = [_load(hall, fps, start, stop, memory, late) for start, stop in zip(starts, stops, strict=True)]
-    stages = {name: sum(it.stages[name] for it in loads) / services for name in loads[0].stages}
+    stages = {name: sum(load.stages[name] for load in loads) / services for name in loads[0].stages}
     return replace(loads[0], services=services, stages=stages)
 
 
@@ -147,10 +147,10 @@ def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> It
                 "benchmarks.scaling.simulated_cameras",
                 str(config),
                 f"{hall.per_camera}",
-                f"{it.start}",
-                f"{len(it)}",
+                f"{half.start}",
+                f"{len(half)}",
             )
-            for it in halves
+            for half in halves
         ]
         try:
             yield running

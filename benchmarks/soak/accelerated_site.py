@@ -60,7 +60,10 @@ class LoopedRecordings:
     @property
     def cameras(self) -> list[dict[str, Any]]:
         """The section `cameras` of the configuration."""
-        return [{"id": it, "source": str(self.folder / f"{it}.mp4"), "at_end": "loop"} for it in CAMERAS]
+        return [
+            {"id": camera, "source": str(self.folder / f"{camera}.mp4"), "at_end": "loop"}
+            for camera in CAMERAS
+        ]
 
     @property
     def site(self) -> dict[str, Any]:
@@ -109,7 +112,7 @@ def film(folder: Path, time_scale: TimeScale) -> LoopedRecordings:
         scene = Scene("room", len(CAMERAS), _PEOPLE, seed, WIDTH, HEIGHT, NOMINAL)
         write_recording(scene, parts[-1], _PART_S)
     for camera in CAMERAS:
-        _join([it / f"{camera}.mp4" for it in parts], folder / f"{camera}.mp4", time_scale.fps)
+        _join([part / f"{camera}.mp4" for part in parts], folder / f"{camera}.mp4", time_scale.fps)
     (folder / "ground.json").write_bytes((parts[0] / "ground.json").read_bytes())
     return LoopedRecordings(folder, time_scale)
 

@@ -9,7 +9,7 @@ from benchmarks.soak.accelerated_site import CAMERAS, TimeScale
 from benchmarks.soak.samples import ProcessSample
 from benchmarks.soak.visitors import Visitors
 
-PROCESSES = ("bestview", "sync", "up", *(f"camera {it}" for it in CAMERAS))
+PROCESSES = ("bestview", "sync", "up", *(f"camera {camera}" for camera in CAMERAS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,9 @@ class SoakMeasurements:
 
     time_scale: TimeScale
     visitors: Visitors
-    samples: dict[str, list[ProcessSample]] = field(default_factory=lambda: {it: [] for it in PROCESSES})
+    samples: dict[str, list[ProcessSample]] = field(
+        default_factory=lambda: {process: [] for process in PROCESSES}
+    )
     delays: list[LatencyMedians] = field(default_factory=list)
     recorded: list[float] = field(default_factory=list)
     """Megabytes on the disk."""

@@ -118,10 +118,10 @@ def threads_of(pid: int) -> int:
 
 def judge(samples: Sequence[ProcessSample]) -> list[GrowthVerdict]:
     """Check the growth of all quantities of a process."""
-    hours = [it.hours for it in samples]
+    hours = [sample.hours for sample in samples]
     return [
-        RESIDENT.judge(hours, [it.resident for it in samples]),
-        DESCRIPTORS.judge(hours, [it.descriptors for it in samples]),
-        THREADS.judge(hours, [it.threads for it in samples]),
-        TASKS.judge(hours, [it.tasks for it in samples]),
+        RESIDENT.judge(hours, [sample.resident for sample in samples]),
+        DESCRIPTORS.judge(hours, [sample.descriptors for sample in samples]),
+        THREADS.judge(hours, [sample.threads for sample in samples]),
+        TASKS.judge(hours, [sample.tasks for sample in samples]),
     ]

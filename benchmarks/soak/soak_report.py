@@ -30,10 +30,10 @@ _CURVES: tuple[tuple[str, Callable[[ProcessSample], float]], ...] = (
 def verdicts(measurements: SoakMeasurements) -> list[tuple[str, GrowthVerdict]]:
     """Check the growth of all measurements."""
     found = [(name, it) for name, samples in measurements.samples.items() for it in judge(samples)]
-    hours = [it.hours for it in measurements.delays]
+    hours = [delay.hours for delay in measurements.delays]
     for name, values in (
-        ("viewer of a camera", [it.camera for it in measurements.delays]),
-        ("viewer of a person", [it.person for it in measurements.delays]),
+        ("viewer of a camera", [delay.camera for delay in measurements.delays]),
+        ("viewer of a person", [delay.person for delay in measurements.delays]),
     ):
         there = [place for place, value in enumerate(values) if np.isfinite(value)]
         found.append((name, DELAY.judge([hours[it] for it in there], [values[it] for it in there])))
@@ -75,7 +75,10 @@ def describe(report: Report, measurements: SoakMeasurements) -> bool:
         "of a person": visitors.person.missing_frames,
     }
     counts = measurements.counts
-    searched = {name: f"{it['shed'] + it['missed']} of {it['frames']}" for name, it in counts.cameras.items()}
+    searched = {
+        name: f"{camera['shed'] + camera['missed']} of {camera['frames']}"
+        for name, camera in counts.cameras.items()
+    }
     report.say(f"visits: {_join_counts(dict(sorted(visitors.visits.items())))}")
     report.say(
         f"events received: {visitors.events}; frames missing in a stream: {_join_counts(missing_frames)}"
@@ -97,14 +100,19 @@ def plot(measurements: SoakMeasurements, path: Path) -> None:
     axes = figure.subplots(len(_CURVES) + 2, 1, sharex=True)
     for axis, (name, value) in zip(axes, _CURVES, strict=False):
         for process, samples in measurements.samples.items():
-            axis.plot([it.hours for it in samples], [value(it) for it in samples], label=process, linewidth=1)
+            axis.plot(
+                [sample.hours for sample in samples],
+                [value(sample) for sample in samples],
+                label=process,
+                linewidth=1,
+            )
         axis.set(ylabel=name, ylim=(0, None))
-    hours = [it.hours for it in measurements.delays]
+    hours = [delay.hours for delay in measurements.delays]
     axes[0].set_title(f"{hours[-1]:.1f} hours of a site, {measurements.time_scale.speed:g} times as fast")
     axes[0].legend(ncols=_NAMED, fontsize="small")
     delay = axes[len(_CURVES)]
-    _line(delay, hours, [it.camera for it in measurements.delays], "of a camera")
-    _line(delay, hours, [it.person for it in measurements.delays], "of a person")
+    _line(delay, hours, [delay.camera for delay in measurements.delays], "of a camera")
+    _line(delay, hours, [delay.person for delay in measurements.delays], "of a person")
     delay.set(ylabel="delay to a viewer, ms", yscale="log")
     delay.legend(fontsize="small")
     axes[-1].plot(hours, measurements.recorded, linewidth=1)

@@ -203,7 +203,7 @@ class Visitors:
             async with self._session.get(f"/objects/{number}/hls/index.m3u8") as answer:
                 self._judge("playlist", answer.status)
                 lines = (await answer.text()).splitlines() if answer.ok else []
-            new = [it for it in lines if it and not it.startswith("#") and it not in fetched]
+            new = [line for line in lines if line and not line.startswith("#") and line not in fetched]
             for name in new:
                 async with self._session.get(f"/objects/{number}/hls/{name}") as answer:
                     self._judge("segment", answer.status)

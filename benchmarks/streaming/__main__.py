@@ -94,8 +94,8 @@ def _watch(
         if "viewers" in parts:
             found.here = hls_here(site, numbers[0], seconds)
             found.nginx = hls_of_nginx(site, numbers[0], seconds, folder / "nginx")
-            found.too_many = [it for it in counts if it + _FREE > files]
-            possible = [it for it in counts if it + _FREE <= files]
+            found.too_many = [count for count in counts if count + _FREE > files]
+            possible = [count for count in counts if count + _FREE <= files]
             found.steps = step_up(site, crowd, numbers, possible, seconds)
             crowd.watch([])
             found.bare = bare_sends(films[0], max(possible), seconds) if possible else None

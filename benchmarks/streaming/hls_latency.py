@@ -125,8 +125,8 @@ async def _segments(session: aiohttp.ClientSession, player: _Player, seconds: fl
         numbers = [int(uri.partition(".")[0]) for _, uri in listed]
         if at < 0:
             last = (numbers[-1] + 1) * frames - 3 * target * SITE.fps
-            at = max(it for it in numbers if it * frames <= max(last, numbers[0] * frames))
-        news = [it for it in numbers if it >= at]
+            at = max(number for number in numbers if number * frames <= max(last, numbers[0] * frames))
+        news = [number for number in numbers if number >= at]
         for number in news:
             await _fetch(session, f"{number}.m4s")
             player.take(number * frames, frames)

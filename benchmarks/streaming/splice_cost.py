@@ -95,7 +95,7 @@ async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int)
             shelved.append(_US * (between - began) / (CAMERAS * cut.gop))
             decided.append(_US * (end - between) / (objects * cut.gop))
         else:
-            viewers = [it.subscribe().chunks() for it in cut.splicer.persons.values()]
+            viewers = [person.subscribe().chunks() for person in cut.splicer.persons.values()]
             for viewer in viewers:
                 await anext(viewer)
     return SpliceCost(objects, statistics.median(shelved), statistics.median(decided))

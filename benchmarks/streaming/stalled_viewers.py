@@ -61,7 +61,7 @@ class StallComparison:
     @property
     def ratio(self) -> float:
         """The p99 with stalled viewers divided by that without: medians over rounds."""
-        alone, beside = (statistics.median(it.p99 for it in turns) for turns in (self.alone, self.beside))
+        alone, beside = (statistics.median(turn.p99 for turn in turns) for turns in (self.alone, self.beside))
         return beside / alone
 
 
@@ -127,7 +127,7 @@ def stalling(port: int, paths: Sequence[str]) -> Iterator[list[socket.socket]]:
 def describe_stalled(report: Report, found: StallComparison) -> None:
     """Print the rounds, and their medians."""
     rows = [
-        [str(number), *(_cell(it, alone, beside) for it in _COLUMNS)]
+        [str(number), *(_cell(column, alone, beside) for column in _COLUMNS)]
         for number, (alone, beside) in enumerate(zip(found.alone, found.beside, strict=True), 1)
     ]
     report.table(
@@ -136,7 +136,7 @@ def describe_stalled(report: Report, found: StallComparison) -> None:
         rows,
     )
     report.say(f"p99 with stalled viewers / without: {found.ratio:.2f} (medians over rounds)")
-    alone, beside = (statistics.median(it.cores for it in turns) for turns in (found.alone, found.beside))
+    alone, beside = (statistics.median(turn.cores for turn in turns) for turns in (found.alone, found.beside))
     report.say(f"cores of the service: {beside:.3f} with, {alone:.3f} without (likewise)")
 
 

@@ -84,16 +84,16 @@ def _splices(report: Report, found: StreamMeasurements, encoded: TranscodeCost) 
 def _steps(report: Report, found: StreamMeasurements) -> None:
     rows = [
         [
-            f"{it.viewers}",
-            f"{it.cores:.2f}",
-            f"{it.crowd:.2f}",
-            f"{it.kbits:.0f}",
-            f"{100 * it.arrived:.0f} %",
-            f"{it.given:.0f}",
-            *(f"{value:.0f}" for value in it.delays),
-            f"{it.load:.1f}",
+            f"{step.viewers}",
+            f"{step.cores:.2f}",
+            f"{step.crowd:.2f}",
+            f"{step.kbits:.0f}",
+            f"{100 * step.arrived:.0f} %",
+            f"{step.given:.0f}",
+            *(f"{value:.0f}" for value in step.delays),
+            f"{step.load:.1f}",
         ]
-        for it in found.steps
+        for step in found.steps
     ]
     columns = ["viewers", "cores", "reader's", "kbit/s each", "arrived"]
     columns += ["sent ms", "p50 ms", "p95 ms", "p99 ms", "load"]
@@ -183,12 +183,12 @@ def _watched_rows(watched: WatchingCost) -> list[list[str]]:
 
 def per_core(steps: Sequence[ViewerStep]) -> tuple[float, float]:
     """Fit a line to the cores; return the cores without viewers, and the viewers that fill a core."""
-    slope, alone = np.polyfit([it.viewers for it in steps], [it.cores for it in steps], 1)
+    slope, alone = np.polyfit([step.viewers for step in steps], [step.cores for step in steps], 1)
     return float(alone), float((1.0 - alone) / slope)
 
 
 def _viewer_rows(found: StreamMeasurements) -> list[list[str]]:
-    soon = max((it.viewers for it in found.steps if it.delays[2] < _SOON_MS), default=0)
+    soon = max((step.viewers for step in found.steps if step.delays[2] < _SOON_MS), default=0)
     rows = [
         [
             "viewers with p99 below 40 ms",
@@ -197,7 +197,7 @@ def _viewer_rows(found: StreamMeasurements) -> list[list[str]]:
             "of the tried counts; all receive each GOP at once",
         ]
     ]
-    whole = [it for it in found.steps if it.arrived > _WHOLE]
+    whole = [step for step in found.steps if step.arrived > _WHOLE]
     if len(whole) > 1:
         alone, count = per_core(whole)
         how = (
@@ -229,11 +229,11 @@ def plot(found: StreamMeasurements, path: Path) -> None:
     """Draw the cost and the delay of viewers."""
     figure = Figure(figsize=(9, 4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    viewers = [it.viewers for it in found.steps]
-    left.plot(viewers, [it.cores for it in found.steps], marker="o")
+    viewers = [step.viewers for step in found.steps]
+    left.plot(viewers, [step.cores for step in found.steps], marker="o")
     left.set(xlabel="viewers", ylabel="cores of the best-view process", xlim=(0, None), ylim=(0, None))
     for place, name in enumerate(("p50", "p95", "p99")):
-        right.plot(viewers, [it.delays[place] for it in found.steps], marker="o", label=name)
+        right.plot(viewers, [step.delays[place] for step in found.steps], marker="o", label=name)
     right.axhline(_SOON_MS, color="black", linestyle="--", linewidth=1, label="40 ms")
     right.set(xlabel="viewers", ylabel="ms until a GOP has arrived", xlim=(0, None), ylim=(0, None))
     right.legend()

@@ -150,33 +150,35 @@ def print_errors(report: Report, tallies: dict[int, MergeCounts], how: str) -> N
     """Print Fig. 5, with the published results."""
     rows = []
     for people, tally in tallies.items():
-        errors = [str(it) for it in tally.errors.values()]
+        errors = [str(error) for error in tally.errors.values()]
         rows.append([f"{people} people", str(tally.merges), str(tally.chances), *errors, _shares([tally])])
         published = [str(it) for it in PUBLISHED[people]]
         rows.append(["  theirs", published[0], "", *published[1:], _of([PUBLISHED[people]])])
     every = list(tallies.values())
-    merges, chances = sum(it.merges for it in every), sum(it.chances for it in every)
-    errors = [str(sum(it.errors[stages] for it in every)) for stages in STAGES]
+    merges, chances = sum(counts.merges for counts in every), sum(counts.chances for counts in every)
+    errors = [str(sum(counts.errors[stages] for counts in every)) for stages in STAGES]
     rows.append(["all", str(merges), str(chances), *errors, _shares(every)])
     published = [str(sum(column)) for column in zip(*PUBLISHED.values(), strict=True)]
     rows.append(["  theirs", published[0], "", *published[1:], _of(list(PUBLISHED.values()))])
     report.table(
         f"Wrong identities after a merge, by the stages of the window (Fig. 5){how}",
-        ["in the room", "merges", "people in them", *(f"{it} st." for it in STAGES), "in % of these"],
+        ["in the room", "merges", "people in them", *(f"{stages} st." for stages in STAGES), "in % of these"],
         rows,
     )
 
 
 def _shares(tallies: Sequence[MergeCounts]) -> str:
     """Return the errors as percentages of the people in merges."""
-    chances = max(sum(it.chances for it in tallies), 1)
-    return " ".join(f"{100 * sum(it.errors[stages] for it in tallies) / chances:.0f}" for stages in STAGES)
+    chances = max(sum(counts.chances for counts in tallies), 1)
+    return " ".join(
+        f"{100 * sum(counts.errors[stages] for counts in tallies) / chances:.0f}" for stages in STAGES
+    )
 
 
 def _of(published: Sequence[tuple[int, ...]]) -> str:
     """Return the published errors as percentages of the published merges."""
     merges, *errors = (sum(column) for column in zip(*published, strict=True))
-    return " ".join(f"{100 * it / merges:.0f}" for it in errors)
+    return " ".join(f"{100 * error / merges:.0f}" for error in errors)
 
 
 def print_edges(report: Report, tallies: dict[int, MergeCounts]) -> None:
@@ -204,8 +206,8 @@ def print_edges(report: Report, tallies: dict[int, MergeCounts]) -> None:
         f"Solving a window of {max(STAGES)} stages: ms, mean (and max.) of one window in {_TIMED_EVERY}",
         ["in the room", *METHODS],
         [
-            [f"{people} people", *(_time_of(it.milliseconds[method]) for method in METHODS)]
-            for people, it in tallies.items()
+            [f"{people} people", *(_time_of(counts.milliseconds[method]) for method in METHODS)]
+            for people, counts in tallies.items()
         ],
     )
 

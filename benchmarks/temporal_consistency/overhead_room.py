@@ -61,8 +61,8 @@ def render_sequence(
     scene = _scene(clip, clip.people, stage_s)
     empty = _scene(clip, 0, stage_s)
     eyes = [
-        _BlobReader(scene.homography(0), [empty.image(0, it) for it in range(_EMPTY)], it)
-        for it in saturations
+        _BlobReader(scene.homography(0), [empty.image(0, frame) for frame in range(_EMPTY)], saturation)
+        for saturation in saturations
     ]
     for frame in range(round(clip.minutes * 60.0 / stage_s)):
         image, truth = scene.image(0, frame), scene.truth(frame)[0]

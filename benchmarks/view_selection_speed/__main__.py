@@ -43,7 +43,12 @@ def decision_row(seen_by: int, gop: int, epochs: int, *, all_terms: bool) -> lis
         spent.people,
         spent.publishing,
     )
-    return [f"{seen_by}", f"{gop}", "all" if all_terms else "default", *(f"{1e3 * it:.2f}" for it in stages)]
+    return [
+        f"{seen_by}",
+        f"{gop}",
+        "all" if all_terms else "default",
+        *(f"{1e3 * stage:.2f}" for stage in stages),
+    ]
 
 
 def plot(report: dict[str, tuple[tuple[int, ...], list[float]]], path: Path) -> None:
@@ -70,8 +75,8 @@ def run(options: argparse.Namespace) -> None:
         ["GOP", "free", "shots of a second"],
         [program_row(gop, repeats) for gop in _GOPS],
     )
-    people = [frame_time(ProgramSize(it, _CAMERAS, _AHEAD, 10, 0), repeats) for it in _MORE_PEOPLE]
-    cameras = [frame_time(ProgramSize(_PEOPLE, it, _AHEAD, 10, 0), repeats) for it in _MORE_CAMERAS]
+    people = [frame_time(ProgramSize(people, _CAMERAS, _AHEAD, 10, 0), repeats) for people in _MORE_PEOPLE]
+    cameras = [frame_time(ProgramSize(_PEOPLE, count, _AHEAD, 10, 0), repeats) for count in _MORE_CAMERAS]
     report.table(
         "Growth, GOP 10; µs a frame",
         ["objects", "time", "cameras", "time"],

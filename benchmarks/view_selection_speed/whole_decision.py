@@ -106,7 +106,7 @@ class _AppearanceRegistry:
     ) -> IdentityUpdate:
         """Return the id of every tracklet."""
         del last_frame, pictures
-        numbers = {TrackletKey(*it.key, 0): int(it.appearance[0].histogram[0]) for it in tracks}
+        numbers = {TrackletKey(*track.key, 0): int(track.appearance[0].histogram[0]) for track in tracks}
         return IdentityUpdate(numbers, created=(), returned=(), departed=(), merged=(), split=())
 
 

@@ -39,7 +39,10 @@ def data(tmp_path: Path) -> Path:
     write_rows(folder / "gt.txt", people)
     write_rows(
         folder / "det.txt",
-        [MotRow(it.frame, -1, it.left, it.top, it.width, it.height, 0.9) for it in people],
+        [
+            MotRow(person.frame, -1, person.left, person.top, person.width, person.height, 0.9)
+            for person in people
+        ],
     )
     return tmp_path / "data"
 

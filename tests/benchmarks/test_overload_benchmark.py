@@ -88,6 +88,6 @@ def test_frames_are_counted_at_the_end_and_what_is_not_known_is_told_so() -> Non
 def test_a_stream_has_no_hole_however_many_cameras_there_are(tmp_path: Path) -> None:
     with run_growing_site(3, tmp_path) as site:
         result = asyncio.run(load(site, 3, 10.0, 10.0))
-    assert [it.cameras for it in result.steps][:2] == [1, 2]
-    assert all(it.missing_frames == 0 for it in result.steps)
-    assert all(np.isfinite(it.delays[0]) for it in result.steps)
+    assert [step.cameras for step in result.steps][:2] == [1, 2]
+    assert all(step.missing_frames == 0 for step in result.steps)
+    assert all(np.isfinite(step.delays[0]) for step in result.steps)

@@ -99,7 +99,7 @@ def test_what_is_kept_is_counted_in_the_time_of_the_site(tmp_path: Path) -> None
         (tmp_path / f"{camera}.mp4").touch()
     content = {
         "site": recordings.site,
-        "cameras": [{**it, "source": "scene:room"} for it in recordings.cameras],
+        "cameras": [{**camera, "source": "scene:room"} for camera in recordings.cameras],
         **recordings.settings(tmp_path / "recorded", 3.0),
     }
     config = build_config(content, where="soak", folder=tmp_path)
@@ -151,7 +151,7 @@ async def test_a_person_may_be_forgotten_and_a_camera_may_not() -> None:
         watching.cancel()
         await asyncio.gather(watching, return_exceptions=True)
     assert "the stream of a camera ended" in visitors.faults
-    assert not [it for it in visitors.faults if "person" in it or "people" in it]
+    assert not [fault for fault in visitors.faults if "person" in fault or "people" in fault]
     assert visitors.camera.missing_frames == visitors.person.missing_frames == 0
 
 

@@ -58,7 +58,9 @@ def composed(files: tuple[str, ...], tmp_path: Path) -> dict[str, Any]:
     secrets = tmp_path / "secrets"
     (secrets / "public").mkdir(parents=True)
     (secrets / "web").mkdir()
-    plain = {name: it for name, it in os.environ.items() if not name.startswith(("MYVIEW_", "COMPOSE_"))}
+    plain = {
+        name: value for name, value in os.environ.items() if not name.startswith(("MYVIEW_", "COMPOSE_"))
+    }
     variables = {
         "MYVIEW_SECRETS": str(secrets),
         "MYVIEW_SERVER": "10.0.0.5",
@@ -130,9 +132,9 @@ def test_each_service_has_its_own_secrets_alone() -> None:
     for camera in load_config(ROOT / "configs" / "demo.yaml").camera_ids:
         assert used[camera] == [f"{camera}_bus", f"{camera}_pulses", f"{camera}_token"]
     assert sorted(secrets) == sorted(source for sources in used.values() for source in sources)
-    files = [it["file"] for it in secrets.values()]
+    files = [secret["file"] for secret in secrets.values()]
     assert len(set(files)) == len(files)
-    assert all(it.startswith("${MYVIEW_SECRETS:-./secrets}/") for it in files)
+    assert all(file.startswith("${MYVIEW_SECRETS:-./secrets}/") for file in files)
 
 
 def test_the_secure_site_trusts_nobody_by_where_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,7 +160,7 @@ def test_what_a_machine_has_to_be_told_stands_in_the_example_of_its_env_file(fil
     assert needed
     text = (ROOT / "docs" / "how-to" / "containers.md").read_text(encoding="utf-8")
     blocks = [it.partition("\n")[2] for it in text.split("```")[1::2]]
-    (env,) = [it for it in blocks if it.startswith("COMPOSE_FILE=") and file in it]
+    (env,) = [block for block in blocks if block.startswith("COMPOSE_FILE=") and file in block]
     assert needed | {"MYVIEW_CONFIG"} <= {line.partition("=")[0] for line in env.splitlines()}
 
 

@@ -41,7 +41,7 @@ async def test_who_is_pointed_at_has_their_number_again_and_the_stream_goes_on(t
 async def point(site: RunningSite, page: Page) -> None:
     gops = site.gops
     await site.until(lambda: gops[-1].first > MET, "they have met")
-    came = [it for it in gops if it.first + it.frames <= MET and len(left_to_right(it)) == len("LR")]
+    came = [gop for gop in gops if gop.first + gop.frames <= MET and len(left_to_right(gop)) == len("LR")]
     who, other = left_to_right(came[-1])
     await site.until(lambda: left_to_right(gops[-1]) == [other, who], "their tracker exchanges them")
     await page.goto(f"{site.url}?object={who}")
@@ -62,8 +62,8 @@ async def point(site: RunningSite, page: Page) -> None:
         await page.wait_for_function(f"myview.pulse !== {pulse} || {taken}")
     exchanged = {Split(who, other, ALIKE), Split(other, who, ALIKE)}
     async with asyncio.timeout(PATIENCE_MS / 1000):
-        await site.until(lambda: any(exchanged <= {*it.split} for it in gops), "the camera solves anew")
-    place = next(n for n, it in enumerate(gops) if exchanged <= {*it.split})
+        await site.until(lambda: any(exchanged <= {*gop.split} for gop in gops), "the camera solves anew")
+    place = next(n for n, gop in enumerate(gops) if exchanged <= {*gop.split})
     assert left_to_right(gops[place - 1]) == [other, who], "what was told before stays"
     assert left_to_right(gops[place]) == [who, other], "what is told next is as they were before they met"
     assert gops[place].choices[who] == ALIKE

@@ -111,8 +111,8 @@ async def killed(site: RunningSite, words: list[CameraTracks]) -> None:
     for track, numbers_now in again().items():
         assert numbers_now & told[track], f"{track}: {told[track]} {numbers_now}"
     now = whose(site.gops[count:], words)
-    used = {it for numbers in told.values() for it in numbers}
-    new = {it for track, numbers in now.items() if track not in told for it in numbers} - used
+    used = {number for numbers in told.values() for number in numbers}
+    new = {number for track, numbers in now.items() if track not in told for number in numbers} - used
     assert all(it > max(used) for it in new), "numbers are not used twice"
 
 

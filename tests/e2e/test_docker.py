@@ -62,15 +62,17 @@ async def _sees_somebody(site: ComposeSite, camera: str, after: int) -> None:
 def test_five_containers_are_healthy(site: ComposeSite) -> None:
     containers = site.containers()
     assert set(containers) == SERVICES
-    assert {it["State"]["Health"]["Status"] for it in containers.values()} == {"healthy"}
-    assert len({it["Image"] for it in containers.values()}) == 1, "one image serves all"
+    assert {container["State"]["Health"]["Status"] for container in containers.values()} == {"healthy"}
+    assert len({container["Image"] for container in containers.values()}) == 1, "one image serves all"
 
 
 def test_no_service_runs_as_root_and_only_the_best_view_is_published(site: ComposeSite) -> None:
     containers = site.containers()
     for service in SERVICES:
         assert site.compose("exec", "-T", service, "id", "-u") not in {"", "0"}
-    published = {name for name, it in containers.items() if any(it["NetworkSettings"]["Ports"].values())}
+    published = {
+        name for name, container in containers.items() if any(container["NetworkSettings"]["Ports"].values())
+    }
     assert published == {"bestview"}
 
 

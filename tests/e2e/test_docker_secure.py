@@ -134,7 +134,7 @@ async def _bad_messages(viewer: aiohttp.ClientSession) -> float:
 
 def test_all_are_healthy_by_https_and_with_tokens(secure: Secure) -> None:
     containers = secure.site.containers()
-    assert {it["State"]["Health"]["Status"] for it in containers.values()} == {"healthy"}
+    assert {container["State"]["Health"]["Status"] for container in containers.values()} == {"healthy"}
 
 
 def test_each_has_its_own_secrets_and_they_are_in_no_variable(secure: Secure) -> None:
@@ -214,7 +214,7 @@ async def test_a_token_that_is_taken_away_lets_nobody_in(
     lines = tokens.read_text("utf-8").splitlines(keepends=True)
     assert (await viewer.get("/api/site")).status == 200
     anew = tokens.with_suffix(".new")
-    anew.write_text("".join(it for it in lines if "operator" not in it), encoding="utf-8")
+    anew.write_text("".join(line for line in lines if "operator" not in line), encoding="utf-8")
     anew.replace(tokens)
     async with asyncio.timeout(10):
         while (await viewer.get("/api/site")).status != 401:  # noqa: ASYNC110

@@ -18,10 +18,10 @@ NAMES = ("kill camera", "kill sync")
 async def test_viewers_notice_neither_a_killed_camera_nor_killed_pulses(tmp_path: Path) -> None:
     chosen = [fault for fault in faults_processes.FAULTS if fault.name in NAMES]
     outcomes = await measure(chosen, tmp_path, Report())
-    assert [it.fault.name for it in outcomes] == [fault.name for fault in chosen]
-    for it in outcomes:
-        assert not it.failed, it.fault.name
-        assert it.reconnections == 0, it.fault.name
-        assert sum(received.frames for received in it.received) > 100
-        assert [note for received in it.received for note in received.notes] == []
-        assert (it.lost, it.broken_files) == (0, 0)
+    assert [outcome.fault.name for outcome in outcomes] == [fault.name for fault in chosen]
+    for outcome in outcomes:
+        assert not outcome.failed, outcome.fault.name
+        assert outcome.reconnections == 0, outcome.fault.name
+        assert sum(received.frames for received in outcome.received) > 100
+        assert [note for received in outcome.received for note in received.notes] == []
+        assert (outcome.lost, outcome.broken_files) == (0, 0)

@@ -67,8 +67,8 @@ async def test_a_bad_file_changes_nothing_and_a_good_one_breaks_no_stream(
         await bounded(viewer)
         await said(site, "waits for a restart of all processes: encode.crf")
         now = site.children()
-        assert {it: now[it] for it in processes if it != "c2"} == {
-            it: pid for it, pid in processes.items() if it != "c2"
+        assert {process: now[process] for process in processes if process != "c2"} == {
+            process: pid for process, pid in processes.items() if process != "c2"
         }
         await site.until(lambda: site.state("c1") == "live", "c1 has begun anew")
         site.process.send_signal(signal.SIGTERM)

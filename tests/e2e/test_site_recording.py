@@ -83,7 +83,7 @@ def it_beeps_every_second_without_a_hole(film: Path) -> None:
     times, beeps = heard(film)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
     assert len(beeps) >= 2
-    assert [it - round(it) for it in beeps] == pytest.approx([0] * len(beeps), abs=0.04)
+    assert [beep - round(beep) for beep in beeps] == pytest.approx([0] * len(beeps), abs=0.04)
 
 
 async def downloaded(session: aiohttp.ClientSession, path: str, folder: Path) -> dict[int, np.ndarray]:

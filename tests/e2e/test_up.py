@@ -156,7 +156,7 @@ def lacks(printed: Printed) -> list[str]:
             series = given(asked.expression, printed)
             if not series:
                 lacking.append(asked.place)
-            assert all(asked.shown <= dict(it).keys() for it in series), asked.place
+            assert all(asked.shown <= dict(one_series).keys() for one_series in series), asked.place
     return lacking
 
 
@@ -188,7 +188,7 @@ async def test_every_frame_is_the_chosen_cameras_own_pixel_for_pixel_across_cuts
         for pulse, picture in shown[f"object-{number}"].items():
             camera, last, before = chosen[number, pulse], before, picture
             if camera is None:  # two numbers were one person, or no camera could be shown: it stands still
-                possible = [last, *(shown[it].get(pulse) for it in CAMERAS)]
+                possible = [last, *(shown[camera].get(pulse) for camera in CAMERAS)]
                 assert any(it is not None and np.array_equal(picture, it) for it in possible), pulse
                 continue
             if pulse in shown[camera]:

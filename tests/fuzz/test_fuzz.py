@@ -30,7 +30,7 @@ def _no_settings_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delenv(name)
 
 
-@pytest.mark.parametrize("target", ALL, ids=[it.name for it in ALL])
+@pytest.mark.parametrize("target", ALL, ids=[target.name for target in ALL])
 def test_no_input_makes_it_crash(target: type[Target], tmp_path: Path) -> None:
     result = TargetRunner(target, target.name, FuzzPlan(INPUTS, SECONDS, seed=7, out=tmp_path)).run()
     found = "\n\n".join(it.read_text() for it in sorted(tmp_path.glob("*.txt")))
@@ -41,7 +41,7 @@ def test_no_input_makes_it_crash(target: type[Target], tmp_path: Path) -> None:
     assert counts.accepted + counts.refused == counts.inputs
 
 
-@pytest.mark.parametrize("target", ALL, ids=[it.name for it in ALL])
+@pytest.mark.parametrize("target", ALL, ids=[target.name for target in ALL])
 def test_its_inputs_are_the_same_in_every_run(target: type[Target]) -> None:
     one, other = target(), target()
     try:
@@ -201,7 +201,7 @@ def test_a_refusal_that_nobody_can_read_is_none(text: str) -> None:
         refused(ValueError(text))
 
 
-@pytest.mark.parametrize("target", ALL, ids=[it.name for it in ALL])
+@pytest.mark.parametrize("target", ALL, ids=[target.name for target in ALL])
 def test_it_leaves_everything_else_as_it_was(target: type[Target]) -> None:
     """Two at once, and the first ended first: what they foresee or hide must not outlive them."""
     before = dict(os.environ), dict(vars(floor_plan))

@@ -307,4 +307,4 @@ async def test_what_is_no_request_leaves_no_traceback_in_the_log(
             writer.close()
     assert not answer or answer.startswith(b"HTTP/1.1 4")
     assert b"Traceback" not in answer
-    assert not [it for it in caplog.records if it.exc_info and it.levelno >= logging.INFO]
+    assert not [record for record in caplog.records if record.exc_info and record.levelno >= logging.INFO]

@@ -85,7 +85,7 @@ def test_every_answer_is_one_that_is_described(
 
         with contextlib.suppress(Unsatisfiable):  # nothing that could be asked of it is wrong
             ask()
-    assert not [it for it in caplog.records if it.exc_info and it.levelno >= logging.WARNING]
+    assert not [record for record in caplog.records if record.exc_info and record.levelno >= logging.WARNING]
 
 
 def _has(operation: Any, mode: GenerationMode) -> bool:

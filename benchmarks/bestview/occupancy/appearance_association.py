@@ -102,15 +102,18 @@ def assign_ids(paths: Sequence[PathAppearance], person: float, settings: Meeting
         person: a person's height in ground units.
         settings: of meetings.
     """
-    numbers = [np.full(len(it.places), place + 1, dtype=np.int64) for place, it in enumerate(paths)]
+    numbers = [np.full(len(path.places), place + 1, dtype=np.int64) for place, path in enumerate(paths)]
     known = [
-        _AppearanceSums(np.zeros(it.histograms.shape[1:]), np.zeros(it.pixels.shape[1:])) for it in paths
+        _AppearanceSums(np.zeros(path.histograms.shape[1:]), np.zeros(path.pixels.shape[1:]))
+        for path in paths
     ]
-    last_seen = [it.first for it in paths]
+    last_seen = [path.first for path in paths]
     meetings = _meetings(paths, settings.near * person)
     for place, meeting in enumerate(meetings):
         continuing = sorted(
-            it for it in meeting.members if paths[it].first < meeting.begin and paths[it].end > meeting.end
+            member
+            for member in meeting.members
+            if paths[member].first < meeting.begin and paths[member].end > meeting.end
         )
         ids = [int(numbers[it][meeting.begin - 1 - paths[it].first]) - 1 for it in continuing]
         for path, number in zip(continuing, ids, strict=True):
@@ -119,10 +122,10 @@ def assign_ids(paths: Sequence[PathAppearance], person: float, settings: Meeting
         for path in meeting.members:
             last_seen[path] = meeting.end
         for column, path in enumerate(continuing):
-            later = (it.begin for it in meetings[place + 1 :] if path in it.members)
+            later = (meeting.begin for meeting in meetings[place + 1 :] if path in meeting.members)
             end = min(next(later, paths[path].end), meeting.end + settings.most_frames)
             after = paths[path].sum_over(meeting.end, end)
-            distance[:, column] = [known[it].distance(after, settings.least_pixels) for it in ids]
+            distance[:, column] = [known[number].distance(after, settings.least_pixels) for number in ids]
         if len(continuing) < 2 or np.isnan(distance).any():
             continue
         rows, columns = linear_sum_assignment(distance - settings.margin * np.eye(len(continuing)))

@@ -96,21 +96,23 @@ def aligned_views(
 ) -> dict[str, CameraView]:
     """Return the cameras' geometry, with aligned homographies."""
     views = {
-        camera: CameraView(ground[camera], it.size, it.height_model, it.weight)
-        for camera, it in masks.items()
+        camera: CameraView(ground[camera], mask.size, mask.height_model, mask.weight)
+        for camera, mask in masks.items()
     }
     person = float(np.median([view.person() for view in views.values()]))
-    aligned = align_homographies(boxes, ground, {camera: it.size[1] for camera, it in views.items()}, person)
+    aligned = align_homographies(
+        boxes, ground, {camera: view.size[1] for camera, view in views.items()}, person
+    )
     return {camera: replace(view, homography=aligned[camera]) for camera, view in views.items()}
 
 
 def occupancy(floor: FloorGrid, masks: Sequence[ForegroundMasks], settings: OccupancySettings) -> Floats:
     """Return the probability (T, L) of a person at each place in each frame."""
     mapping = OccupancyMap(floor.rectangles, settings)
-    frames = max(len(it.foreground) for it in masks)
+    frames = max(len(mask.foreground) for mask in masks)
     q = np.empty((frames, len(floor.places)))
     for frame in range(frames):
-        q[frame] = mapping.compute([_observation(it, frame) for it in masks])
+        q[frame] = mapping.compute([_observation(mask, frame) for mask in masks])
     return q
 
 

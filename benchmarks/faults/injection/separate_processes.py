@@ -91,9 +91,9 @@ async def run_separately(
         finally:
             fault_site.exits += await asyncio.gather(
                 *(
-                    terminate_process(name, it)
-                    for name, it in control.processes.items()
-                    if it.returncode is None
+                    terminate_process(name, process)
+                    for name, process in control.processes.items()
+                    if process.returncode is None
                 )
             )
 

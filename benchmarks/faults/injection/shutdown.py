@@ -43,12 +43,14 @@ async def shut_down_right_after_start(views: StampedViews, folder: Path) -> list
             single = SeparateProcesses(config, log)
             for name in NAMES:
                 await single.start(name)
-            await asyncio.gather(*(_wait_for_sigterm_handler(it) for it in single.processes.values()))
+            await asyncio.gather(
+                *(_wait_for_sigterm_handler(process) for process in single.processes.values())
+            )
             await asyncio.sleep(moment)
             exits += await asyncio.gather(
                 *(
-                    terminate_process(f"{name} after {moment:g} s", it)
-                    for name, it in single.processes.items()
+                    terminate_process(f"{name} after {moment:g} s", process)
+                    for name, process in single.processes.items()
                 )
             )
     return exits

@@ -100,8 +100,8 @@ async def _all_watch(fault_site: FaultSite) -> None:
     """Wait, up to a limit, until all viewers receive video and one is shown the network camera, if any."""
     give_up = time.monotonic() + _JOIN_S
     while time.monotonic() < give_up:
-        shown = {fault_site.events.shown(it.number) for it in fault_site.viewers}
-        if all(it.last_came for it in fault_site.viewers) and shown.issuperset(fault_site.live[:1]):
+        shown = {fault_site.events.shown(viewer.number) for viewer in fault_site.viewers}
+        if all(viewer.last_came for viewer in fault_site.viewers) and shown.issuperset(fault_site.live[:1]):
             return
         await asyncio.sleep(_POLL_S)
 
@@ -111,7 +111,7 @@ async def _all_back(fault_site: FaultSite) -> None:
     give_up = time.monotonic() + _BACK_S
     while time.monotonic() < give_up:
         if fault_site.ready_times and all(
-            it.last_came > fault_site.ready_times[0] + RHYTHM_S for it in fault_site.viewers
+            viewer.last_came > fault_site.ready_times[0] + RHYTHM_S for viewer in fault_site.viewers
         ):
             return
         await asyncio.sleep(_POLL_S)

@@ -51,7 +51,7 @@ async def _group(
     except (ClientError, RuntimeError) as error:
         report.say(f"{faults[0].name} and what follows it: {error}")
         report.say(await asyncio.to_thread(_log_of, folder))
-        outcomes += [FaultOutcome(it, failed="the site did not run") for it in faults[len(outcomes) :]]
+        outcomes += [FaultOutcome(fault, failed="the site did not run") for fault in faults[len(outcomes) :]]
     return outcomes
 
 

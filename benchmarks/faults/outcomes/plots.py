@@ -17,7 +17,7 @@ _ROW_INCHES = 0.35
 
 def draw(outcomes: Sequence[FaultOutcome], path: Path) -> None:
     """Draw a line per fault and viewer; time counts from when the fault began."""
-    lines = [(it, received) for it in outcomes for received in it.received]
+    lines = [(outcome, received) for outcome in outcomes for received in outcome.received]
     if not lines:
         return
     figure = Figure(figsize=(10, 1.2 + _ROW_INCHES * len(lines)), layout="constrained")

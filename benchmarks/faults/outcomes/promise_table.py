@@ -25,7 +25,7 @@ def describe(report: Report, outcomes: Sequence[FaultOutcome]) -> None:
         "recorded",
         "exit",
     ]
-    report.table("faults", [*columns, "kept"], [_row(it) for it in outcomes])
+    report.table("faults", [*columns, "kept"], [_row(outcome) for outcome in outcomes])
     for outcome in outcomes:
         notes = [outcome.failed, *(note for it in outcome.received for note in it.notes), *outcome.differing]
         notes += [f"{it.name}: {it.seconds:.2f} s, {it.code}" for it in outcome.exits if not it.clean]
@@ -36,7 +36,7 @@ def describe(report: Report, outcomes: Sequence[FaultOutcome]) -> None:
         if late:
             said = f"{min(late)} to {max(late)} frames behind their pulses, half of them {median_low(late)}"
             report.say(f"{outcome.fault.name}: pictures of the network camera are {said} at most")
-    broken = [it.fault.name for it in outcomes if not keeps_promises(it)]
+    broken = [outcome.fault.name for outcome in outcomes if not keeps_promises(outcome)]
     report.say(f"{len(outcomes) - len(broken)} of {len(outcomes)} keep all promises" + _list(broken))
 
 

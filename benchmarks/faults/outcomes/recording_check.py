@@ -95,5 +95,7 @@ def note(outcomes: Sequence[FaultOutcome], events: EventLog, files: Sequence[Rec
             outcome.failed = "the recording did not resume"
         last = number == len(outcomes) - 1
         until = shown[-1].first + shown[-1].frames
-        own_files = [it for it in files if shown[0].first <= it.first < until or (last and it.first >= until)]
+        own_files = [
+            file for file in files if shown[0].first <= file.first < until or (last and file.first >= until)
+        ]
         outcome.broken_files = sum(not file.plays for file in own_files)

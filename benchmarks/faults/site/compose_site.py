@@ -134,7 +134,9 @@ def run_compose_site(files: Sequence[Path] = PLAIN, **variables: str) -> Iterato
     if missing is not None:
         raise CannotRunError(missing)
     project = f"myview-test-{uuid.uuid4().hex[:8]}"
-    plain = {name: it for name, it in os.environ.items() if not name.startswith(("MYVIEW_", "COMPOSE_"))}
+    plain = {
+        name: value for name, value in os.environ.items() if not name.startswith(("MYVIEW_", "COMPOSE_"))
+    }
     environment = {
         **plain,
         "COMPOSE_PROJECT_NAME": project,

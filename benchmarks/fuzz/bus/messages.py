@@ -98,7 +98,7 @@ class IngestMessages(Target):
                     handle(message)
         aligner.ready(now=100)
         ingest.forget_thumbnails_before(1)
-        return not any(it.bad_messages for it in ingest.states.values())
+        return not any(state.bad_messages for state in ingest.states.values())
 
 
 class PeerMessages(ScriptTarget):

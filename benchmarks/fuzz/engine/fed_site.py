@@ -47,7 +47,7 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
         "encode": {"gop": GOP, "codec": codec},
-        "cameras": [{"id": it, "source": "scene:room", "ground": _GROUND} for it in CAMERAS],
+        "cameras": [{"id": camera, "source": "scene:room", "ground": _GROUND} for camera in CAMERAS],
         "track": {
             "window": {"window": 5, "stride": STRIDE, "birth_window": 5},
             "backlog_s": 0.2,
@@ -212,7 +212,7 @@ class FedService(BestViewPipeline):
     @property
     def dropped(self) -> int:
         """The number of dropped messages."""
-        return sum(it.bad_messages for it in self.ingest.states.values())
+        return sum(state.bad_messages for state in self.ingest.states.values())
 
 
 def feed_epoch(

@@ -129,7 +129,9 @@ def _raise_hang(_: int, __: FrameType | None) -> None:
 def _kind(error: BaseException) -> str:
     """Name a crash by its exception and place, so that crashes of one kind have one cause."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = [it for it in frames if "site-packages" not in it.filename and "fuzz_" not in it.filename]
+    ours = [
+        frame for frame in frames if "site-packages" not in frame.filename and "fuzz_" not in frame.filename
+    ]
     place = ours[-1] if ours else frames[-1] if frames else None
     where = "" if place is None else f"{Path(place.filename).stem}-{place.name.strip('<>')}"
     return f"{type(error).__name__}-{where}"

@@ -50,7 +50,7 @@ def _pairs(rng: Random) -> list[dict[str, Any]]:
 def _as_csv(cameras: dict[str, list[dict[str, Any]]]) -> bytes:
     lines = [",".join(COLUMNS)]
     for camera, pairs in cameras.items():
-        lines += [",".join(map(str, (camera, *it["image"], *it["floor"]))) for it in pairs]
+        lines += [",".join(map(str, (camera, *pair["image"], *pair["floor"]))) for pair in pairs]
     return ("\n".join(lines) + "\n").encode()
 
 
@@ -112,7 +112,7 @@ class MarkedPoints(_GroundFiles):
             fits = fit_cameras(read_points(self.written(data)).cameras)
         except (UserError, CalibrationError) as error:
             return refused(error)
-        assert all(np.isfinite(it.homography).all() for it in fits.values())
+        assert all(np.isfinite(fit.homography).all() for fit in fits.values())
         return True
 
 

@@ -147,7 +147,7 @@ class ConfigValues(_IsolatedConfig):
         content: Any = {name: self._sections[name] for name in names} | {"cameras": self._cameras}
         if not whole:
             some = {name: _some(rng, content[name]) for name in names}
-            content = some | {"cameras": [_some(rng, it, ("id", "source")) for it in self._cameras]}
+            content = some | {"cameras": [_some(rng, camera, ("id", "source")) for camera in self._cameras]}
         variables: dict[str, str] = {}
         if rng.random() < 0.1:
             section = rng.choice(names)

@@ -62,7 +62,7 @@ class RecordedRuns(ScriptTarget):
         self._service = self._loop.run_until_complete(self._record())
         (self._run,) = (self._path / "kept").glob("2*")
         files = sorted(it for it in self._run.rglob("*") if it.is_file())
-        self._right = {str(it.relative_to(self._run)): it.read_bytes() for it in files}
+        self._right = {str(file.relative_to(self._run)): file.read_bytes() for file in files}
         when = {
             "started": _PULSE0,
             "person_numbers_since": _PULSE0,
@@ -70,7 +70,9 @@ class RecordedRuns(ScriptTarget):
             "age_clock_at_pulse0": 1.0,
         }  # inputs are the same in every run
         self._right[INFO_FILE] = as_json({**msgspec.json.decode(self._right[INFO_FILE]), **when})
-        self._kinds = {it.suffix: [name for name in self._right if name.endswith(it.suffix)] for it in files}
+        self._kinds = {
+            file.suffix: [name for name in self._right if name.endswith(file.suffix)] for file in files
+        }
         self._restore()
 
     async def _record(self) -> FedService:

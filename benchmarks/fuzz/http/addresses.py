@@ -38,7 +38,7 @@ def address(rng: Random, path: str, queries: tuple[str, ...]) -> str:
         while "{" + name + "}" in path:
             value = rng.choice(values) if rng.random() < 0.8 else quote(str(odd(rng)), errors="replace")[:300]
             path = path.replace("{" + name + "}", value, 1)
-    asked = [f"{it}={_value(rng, it)}" for it in queries if rng.random() < 0.5]
+    asked = [f"{query}={_value(rng, query)}" for query in queries if rng.random() < 0.5]
     if rng.random() < 0.1:
         name = rng.choice(("overlay", "from", "prefer", "x"))
         asked.append(f"{name}={quote(str(odd(rng)), errors='replace')[:200]}")

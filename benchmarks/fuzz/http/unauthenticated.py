@@ -88,7 +88,9 @@ class UnauthenticatedRequests(Target):
         self._sessions = {
             token_digest(_COOKIES[who]): _Session(token_digest(SECRETS[who]), ends) for who in _WHO
         }
-        self._paths = [it for it in self._served.documented_addresses if not it[0].endswith(_MADE)]
+        self._paths = [
+            address for address in self._served.documented_addresses if not address[0].endswith(_MADE)
+        ]
         self._pictures = {
             "c0": _windows(0, 0.5) - _windows(1, 0.0),
             "c1": _windows(1, 0.5) - _windows(0, 0.0),

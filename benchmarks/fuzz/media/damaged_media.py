@@ -35,6 +35,6 @@ def stream(codec: Literal["h264", "vp8"], frames: int = 10) -> bytes:
         found.accept(units[0].data)
         head = found.init_segment((WIDTH, HEIGHT), FPS, form) or b""
         sound = audio_fragment(form, [form.silence] * 9, 0)
-        return head + sound + b"".join(found.pack(it.data, it.pulse, FPS, key=it.key) for it in units)
+        return head + sound + b"".join(found.pack(unit.data, unit.pulse, FPS, key=unit.key) for unit in units)
     head = stream_format.init_segment((WIDTH, HEIGHT), FPS)
-    return head + b"".join(stream_format.pack(it.data, it.pulse, FPS, key=it.key) for it in units)
+    return head + b"".join(stream_format.pack(unit.data, unit.pulse, FPS, key=unit.key) for unit in units)

@@ -104,7 +104,7 @@ class _Splice(ScriptTarget):
         read_api(service)
         for viewer in viewers:
             drain(viewer)
-        return not any(it.refused for it in service.ingest.states.values())
+        return not any(state.refused for state in service.ingest.states.values())
 
     async def _cut(self, cuts: _Cuts, units: _Units) -> bool:
         """Cut where the input says, also to pictures that never arrived."""
@@ -117,18 +117,20 @@ class _Splice(ScriptTarget):
                 number: None if it is None else CAMERAS[it]
                 for number, it in zip(_PEOPLE, chosen, strict=True)
             }
-            choices = tuple(ObjectChoice(it, now[it], before[it], now[it] is None) for it in _PEOPLE)
+            choices = tuple(
+                ObjectChoice(person, now[person], before[person], now[person] is None) for person in _PEOPLE
+            )
             decision = replace(
                 self._decided[0], first=gop * STRIDE, choices=choices, merged={}, corrections=()
             )
             service.recorder.put(service.decision_state.put(decision), None)
             service.splicer.publish_decision(decision)
             if gop == 0:
-                viewers += [it.subscribe() for it in service.splicer.persons.values()]
+                viewers += [person.subscribe() for person in service.splicer.persons.values()]
             before = now
         for viewer in viewers:
             drain(viewer)
-        return not any(it.refused for it in service.ingest.states.values())
+        return not any(state.refused for state in service.ingest.states.values())
 
     def _show(self, service: FedService, units: _Units, gop: int) -> None:
         for camera, pulse, data in units:

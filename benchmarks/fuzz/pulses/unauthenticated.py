@@ -82,7 +82,7 @@ class UnauthenticatedClients(ScriptTarget):
         for wire in wires[1:]:
             first, *others = map(parse_server_line, wire.lines)
             assert isinstance(first, LoginRequest)
-            assert all(isinstance(it, ErrorMessage) for it in others), others
+            assert all(isinstance(other, ErrorMessage) for other in others), others
             assert len(others) <= 1, others
         refused = server.refused
         await server.stop()

@@ -202,10 +202,10 @@ async def test_faults_of_a_site_that_does_not_start_are_broken_promises(tmp_path
     def not_started(views: StampedViews, folder: Path) -> AbstractAsyncContextManager[FaultSite]:
         raise RuntimeError(f"{folder}, {len(views.cameras)} cameras: did not start")
 
-    faults = [replace(it, setup=not_started) for it in FAULTS[:2]]
+    faults = [replace(fault, setup=not_started) for fault in FAULTS[:2]]
     outcomes = await _group(faults, VIEWS, tmp_path / "site", Report())
-    assert [it.fault for it in outcomes] == faults
-    assert not any(keeps_promises(it) for it in outcomes)
+    assert [outcome.fault for outcome in outcomes] == faults
+    assert not any(keeps_promises(outcome) for outcome in outcomes)
 
 
 async def test_a_stream_that_ends_meanwhile_fails_its_fault_and_no_other() -> None:

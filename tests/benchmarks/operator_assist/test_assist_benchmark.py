@@ -96,7 +96,7 @@ def test_a_second_flag_waits_until_the_first_is_over_and_is_let_be_if_all_is_ove
         first, second = operator.flags
         assert first.fish == 0
         assert (second.fish == 1) == seen_to
-        assert {it.object for it in pointings if it} == ({1, 2} if seen_to else {1})
+        assert {pointing.object for pointing in pointings if pointing} == ({1, 2} if seen_to else {1})
 
 
 def test_what_is_over_when_the_first_is_over_is_seen_again_from_a_moment_before() -> None:
@@ -112,7 +112,7 @@ def test_what_is_over_when_the_first_is_over_is_seen_again_from_a_moment_before(
     assert second.begun is not None
     assert second.begun > 61
     assert second.pointing_frames[0] in range(40, 61)
-    assert {it.object for it in pointings if it} == {1, 2}
+    assert {pointing.object for pointing in pointings if pointing} == {1, 2}
 
 
 def test_who_was_lost_long_ago_is_seen_again_when_they_were_still_there() -> None:
@@ -166,7 +166,7 @@ def test_what_a_flag_was_good_for_is_told_by_the_fish_that_its_tracks_were_on(
     truth = _truth()
     flag = OperatorFlag(_event((1, 2), 105, 0.5), 1, raised=90, until=105, fish=followed)
     outcome_counts = count([(_watched(truth, alone), _watched(truth, helped, [flag]))], OperatorProfile())
-    assert {it for _, it in outcome_counts.flags} == {outcome}
+    assert {flag for _, flag in outcome_counts.flags} == {outcome}
 
 
 def test_a_flag_about_others_than_those_who_fail_was_not_needed() -> None:

@@ -75,7 +75,11 @@ def seen(
             (boxes[:, 0] > 2) & (boxes[:, 1] > 2) & (boxes[:, 2] < SIZE[0] - 2) & (boxes[:, 3] < SIZE[1] - 2)
         )
         parts = np.split(np.arange(len(path)), np.flatnonzero(np.diff(whole.astype(int))) + 1)
-        tracks += [WalkTrack(int(it[0]) - offset, boxes[it]) for it in parts if whole[it[0]] and len(it) > 10]
+        tracks += [
+            WalkTrack(int(part[0]) - offset, boxes[part])
+            for part in parts
+            if whole[part[0]] and len(part) > 10
+        ]
     return Walk(name, SIZE, tuple(tracks))
 
 

@@ -42,4 +42,4 @@ _PIECE = 4
 def tells(text: str, password: str, without: str) -> bool:
     """Return whether four characters of a password are in a text, that are not there without it."""
     pieces = {password[at : at + _PIECE] for at in range(len(password) - _PIECE + 1)}
-    return any(it in text and it not in without for it in pieces)
+    return any(piece in text and piece not in without for piece in pieces)

@@ -94,7 +94,7 @@ def sends(service: FedService, recording: Path, silent: range = range(0)) -> lis
     """Send all of the recording's sound, but for some frames; give its frames."""
     sound = RecordedAudioSource(str(recording), service.config.sound, FPS, 0, "stop")
     frames = [*sound.until(0), *sound.until(FRAMES)]
-    for message in messages([it for it in frames if it.number not in silent]):
+    for message in messages([frame for frame in frames if frame.number not in silent]):
         service.ingest.audio(message)
     return [frame.data for frame in frames]
 
@@ -121,8 +121,8 @@ def heard(stream: bytes, kind: str | None = None) -> tuple[NDArray[np.float64], 
     """Return what is heard of a stream: times of all samples (seconds), and the samples, in one channel."""
     with av.open(io.BytesIO(stream), format=kind) as container:
         frames = list(container.decode(audio=0))
-    times = [float(it.time or 0) + np.arange(it.samples) / it.sample_rate for it in frames]
-    return np.concatenate(times), np.concatenate([it.to_ndarray()[0] for it in frames])
+    times = [float(frame.time or 0) + np.arange(frame.samples) / frame.sample_rate for frame in frames]
+    return np.concatenate(times), np.concatenate([frame.to_ndarray()[0] for frame in frames])
 
 
 def beeps(stream: bytes, kind: str | None = None) -> list[float]:

@@ -322,7 +322,7 @@ class SiteServer:
     async def _told(self, request: web.Request) -> web.Response:
         first, end = (int(request.query[name][1:]) for name in ("from", "to"))
         gops = range(first - first % GOP, min(end, self.site.edge), GOP)
-        return web.Response(text="".join(json.dumps(self.site.gop(it)) + "\n" for it in gops))
+        return web.Response(text="".join(json.dumps(self.site.gop(gop)) + "\n" for gop in gops))
 
     async def _thumbnail(self, request: web.Request) -> web.Response:
         return web.Response(body=thumbnail(int(request.match_info["k"])), content_type="image/jpeg")

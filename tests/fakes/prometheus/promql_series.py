@@ -32,9 +32,9 @@ class Printed:
         samples: dict[str, set[Series]] = {}
         kinds: dict[str, str] = {}
         for family in text_string_to_metric_families(text):
-            for it in family.samples:
-                samples.setdefault(it.name, set()).add(frozenset(it.labels.items()))
-                kinds[it.name] = "counter" if family.type in {"counter", "histogram"} else family.type
+            for sample in family.samples:
+                samples.setdefault(sample.name, set()).add(frozenset(sample.labels.items()))
+                kinds[sample.name] = "counter" if family.type in {"counter", "histogram"} else family.type
         return cls(samples, kinds)
 
 
@@ -73,13 +73,17 @@ def _given(node: promql.Expr, printed: Printed) -> set[Series]:
             sides = [it for it in (node.lhs, node.rhs) if not isinstance(it, promql.NumberLiteral)]
             if node.modifier is not None and node.modifier.matching is not None:
                 raise ValueError(f"not known here: {node.modifier}")
-            return set.intersection(*(_given(it, printed) for it in sides))
+            return set.intersection(*(_given(side, printed) for side in sides))
     raise ValueError(f"not known here: {type(node).__name__}")
 
 
 def _selected(node: promql.VectorSelector, printed: Printed) -> set[Series]:
-    wanted = {it.name: it.value for it in node.matchers.matchers if it.name not in GIVEN_BY_PROMETHEUS}
-    if any(it.op != promql.MatchOp.Equal for it in node.matchers.matchers):
+    wanted = {
+        matcher.name: matcher.value
+        for matcher in node.matchers.matchers
+        if matcher.name not in GIVEN_BY_PROMETHEUS
+    }
+    if any(matcher.op != promql.MatchOp.Equal for matcher in node.matchers.matchers):
         raise ValueError(f"not known here: {node.prettify()}")
     return {it for it in printed.samples.get(node.name or "", ()) if wanted.items() <= dict(it).items()}
 
@@ -88,9 +92,9 @@ def _called(node: promql.Call, printed: Printed) -> set[Series]:
     name = node.func.name
     if name == "histogram_quantile":
         buckets = _given(node.args[1], printed)
-        if not all("le" in dict(it) for it in buckets):
+        if not all("le" in dict(bucket) for bucket in buckets):
             raise ValueError(f"a quantile of what has no buckets: {node.prettify()}")
-        return {frozenset((label, value) for label, value in it if label != "le") for it in buckets}
+        return {frozenset((label, value) for label, value in bucket if label != "le") for bucket in buckets}
     (over,) = node.args
     if not isinstance(over, promql.MatrixSelector) or name not in _KIND_OF:
         raise ValueError(f"not known here: {name}")
@@ -106,6 +110,6 @@ def _summed(node: promql.AggregateExpr, printed: Printed) -> set[Series]:
     by = set(node.modifier.labels) if node.modifier is not None else set()
     if node.modifier is not None and node.modifier.type != promql.AggModifierType.By:
         raise ValueError(f"not known here: {node.modifier}")
-    if not all(by <= dict(it).keys() for it in series):
+    if not all(by <= dict(one_series).keys() for one_series in series):
         raise ValueError(f"by labels that there are not: {node.prettify()}")
-    return {frozenset((label, value) for label, value in it if label in by) for it in series}
+    return {frozenset((label, value) for label, value in one_series if label in by) for one_series in series}

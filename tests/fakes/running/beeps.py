@@ -34,7 +34,9 @@ def heard(path: Path) -> tuple[NDArray[np.float64], list[float]]:
     data = path.read_bytes()
     with av.open(io.BytesIO(data[: data.rfind(b"moof") - 4])) as container:
         frames = list(container.decode(audio=0))
-    times = np.concatenate([float(it.time or 0) + np.arange(it.samples) / it.sample_rate for it in frames])
-    loud = times[np.abs(np.concatenate([it.to_ndarray()[0] for it in frames])) > 0.1]
+    times = np.concatenate(
+        [float(frame.time or 0) + np.arange(frame.samples) / frame.sample_rate for frame in frames]
+    )
+    loud = times[np.abs(np.concatenate([frame.to_ndarray()[0] for frame in frames])) > 0.1]
     begins = [float(time) for before, time in pairwise([times[0], *loud]) if time - before > EVERY_S / 2]
     return times, begins

@@ -34,8 +34,8 @@ def camera(name: str, folder: Path) -> dict[str, Any]:
     """Write the film and what is found in it, of 320 x 180 pixels; give the camera that shows it."""
     film, found = folder / f"{name}.mp4", folder / f"{name}.txt"
     sides = [_sides(pulse) for pulse in range(FRAMES)]
-    drawn = {it: _picture(it) for it in set(sides)}
-    write_film([drawn[it] for it in sides], film, FPS)
+    drawn = {side: _picture(side) for side in set(sides)}
+    write_film([drawn[side] for side in sides], film, FPS)
     lines = [
         f"{pulse + 1},-1,{left},{_TOP},{_WIDE},{_TALL},1,-1,-1,-1"
         for pulse, both in enumerate(sides)

@@ -110,8 +110,8 @@ class RunningSite:
                     case Gop():
                         self.gops.append(event)
                     case Cameras():
-                        for it in event.cameras:
-                            self.states[it.camera].append(it.state)
+                        for camera in event.cameras:
+                            self.states[camera.camera].append(camera.state)
                     case Objects():
                         self.objects = event
                 self.heard.notify_all()

@@ -59,7 +59,7 @@ def decision(
     **boxes: list[list[NumberedBox]],
 ) -> GopDecision:
     empty: list[list[NumberedBox]] = [[]] * frames
-    boxes_of_camera = {it: boxes.get(it, empty) for it in CAMERAS}
+    boxes_of_camera = {camera: boxes.get(camera, empty) for camera in CAMERAS}
     return GopDecision(gop * GOP, frames, choices, boxes_of_camera, {}, corrections, NO_REASON)
 
 

@@ -97,7 +97,7 @@ def decoded(data: bytes) -> dict[int, Picture]:
     with av.open(io.BytesIO(data), "r", options={"err_detect": "explode"}) as stream:
         stream.streams.video[0].codec_context.options = {"err_detect": "explode"}
         frames = list(stream.decode(video=0))
-    return {round(float(it.time or 0) * FPS): it.to_ndarray(format="yuv420p") for it in frames}
+    return {round(float(frame.time or 0) * FPS): frame.to_ndarray(format="yuv420p") for frame in frames}
 
 
 def equal(shown: dict[int, Picture], right: dict[int, Picture]) -> None:
@@ -109,7 +109,11 @@ def equal(shown: dict[int, Picture], right: dict[int, Picture]) -> None:
 
 def chosen(decisions: list[GopChoices], codec: Codec = "h264") -> dict[int, Picture]:
     """Return the pictures for viewers with access to all persons."""
-    cameras = {pulse: it.choices[1] for it in decisions for pulse in range(it.first, it.first + it.frames)}
+    cameras = {
+        pulse: decision.choices[1]
+        for decision in decisions
+        for pulse in range(decision.first, decision.first + decision.frames)
+    }
     return {pulse: own(camera, codec)[pulse] for pulse, camera in cameras.items()}
 
 
@@ -132,4 +136,4 @@ async def fetched(hall: Hall, path: str, who: str) -> bytes:
 async def to_the_end(hall: Hall, *answers: aiohttp.ClientResponse) -> list[bytes]:
     """End all streams; return what was sent."""
     hall.service.splicer.close()
-    return await asyncio.gather(*(it.read() for it in answers))
+    return await asyncio.gather(*(answer.read() for answer in answers))

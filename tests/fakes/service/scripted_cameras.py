@@ -45,7 +45,10 @@ def small_config(cameras: Sequence[str | dict[str, Any]] = CAMERAS, **changes: A
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
         "encode": {"gop": GOP},
-        "cameras": [{"id": it, "source": "scene:room"} if isinstance(it, str) else it for it in cameras],
+        "cameras": [
+            {"id": camera, "source": "scene:room"} if isinstance(camera, str) else camera
+            for camera in cameras
+        ],
         "track": {"window": {"window": 5, "stride": STRIDE, "birth_window": 5}},
         "view": {
             "lookahead": 2 * GOP,
@@ -161,7 +164,9 @@ class TrackNumbers:
     ) -> IdentityUpdate:
         """Return each track's number as the person's."""
         del last_frame, pictures
-        return IdentityUpdate({TrackletKey(*it.key, 0): it.local_id for it in tracks}, (), (), (), (), ())
+        return IdentityUpdate(
+            {TrackletKey(*track.key, 0): track.local_id for track in tracks}, (), (), (), (), ()
+        )
 
 
 class FedService(BestViewPipeline):

@@ -38,6 +38,6 @@ def boxes(it: PersonTracker, camera: str, pulse: int) -> dict[int, Box]:
 
 def identity_update(numbers: dict[tuple[str, int], int], *corrections: Merge | Split) -> IdentityUpdate:
     keys = {TrackletKey(*key, 0): number for key, number in numbers.items()}
-    merged = tuple(it for it in corrections if isinstance(it, Merge))
-    split = tuple(it for it in corrections if isinstance(it, Split))
+    merged = tuple(correction for correction in corrections if isinstance(correction, Merge))
+    split = tuple(correction for correction in corrections if isinstance(correction, Split))
     return IdentityUpdate(person_ids=keys, created=(), returned=(), departed=(), merged=merged, split=split)

@@ -119,8 +119,8 @@ def written_folder(
 ) -> RecordingFolder:
     """Open a recording folder and write GOPs to it."""
     store.open()
-    for it in records:
-        store.write(it, session_info(began), InitSegments(filled_buffers()[1]))
+    for record in records:
+        store.write(record, session_info(began), InitSegments(filled_buffers()[1]))
     return store
 
 

@@ -74,7 +74,7 @@ def least_by_trying(lattice: Lattice) -> int:
 @given(lattices(most_frames=4, most_places=2) | lattices(most_frames=2, most_places=4))
 def test_paths_are_the_cheapest_of_all_that_never_share_a_place(lattice: Lattice) -> None:
     paths = shortest_paths(lattice)
-    nodes = [(path.first + step, int(it)) for path in paths for step, it in enumerate(path.places)]
+    nodes = [(path.first + step, int(place)) for path in paths for step, place in enumerate(path.places)]
     assert len(nodes) == len(set(nodes))
     assert sum(cost_of(lattice, path) for path in paths) == least_by_trying(lattice)
 
@@ -175,9 +175,9 @@ def test_one_person_and_two_apart_are_where_the_exact_posterior_has_them(people:
     model = OccupancySettings(sigma=0.05, least_area=1.0)
     sights = [
         ForegroundObservation(
-            noisy(covered(it, tuple(people)), seed + 2000 * camera, 0.04), np.ones((HIGH, WIDE))
+            noisy(covered(rectangle, tuple(people)), seed + 2000 * camera, 0.04), np.ones((HIGH, WIDE))
         )
-        for camera, it in enumerate(rectangles)
+        for camera, rectangle in enumerate(rectangles)
     ]
     exact = marginals_by_trying(rectangles, sights, model)
     q = OccupancyMap(rectangles, model).compute(sights)

@@ -122,4 +122,4 @@ def test_paths_that_swapped_two_people_give_their_numbers_back() -> None:
 )
 def test_paths_keep_their_numbers_where_colors_say_nothing_else(walkers: list[PathAppearance]) -> None:
     numbers = assign_ids(walkers, 1.0, MeetingSettings())
-    assert [set(it.tolist()) for it in numbers] == [{1}, {2}]
+    assert [set(number.tolist()) for number in numbers] == [{1}, {2}]
