@@ -129,12 +129,12 @@ def run(recordings: list[Recording], out: Path, jobs: int) -> None:
     """Measure, print and save."""
     sequence = input_sequences(recordings)
     report = Report()
-    pairs = [(ablation, it) for ablation in (DEFAULT, *ABLATIONS) for it in sequence]
+    pairs = [(ablation, input_sequence) for ablation in (DEFAULT, *ABLATIONS) for input_sequence in sequence]
     with ProcessPoolExecutor(jobs) as pool:
         scores = iter(list(pool.map(score, *zip(*pairs, strict=True))))
     tables(
         report,
-        [it.name for it in sequence],
+        [input_sequence.name for input_sequence in sequence],
         {ablation.name: [next(scores) for _ in sequence] for ablation in (DEFAULT, *ABLATIONS)},
     )
     report.save(out / "ablation.txt")

@@ -70,9 +70,9 @@ def views(data: Path, most: int | None) -> list[SearchedView]:
         video, truth = data / scene / f"{name}.mp4", data / scene / "gt" / f"{name}.txt"
         if video.is_file() and truth.is_file():
             frames = [
-                it
-                for it in detect_frames(config_for_video(video, None, None))
-                if most is None or it.number < most
+                frame
+                for frame in detect_frames(config_for_video(video, None, None))
+                if most is None or frame.number < most
             ]
             rows = [row for row in read_rows(truth) if row.frame <= len(frames)]
             found.append(SearchedView(f"{scene} {name}", frames, rows, rate))

@@ -152,10 +152,15 @@ def main() -> None:
         ]
     rows = []
     for variant, *costs in zip(VARIANTS, *rounds, strict=True):
-        it = median_cost(costs)
-        quality = "the same" if np.isinf(it.quality) else f"{it.quality:.1f}"
-        times = [f"{it.capture_ms:.2f}", f"{it.encode_ms:.2f}", f"{it.track_ms:.2f}", f"{it.total_ms:.2f}"]
-        rows.append([variant.name, *times, f"{it.kbps:.0f}", quality])
+        cost = median_cost(costs)
+        quality = "the same" if np.isinf(cost.quality) else f"{cost.quality:.1f}"
+        times = [
+            f"{cost.capture_ms:.2f}",
+            f"{cost.encode_ms:.2f}",
+            f"{cost.track_ms:.2f}",
+            f"{cost.total_ms:.2f}",
+        ]
+        rows.append([variant.name, *times, f"{cost.kbps:.0f}", quality])
     report.table(
         f"One camera, {chosen.size} at {site.fps:g} a second; milliseconds of processor time a frame",
         ["stream", "capture", "encode", "track", "total", "kbit/s", "PSNR, dB"],

@@ -71,9 +71,9 @@ class RoomStream:
         self._boxes = [
             [
                 (int(who), float(x0), float(y0), float(x1), float(y1))
-                for who, (x0, y0, x1, y1) in zip(it.ids, it.boxes, strict=True)
+                for who, (x0, y0, x1, y1) in zip(camera_truth.ids, camera_truth.boxes, strict=True)
             ]
-            for it in truth
+            for camera_truth in truth
         ]
         self._encoder = Encoder(site, encode)
         self._pulse = 0

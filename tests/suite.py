@@ -73,7 +73,7 @@ def run_often(command: Sequence[str], runs: int, at_once: int) -> bool:
             pool.submit(subprocess.run, command, capture_output=True, text=True, check=False)
             for _ in range(runs)
         ]
-        for number, run in enumerate((it.result() for it in as_completed(waiting)), 1):
+        for number, run in enumerate((future.result() for future in as_completed(waiting)), 1):
             lines = run.stdout.rstrip().splitlines() or [f"exit code {run.returncode}"]
             closing.append(lines[-1])
             failed += run.returncode != 0
@@ -148,7 +148,7 @@ def run_pytest(
         reported = report.exists()
         cases = list(ET.parse(report).iter("testcase")) if reported else []  # noqa: S314 — our own
     failed = sum(case.find("failure") is not None or case.find("error") is not None for case in cases)
-    skipped = Counter(it.get("message", "") for case in cases for it in case.iter("skipped"))
+    skipped = Counter(element.get("message", "") for case in cases for element in case.iter("skipped"))
     refused = {reason: n for reason, n in skipped.items() if may_skip is not None and may_skip not in reason}
     for reason, n in refused.items():
         print(f"{n} skipped that may not be here: {reason}")

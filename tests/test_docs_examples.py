@@ -190,7 +190,11 @@ def test_every_field_of_an_answer_is_described(kind: type[msgspec.Struct]) -> No
 
 def test_every_field_of_a_message_is_described() -> None:
     zenoh = reference("messages")
-    kinds = [it for it in vars(messages).values() if isinstance(it, type) and issubclass(it, msgspec.Struct)]
+    kinds = [
+        kind
+        for kind in vars(messages).values()
+        if isinstance(kind, type) and issubclass(kind, msgspec.Struct)
+    ]
     assert len(kinds) > 5
     for kind in kinds:
         part = zenoh.partition(f"**`{kind.__name__}`**")[2]
@@ -202,7 +206,9 @@ def test_every_field_of_a_message_is_described() -> None:
 async def test_every_metric_is_described(by_hand: Any) -> None:
     service = BestViewPipeline(by_hand.small_config())
     metrics: CollectorRegistry = make_app(BestViewService(service))[METRICS]
-    names = [f"{it.name}_total" if it.type == "counter" else it.name for it in metrics.collect()]
+    names = [
+        f"{metric.name}_total" if metric.type == "counter" else metric.name for metric in metrics.collect()
+    ]
     for name in [name for name in names if name.startswith("myview_")]:
         assert f"`{name}`" in reference("metrics"), name
 

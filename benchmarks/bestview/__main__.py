@@ -101,16 +101,18 @@ def as_live(scene: BenchmarkScene) -> BenchmarkScene:
     return replace(scene, content={**scene.content, "detect": {"prescan_frames": 0}})
 
 
-def score_row(it: MethodScores) -> list[str]:
+def score_row(scores: MethodScores) -> list[str]:
     """Return a row of the main table: percent, cuts a minute, and the shortest shot in frames."""
     idf1 = (
-        ["", ""] if it.tracks is None else [f"{100 * s.idf1:.1f}" for s in (it.tracks.joint, it.tracks.mean)]
+        ["", ""]
+        if scores.tracks is None
+        else [f"{100 * s.idf1:.1f}" for s in (scores.tracks.joint, scores.tracks.mean)]
     )
-    views = it.views
+    views = scores.views
     shares = (views.agreement, views.regret, views.visible, views.chosen)
     cuts = (views.cuts_per_minute, views.optimum_cuts_per_minute)
     return [
-        it.name,
+        scores.name,
         *idf1,
         *(f"{100 * share:.1f}" for share in shares),
         *(f"{cut:.1f}" for cut in cuts),
@@ -118,9 +120,15 @@ def score_row(it: MethodScores) -> list[str]:
     ]
 
 
-def loss_row(name: str, it: VisibilityLosses) -> list[str]:
+def loss_row(name: str, losses: VisibilityLosses) -> list[str]:
     """Return a row of the table of visibility losses, percent."""
-    return [name, *(f"{100 * share:.1f}" for share in (it.visible, it.selection, it.identity, it.detection))]
+    return [
+        name,
+        *(
+            f"{100 * share:.1f}"
+            for share in (losses.visible, losses.selection, losses.identity, losses.detection)
+        ),
+    ]
 
 
 def identity_row(scene: BenchmarkScene, result: MethodResult) -> list[str]:
@@ -182,7 +190,9 @@ def measure(options: argparse.Namespace) -> None:
             )
             scores[scene.name] = [score_method(scene, truth, result) for result in results]
             report.table(
-                f"{scene.name}: {scene.about}", COLUMNS, [score_row(it) for it in scores[scene.name]]
+                f"{scene.name}: {scene.about}",
+                COLUMNS,
+                [score_row(method_scores) for method_scores in scores[scene.name]],
             )
             identity_rows = [identity_row(scene, result) for result in results if not result.ground_truth]
             report.table(

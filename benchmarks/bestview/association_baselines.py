@@ -86,9 +86,9 @@ def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[
             group.update(dict.fromkeys(group_b, group_a))
     unassociated = unassociated_tracks(rows)
     number = {
-        _TrackKey(camera, it.id): new.id
+        _TrackKey(camera, row.id): new.id
         for camera in rows
-        for it, new in zip(rows[camera], unassociated[camera], strict=True)
+        for row, new in zip(rows[camera], unassociated[camera], strict=True)
     }
     joined = {key: min(number[member] for member in members) for key, members in group.items()}
     return {

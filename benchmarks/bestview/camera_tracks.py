@@ -90,22 +90,26 @@ def followed(config: Config, frames: Mapping[str, CameraDetections]) -> dict[str
     cameras = {camera: _Camera(config, camera, frame) for camera, frame in frames.items()}
     messages: dict[str, list[CameraTracks]] = {camera: [] for camera in frames}
     for pulse in range(max(len(frame.detections) for frame in frames.values())):
-        there = {camera: it for camera, it in cameras.items() if pulse < len(frames[camera].detections)}
-        shared = {
-            camera: it.scorer.build_message(pulse, it.shared(pulse))
-            for camera, it in there.items()
-            if it.scorer
+        there = {
+            camera: reader for camera, reader in cameras.items() if pulse < len(frames[camera].detections)
         }
-        for camera, it in there.items():
+        shared = {
+            camera: reader.scorer.build_message(pulse, reader.shared(pulse))
+            for camera, reader in there.items()
+            if reader.scorer
+        }
+        for camera, reader in there.items():
             detections = frames[camera].detections[pulse]
-            if it.scorer is not None:
+            if reader.scorer is not None:
                 others = [message for other, message in shared.items() if other != camera]
-                detections = it.scorer.rescore(detections, others)
-            result = it.tracker.push(pulse, detections)
+                detections = reader.scorer.rescore(detections, others)
+            result = reader.tracker.push(pulse, detections)
             if result is not None:
-                messages[camera].append(it.builder.regular(result))
-    for camera, it in cameras.items():
-        messages[camera].append(it.builder.closing(it.tracker.flush(), len(frames[camera].detections) - 1))
+                messages[camera].append(reader.builder.regular(result))
+    for camera, reader in cameras.items():
+        messages[camera].append(
+            reader.builder.closing(reader.tracker.flush(), len(frames[camera].detections) - 1)
+        )
     return messages
 
 

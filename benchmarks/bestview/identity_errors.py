@@ -54,9 +54,9 @@ class MatchedBoxes:
         found: list[tuple[int, int, int, int]] = []
         for camera, (name, truth) in enumerate(sorted(gt.items())):
             numbers = sorted({row.frame for rows in (truth, tracks[name]) for row in rows})
-            for number, it in zip(numbers, align_frames(truth, tracks[name], least_iou), strict=True):
-                rows, columns = assign_pairs(it.similarity, least_iou)
-                pairs = zip(it.truth[rows].tolist(), it.tracks[columns].tolist(), strict=True)
+            for number, match in zip(numbers, align_frames(truth, tracks[name], least_iou), strict=True):
+                rows, columns = assign_pairs(match.similarity, least_iou)
+                pairs = zip(match.truth[rows].tolist(), match.tracks[columns].tolist(), strict=True)
                 found += [(camera, number, person, track) for person, track in pairs]
         return cls(*np.array(found, dtype=np.int64).reshape(-1, 4).T)
 

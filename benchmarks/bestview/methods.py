@@ -162,9 +162,9 @@ def run_methods(
         yield MethodResult(f"{name}, final ids", select(result.tracks))
         yield MethodResult(f"{name}, largest", select_largest(result.tracks))
         ground = {
-            camera: it
-            for camera, it in camera_homographies(calibrated_scene.config()).items()
-            if it is not None
+            camera: homography
+            for camera, homography in camera_homographies(calibrated_scene.config()).items()
+            if homography is not None
         }
         name_of_nearest = "nearest feet" if calibrated_scene is scene else "nearest feet, calibr."
         yield MethodResult(

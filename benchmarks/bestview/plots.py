@@ -52,27 +52,36 @@ def plot_sweeps(swept: Mapping[str, Sequence[SweepResult]], out: Path) -> None:
             score for score in scores if score.setting.extrapolate_s == DEFAULT_EXTRAPOLATE_S
         ]
         default_cost = [
-            it for it in default_extrapolation if it.setting.switch_cost_s == DEFAULT_SWITCH_COST_S
+            score for score in default_extrapolation if score.setting.switch_cost_s == DEFAULT_SWITCH_COST_S
         ]
-        for gop in sorted({it.setting.gop for it in default_cost}):
-            live = [it for it in default_cost if it.setting.gop == gop and it.setting.lookahead is not None]
+        for gop in sorted({score.setting.gop for score in default_cost}):
+            live = [
+                score
+                for score in default_cost
+                if score.setting.gop == gop and score.setting.lookahead is not None
+            ]
             line[0].plot(
-                [it.delay_s for it in live], [100 * it.score.regret for it in live], "o-", label=f"GOP {gop}"
+                [score.delay_s for score in live],
+                [100 * score.score.regret for score in live],
+                "o-",
+                label=f"GOP {gop}",
             )
         line[0].set_xlabel("delay declared, s")
         line[0].legend(fontsize="x-small")
-        offline = [it for it in default_cost if it.setting.lookahead is None]
-        line[1].plot([it.setting.gop for it in offline], [100 * it.score.regret for it in offline], "o-")
+        offline = [score for score in default_cost if score.setting.lookahead is None]
+        line[1].plot(
+            [score.setting.gop for score in offline], [100 * score.score.regret for score in offline], "o-"
+        )
         line[1].set_xlabel("GOP, frames; whole recording known")
         for axis in line[:2]:
             axis.set_ylabel("regret, %")
         costs = sorted(
             (
-                it
-                for it in default_extrapolation
-                if it.setting.gop == DEFAULT_GOP and it.setting.lookahead == DEFAULT_LOOKAHEAD
+                score
+                for score in default_extrapolation
+                if score.setting.gop == DEFAULT_GOP and score.setting.lookahead == DEFAULT_LOOKAHEAD
             ),
-            key=lambda it: it.setting.switch_cost_s,
+            key=lambda score: score.setting.switch_cost_s,
         )
         values = [cost.setting.switch_cost_s for cost in costs]
         line[2].plot(values, [cost.score.cuts_per_minute for cost in costs], "o-", label="MyView's choice")

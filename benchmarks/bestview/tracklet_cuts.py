@@ -30,7 +30,7 @@ def own_tracklets(config: Config, messages: Messages) -> dict[str, list[MotRow]]
         if message is not None:
             aligner.add_tracks(message)
         for epoch in aligner.ready(now=-1):
-            tracks = [it for window in reader.read(epoch) for it in window.local_tracks()]
+            tracks = [track for window in reader.read(epoch) for track in window.local_tracks()]
             seen = align_tracks(tracks, ground, error, config.overhead)
             # No tracklet is ever settled here, so that a row stays the same tracklet.
             rows, _ = tracklets.update(seen, {track.key: track.appearance for track in tracks})

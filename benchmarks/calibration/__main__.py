@@ -158,8 +158,13 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
         "auditorium, true boxes of one person in two cameras at once",
         ["cameras", "people", "boxes", "distance from a fitted plane, box heights"],
         [
-            [f"{one}, {other}", str(it.people), str(it.boxes), f"{it.off:.2f}" if it.boxes else "-"]
-            for (one, other), it in common.items()
+            [
+                f"{one}, {other}",
+                str(overlap.people),
+                str(overlap.boxes),
+                f"{overlap.off:.2f}" if overlap.boxes else "-",
+            ]
+            for (one, other), overlap in common.items()
         ],
     )
     tracks.mkdir()

@@ -131,8 +131,8 @@ def _of_two(
     places = dict(zip(there, to_ground(other, foot_points(np.array(list(there.values())))), strict=True))
     right = 0
     for (frame, person), place in zip(both, at, strict=True):
-        far = {it: np.hypot(*(places[frame, it] - place)) for it in by_frame[frame]}
-        right += min(far, key=lambda it: np.nan_to_num(far[it], nan=np.inf)) == person
+        far = {candidate: np.hypot(*(places[frame, candidate] - place)) for candidate in by_frame[frame]}
+        right += min(far, key=lambda candidate: np.nan_to_num(far[candidate], nan=np.inf)) == person
     return GroundAgreement(float(np.median(apart)), float(np.quantile(apart, 0.9)), right / len(both))
 
 
@@ -149,4 +149,6 @@ def _people(path: Path, size: tuple[int, int]) -> _Boxes:
 
 
 def _file(folder: Path, name: str) -> Path | None:
-    return next((it for it in (folder / f"{name}.txt", folder / f"{name}.txt.gz") if it.is_file()), None)
+    return next(
+        (path for path in (folder / f"{name}.txt", folder / f"{name}.txt.gz") if path.is_file()), None
+    )

@@ -48,11 +48,11 @@ def find_recordings(data: Path, names: list[str] | None = None) -> list[Recordin
             for camera in ("HC3", "HC4", "IP2", "IP5")
         ),
     ]
-    found = [it for it in known if it.detections.is_file() and it.truth.is_file()]
+    found = [recording for recording in known if recording.detections.is_file() and recording.truth.is_file()]
     if names:
-        found = [it for it in found if it.name in names]
+        found = [recording for recording in found if recording.name in names]
     if not found:
-        which = ", ".join(names or [it.name for it in known])
+        which = ", ".join(names or [recording.name for recording in known])
         raise CannotRunError(f"needs detections and ground truth ({which}) in {data}")
     return found
 
@@ -67,7 +67,7 @@ def track(
     with tempfile.TemporaryDirectory() as folder:
         out, config = Path(folder) / "tracks.txt", Path(folder) / "settings.yaml"
         config.write_text(
-            yaml.safe_dump({"track": {key: dict(it) for key, it in (settings or {}).items()}}),
+            yaml.safe_dump({"track": {key: dict(section) for key, section in (settings or {}).items()}}),
             encoding="utf-8",
         )
         video = sequence.video if pictures else None

@@ -137,8 +137,10 @@ def _cells(row: ScoreRow, truths: dict[str, list[MotRow]], runs: list[DetectorRu
     ]
     seconds = sum(run.detect_s + (run.track_s if row.tracks else 0.0) for run in runs)
     frames = sum(run.frames for run in runs)
-    idf1 = f"{100 * sum(it.idf1 for it in scored) / len(scored):.0f}" if row.tracks else ""
-    shares = [f"{share:.2f}" for it in scored for share in (it.recall, it.precision)]
+    idf1 = f"{100 * sum(view_scores.idf1 for view_scores in scored) / len(scored):.0f}" if row.tracks else ""
+    shares = [
+        f"{share:.2f}" for view_scores in scored for share in (view_scores.recall, view_scores.precision)
+    ]
     joint = f"{100 * oracle(truths, row.boxes):.0f}"
     times = [f"{1e3 * seconds / frames:.1f}", f"{frames / seconds:.0f}"] if row.ours else ["", ""]
     return [row.name, *shares, idf1, joint, *times]

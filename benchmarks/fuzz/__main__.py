@@ -65,7 +65,9 @@ def replay(path: Path) -> int:
     """Feed a saved input again; return 1 if it still crashes."""
     name = path.name.split(".")[0]
     part = name.split("-", maxsplit=1)[0]
-    kind = next((it for it in targets_of(part) if it.name == name), None) if part in PARTS else None
+    kind = (
+        next((target for target in targets_of(part) if target.name == name), None) if part in PARTS else None
+    )
     if kind is None:
         sys.exit(f"{path}: no saved input of this name; they are called TARGET.KIND.NUMBER.bin")
     target = kind()
@@ -107,10 +109,10 @@ def main() -> None:
         sys.exit(replay(chosen.replay))
     report = Report()
     targets = [
-        it
+        target
         for part in chosen.part or PARTS
-        for it in targets_of(part)
-        if not chosen.target or it.name in chosen.target
+        for target in targets_of(part)
+        if not chosen.target or target.name in chosen.target
     ]
     if not targets:
         options.error("no target of these parts has this name")

@@ -121,8 +121,14 @@ def describe(report: Report, name: str, watched: LiveRun) -> None:
         f"myview up, {CAMERAS} cameras of {name} at {FPS:g} a second: frames",
         ["camera", "received", "missed", "not searched", "bad messages"],
         [
-            [camera, str(it["frames"]), str(it["missed"]), str(it["shed"]), str(it["bad_messages"])]
-            for camera, it in counts.cameras.items()
+            [
+                camera,
+                str(counts_of_camera["frames"]),
+                str(counts_of_camera["missed"]),
+                str(counts_of_camera["shed"]),
+                str(counts_of_camera["bad_messages"]),
+            ]
+            for camera, counts_of_camera in counts.cameras.items()
         ],
     )
     _describe_stages(report, watched.milliseconds)

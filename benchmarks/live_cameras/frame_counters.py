@@ -27,9 +27,10 @@ class FrameCounts:
         """Return the difference to earlier counts."""
         cameras = {
             camera: {
-                what: number - earlier.cameras.get(camera, {}).get(what, 0) for what, number in it.items()
+                what: number - earlier.cameras.get(camera, {}).get(what, 0)
+                for what, number in counts_of_camera.items()
             }
-            for camera, it in self.cameras.items()
+            for camera, counts_of_camera in self.cameras.items()
         }
         return FrameCounts(cameras, self.late - earlier.late)
 

@@ -80,7 +80,7 @@ def _with_operator(
 ) -> list[tuple[TrackedClip, TrackedClip]]:
     """Track the clips again, one after the other, with an operator."""
     selector = FlagSelector(flags, alone[0].clip.fps)
-    return [(it, track_clip(it.clip, kind.setup, person, selector)) for it in alone]
+    return [(result, track_clip(result.clip, kind.setup, person, selector)) for result in alone]
 
 
 def _print_tables(report: Report, found: dict[str, OutcomeCounts], *, thesis: bool) -> None:

@@ -94,7 +94,7 @@ def track_clip(
             result = tracker.push(newest, clip.detections[newest])
             _merge_result(shown, result)
             found: Sequence[RiskEvent] = result.risk_events if result else ()
-            risk_events += [(newest, it) for it in found]
+            risk_events += [(newest, event) for event in found]
             if operator:
                 operator.receive(newest, found)
         elif newest == count:

@@ -151,14 +151,16 @@ def _cause(failure: IdentityFailure, helped: TrackedClip, matched: NDArray[np.in
         if (own_tracks & {*flag.event.objects} or flag.fish in failure.fish) and first <= flag.raised <= last
     ]
     handled = [flag for flag in flags if flag.fish is not None and flag.pointing_frames]
-    if any(_right(it, matched) and it.pointing_frames[0] <= failure.frame for it in handled):
+    if any(_right(flag, matched) and flag.pointing_frames[0] <= failure.frame for flag in handled):
         return "pointed in vain"
     if handled:
-        return "late" if any(_right(it, matched) for it in handled) else "followed wrongly"
+        return "late" if any(_right(flag, matched) for flag in handled) else "followed wrongly"
     if flags:
         return "busy" if any(flag.begun is None for flag in flags) else "late"
     if any(
-        it.frame < failure.before and {*it.tracks} & own_tracks for it in helped.failures if it is not failure
+        earlier.frame < failure.before and {*earlier.tracks} & own_tracks
+        for earlier in helped.failures
+        if earlier is not failure
     ):
         return "earlier failure"
     was_foreseen = any(

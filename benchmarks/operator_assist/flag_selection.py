@@ -29,11 +29,13 @@ class FlagSelector:
     def raised(self, newest: int, risk_events: Sequence[RiskEvent]) -> list[RiskEvent]:
         """Return the risk events of a window that raise flags, the riskiest first."""
         now = self._last = self._began + newest
-        whose = [frozenset(self._began * _MOST + it for it in event.objects) for event in risk_events]
+        whose = [
+            frozenset(self._began * _MOST + local_id for local_id in event.objects) for event in risk_events
+        ]
         for who, it in zip(whose, risk_events, strict=True):
             self._budget.record_risk(now, who, it.risk)
         found = []
-        for who, it in sorted(zip(whose, risk_events, strict=True), key=lambda it: -it[1].risk):
+        for who, it in sorted(zip(whose, risk_events, strict=True), key=lambda event: -event[1].risk):
             if now - self._raised.get(who, -(10**9)) > self._same and self._budget.is_worth_flag(
                 now, who, it.risk
             ):

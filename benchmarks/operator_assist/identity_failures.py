@@ -142,8 +142,8 @@ def _changes(numbers: NDArray[np.int64], least: int) -> list[tuple[int, int, int
 def _failure(
     truth: ObjectTruth, group: Sequence[tuple[int, int, int, int, int]], fps: float
 ) -> IdentityFailure:
-    fish = sorted({it[2] for it in group})
-    first, last = min(it[1] for it in group), max(it[0] for it in group)
-    tracks = sorted({number for it in group for number in it[3:]})
+    fish = sorted({change[2] for change in group})
+    first, last = min(change[1] for change in group), max(change[0] for change in group)
+    tracks = sorted({number for change in group for number in change[3:]})
     crossed = involved(truth, fish, first, last, fps)
-    return IdentityFailure(min(it[0] for it in group), first, tuple(fish), tuple(tracks), crossed)
+    return IdentityFailure(min(change[0] for change in group), first, tuple(fish), tuple(tracks), crossed)

@@ -79,11 +79,11 @@ def texts(outcome_counts: OutcomeCounts, *, thesis: bool) -> list[list[str]]:
     scale = _CLIPS_MINUTES / outcome_counts.minutes
     return [
         [
-            it.name,
-            str(it.count),
-            *([f"{scale * it.count:.0f}", "-" if it.thesis is None else str(it.thesis)] if thesis else []),
+            row.name,
+            str(row.count),
+            *([f"{scale * row.count:.0f}", "-" if row.thesis is None else str(row.thesis)] if thesis else []),
         ]
-        for it in table2(outcome_counts)
+        for row in table2(outcome_counts)
     ]
 
 

@@ -80,7 +80,9 @@ def _raised(tracked_clips: TrackedClip, selector: FlagSelector) -> list[tuple[in
     windows: dict[int, list[RiskEvent]] = {}
     for newest, event in tracked_clips.risk_events:
         windows.setdefault(newest, []).append(event)
-    return [(newest, it) for newest, events in windows.items() for it in selector.raised(newest, events)]
+    return [
+        (newest, event) for newest, events in windows.items() for event in selector.raised(newest, events)
+    ]
 
 
 def rows(points: Sequence[RecallPoint]) -> list[list[str]]:

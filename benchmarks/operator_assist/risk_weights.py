@@ -71,7 +71,7 @@ def main() -> None:
         terms, wrong = examples(tracked_clips, reason)
         if not len(wrong):
             continue
-        weights = [f"{it:.2f}" for it in fit_weights(terms, wrong)]
+        weights = [f"{weight:.2f}" for weight in fit_weights(terms, wrong)]
         table.append([reason, str(len(wrong)), f"{100.0 * wrong.mean():.0f} %", *weights])
     report = Report()
     report.say(f"{len(tracked_clips)} clips, {sum(clip.clip.minutes for clip in tracked_clips):.1f} minutes")

@@ -110,7 +110,8 @@ class SimulatedOperator:
             else:
                 others.append(event)
         self.flags += [
-            OperatorFlag(it, it.objects[0], newest, it.frame) for it in self._selector.raised(newest, others)
+            OperatorFlag(event, event.objects[0], newest, event.frame)
+            for event in self._selector.raised(newest, others)
         ]
 
     def point(self, newest: int, shown: Mapping[int, Mapping[int, Floats]]) -> PositionCorrection | None:
@@ -126,12 +127,12 @@ class SimulatedOperator:
     def _next_flag(self, newest: int, screen: int) -> OperatorFlag | None:
         """Turn to the flag that is due first; without any, to one that has passed on the screen."""
         waiting = [flag for flag in self.flags if flag.begun is None and flag.ended is None]
-        over = {id(it) for it in waiting if it.until < screen}
+        over = {id(flag) for flag in waiting if flag.until < screen}
         for it in waiting:
             if id(it) in over and newest - it.event.frame + self._before > self._back:
                 it.ended = screen
-        left = (it for it in waiting if it.ended is None)
-        flag = min(left, key=lambda it: (id(it) in over, it.until), default=None)
+        left = (flag for flag in waiting if flag.ended is None)
+        flag = min(left, key=lambda flag: (id(flag) in over, flag.until), default=None)
         if flag is not None:
             flag.begun = newest
             again = newest - flag.event.frame + self._before if id(flag) in over else 0
@@ -150,7 +151,9 @@ class SimulatedOperator:
                 # No fish in particular: a part of a known fish, or a weed.
                 flag.ended = screen
                 return None
-            flag.object, flag.fish = max(flag.likely, key=lambda it: (it[0] == flag.object, flag.likely[it]))
+            flag.object, flag.fish = max(
+                flag.likely, key=lambda guess: (guess[0] == flag.object, flag.likely[guess])
+            )
         self._follow(flag, newest, shown.get(screen, {}).get(flag.object))
         if flag.ended is not None or self._truth.visible[flag.fish, screen] < _MIN_VISIBLE:
             return None

@@ -125,9 +125,9 @@ def run(options_data: Path, out: Path, folder: Path, names: list[str] | None, *,
             [[name, *format_scores(scores, _SHOWN)] for name, scores in found.items()],
         )
     if len(table) > 1:
-        everywhere = [name for name in table[sequences[0].name] if all(name in it for it in table.values())]
+        everywhere = [name for name in table[sequences[0].name] if all(name in row for row in table.values())]
         averages = [
-            [name, *format_scores(average_scores([it[name] for it in table.values()]), _SHOWN)]
+            [name, *format_scores(average_scores([row[name] for row in table.values()]), _SHOWN)]
             for name in everywhere
         ]
         report.table("mean over the sequences; counts are totals", ["", *_HEADINGS], averages)

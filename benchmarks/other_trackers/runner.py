@@ -32,7 +32,9 @@ def read(path: Path) -> Rows:
     """Return rows `frame, id, left, top, right, bottom, confidence`."""
     data = path.read_bytes()
     text = (gzip.decompress(data) if path.suffix == ".gz" else data).decode("ascii")
-    rows = np.array([[float(it) for it in line.split(",")[:7]] for line in text.splitlines() if line.strip()])
+    rows = np.array(
+        [[float(value) for value in line.split(",")[:7]] for line in text.splitlines() if line.strip()]
+    )
     rows[:, 4:6] += rows[:, 2:4]
     return rows
 
@@ -72,7 +74,9 @@ def windows(rows: Rows) -> Iterator[str]:
     for start in range(1, max(last, 2), WINDOW - 1):
         frames = [np.flatnonzero(rows[:, 0] == frame) for frame in range(start, start + WINDOW)]
         if start > 1:  # the first of two windows decides their common frame
-            frames[0] = np.array([it for it in frames[0].tolist() if it in numbers], dtype=np.intp)
+            frames[0] = np.array(
+                [number for number in frames[0].tolist() if number in numbers], dtype=np.intp
+            )
         for box, parent in linked(rows, frames):
             if box not in numbers:
                 numbers[box] = numbers[parent] if parent is not None else max(numbers.values(), default=0) + 1

@@ -63,7 +63,9 @@ class SiteSampler:
                 raise RuntimeError(f"the viewers ended: {self._viewers_task.exception()!r}")
             async with session.get(f"{self._site.url}api/cameras") as answer:
                 cameras = [
-                    it for it in (await answer.json())["cameras"] if it["camera"] in self._site.cameras
+                    camera
+                    for camera in (await answer.json())["cameras"]
+                    if camera["camera"] in self._site.cameras
                 ]
             samples.append(self._sample(cameras))
         self._result.samples += samples

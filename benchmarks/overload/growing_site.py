@@ -45,7 +45,7 @@ class GrowingSite:
     def kill_all_but(self, count: int) -> None:
         """Kill all cameras but the first `count`."""
         removed = list(self.cameras)[count:]
-        processes = [self.cameras.pop(it) for it in removed]
+        processes = [self.cameras.pop(camera) for camera in removed]
         for process in processes:
             process.kill()
         for process in processes:
@@ -66,14 +66,14 @@ def run_growing_site(most: int, folder: Path) -> Iterator[GrowingSite]:
         "zenoh": {"connect": address, "listen": address},
         "http": {"port": http},
         "cameras": [
-            {"id": f"c{it}", "source": str(films / f"c{it % _FILMS}.mp4"), "at_end": "loop"}
-            for it in range(most)
+            {"id": f"c{number}", "source": str(films / f"c{number % _FILMS}.mp4"), "at_end": "loop"}
+            for number in range(most)
         ],
     }
     config = folder / "site.yaml"
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
     with (folder / LOG).open("wb") as log:
-        started = [_start(log, it, str(config)) for it in ("bestview", "sync")]
+        started = [_start(log, name, str(config)) for name in ("bestview", "sync")]
         site = GrowingSite(config, f"http://127.0.0.1:{http}/", log)
         try:
             _wait_until_up(site.url)

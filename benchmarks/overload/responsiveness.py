@@ -180,8 +180,8 @@ def write_site(folder: Path, films: Path, cameras: int) -> tuple[Path, int]:
         "zenoh": {"connect": address, "listen": address},
         "http": {"port": http},
         "cameras": [
-            {"id": f"c{it}", "source": str(films / f"c{it % _FILMS}.mp4"), "at_end": "loop"}
-            for it in range(cameras)
+            {"id": f"c{number}", "source": str(films / f"c{number % _FILMS}.mp4"), "at_end": "loop"}
+            for number in range(cameras)
         ],
     }
     path = folder / f"site-{http}.yaml"
@@ -197,13 +197,13 @@ def row(cameras: int, niceness: int, measured: Responsiveness) -> list[str]:
         for sample in family.samples
         if sample.name.endswith("_bucket")
     ]
-    seconds = [measured.first_response_s, *(measured.response_time(it) for it in (50, 95, 100))]
+    seconds = [measured.first_response_s, *(measured.response_time(percent) for percent in (50, 95, 100))]
     bounds = [lag_below(0.95, measured.lags), lag_below(1.0, measured.lags), lag_below(0.95, own_lag)]
     return [
         *(str(cameras), str(niceness)),
         *(f"{second:.2f}" for second in seconds),
         *(f"{bound:g}" for bound in bounds),
-        *(f"{it:.0f}" for it in (measured.rate, measured.camera_mb, measured.service_mb)),
+        *(f"{value:.0f}" for value in (measured.rate, measured.camera_mb, measured.service_mb)),
     ]
 
 

@@ -108,7 +108,7 @@ async def _switch(page: Page, turn: int) -> list[float]:
 async def _reading(page: Page, tools: CDPSession) -> tuple[float, float, float, float]:
     await tools.send("HeapProfiler.collectGarbage")
     heap = (await tools.send("Runtime.getHeapUsage"))["usedSize"] / 1e6
-    delays = [it["delayMs"] for it in await page.evaluate("myview.delays.slice(-100)")]
+    delays = [delay["delayMs"] for delay in await page.evaluate("myview.delays.slice(-100)")]
     return (
         await page.evaluate("performance.now()") / 1e3,
         heap,
@@ -117,18 +117,18 @@ async def _reading(page: Page, tools: CDPSession) -> tuple[float, float, float, 
     )
 
 
-def describe(report: Report, it: PageVisit) -> None:
+def describe(report: Report, visit: PageVisit) -> None:
     """Print the tables."""
-    middle, late = np.percentile(it.switches, [50, 95])
+    middle, late = np.percentile(visit.switches, [50, 95])
     report.table(
         "from a click to the new person's first frame, ms",
         ["switches", "p50", "p95", "longest", "goal, p95"],
         [
             [
-                str(len(it.switches)),
+                str(len(visit.switches)),
                 f"{middle:.0f}",
                 f"{late:.0f}",
-                f"{it.switches.max():.0f}",
+                f"{visit.switches.max():.0f}",
                 f"{_GOAL_MS:.0f}",
             ]
         ],
@@ -138,24 +138,28 @@ def describe(report: Report, it: PageVisit) -> None:
         ["minute", "heap, MB", "buffered, s", "behind, ms"],
         [
             [f"{second / 60:.1f}", f"{heap:.1f}", f"{buffered:.0f}", f"{delay:.0f}"]
-            for second, heap, buffered, delay in zip(it.seconds, it.heap, it.buffered, it.delays, strict=True)
+            for second, heap, buffered, delay in zip(
+                visit.seconds, visit.heap, visit.buffered, visit.delays, strict=True
+            )
         ],
     )
 
 
-def plot(it: PageVisit, path: Path) -> None:
+def plot(visit: PageVisit, path: Path) -> None:
     """Draw the switch times, and memory and delay over the visit."""
     figure = Figure(figsize=(9, 6))
     took, memory = figure.subplots(2, 1)
     took.plot(
-        np.sort(it.switches), np.arange(1, len(it.switches) + 1) / len(it.switches), drawstyle="steps-post"
+        np.sort(visit.switches),
+        np.arange(1, len(visit.switches) + 1) / len(visit.switches),
+        drawstyle="steps-post",
     )
     took.axvline(_GOAL_MS, color="black", linestyle="--", linewidth=1, label="goal for 95 %")
     took.set(xlabel="ms from the click to the first frame", ylabel="share of the switches", xlim=(0, None))
     took.legend()
-    memory.plot(it.seconds / 60, it.heap, label="heap, MB")
-    memory.plot(it.seconds / 60, it.buffered, label="buffered, s")
-    memory.plot(it.seconds / 60, it.delays / 1e3, label="behind, s")
+    memory.plot(visit.seconds / 60, visit.heap, label="heap, MB")
+    memory.plot(visit.seconds / 60, visit.buffered, label="buffered, s")
+    memory.plot(visit.seconds / 60, visit.delays / 1e3, label="behind, s")
     memory.set(xlabel="minutes", ylim=(0, None))
     memory.legend()
     figure.tight_layout()
@@ -187,10 +191,10 @@ def main() -> None:
             page_hours.run(report, chosen.hours, chosen.speed)
             report.save(chosen.out / "page_hours.txt")
             return
-        it = asyncio.run(run(chosen))
-        describe(report, it)
+        visit = asyncio.run(run(chosen))
+        describe(report, visit)
         chosen.out.mkdir(parents=True, exist_ok=True)
-        plot(it, chosen.out / "page.png")
+        plot(visit, chosen.out / "page.png")
         report.save(chosen.out / "page.txt")
     except CannotRunError as problem:
         finish(problem, "page")

@@ -80,7 +80,7 @@ class FastSite:
         for pulse, picture in enumerate(small.repeat(16, axis=1).repeat(16, axis=2)):
             unit = encoder.encode(pulse, picture)
             frame_buffer.put(pulse, 1, unit.data, key=unit.key)
-        return [it.fragment for pulse in range(_LOOP) if (it := frame_buffer.get(pulse)) is not None]
+        return [frame.fragment for pulse in range(_LOOP) if (frame := frame_buffer.get(pulse)) is not None]
 
     @property
     def _edge(self) -> int:
@@ -146,7 +146,7 @@ class FastSite:
             async for first in self._released():
                 loop = self._fragments[_camera(number, first)]
                 moved = ticks(first - first % _LOOP, _FPS)
-                gop = [shift_fragment(it, moved) for it in loop[first % _LOOP : first % _LOOP + _GOP]]
+                gop = [shift_fragment(piece, moved) for piece in loop[first % _LOOP : first % _LOOP + _GOP]]
                 await response.write(b"".join(gop))
         return response
 
@@ -195,8 +195,11 @@ def _people(first: int) -> dict[str, Any]:
 
 def _gop(first: int) -> dict[str, Any]:
     boxes = [
-        [[n, 20.0 * place + it, 10.0, 20.0 * place + it + 12, 60.0] for place, n in enumerate(_there(first))]
-        for it in range(_GOP)
+        [
+            [n, 20.0 * place + frame, 10.0, 20.0 * place + frame + 12, 60.0]
+            for place, n in enumerate(_there(first))
+        ]
+        for frame in range(_GOP)
     ]
     return {
         "first": first,

@@ -117,9 +117,11 @@ async def play(hours: float, speed: float) -> list[BrowserSample]:
 async def _read(page: Page, tools: CDPSession, hours: float) -> BrowserSample:
     await tools.send("HeapProfiler.collectGarbage")
     heap = (await tools.send("Runtime.getHeapUsage"))["usedSize"] / 1e6
-    metrics = {it["name"]: it["value"] for it in (await tools.send("Performance.getMetrics"))["metrics"]}
+    metrics = {
+        metric["name"]: metric["value"] for metric in (await tools.send("Performance.getMetrics"))["metrics"]
+    }
     state = await page.evaluate(_STATE)
-    behind = [it for it in state["delays"] if it is not None]
+    behind = [delay for delay in state["delays"] if delay is not None]
     return BrowserSample(
         hours,
         heap,
@@ -167,7 +169,10 @@ def describe(report: Report, readings: list[BrowserSample], speed: float) -> Non
     )
     half = len(readings) // 2
     early, late = (
-        np.median([(it.heap, it.nodes, it.buffered, it.behind / 1000) for it in some], axis=0)
+        np.median(
+            [(reading.heap, reading.nodes, reading.buffered, reading.behind / 1000) for reading in some],
+            axis=0,
+        )
         for some in (readings[1:half], readings[half:])
     )
     report.table(

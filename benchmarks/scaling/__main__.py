@@ -86,7 +86,7 @@ def describe(report: Report, loads: Sequence[SiteLoad]) -> None:
         for stage, about in names.items()
     ]
     total = [load.milliseconds for load in loads]
-    rows.append(["total", *(f"{it:.1f}" for it in total), f"{exponent(cameras, total):.2f}", ""])
+    rows.append(["total", *(f"{value:.1f}" for value in total), f"{exponent(cameras, total):.2f}", ""])
     report.table(
         "processor ms a frame, by cameras, and the exponent of growth",
         ["stage", *(f"{camera}" for camera in cameras), "grows", "what"],

@@ -79,13 +79,14 @@ def carry(
     """
     folder.mkdir(parents=True)
     with _running(hall, fps, folder, services) as running:
-        starts = [_after(it.times, settle, folder) for it in running]
-        late = sum(_late(it.url) for it in running)
+        starts = [_after(service.times, settle, folder) for service in running]
+        late = sum(_late(service.url) for service in running)
         stops = [
-            _after(it.times, start.epochs + epochs, folder) for it, start in zip(running, starts, strict=True)
+            _after(service.times, start.epochs + epochs, folder)
+            for service, start in zip(running, starts, strict=True)
         ]
-        late = sum(_late(it.url) for it in running) - late
-        memory = sum(_resident(it.process.pid) for it in running) / services
+        late = sum(_late(service.url) for service in running) - late
+        memory = sum(_resident(service.process.pid) for service in running) / services
     loads = [_load(hall, fps, start, stop, memory, late) for start, stop in zip(starts, stops, strict=True)]
     stages = {name: sum(load.stages[name] for load in loads) / services for name in loads[0].stages}
     return replace(loads[0], services=services, stages=stages)

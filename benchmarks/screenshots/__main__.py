@@ -146,7 +146,9 @@ async def _score(page: Page) -> float:
     if not await page.evaluate(_PLAYS):
         return 0.0
     number = await page.evaluate("myview.object")
-    return float(next((it["score"] for it in await page.evaluate(_RATED) if it["object"] == number), 0.0))
+    return float(
+        next((rating["score"] for rating in await page.evaluate(_RATED) if rating["object"] == number), 0.0)
+    )
 
 
 def small_png(png: bytes) -> bytes:

@@ -227,7 +227,7 @@ def main() -> None:
         if chosen.page != "viewer":
             asyncio.run(take_operating(chosen.out, chosen.fps))
         made = sorted(chosen.out.glob("*.webp"))
-        print(f"{len(made)} pictures, {sum(it.stat().st_size for it in made) / 1000:.0f} kB")
+        print(f"{len(made)} pictures, {sum(path.stat().st_size for path in made) / 1000:.0f} kB")
     except CannotRunError as problem:
         finish(problem, "screenshots.page_states")
 

@@ -130,7 +130,7 @@ def _note_delay(measurements: SoakMeasurements, now: float) -> None:
         stream.delays for stream in (measurements.visitors.camera, measurements.visitors.person)
     )
     measurements.delays.append(
-        LatencyMedians(now, *(float(np.median(it)) if it else np.nan for it in (camera, person)))
+        LatencyMedians(now, *(float(np.median(delays)) if delays else np.nan for delays in (camera, person)))
     )
     camera.clear()
     person.clear()

@@ -58,7 +58,7 @@ class GrowthRule:
         whole = max(hours, default=0.0) or 1.0
         quarters = np.minimum(3, (4 * np.asarray(hours) / whole).astype(int))
         numbers: NDArray[np.float64] = np.asarray(values, dtype=np.float64)
-        second, fourth = (self._of(numbers[quarters == it]) for it in (1, 3))
+        second, fourth = (self._of(numbers[quarters == quarter]) for quarter in (1, 3))
         return GrowthVerdict(self, second, fourth)
 
     def _of(self, samples: NDArray[np.float64]) -> float:

@@ -19,24 +19,26 @@ _NAMED = 5
 """Numbers of a table's row."""
 
 _CURVES: tuple[tuple[str, Callable[[ProcessSample], float]], ...] = (
-    ("resident memory, MB", lambda it: it.resident),
-    ("descriptors", lambda it: it.descriptors),
-    ("threads", lambda it: it.threads),
-    ("tasks of the event loop", lambda it: it.tasks),
-    ("Python's memory blocks, thousands", lambda it: it.blocks / 1e3),
+    ("resident memory, MB", lambda sample: sample.resident),
+    ("descriptors", lambda sample: sample.descriptors),
+    ("threads", lambda sample: sample.threads),
+    ("tasks of the event loop", lambda sample: sample.tasks),
+    ("Python's memory blocks, thousands", lambda sample: sample.blocks / 1e3),
 )
 
 
 def verdicts(measurements: SoakMeasurements) -> list[tuple[str, GrowthVerdict]]:
     """Check the growth of all measurements."""
-    found = [(name, it) for name, samples in measurements.samples.items() for it in judge(samples)]
+    found = [(name, verdict) for name, samples in measurements.samples.items() for verdict in judge(samples)]
     hours = [delay.hours for delay in measurements.delays]
     for name, values in (
         ("viewer of a camera", [delay.camera for delay in measurements.delays]),
         ("viewer of a person", [delay.person for delay in measurements.delays]),
     ):
         there = [place for place, value in enumerate(values) if np.isfinite(value)]
-        found.append((name, DELAY.judge([hours[it] for it in there], [values[it] for it in there])))
+        found.append(
+            (name, DELAY.judge([hours[place] for place in there], [values[place] for place in there]))
+        )
     return [*found, ("recording", _DISK.judge(hours, measurements.recorded))]
 
 
@@ -57,16 +59,16 @@ def describe(report: Report, measurements: SoakMeasurements) -> bool:
             [
                 [
                     who,
-                    f"{it.second:.1f}",
-                    f"{it.fourth:.1f}",
-                    f"{100 * (it.fourth / it.second - 1):+.1f} %" if it.second else "+0.0 %",
-                    it.rule.name,
-                    "yes" if it.flat else "NO",
+                    f"{verdict.second:.1f}",
+                    f"{verdict.fourth:.1f}",
+                    f"{100 * (verdict.fourth / verdict.second - 1):+.1f} %" if verdict.second else "+0.0 %",
+                    verdict.rule.name,
+                    "yes" if verdict.flat else "NO",
                 ]
-                for who, it in growth
+                for who, verdict in growth
             ],
         )
-        passed &= all(it.flat for _, it in growth)
+        passed &= all(verdict.flat for _, verdict in growth)
     else:
         passed = False
         report.say("too few samples to compare the quarters")

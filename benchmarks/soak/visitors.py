@@ -152,7 +152,7 @@ class Visitors:
 
     async def _visible_person(self) -> int | None:
         async with self._session.get("/api/objects") as answer:
-            people = [it["object"] for it in (await answer.json())["objects"] if it["visible"]]
+            people = [person["object"] for person in (await answer.json())["objects"] if person["visible"]]
         return self._random.choice(people) if people else None
 
     async def _visit(self) -> None:

@@ -54,7 +54,9 @@ def carry_out(options: argparse.Namespace, films: Films, folder: Path) -> Stream
     found = StreamMeasurements()
     if "splice" in parts:
         found.encoded = encode_again(films[0], 5 if quick else 40)
-        found.spliced = [asyncio.run(splice(films, it, 20 if quick else 200)) for it in (1, 10, _OBJECTS)]
+        found.spliced = [
+            asyncio.run(splice(films, objects, 20 if quick else 200)) for objects in (1, 10, _OBJECTS)
+        ]
         found.ffmpeg = ffmpeg_switching(films, 100 if quick else 1000, folder)
     if "right" in parts:
         found.right = asyncio.run(judge(1000 if quick else 10_000, 50 if quick else 500))

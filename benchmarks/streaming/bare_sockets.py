@@ -49,11 +49,13 @@ def bare_sends(film: Sequence[AccessUnit], count: int, seconds: float) -> BareSo
         hearing = aside.submit(crowd.read, seconds)
         rounds = list(_rounds(film, sockets, hearing))
         heard = hearing.result()
-    low, middle, high = np.percentile(send_delays(heard, {it.first: it.began for it in rounds}), [50, 95, 99])
+    low, middle, high = np.percentile(
+        send_delays(heard, {sending.first: sending.began for sending in rounds}), [50, 95, 99]
+    )
     return BareSocketCost(
         count,
-        1e6 * statistics.median(it.busy for it in rounds) / count,
-        1e3 * statistics.median(it.given for it in rounds),
+        1e6 * statistics.median(sending.busy for sending in rounds) / count,
+        1e3 * statistics.median(sending.given for sending in rounds),
         (float(low), float(middle), float(high)),
     )
 

@@ -96,7 +96,7 @@ async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> DelayDrif
         for choices in decided:
             piece = await anext(viewer)
             delays.append(number - choices.first)
-            off = max(off, *(abs(it - ticks(choices.first, SITE.fps)) for it in times(piece)))
+            off = max(off, *(abs(stamp - ticks(choices.first, SITE.fps)) for stamp in times(piece)))
         decided.clear()
         if number % part == part - 1:
             now = time.process_time()

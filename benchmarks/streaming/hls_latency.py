@@ -120,7 +120,7 @@ async def _segments(session: aiohttp.ClientSession, player: _Player, seconds: fl
     while player.clock() < end:
         text = await _text(session, "index.m3u8")
         target = int(_tag(text, "#EXT-X-TARGETDURATION:"))
-        listed = [(float(it[3]), it[4]) for it in _LINE.finditer(text) if it[4]]
+        listed = [(float(entry[3]), entry[4]) for entry in _LINE.finditer(text) if entry[4]]
         frames = round(listed[0][0] * SITE.fps)
         numbers = [int(uri.partition(".")[0]) for _, uri in listed]
         if at < 0:
@@ -140,7 +140,7 @@ async def _parts(session: aiohttp.ClientSession, player: _Player, seconds: float
     text = await _text(session, "index.m3u8")
     each = round(float(_tag(text, "#EXT-X-PART-INF:PART-TARGET=")) * SITE.fps)
     back = float(_tag(text, ".*PART-HOLD-BACK="))
-    uris = [it[2] for it in _LINE.finditer(text) if it[2]]
+    uris = [entry[2] for entry in _LINE.finditer(text) if entry[2]]
     waiting = uris[-max(1, round(back * SITE.fps / each)) :]
     per = len({uri for uri in uris if uri.startswith(uris[0].partition(".")[0] + ".")})
     while player.clock() < end:
@@ -151,7 +151,7 @@ async def _parts(session: aiohttp.ClientSession, player: _Player, seconds: float
             uris.append(uri)
         number, index = divmod(segment * per + index + 1, per)
         text = await _text(session, f"index.m3u8?_HLS_msn={number}&_HLS_part={index}")
-        waiting = [it[2] for it in _LINE.finditer(text) if it[2] and it[2] not in uris]
+        waiting = [entry[2] for entry in _LINE.finditer(text) if entry[2] and entry[2] not in uris]
 
 
 async def _text(session: aiohttp.ClientSession, path: str) -> str:

@@ -51,7 +51,9 @@ class SplicerFixture:
     def decide(self, gop: int, cameras: Sequence[int]) -> GopDecision:
         """Return a decision with a camera for each object."""
         names = list(self._shelves)
-        choices = tuple(ObjectChoice(n, names[it], None, away=False) for n, it in enumerate(cameras, start=1))
+        choices = tuple(
+            ObjectChoice(n, names[camera], None, away=False) for n, camera in enumerate(cameras, start=1)
+        )
         return GopDecision(gop * self.gop, self.gop, choices, {}, {}, (), _NO_REASON)
 
 

@@ -99,7 +99,7 @@ def _turn(site: StreamSite, crowd: ViewerProcess, good: int, seconds: float) -> 
     for _ in range(_TRIES):
         heard = crowd.read(seconds)
         ticks += heard.ticks
-        delays.append(send_delays(heard, {first: it.began for first, it in site.sent.items()}))
+        delays.append(send_delays(heard, {first: sent_gop.began for first, sent_gop in site.sent.items()}))
         passed += heard.seconds
         times, counts = np.unique(ticks, return_counts=True)
         ends = np.rint(times * SITE.fps / TIMESCALE).astype(int) % ENCODE.gop == ENCODE.gop - 1

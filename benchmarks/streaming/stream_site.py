@@ -85,7 +85,7 @@ class StreamSite:
             with contextlib.suppress(urllib.error.URLError, ConnectionError):
                 address = f"http://127.0.0.1:{self.http}/api/objects"
                 with urllib.request.urlopen(address, timeout=_PATIENCE_S) as answer:
-                    numbers = [it["object"] for it in json.load(answer)["objects"]]
+                    numbers = [entry["object"] for entry in json.load(answer)["objects"]]
                 if len(numbers) >= at_least:
                     return numbers
             time.sleep(_POLL_S)

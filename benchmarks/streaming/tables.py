@@ -63,13 +63,13 @@ def describe(report: Report, found: StreamMeasurements) -> None:
 def _splices(report: Report, found: StreamMeasurements, encoded: TranscodeCost) -> None:
     rows = [
         [
-            f"spliced, objects: {it.objects}",
-            f"{it.spliced:.2f}",
-            f"{encoded.whole / it.spliced:.0f}",
-            f"{encoded.whole / (it.spliced + it.shelved_share):.0f}",
+            f"spliced, objects: {cost.objects}",
+            f"{cost.spliced:.2f}",
+            f"{encoded.whole / cost.spliced:.0f}",
+            f"{encoded.whole / (cost.spliced + cost.shelved_share):.0f}",
             "with one viewer each",
         ]
-        for it in found.spliced
+        for cost in found.spliced
     ]
     rows.append(["decoded", f"{encoded.decoded:.0f}", "", "", "one thread"])
     rows.append(["encoded again", f"{encoded.encoded:.0f}", "1", "1", "the site's encoder, from BGR"])
@@ -110,11 +110,11 @@ def _steps(report: Report, found: StreamMeasurements) -> None:
         report.say("HLS of nginx: left out: needs nginx; on Debian: apt install nginx-light")
 
 
-def _bare(it: BareSocketCost) -> str:
-    late = ", ".join(f"{value:.0f}" for value in it.delays)
+def _bare(cost: BareSocketCost) -> str:
+    late = ", ".join(f"{value:.0f}" for value in cost.delays)
     return (
-        f"A bare loop of sends to {it.viewers} sockets, beside it: {it.each:.1f} µs of the processor each, "
-        f"sent in {it.given:.0f} ms; read after {late} ms (p50, p95, p99)"
+        f"A bare loop of sends to {cost.viewers} sockets, beside it: {cost.each:.1f} µs of the processor each, "
+        f"sent in {cost.given:.0f} ms; read after {late} ms (p50, p95, p99)"
     )
 
 
@@ -148,10 +148,10 @@ def summary(found: StreamMeasurements) -> list[list[str]]:
         what = f"of {len(found.first)} requests; p50 {middle:.1f} ms"
         rows.append(["request to first picture, p95", f"{late:.1f} ms", "100 ms", f"decoded, {what}"])
     if found.right:
-        it = found.right
-        good = it.contained if it.ts is None else min(it.contained, it.ts)
-        how = f"{it.cuts} cuts; {'WebM' if it.ts is None else 'MP4 and transport stream'}, to the pixel"
-        rows.append(["right camera on every frame", f"{good} of {it.frames}", "all", how])
+        correctness = found.right
+        good = correctness.contained if correctness.ts is None else min(correctness.contained, correctness.ts)
+        how = f"{correctness.cuts} cuts; {'WebM' if correctness.ts is None else 'MP4 and transport stream'}, to the pixel"
+        rows.append(["right camera on every frame", f"{good} of {correctness.frames}", "all", how])
     if found.drift:
         rows += _drift_rows(found.drift)
     if found.hls:
@@ -163,11 +163,11 @@ def _hls_rows(segments: HlsLatency, parts: HlsLatency) -> list[list[str]]:
     return [
         [
             f"HLS, {what}: decided to shown, p50",
-            f"{it.shown:.1f} s",
+            f"{serving_cost.shown:.1f} s",
             "",
-            f"fetched after {it.fetched:.2f} s; {it.stalls} stalls",
+            f"fetched after {serving_cost.fetched:.2f} s; {serving_cost.stalls} stalls",
         ]
-        for what, it in (("whole segments", segments), ("parts", parts))
+        for what, serving_cost in (("whole segments", segments), ("parts", parts))
     ]
 
 
@@ -207,20 +207,20 @@ def _viewer_rows(found: StreamMeasurements) -> list[list[str]]:
     return rows
 
 
-def _drift_rows(it: DelayDrift) -> list[list[str]]:
-    minutes = it.pulses / SITE.fps / 60
+def _drift_rows(cost: DelayDrift) -> list[list[str]]:
+    minutes = cost.pulses / SITE.fps / 60
     return [
         [
             f"delay in {minutes:.0f} minutes",
-            f"{it.least} to {it.most} pulses",
+            f"{cost.least} to {cost.most} pulses",
             "no drift",
-            f"{it.gops} GOPs; times off by {it.off} ticks of 1/90000 s",
+            f"{cost.gops} GOPs; times off by {cost.off} ticks of 1/90000 s",
         ],
         [
             "cost of a pulse, last tenth",
-            f"{it.costs[-1] / it.costs[0]:.2f}x",
+            f"{cost.costs[-1] / cost.costs[0]:.2f}x",
             "no drift",
-            f"of the first tenth's {it.costs[0]:.2f} ms",
+            f"of the first tenth's {cost.costs[0]:.2f} ms",
         ],
     ]
 

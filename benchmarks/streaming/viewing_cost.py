@@ -106,7 +106,7 @@ def step_up(
         viewers.watch([_path(numbers[place % len(numbers)]) for place in range(count)], _SETTLE_S)
         cores, heard = _used(site, viewers, seconds)
         sent = site.sent
-        delays = send_delays(heard, {first: it.began for first, it in sent.items()})
+        delays = send_delays(heard, {first: sent_gop.began for first, sent_gop in sent.items()})
         low, middle, high = np.percentile(delays, [50, 95, 99]).tolist()
         steps.append(
             ViewerStep(
@@ -126,7 +126,7 @@ def step_up(
 def _given(heard: CrowdReading, sent: dict[int, SendTimes]) -> list[float]:
     """Return the milliseconds that sending took, of the received GOPs."""
     gops = {round(tick * SITE.fps / TIMESCALE) // ENCODE.gop * ENCODE.gop for tick in heard.ticks}
-    return [1e3 * (it.ended - it.began) for first, it in sent.items() if first in gops]
+    return [1e3 * (sent_gop.ended - sent_gop.began) for first, sent_gop in sent.items() if first in gops]
 
 
 def send_delays(heard: CrowdReading, sent: dict[int, float]) -> NDArray[np.float64]:

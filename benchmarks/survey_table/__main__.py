@@ -100,15 +100,15 @@ def measure(options: argparse.Namespace) -> None:
     report.save(options.out / "survey_table.txt")
 
 
-def _cells(it: ViewMeasurement) -> list[str]:
+def _cells(measurement: ViewMeasurement) -> list[str]:
     return [
-        f"{it.survived} of {it.occlusions}",
-        str(it.scores.switches),
-        f"{100 * it.scores.idf1:.1f}",
-        f"{100 * it.scores.hota:.1f}",
-        f"{it.tracked:.1f} of {it.present:.1f}",
-        f"{it.milliseconds:.1f}",
-        f"{1e3 / it.milliseconds:.0f}",
+        f"{measurement.survived} of {measurement.occlusions}",
+        str(measurement.scores.switches),
+        f"{100 * measurement.scores.idf1:.1f}",
+        f"{100 * measurement.scores.hota:.1f}",
+        f"{measurement.tracked:.1f} of {measurement.present:.1f}",
+        f"{measurement.milliseconds:.1f}",
+        f"{1e3 / measurement.milliseconds:.0f}",
     ]
 
 

@@ -66,11 +66,11 @@ def measure_view(view: SearchedView, tracker: str) -> ViewMeasurement:
 def combine(found: Sequence[ViewMeasurement]) -> TrackerRow:
     """Combine a tracker's measurements of all views."""
     return TrackerRow(
-        survived=sum(it.survived for it in found),
-        occlusions=sum(it.occlusions for it in found),
-        idf1=fmean(it.scores.idf1 for it in found),
-        switches=sum(it.scores.switches for it in found),
-        tracked=fmean(it.tracked for it in found),
-        present=fmean(it.present for it in found),
-        lowest_fps=1e3 / max(it.milliseconds for it in found),
+        survived=sum(measurement.survived for measurement in found),
+        occlusions=sum(measurement.occlusions for measurement in found),
+        idf1=fmean(measurement.scores.idf1 for measurement in found),
+        switches=sum(measurement.scores.switches for measurement in found),
+        tracked=fmean(measurement.tracked for measurement in found),
+        present=fmean(measurement.present for measurement in found),
+        lowest_fps=1e3 / max(measurement.milliseconds for measurement in found),
     )

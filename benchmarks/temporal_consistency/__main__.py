@@ -96,7 +96,7 @@ def follow(
                 _time(window.graph, settings, tally)
     while (decision := window.commit()) is not None:
         tracked.append(decision)
-    return [first, *(it.blob_by_id for it in tracked)]
+    return [first, *(decision.blob_by_id for decision in tracked)]
 
 
 def _time(graph: WindowGraph, settings: TemporalSettings, tally: MergeCounts) -> None:
@@ -152,7 +152,7 @@ def print_errors(report: Report, tallies: dict[int, MergeCounts], how: str) -> N
     for people, tally in tallies.items():
         errors = [str(error) for error in tally.errors.values()]
         rows.append([f"{people} people", str(tally.merges), str(tally.chances), *errors, _shares([tally])])
-        published = [str(it) for it in PUBLISHED[people]]
+        published = [str(number) for number in PUBLISHED[people]]
         rows.append(["  theirs", published[0], "", *published[1:], _of([PUBLISHED[people]])])
     every = list(tallies.values())
     merges, chances = sum(counts.merges for counts in every), sum(counts.chances for counts in every)

@@ -30,16 +30,16 @@ class PersonMerge:
 
 def find_merges(blobs: NDArray[np.int64]) -> list[PersonMerge]:
     """Return the merges that begin and end in a recording, one for each person, by `(T, P)` blobs."""
-    return [it for person in range(blobs.shape[1]) for it in _of(person, _alone(blobs, person))]
+    return [merge for person in range(blobs.shape[1]) for merge in _of(person, _alone(blobs, person))]
 
 
 def events(found: Sequence[PersonMerge], blobs: NDArray[np.int64]) -> int:
     """Count the distinct merges: people in one blob at one time are in the same merge."""
     group = list(range(len(found)))
     at: dict[tuple[int, int], int] = {}
-    for place, it in enumerate(found):
-        for stage in range(*it.inside):
-            first = at.setdefault((stage, int(blobs[stage, it.person])), place)
+    for place, merge in enumerate(found):
+        for stage in range(*merge.inside):
+            first = at.setdefault((stage, int(blobs[stage, merge.person])), place)
             old, new = group[place], group[first]
             group = [new if name == old else name for name in group]
     return len(set(group))
@@ -54,9 +54,9 @@ def count_wrong_ids(
     without an id before cannot lose it.
     """
     wrong = []
-    for it in found:
-        before = _number(it.person, it.before, blobs, tracked)
-        wrong.append(before is not None and before != _number(it.person, it.after, blobs, tracked))
+    for merge in found:
+        before = _number(merge.person, merge.before, blobs, tracked)
+        wrong.append(before is not None and before != _number(merge.person, merge.after, blobs, tracked))
     return wrong
 
 
@@ -83,7 +83,7 @@ def _alone(blobs: NDArray[np.int64], person: int) -> list[bool | None]:
 def _of(person: int, alone: Sequence[bool | None]) -> Iterator[PersonMerge]:
     """Return a person's runs of stages in merges that lie between two runs alone."""
     known = [(stage, state) for stage, state in enumerate(alone) if state is not None]
-    runs = [(state, list(run)) for state, run in groupby(known, key=lambda it: it[1])]
+    runs = [(state, list(run)) for state, run in groupby(known, key=lambda pair: pair[1])]
     spans = [(state, (run[0][0], run[-1][0] + 1)) for state, run in runs]
     for (_, before), ((state, inside), (_, after)) in zip(spans, pairwise(spans[1:]), strict=False):
         if state is False:

@@ -70,7 +70,9 @@ class SimulatedCrowd:
                 )
                 for camera in cameras[person]:
                     said[config.camera_ids[camera]].append(track)
-            yield Epoch(number, last, {it: _message(it, number, first, last, said[it]) for it in said})
+            yield Epoch(
+                number, last, {camera: _message(camera, number, first, last, said[camera]) for camera in said}
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,7 +55,7 @@ def test_the_machine_carries_as_many_as_are_searched_whole() -> None:
 
 
 def test_what_was_found_is_drawn(tmp_path: Path) -> None:
-    samples = [replace(CALM, at=float(it), delays=(400.0,)) for it in range(5)]
+    samples = [replace(CALM, at=float(second), delays=(400.0,)) for second in range(5)]
     plot(OverloadResult(samples=samples, started=[(0.0, 1), (3.0, 2)]), tmp_path / "load.png")
     assert (tmp_path / "load.png").stat().st_size > 1000
 
@@ -65,7 +65,7 @@ def test_who_was_not_answered_counts_with_the_time_that_they_waited() -> None:
         60.0, response_times=[(0.0, None), (1.0, 2.0), (10.0, 0.5), (20.0, None), (5.0, 1.5), (2.0, 9.0)]
     )
     assert measured.first_response_s == 3.0
-    assert [measured.response_time(it) for it in (0, 50, 100)] == [0.5, 1.5, 40.0], (
+    assert [measured.response_time(percent) for percent in (0, 50, 100)] == [0.5, 1.5, 40.0], (
         "those that came before are not counted"
     )
     assert Responsiveness(60.0, response_times=[(0.0, None)]).first_response_s == np.inf
@@ -73,7 +73,7 @@ def test_who_was_not_answered_counts_with_the_time_that_they_waited() -> None:
 
 def test_a_lag_is_told_by_the_bound_that_it_does_not_pass() -> None:
     lags = [(0.1, 90.0), (0.5, 95.0), (1.0, 95.0), (np.inf, 100.0)]
-    assert [lag_below(it, lags) for it in (0.5, 0.95, 1.0)] == [0.1, 0.5, np.inf]
+    assert [lag_below(share, lags) for share in (0.5, 0.95, 1.0)] == [0.1, 0.5, np.inf]
 
 
 def test_frames_are_counted_at_the_end_and_what_is_not_known_is_told_so() -> None:

@@ -54,10 +54,10 @@ def test_what_was_not_seen_is_not_flat(hours: list[float]) -> None:
 
 def test_every_quantity_of_a_process_is_judged_by_itself() -> None:
     samples = [
-        ProcessSample(it, 100.0, 10, 5 + (it > 16.0) * 2, 7, 1000)
-        for it in map(float, np.linspace(0.1, 24.0, 40))
+        ProcessSample(hour, 100.0, 10, 5 + (hour > 16.0) * 2, 7, 1000)
+        for hour in map(float, np.linspace(0.1, 24.0, 40))
     ]
-    assert [it.rule.name for it in judge(samples) if not it.flat] == ["threads"]
+    assert [verdict.rule.name for verdict in judge(samples) if not verdict.flat] == ["threads"]
 
 
 def test_a_process_is_read_as_it_is() -> None:
@@ -155,4 +155,4 @@ async def test_a_person_may_be_forgotten_and_a_camera_may_not() -> None:
     assert visitors.camera.missing_frames == visitors.person.missing_frames == 0
 
 
-FILM = [fmp4.fragment([fmp4.FragmentSample(b"a", key=not it)], it, 25.0) for it in range(3)]
+FILM = [fmp4.fragment([fmp4.FragmentSample(b"a", key=not number)], number, 25.0) for number in range(3)]

@@ -140,9 +140,9 @@ def test_a_crowd_hears_all_that_is_sent_and_notices_who_hangs_up() -> None:
         while heard[-1].gone < 3:
             heard.append(crowd.read(0.1))
         crowd.leave()
-    assert sum(it.megabytes for it in heard) == pytest.approx(3 * len(data) / 1e6)
-    assert [tick for it in heard for tick in it.ticks] == [ticks(9, 25)] * 3
-    assert all(began < at < time.monotonic() for it in heard for at in it.at)
+    assert sum(reading.megabytes for reading in heard) == pytest.approx(3 * len(data) / 1e6)
+    assert [tick for reading in heard for tick in reading.ticks] == [ticks(9, 25)] * 3
+    assert all(began < at < time.monotonic() for reading in heard for at in reading.at)
 
 
 def step(count: int, cores: float, late: float) -> ViewerStep:
@@ -208,4 +208,4 @@ def test_a_tenth_of_a_real_site_stalls_and_the_others_are_sent_everything(
     with running(films, tmp_path / "site") as site, viewers(site.http) as crowd:
         found = beside_stalled(site, crowd, site.objects(20)[:20], 50, 4.0, 2)
         assert (found.good, found.stalled) == (45, 5)
-        assert all(it.arrived > 0.9 for it in found.beside)
+        assert all(reading_round.arrived > 0.9 for reading_round in found.beside)

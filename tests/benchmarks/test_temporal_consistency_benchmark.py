@@ -22,7 +22,7 @@ def _told(*swapped: int) -> list[dict[int, int]]:
 
 def test_a_merge_of_two_is_one_merge_and_two_chances() -> None:
     found = find_merges(_BLOBS)
-    assert [(it.person, it.inside) for it in found] == [(0, (2, 4)), (1, (2, 4))]
+    assert [(merge.person, merge.inside) for merge in found] == [(0, (2, 4)), (1, (2, 4))]
     assert events(found, _BLOBS) == 1
 
 
@@ -51,7 +51,7 @@ def test_a_merge_that_does_not_end_is_no_chance() -> None:
 def test_who_is_seen_nowhere_for_a_moment_is_still_merged() -> None:
     blobs = _BLOBS.copy()
     blobs[3, 0] = NOBODY
-    assert (0, (2, 3)) in [(it.person, it.inside) for it in find_merges(blobs)]
+    assert (0, (2, 3)) in [(merge.person, merge.inside) for merge in find_merges(blobs)]
 
 
 def test_an_exchange_after_the_merge_is_two_mistakes_and_one_within_it_none() -> None:

@@ -92,7 +92,9 @@ def test_cameras_yield_to_the_best_view_and_the_pulses() -> None:
     """In containers niceness orders only what is in the same one."""
     cameras = load_config(ROOT / "configs" / "demo.yaml").camera_ids
     default = 1024  # docker run --cpu-shares
-    shares = {name: it.get("cpu_shares", default) for name, it in content(PLAIN)["services"].items()}
+    shares = {
+        name: service.get("cpu_shares", default) for name, service in content(PLAIN)["services"].items()
+    }
     assert all(shares[name] < min(shares["bestview"], shares["sync"]) for name in cameras)
 
 
@@ -124,7 +126,9 @@ def test_no_file_gives_a_service_more_than_it_needs(file: str) -> None:
 def test_each_service_has_its_own_secrets_alone() -> None:
     services, secrets = content(SECURE)["services"], content(SECURE)["secrets"]
     used = {
-        name: [it if isinstance(it, str) else it["source"] for it in service.get("secrets", ())]
+        name: [
+            secret if isinstance(secret, str) else secret["source"] for secret in service.get("secrets", ())
+        ]
         for name, service in services.items()
     }
     assert used["bestview"] == ["bus", "router_key"]
@@ -159,14 +163,16 @@ def test_what_a_machine_has_to_be_told_stands_in_the_example_of_its_env_file(fil
     needed = set(re.findall(r"\$\{(MYVIEW_\w+):\?", (ROOT / file).read_text(encoding="utf-8")))
     assert needed
     text = (ROOT / "docs" / "how-to" / "containers.md").read_text(encoding="utf-8")
-    blocks = [it.partition("\n")[2] for it in text.split("```")[1::2]]
+    blocks = [block.partition("\n")[2] for block in text.split("```")[1::2]]
     (env,) = [block for block in blocks if block.startswith("COMPOSE_FILE=") and file in block]
     assert needed | {"MYVIEW_CONFIG"} <= {line.partition("=")[0] for line in env.splitlines()}
 
 
 def test_a_port_that_is_published_is_the_one_that_is_listened_on() -> None:
     plain, server = content(PLAIN)["services"], content(SERVER)["services"]
-    published = {name: [it.rpartition(":")[2] for it in service["ports"]] for name, service in server.items()}
+    published = {
+        name: [port.rpartition(":")[2] for port in service["ports"]] for name, service in server.items()
+    }
     assert published["sync"] == [str(plain["sync"]["environment"]["MYVIEW_SYNC__PORT"])]
     listened = plain["bestview"]["environment"]["MYVIEW_ZENOH__LISTEN"]
     assert published["bestview"] == [listened.rpartition(":")[2]]
@@ -181,15 +187,17 @@ def _config(environment: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> Con
 
 
 @NEEDS_COMPOSE
-@pytest.mark.parametrize("files", VARIANTS, ids=lambda it: "+".join(name.split(".")[-2] for name in it))
+@pytest.mark.parametrize(
+    "files", VARIANTS, ids=lambda variant: "+".join(name.split(".")[-2] for name in variant)
+)
 def test_compose_takes_the_files_together(files: tuple[str, ...], tmp_path: Path) -> None:
     found = composed(files, tmp_path)
     for name, service in found["services"].items():
         assert service["read_only"], name
         assert service["cap_drop"] == ["ALL"], name
         assert int(service["mem_limit"]) > 0, name
-        given = {SECRETS + it["target"] for it in service.get("secrets", ())}
-        named = {it for it in service["environment"].values() if it.startswith(SECRETS)}
+        given = {SECRETS + secret["target"] for secret in service.get("secrets", ())}
+        named = {value for value in service["environment"].values() if value.startswith(SECRETS)}
         assert name == "sync" or named == given, "what the configuration names is what is there"
         for mounted in service["volumes"]:
             assert mounted["read_only"], name
@@ -199,7 +207,9 @@ def test_compose_takes_the_files_together(files: tuple[str, ...], tmp_path: Path
 def test_pulses_and_bus_are_published_where_cameras_are_elsewhere_alone(tmp_path: Path) -> None:
     def ports(files: tuple[str, ...], folder: str) -> set[tuple[str, int]]:
         services = composed(files, tmp_path / folder)["services"].values()
-        return {(it["host_ip"], it["target"]) for service in services for it in service.get("ports", ())}
+        return {
+            (port["host_ip"], port["target"]) for service in services for port in service.get("ports", ())
+        }
 
     assert ports((PLAIN, SECURE), "one") == {("127.0.0.1", 8080)}
     assert ports((PLAIN, SECURE, SERVER), "many") == {

@@ -26,7 +26,7 @@ ALIKE = "crossing"
 
 def left_to_right(gop: Gop) -> list[int]:
     """Return who is shown by the camera of the two; empty where they change within the GOP."""
-    rows = {tuple(it.object for it in sorted(row, key=lambda it: it.left)) for row in gop.boxes[ALIKE]}
+    rows = {tuple(box.object for box in sorted(row, key=lambda box: box.left)) for row in gop.boxes[ALIKE]}
     return list(rows.pop()) if len(rows) == 1 else []
 
 

@@ -73,7 +73,7 @@ async def test_a_scripted_pointer_follows_a_flag_through_and_the_stream_goes_on(
         while await metric(site, "myview_camera_position_corrections_total") < 1:
             await page.wait_for_function(f"myview.pulse > {await page.evaluate('myview.pulse')} + 5")
     async with aiohttp.ClientSession() as session, session.get(f"{site.url}api/flags") as answer:
-        states = {it["state"] for it in (await answer.json())["flags"]}
+        states = {flag["state"] for flag in (await answer.json())["flags"]}
     assert states & {"followed", "answered"}
     await page.keyboard.press("Escape")
     await page.wait_for_function("myview.pointing.object === null")

@@ -69,7 +69,7 @@ async def test_a_best_view_that_is_killed_shows_the_same_people_under_the_same_a
         words: list[CameraTracks] = []
         bus = await asyncio.to_thread(Bus.hearing, ZenohSettings(connect=site.config["zenoh"]["connect"]))
         try:
-            bus.subscribe(ZenohKeys("e2e").camera("*", "tracks"), lambda it: words.append(read(it)))
+            bus.subscribe(ZenohKeys("e2e").camera("*", "tracks"), lambda message: words.append(read(message)))
             for _ in range(2):
                 await killed(site, words)
         finally:
@@ -113,7 +113,7 @@ async def killed(site: RunningSite, words: list[CameraTracks]) -> None:
     now = whose(site.gops[count:], words)
     used = {number for numbers in told.values() for number in numbers}
     new = {number for track, numbers in now.items() if track not in told for number in numbers} - used
-    assert all(it > max(used) for it in new), "numbers are not used twice"
+    assert all(number > max(used) for number in new), "numbers are not used twice"
 
 
 def seen_now(gop: Gop) -> set[int]:

@@ -45,7 +45,11 @@ async def _somebody(site: ComposeSite, camera: str | None = None) -> int:
     async with asyncio.timeout(SEEN_S):
         async for event in client.events(url_of(site)):
             if isinstance(event, client.Objects):
-                shown = [it.object for it in event.objects if it.visible and camera in {None, it.camera}]
+                shown = [
+                    shown_object.object
+                    for shown_object in event.objects
+                    if shown_object.visible and camera in {None, shown_object.camera}
+                ]
                 if shown:
                     return shown[0]
     pytest.fail("the events have ended")
@@ -78,8 +82,8 @@ def test_no_service_runs_as_root_and_only_the_best_view_is_published(site: Compo
 
 def test_limits_hold(site: ComposeSite) -> None:
     """A process that wants more memory than its container has is ended; what else is there goes on."""
-    for name, it in site.containers().items():
-        host = it["HostConfig"]
+    for name, container in site.containers().items():
+        host = container["HostConfig"]
         assert 0 < host["Memory"] == host["MemorySwap"], name
         assert host["NanoCpus"] > 0, name
         assert 0 < host["PidsLimit"] <= 512, name

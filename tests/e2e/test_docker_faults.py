@@ -32,7 +32,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, FaultOutcome
         pytest.skip(missing)
     found = asyncio.run(measure(list(FAULTS), tmp_path_factory.mktemp("faults"), Report()))
     gc.collect()  # here, where it is let pass, not in whichever test the collector comes to next
-    return {it.fault.name: it for it in found}
+    return {outcome.fault.name: outcome for outcome in found}
 
 
 @pytest.mark.parametrize("name", BY_NAME)
@@ -55,8 +55,8 @@ def test_a_stream_is_back_when_its_server_is(outcomes: dict[str, FaultOutcome], 
 @pytest.mark.parametrize("name", BY_NAME)
 def test_no_picture_and_no_box_is_a_wrong_one(outcomes: dict[str, FaultOutcome], name: str) -> None:
     outcome = outcomes[name]
-    assert sum(it.frames for it in outcome.received), "there is something to be wrong"
-    assert [note for it in outcome.received for note in it.notes] == []
+    assert sum(viewer.frames for viewer in outcome.received), "there is something to be wrong"
+    assert [note for viewer in outcome.received for note in viewer.notes] == []
 
 
 @pytest.mark.parametrize("name", [name for name in BY_NAME if name.startswith("restart")])

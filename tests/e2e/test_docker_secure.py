@@ -118,9 +118,9 @@ async def _json(viewer: aiohttp.ClientSession, path: str) -> Any:
 async def _somebody(viewer: aiohttp.ClientSession) -> int:
     async with asyncio.timeout(SEEN_S):
         while True:
-            for it in (await _json(viewer, "/api/objects"))["objects"]:
-                if it["visible"]:
-                    return int(it["object"])
+            for shown_object in (await _json(viewer, "/api/objects"))["objects"]:
+                if shown_object["visible"]:
+                    return int(shown_object["object"])
             await asyncio.sleep(0.5)
 
 
@@ -145,13 +145,13 @@ def test_each_has_its_own_secrets_and_they_are_in_no_variable(secure: Secure) ->
             own = secure.site.compose("exec", "-T", camera, "cat", f"/run/secrets/{secret}")
             assert own == (secure.secrets / "cameras" / camera / secret).read_text("ascii").strip()
     hidden = [
-        it.read_text("ascii").strip()
-        for it in secure.secrets.rglob("*")
-        if it.name in {"token", "bus", "pulses"}
+        path.read_text("ascii").strip()
+        for path in secure.secrets.rglob("*")
+        if path.name in {"token", "bus", "pulses"}
     ]
     assert len(hidden) == 12
     for container in secure.site.containers().values():
-        assert not [it for it in hidden if it in str(container["Config"])]
+        assert not [secret for secret in hidden if secret in str(container["Config"])]
 
 
 async def test_who_has_a_token_watches_by_https(viewer: aiohttp.ClientSession, tmp_path: Path) -> None:
@@ -180,7 +180,7 @@ async def test_a_camera_s_token_shows_that_camera_alone(
 ) -> None:
     token = (secure.secrets / "cameras" / "c0" / "token").read_text("ascii").strip()
     async with viewer.get("/api/cameras", headers={"Authorization": f"Bearer {token}"}) as answer:
-        assert [it["camera"] for it in (await answer.json())["cameras"]] == ["c0"]
+        assert [camera["camera"] for camera in (await answer.json())["cameras"]] == ["c0"]
 
 
 async def test_strangers_on_the_bus_are_heard_by_nobody(

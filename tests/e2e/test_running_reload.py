@@ -57,7 +57,7 @@ async def test_a_bad_file_changes_nothing_and_a_good_one_breaks_no_stream(
         await site.until(lambda: site.state("c2") != "live", "c2 is lost")
         await site.until(lambda: site.state("c2") == "live", "c2 is back")
 
-        cameras = [dict(it) for it in site.config["cameras"]]
+        cameras = [dict(camera) for camera in site.config["cameras"]]
         cameras[1]["offset"] = 5
         await read_again(site, config, cameras=cameras, view={"switch_cost_s": 0.7}, encode={"crf": 30})
         await said(site, "bestview: configuration reloaded: in force now: view.switch_cost_s")

@@ -36,7 +36,7 @@ async def site(recording: Path, tmp_path: Path) -> AsyncIterator[RunningSite]:
 
 
 def runs(folder: Path) -> list[Path]:
-    return sorted(it for it in folder.iterdir() if it.is_dir())
+    return sorted(path for path in folder.iterdir() if path.is_dir())
 
 
 async def test_the_past_is_what_the_cameras_showed_and_a_kill_leaves_all_of_it_playable(
@@ -52,7 +52,7 @@ async def test_the_past_is_what_the_cameras_showed_and_a_kill_leaves_all_of_it_p
     for path in files:
         await asyncio.to_thread(decodes_without_errors, path)
     async with asyncio.timeout(PATIENCE):
-        while not any(it != run and any(it.glob("cameras/c0/*.mp4")) for it in runs(tmp_path / "kept")):  # noqa: ASYNC110
+        while not any(path != run and any(path.glob("cameras/c0/*.mp4")) for path in runs(tmp_path / "kept")):  # noqa: ASYNC110
             await asyncio.sleep(0.1)
 
 

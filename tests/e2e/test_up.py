@@ -83,7 +83,9 @@ async def test_it_is_five_processes(site: RunningSite) -> None:
 async def test_cameras_yield_to_the_best_view_and_the_pulses(site: RunningSite) -> None:
     """Every thread of theirs, which begins as nice as the one that has begun it."""
     niceness = {
-        name: {os.getpriority(os.PRIO_PROCESS, int(it.name)) for it in Path(f"/proc/{pid}/task").iterdir()}
+        name: {
+            os.getpriority(os.PRIO_PROCESS, int(task.name)) for task in Path(f"/proc/{pid}/task").iterdir()
+        }
         for name, pid in site.children().items()
     }
     own = os.getpriority(os.PRIO_PROCESS, site.process.pid)
@@ -152,7 +154,7 @@ def lacks(printed: Printed) -> list[str]:
     """List what asks for something that was not printed yet."""
     lacking = []
     for asked in ASKED:
-        if not {it.name for it in selectors(asked.expression)} <= OF_PROMETHEUS:
+        if not {selector.name for selector in selectors(asked.expression)} <= OF_PROMETHEUS:
             series = given(asked.expression, printed)
             if not series:
                 lacking.append(asked.place)
@@ -189,7 +191,9 @@ async def test_every_frame_is_the_chosen_cameras_own_pixel_for_pixel_across_cuts
             camera, last, before = chosen[number, pulse], before, picture
             if camera is None:  # two numbers were one person, or no camera could be shown: it stands still
                 possible = [last, *(shown[camera].get(pulse) for camera in CAMERAS)]
-                assert any(it is not None and np.array_equal(picture, it) for it in possible), pulse
+                assert any(
+                    candidate is not None and np.array_equal(picture, candidate) for candidate in possible
+                ), pulse
                 continue
             if pulse in shown[camera]:
                 np.testing.assert_array_equal(picture, shown[camera][pulse], f"{number} at {pulse}: {camera}")

@@ -33,7 +33,7 @@ def _no_settings_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("target", ALL, ids=[target.name for target in ALL])
 def test_no_input_makes_it_crash(target: type[Target], tmp_path: Path) -> None:
     result = TargetRunner(target, target.name, FuzzPlan(INPUTS, SECONDS, seed=7, out=tmp_path)).run()
-    found = "\n\n".join(it.read_text() for it in sorted(tmp_path.glob("*.txt")))
+    found = "\n\n".join(path.read_text() for path in sorted(tmp_path.glob("*.txt")))
     counts = result.counts
     assert counts.crashes == 0, found
     assert counts.inputs > 0
@@ -140,8 +140,8 @@ class Talking(ScriptTarget):
 
 def test_messages_are_counted_that_were_handed_over_though_a_process_dies() -> None:
     inputs = [make_input(Talking(), SEED, index).split() for index in range(INPUTS)]
-    handed = [it.index(b"over") + 1 if b"over" in it else len(it) for it in inputs]
-    died = [it == [b"right"] * 5 for it in inputs]
+    handed = [messages.index(b"over") + 1 if b"over" in messages else len(messages) for messages in inputs]
+    died = [messages == [b"right"] * 5 for messages in inputs]
     assert any(died)
     counts = TargetRunner(Talking, Talking.name, FuzzPlan(INPUTS, seed=SEED)).run().counts
     assert counts.messages == sum(1 if dead else count for count, dead in zip(handed, died, strict=True))

@@ -49,8 +49,8 @@ def described() -> Iterator[Site]:
     try:
         url = f"http://127.0.0.1:{served.port}"
         schema = schemathesis.openapi.from_url(f"{url}/api/openapi.json")
-        found = [it.ok() for it in schema.get_all_operations()]
-        yield Site(url, {it.label: it for it in found})
+        found = [operation.ok() for operation in schema.get_all_operations()]
+        yield Site(url, {operation.label: operation for operation in found})
     finally:
         loop.call_soon_threadsafe(loop.stop)
         thread.join()

@@ -115,7 +115,7 @@ def assign_ids(paths: Sequence[PathAppearance], person: float, settings: Meeting
             for member in meeting.members
             if paths[member].first < meeting.begin and paths[member].end > meeting.end
         )
-        ids = [int(numbers[it][meeting.begin - 1 - paths[it].first]) - 1 for it in continuing]
+        ids = [int(numbers[member][meeting.begin - 1 - paths[member].first]) - 1 for member in continuing]
         for path, number in zip(continuing, ids, strict=True):
             known[number] = known[number].plus(paths[path].sum_over(last_seen[path], meeting.begin))
         distance = np.full((len(continuing), len(continuing)), np.nan)
@@ -150,7 +150,7 @@ def _meetings(paths: Sequence[PathAppearance], near: float) -> list[_Meeting]:
             for start, stop in edges.reshape(-1, 2).tolist():
                 found.append(_Meeting(begin + start, begin + stop, frozenset((one, other))))
     merged: list[_Meeting] = []
-    for meeting in sorted(found, key=lambda it: (it.begin, it.end, sorted(it.members))):
+    for meeting in sorted(found, key=lambda meeting: (meeting.begin, meeting.end, sorted(meeting.members))):
         it = meeting
         for before in list(merged):
             if before.members & it.members and before.end >= it.begin:
@@ -158,4 +158,4 @@ def _meetings(paths: Sequence[PathAppearance], near: float) -> list[_Meeting]:
                 span = min(before.begin, it.begin), max(before.end, it.end)
                 it = _Meeting(*span, before.members | it.members)
         merged.append(it)
-    return sorted(merged, key=lambda it: (it.begin, it.end, sorted(it.members)))
+    return sorted(merged, key=lambda meeting: (meeting.begin, meeting.end, sorted(meeting.members)))

@@ -43,18 +43,18 @@ def path_histograms(
         foreground = masks.foreground[frame]
         if image is None or foreground is None or frame % _EVERY:
             continue
-        present = [it for it, first in enumerate(firsts) if 0 <= frame - first < len(boxes[it])]
-        present = [it for it in present if np.isfinite(boxes[it][frame - firsts[it]]).all()]
-        present_boxes = np.array([boxes[it][frame - firsts[it]] for it in present]).reshape(-1, 4)
+        present = [track for track, first in enumerate(firsts) if 0 <= frame - first < len(boxes[track])]
+        present = [track for track in present if np.isfinite(boxes[track][frame - firsts[track]]).all()]
+        present_boxes = np.array([boxes[track][frame - firsts[track]] for track in present]).reshape(-1, 4)
         mask = _unoccluded(foreground, image.shape[:2], present_boxes)
-        for it, row, count in zip(
+        for track, row, count in zip(
             present,
             color_histograms(image, present_boxes, _BINS, mask),
             _sums(mask, present_boxes),
             strict=True,
         ):
-            histograms[it][frame - firsts[it]] = row
-            pixels[it][frame - firsts[it]] = count
+            histograms[track][frame - firsts[track]] = row
+            pixels[track][frame - firsts[track]] = count
     pipeline.close()
     return histograms, pixels
 

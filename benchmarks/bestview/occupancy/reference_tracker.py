@@ -77,7 +77,11 @@ def track_by_occupancy(
     """
     settings, config = settings or ReferenceSettings(), scene.config()
     masks = {camera: compute_masks(config, camera) for camera in scene.gt}
-    ground = {camera: it for camera, it in camera_homographies(config).items() if it is not None}
+    ground = {
+        camera: homography
+        for camera, homography in camera_homographies(config).items()
+        if homography is not None
+    }
     views = aligned_views(masks, ground, boxes)
     floor = build_grid(list(views.values()), settings.floor)
     q = occupancy(floor, list(masks.values()), settings.map)

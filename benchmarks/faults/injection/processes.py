@@ -96,6 +96,6 @@ def _freeze(processes: tuple[str, ...]) -> Fault:
 FAULTS = (
     *map(_kill, process_sets(BESTVIEW)),
     *map(_freeze, process_sets(BESTVIEW)),
-    *map(_freeze, (it for it in process_sets() if BESTVIEW in it)),
-    *map(_kill, (it for it in process_sets() if BESTVIEW in it)),
+    *map(_freeze, (processes for processes in process_sets() if BESTVIEW in processes)),
+    *map(_kill, (processes for processes in process_sets() if BESTVIEW in processes)),
 )

@@ -121,5 +121,5 @@ def _restart(processes: tuple[str, ...]) -> Fault:
 # A render worker is terminated only by the best view, its parent.
 FAULTS = (
     *map(_restart, process_sets(BESTVIEW, DRAWING)),
-    *map(_restart, (it for it in process_sets(DRAWING) if BESTVIEW in it)),
+    *map(_restart, (processes for processes in process_sets(DRAWING) if BESTVIEW in processes)),
 )

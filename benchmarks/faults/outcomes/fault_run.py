@@ -128,14 +128,16 @@ def _received(fault_site: FaultSite, views: StampedViews) -> list[PictureVerdict
 def _sum_up(outcome: FaultOutcome, received: Sequence[PictureVerdict], fault_site: FaultSite) -> None:
     outcome.received = list(received)
     begun, until = outcome.began, outcome.until
-    spans = [it.longest_gap(begun - _BEFORE_S, begun) for it in received]
+    spans = [viewer.longest_gap(begun - _BEFORE_S, begun) for viewer in received]
     outcome.gap_before = max(0.0, max(spans, default=0.0) - RHYTHM_S)
     outcome.gap_after = max(
-        0.0, max((it.longest_gap(begun, until) for it in received), default=0.0) - RHYTHM_S
+        0.0, max((viewer.longest_gap(begun, until) for viewer in received), default=0.0) - RHYTHM_S
     )
     if outcome.fault.kills_server and fault_site.ready_times:
         ready = fault_site.ready_times[0]
-        first = [min((at for at, _ in it.fresh if at > ready - RHYTHM_S), default=None) for it in received]
+        first = [
+            min((at for at, _ in viewer.fresh if at > ready - RHYTHM_S), default=None) for viewer in received
+        ]
         if all(at is not None for at in first):
             outcome.page_recovery_s = (
                 None if fault_site.page_resumed_at is None else max(0.0, fault_site.page_resumed_at - ready)

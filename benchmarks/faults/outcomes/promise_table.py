@@ -27,12 +27,25 @@ def describe(report: Report, outcomes: Sequence[FaultOutcome]) -> None:
     ]
     report.table("faults", [*columns, "kept"], [_row(outcome) for outcome in outcomes])
     for outcome in outcomes:
-        notes = [outcome.failed, *(note for it in outcome.received for note in it.notes), *outcome.differing]
-        notes += [f"{it.name}: {it.seconds:.2f} s, {it.code}" for it in outcome.exits if not it.clean]
+        notes = [
+            outcome.failed,
+            *(note for viewer in outcome.received for note in viewer.notes),
+            *outcome.differing,
+        ]
+        notes += [
+            f"{process.name}: {process.seconds:.2f} s, {process.code}"
+            for process in outcome.exits
+            if not process.clean
+        ]
         for note in [note for note in notes if note][:_NOTES]:
             report.say(f"{outcome.fault.name}: {note}")
     for outcome in outcomes:
-        late = [late for it in outcome.received for order in it.live_orders.values() for late in order.behind]
+        late = [
+            late
+            for viewer in outcome.received
+            for order in viewer.live_orders.values()
+            for late in order.behind
+        ]
         if late:
             said = f"{min(late)} to {max(late)} frames behind their pulses, half of them {median_low(late)}"
             report.say(f"{outcome.fault.name}: pictures of the network camera are {said} at most")
@@ -58,48 +71,55 @@ def keeps_promises(outcome: FaultOutcome) -> bool:
     ):
         return False
     return not (
-        outcome.failed or _wrong(outcome) or outcome.broken_files or any(not it.clean for it in outcome.exits)
+        outcome.failed
+        or _wrong(outcome)
+        or outcome.broken_files
+        or any(not process.clean for process in outcome.exits)
     )
 
 
 def _wrong(outcome: FaultOutcome) -> bool:
     """Return whether any picture or box was wrong, or unnamed without a killed server."""
-    unnamed = not outcome.fault.kills_server and any(it.unnamed for it in outcome.received)
-    return unnamed or bool(outcome.differing) or any(it.wrong or it.wrong_boxes for it in outcome.received)
+    unnamed = not outcome.fault.kills_server and any(viewer.unnamed for viewer in outcome.received)
+    return (
+        unnamed
+        or bool(outcome.differing)
+        or any(viewer.wrong or viewer.wrong_boxes for viewer in outcome.received)
+    )
 
 
-def _row(it: FaultOutcome) -> list[str]:
-    frames, boxes = sum(r.frames for r in it.received), sum(r.boxes for r in it.received)
-    wrong, wrong_boxes = sum(r.wrong for r in it.received), sum(r.wrong_boxes for r in it.received)
-    means = sum(r.averaged for r in it.received)
-    wrong, unnamed = wrong + len(it.differing), sum(r.unnamed for r in it.received)
-    slowest = max(it.exits, key=lambda one: one.seconds, default=None)
+def _row(outcome: FaultOutcome) -> list[str]:
+    frames, boxes = sum(r.frames for r in outcome.received), sum(r.boxes for r in outcome.received)
+    wrong, wrong_boxes = sum(r.wrong for r in outcome.received), sum(r.wrong_boxes for r in outcome.received)
+    means = sum(r.averaged for r in outcome.received)
+    wrong, unnamed = wrong + len(outcome.differing), sum(r.unnamed for r in outcome.received)
+    slowest = max(outcome.exits, key=lambda one: one.seconds, default=None)
     return [
-        it.fault.name,
-        str(it.reconnections) if it.received else "",
-        _fresh(it),
-        _promised(it),
-        f"{wrong} of {frames}{f', {unnamed} unnamed' if unnamed else ''}" if it.received else "",
-        f"{wrong_boxes} of {boxes - means}{f', {means} means' if means else ''}" if it.received else "",
-        "" if it.lost is None else f"{it.lost} lost, {it.broken_files} broken",
+        outcome.fault.name,
+        str(outcome.reconnections) if outcome.received else "",
+        _fresh(outcome),
+        _promised(outcome),
+        f"{wrong} of {frames}{f', {unnamed} unnamed' if unnamed else ''}" if outcome.received else "",
+        f"{wrong_boxes} of {boxes - means}{f', {means} means' if means else ''}" if outcome.received else "",
+        "" if outcome.lost is None else f"{outcome.lost} lost, {outcome.broken_files} broken",
         "" if slowest is None else f"{slowest.seconds:.2f} s, {slowest.code}",
-        "yes" if keeps_promises(it) else "NO",
+        "yes" if keeps_promises(outcome) else "NO",
     ]
 
 
-def _fresh(it: FaultOutcome) -> str:
-    if not it.received:
+def _fresh(outcome: FaultOutcome) -> str:
+    if not outcome.received:
         return ""
-    if not it.fault.kills_server:
-        return f"{it.gap_after:.2f} ({it.gap_before:.2f})"
-    page = "" if it.page_recovery_s is None else f", page {it.page_recovery_s:.2f}"
-    return f"{'never' if it.recovery_s is None else f'{it.recovery_s:.2f}'}{page} ({it.gap_after:.2f})"
+    if not outcome.fault.kills_server:
+        return f"{outcome.gap_after:.2f} ({outcome.gap_before:.2f})"
+    page = "" if outcome.page_recovery_s is None else f", page {outcome.page_recovery_s:.2f}"
+    return f"{'never' if outcome.recovery_s is None else f'{outcome.recovery_s:.2f}'}{page} ({outcome.gap_after:.2f})"
 
 
-def _promised(it: FaultOutcome) -> str:
-    if it.fault.kills_server:
+def _promised(outcome: FaultOutcome) -> str:
+    if outcome.fault.kills_server:
         return f"{_BACK_S:g}"
-    return "" if it.fault.max_gap_s is None or not it.received else f"{it.fault.max_gap_s:g}"
+    return "" if outcome.fault.max_gap_s is None or not outcome.received else f"{outcome.fault.max_gap_s:g}"
 
 
 def _list(names: Sequence[str]) -> str:

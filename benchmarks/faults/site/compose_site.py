@@ -85,7 +85,7 @@ class ComposeSite:
         """Return `docker inspect` of every container by service, stopped ones included."""
         ids = self.compose("ps", "--all", "--quiet").split()
         found = json.loads(self.run("docker", "inspect", *ids)) if ids else []
-        return {it["Config"]["Labels"]["com.docker.compose.service"]: it for it in found}
+        return {container["Config"]["Labels"]["com.docker.compose.service"]: container for container in found}
 
     def state(self, service: str) -> dict[str, Any]:
         """Return the engine's state of a service's container: when it started, how it exited."""

@@ -63,17 +63,19 @@ class LossyLink:
         kind = kind_of(message.key)
         altered = self.mode != "plain" and kind != PICTURES and self._random.random() < SHARE
         self.altered[kind] += altered
-        delayed = [(left - 1, it) for left, it in self._delayed.pop(message.key, ())]
+        delayed = [
+            (left - 1, delayed_message) for left, delayed_message in self._delayed.pop(message.key, ())
+        ]
         if altered and self.mode == "disordered":
             delayed.append((_LATER, message))
         elif not (altered and self.mode == "lost"):
             self._forward(message)
         if altered and self.mode == "doubled":
             self._forward(message)
-        for left, it in delayed:
+        for left, delayed_message in delayed:
             if left <= 0:
-                self._forward(it)
-        if waiting := [(left, it) for left, it in delayed if left > 0]:
+                self._forward(delayed_message)
+        if waiting := [(left, delayed_message) for left, delayed_message in delayed if left > 0]:
             self._delayed[message.key] = waiting
 
     def _forward(self, message: Message) -> None:

@@ -120,7 +120,7 @@ class EventLog:
         match event:
             case Gop() if not self.gops or event.first > self.gops[-1][1].first:
                 self.gops.append((time.monotonic(), event))
-                self.merged.update({it.lost: it.kept for it in event.merged})
+                self.merged.update({merge.lost: merge.kept for merge in event.merged})
             case Cameras():
                 self.cameras = event
 
@@ -135,7 +135,7 @@ class EventLog:
     def state(self, camera: str) -> str | None:
         """Return a camera's last reported state."""
         known = self.cameras.cameras if self.cameras else ()
-        return next((it.state for it in known if it.camera == camera), None)
+        return next((camera_state.state for camera_state in known if camera_state.camera == camera), None)
 
     def shown(self, number: int) -> str | None:
         """Return the camera that shows an object now."""

@@ -78,8 +78,8 @@ class IngestMessages(Target):
                 lambda: sound(pulse),
             )
         )()
-        it = damaged_message(rng, right) if rng.random() < 0.95 else right
-        return _packed([(it.key.encode("utf-8", "replace").decode(), it.payload, it.attachment)])
+        sent = damaged_message(rng, right) if rng.random() < 0.95 else right
+        return _packed([(sent.key.encode("utf-8", "replace").decode(), sent.payload, sent.attachment)])
 
     def feed(self, data: bytes) -> bool:
         """Handle the message, and take the epoch that it may complete."""
@@ -116,8 +116,8 @@ class PeerMessages(ScriptTarget):
             boxes = [(1.0, 2.0, 9.0, 30.0, 0.9)] * rng.randrange(3)
             detections = FrameDetections(camera="c1", boot=1, size=(WIDTH, HEIGHT), pulse=pulse, boxes=boxes)
             message = Message(KEYS.camera("c1", "detections"), msgspec.json.encode(detections), b"")
-            it = damaged_message(rng, message) if rng.random() < 0.7 else message
-            script.append((it.key, it.payload, b""))
+            sent = damaged_message(rng, message) if rng.random() < 0.7 else message
+            script.append((sent.key, sent.payload, b""))
         return _packed(script)
 
     def feed(self, data: bytes) -> bool:
@@ -149,8 +149,8 @@ class OperatorPlaces(ScriptTarget):
             points = [place] * rng.randrange(3)
             payload = msgspec.json.encode(PositionCorrections(boot=1, corrections=points))
             message = Message(KEYS.camera("c0", "position_corrections"), payload, b"")
-            it = damaged_message(rng, message) if rng.random() < 0.7 else message
-            script.append((it.key, it.payload, b""))
+            sent = damaged_message(rng, message) if rng.random() < 0.7 else message
+            script.append((sent.key, sent.payload, b""))
         return _packed(script)
 
     def feed(self, data: bytes) -> bool:
@@ -181,7 +181,9 @@ class SiteSessions(ScriptTarget):
         for epoch in range(_EPOCHS):
             messages = [sound(epoch)]
             for seed, camera in enumerate(CAMERAS):
-                messages += [video(camera, it) for it in self._pictures[seed][epoch * STRIDE :][:STRIDE]]
+                messages += [
+                    video(camera, picture) for picture in self._pictures[seed][epoch * STRIDE :][:STRIDE]
+                ]
                 messages += [
                     tracks(make_tracks(rng, camera, epoch)),
                     status(camera, epoch),
@@ -194,7 +196,7 @@ class SiteSessions(ScriptTarget):
                     sent = rng.choice(
                         ([], [message] * 2, [damaged_message(rng, message)], [damaged_message(rng, message)])
                     )
-                script += [(_plain(it.key), it.payload, it.attachment) for it in sent]
+                script += [(_plain(message.key), message.payload, message.attachment) for message in sent]
             if rng.random() < share:
                 at = rng.randrange(len(script) + 1)
                 alive = (KEYS.camera(rng.choice(CAMERAS), "alive"), rng.choice((b"0", b"1")), b"")
@@ -211,8 +213,8 @@ class SiteSessions(ScriptTarget):
         service = FedService(self._config)
         service.stream_format.accept(self._pictures[0][0].data)
         viewers = [
-            it.subscribe()
-            for it in (*service.splicer.cameras.values(), *service.splicer.decided_cameras.values())
+            broadcaster.subscribe()
+            for broadcaster in (*service.splicer.cameras.values(), *service.splicer.decided_cameras.values())
         ]
         epoch = 0
         for key, payload, head in script:

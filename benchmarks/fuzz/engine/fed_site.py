@@ -139,7 +139,9 @@ def make_separate_tracks(rng: Random, camera: str, epoch: int) -> CameraTracks:
     boxes = [(4.0 + 40 * number, 10.0 + 8 * number, 14.0 + 40 * number, 34.0 + 8 * number)] * STRIDE
     appearance = [
         AppearanceHistogram(
-            first=first, last=first + STRIDE - 1, histogram=[float(it == number) for it in range(8)]
+            first=first,
+            last=first + STRIDE - 1,
+            histogram=[float(bin_number == number) for bin_number in range(8)],
         )
     ]
     track = TrackMessage(id=1, boxes=[*boxes], confidence=1.0, appearance=appearance, sharpness=0.5)

@@ -139,7 +139,7 @@ def odd_key(rng: Random) -> str:
 
 def _without_key(rng: Random, value: dict[str, Any]) -> dict[str, Any]:
     gone = rng.choice(list(value)) if value else ""
-    return {key: it for key, it in value.items() if key != gone}
+    return {key: item for key, item in value.items() if key != gone}
 
 
 def as_json(value: Any) -> bytes:
@@ -189,7 +189,7 @@ def _insert_word(rng: Random, data: bytes, words: Sequence[bytes]) -> bytes:
 
 def _renumber(rng: Random, data: bytes, words: Sequence[bytes]) -> bytes:
     """Replace a decimal number."""
-    digits = [it.start() for it in _DIGIT.finditer(data, 0, 2000)]
+    digits = [match.start() for match in _DIGIT.finditer(data, 0, 2000)]
     if not digits:
         return _insert_word(rng, data, words)
     at = end = rng.choice(digits)

@@ -196,7 +196,7 @@ class TargetRunner:
             if death is not None:
                 self._save(Crash(f"{DEAD}-{death}", f"the process {death}"), counts.inputs, shared.data)
                 counts.inputs, counts.messages, counts.crashes = (
-                    it + 1 for it in (counts.inputs, counts.messages, counts.crashes)
+                    count + 1 for count in (counts.inputs, counts.messages, counts.crashes)
                 )
                 shared.store(counts)
         return TargetResult(counts, time.monotonic() - began, len(self._kinds))

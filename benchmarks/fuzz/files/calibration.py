@@ -71,7 +71,7 @@ class _GroundFiles(Target):
     def __init__(self) -> None:
         self._folder = folder()
         self._path = Path(self._folder.name)
-        cameras = [{"id": it, "source": "scene:room"} for it in ("c0", "c1")]
+        cameras = [{"id": camera, "source": "scene:room"} for camera in ("c0", "c1")]
         self._site = build_config({"cameras": cameras}, where="site", folder=self._path)
         self._site = self._site.model_copy(update={"ground": Path("ground.json")})
 
@@ -100,7 +100,9 @@ class MarkedPoints(_GroundFiles):
     def __init__(self) -> None:
         super().__init__()
         rng = Random(1)
-        self._right = [{f"c{it}": _pairs(rng) for it in range(rng.choice((1, 1, 2)))} for _ in range(400)]
+        self._right = [
+            {f"c{camera}": _pairs(rng) for camera in range(rng.choice((1, 1, 2)))} for _ in range(400)
+        ]
 
     def make(self, rng: Random) -> bytes:
         """Return a file of points."""

@@ -61,7 +61,7 @@ class RecordedRuns(ScriptTarget):
         self._config = site(record={"folder": str(self._path / "kept"), "segment_s": 0.4})
         self._service = self._loop.run_until_complete(self._record())
         (self._run,) = (self._path / "kept").glob("2*")
-        files = sorted(it for it in self._run.rglob("*") if it.is_file())
+        files = sorted(path for path in self._run.rglob("*") if path.is_file())
         self._right = {str(file.relative_to(self._run)): file.read_bytes() for file in files}
         when = {
             "started": _PULSE0,
@@ -149,7 +149,7 @@ class RecordedRuns(ScriptTarget):
     async def _asked(recorder: Recorder, lot: int) -> int:
         """List everything; play one camera and one person only, which halves the time."""
         assert recorder.session is not None
-        lines = [it async for it in read_decision_lines(recorder, 0, _FAR)]
+        lines = [line async for line in read_decision_lines(recorder, 0, _FAR)]
         sources: tuple[PlaybackSource, ...] = (
             CameraPlayback(recorder, CAMERAS[lot % 2]),
             PersonPlayback(recorder, (1 + lot // 2 % 2,)),

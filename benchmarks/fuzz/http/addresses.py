@@ -42,7 +42,7 @@ def address(rng: Random, path: str, queries: tuple[str, ...]) -> str:
     if rng.random() < 0.1:
         name = rng.choice(("overlay", "from", "prefer", "x"))
         asked.append(f"{name}={quote(str(odd(rng)), errors='replace')[:200]}")
-    asked = [it for it in asked if it != "overlay=1" or rng.random() < 0.01]
+    asked = [parameter for parameter in asked if parameter != "overlay=1" or rng.random() < 0.01]
     return f"{path}{'?' + '&'.join(asked) if asked else ''}"
 
 

@@ -69,7 +69,9 @@ class ServedSite:
         found = [("/", ("object",)), ("/operator", ()), ("/api", ()), ("/api/openapi.json", ())]
         for path, item in describe(self.app)["paths"].items():
             for operation in item.values():
-                named = tuple(it["name"] for it in operation["parameters"] if it["in"] == "query")
+                named = tuple(
+                    parameter["name"] for parameter in operation["parameters"] if parameter["in"] == "query"
+                )
                 found.append((path, named))
         return found
 

@@ -160,7 +160,9 @@ class UnauthenticatedRequests(Target):
         answer = self._served.send(data[1:], came_from)
         granted = check_response(data[1:], answer)
         said = data + unquote_to_bytes(data)
-        who = {it for it in _WHO if SECRETS[it].encode() in said or _COOKIES[it].encode() in said}
+        who = {
+            secret for secret in _WHO if SECRETS[secret].encode() in said or _COOKIES[secret].encode() in said
+        }
         for one in self._answered:
             assert one.status >= HTTPStatus.BAD_REQUEST or _may(who, one), f"{sorted(who)}: {one}"
         if not who & {"hall", "night"}:

@@ -42,7 +42,7 @@ class PassthroughPackets(Target):
         units = pictures(0, 2)
         sps = b"\x67\x42\xc0\x1e\xd9"
         avcc = b"\x01\x42\xc0\x1e\xff\xe1" + struct.pack(">H", len(sps)) + sps + b"\x01\x00\x02\x68\xce"
-        lengths = b"".join(struct.pack(">I", len(it)) + it for it in (b"\x65\x88\x84", b"\x41\x9a"))
+        lengths = b"".join(struct.pack(">I", len(unit)) + unit for unit in (b"\x65\x88\x84", b"\x41\x9a"))
         self._right = ((avcc, lengths), (units[0].data[:40], units[1].data), (b"", units[0].data))
 
     def make(self, rng: Random) -> bytes:

@@ -84,7 +84,7 @@ class ClientEvents(Target):
         try:
             events = whole.feed(data)
             step = 1 + len(data) % 7
-            cut = [it for at in range(0, len(data), step) for it in pieces.feed(data[at : at + step])]
+            cut = [piece for at in range(0, len(data), step) for piece in pieces.feed(data[at : at + step])]
         except EventStreamError as error:
             return refused(error)
         assert cut == events, "how a stream is cut changes what it says"

@@ -114,8 +114,8 @@ class _Splice(ScriptTarget):
         for gop, chosen in enumerate(cuts):
             self._show(service, units, gop)
             now = {
-                number: None if it is None else CAMERAS[it]
-                for number, it in zip(_PEOPLE, chosen, strict=True)
+                number: None if camera is None else CAMERAS[camera]
+                for number, camera in zip(_PEOPLE, chosen, strict=True)
             }
             choices = tuple(
                 ObjectChoice(person, now[person], before[person], now[person] is None) for person in _PEOPLE

@@ -25,8 +25,8 @@ from camsync.messages import (
 from camsync.protocol import MAX_LINE, ProtocolError, encode, parse_client_line, parse_server_line
 
 CLIENT_LINES = tuple(
-    encode(it)
-    for it in (
+    encode(message)
+    for message in (
         Hello("c0"),
         Hello("c1", CountedPulse(123, 0.52)),
         Hello("c0", CountedPulse(2**39, 4.0)),
@@ -36,8 +36,8 @@ CLIENT_LINES = tuple(
     )
 )
 SERVER_LINES = tuple(
-    encode(it)
-    for it in (
+    encode(message)
+    for message in (
         Greeting(1, 25.0, 1000.0, None),
         Greeting(1, 25.0, 1000.0, 7),
         WaitMessage(("c0", "c1")),

@@ -64,7 +64,7 @@ class ServerSessions(ScriptTarget):
         for _ in range(3):
             clock.now += 0.04
             server._tick()
-        errors = sum(it.errors for it in server.clients())
+        errors = sum(client.errors for client in server.clients())
         for wire in wires:
             self._spoken(wire)
         if server.pulse is not None:
@@ -122,7 +122,7 @@ class ClientSessions(ScriptTarget):
             parse_client_line(line)
         client.status()
         client._hello()
-        numbers = [it.number for it in client._queue]
+        numbers = [pulse.number for pulse in client._queue]
         assert numbers == sorted(set(numbers)), "pulses go back"
         link.end("over")
         client._cancel_timer()

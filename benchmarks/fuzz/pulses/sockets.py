@@ -64,7 +64,7 @@ class SocketBytes(ScriptTarget):
         self._fed += 1
         if self._fed % _OTHERS_EVERY == 0 or not heard:
             await query_clients("127.0.0.1", self._server.port)
-        return not any(isinstance(it, ErrorMessage) for it in heard)
+        return not any(isinstance(message, ErrorMessage) for message in heard)
 
     async def _insert_word(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         skip_time_wait(writer.get_extra_info("socket"))

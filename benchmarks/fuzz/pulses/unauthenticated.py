@@ -78,7 +78,7 @@ class UnauthenticatedClients(ScriptTarget):
             "Pong",
             "ClientList",
         ], kinds
-        assert [it.name for it in server.clients()] == ["c0"]
+        assert [client.name for client in server.clients()] == ["c0"]
         for wire in wires[1:]:
             first, *others = map(parse_server_line, wire.lines)
             assert isinstance(first, LoginRequest)

@@ -52,8 +52,8 @@ def passing() -> BenchmarkScene:
     first, second = range(1, FRAMES // 2 + 1), range(FRAMES // 2 + 1, FRAMES + 1)
     return hall(
         {
-            "c0": [MotRow(it, 5, *NEAR) for it in first] + [MotRow(it, 5, *FAR) for it in second],
-            "c1": [MotRow(it, 5, *FAR) for it in first] + [MotRow(it, 5, *NEAR) for it in second],
+            "c0": [MotRow(frame, 5, *NEAR) for frame in first] + [MotRow(frame, 5, *FAR) for frame in second],
+            "c1": [MotRow(frame, 5, *FAR) for frame in first] + [MotRow(frame, 5, *NEAR) for frame in second],
         }
     )
 
@@ -72,7 +72,7 @@ def test_on_true_boxes_myviews_choice_is_the_optimum_where_it_is_plain(passing: 
 def test_the_largest_box_is_taken_frame_by_frame(passing: BenchmarkScene) -> None:
     shown = largest(passing.gt, passing.sizes, FRAMES)
     assert shown[:2] == [Choice(1, 5, "c0"), Choice(2, 5, "c0")]
-    assert {it.camera for it in shown[FRAMES // 2 :]} == {"c1"}
+    assert {choice.camera for choice in shown[FRAMES // 2 :]} == {"c1"}
     assert largest({"c0": [], "c1": []}, passing.sizes, FRAMES) == []
 
 
@@ -168,10 +168,10 @@ def test_what_keeps_somebody_from_being_seen_is_told_apart(passing: BenchmarkSce
 
 
 def test_settings_are_swept_and_knowing_all_costs_nothing_but_the_gop(passing: BenchmarkScene) -> None:
-    found = {it.setting: it for it in sweep(passing, passing.truth(), quick=True)}
+    found = {score.setting: score for score in sweep(passing, passing.truth(), quick=True)}
     assert found[SweepSetting(None, 1, DEFAULT_SWITCH_COST_S)].score.regret == 0.0
     assert found[SweepSetting(25, 10, DEFAULT_SWITCH_COST_S)].delay_s == (25 + STRIDE - 2) / 10.0
-    assert all(it.score.regret >= 0.0 for it in found.values())
+    assert all(score.score.regret >= 0.0 for score in found.values())
 
 
 @pytest.mark.slow

@@ -62,7 +62,8 @@ def test_of_two_boxes_at_one_person_one_counts() -> None:
 
 def message(boxes: Sequence[Sequence[Box | None]], frames: int) -> CameraTracks:
     tracks = [
-        TrackMessage(id=number, boxes=list(it), confidence=1.0) for number, it in enumerate(boxes, start=1)
+        TrackMessage(id=number, boxes=list(track_boxes), confidence=1.0)
+        for number, track_boxes in enumerate(boxes, start=1)
     ]
     return CameraTracks(
         camera="c0",

@@ -158,7 +158,7 @@ def test_the_reader_finds_people_where_they_are_in_the_picture_that_it_is_given(
 
 
 def test_who_gets_nothing_waits() -> None:
-    pictures = [it for it in pictures_of(10) if not 30 <= it.pulse < 70]
+    pictures = [picture for picture in pictures_of(10) if not 30 <= picture.pulse < 70]
     assert judge(pictures, events_of(10), 1, VIEWS).longest_gap(100.0, 104.0) == pytest.approx(2.0)
     assert judge([], events_of(10), 1, VIEWS).longest_gap(100.0, 104.0) == pytest.approx(4.0)
 

@@ -20,16 +20,16 @@ from client import Gop
 
 
 def test_each_process_fails_and_any_two_of_them() -> None:
-    assert [title(it) for it in process_sets()] == [
+    assert [title(processes) for processes in process_sets()] == [
         *("bestview", "sync", "camera", "drawing"),
         *("bestview+sync", "bestview+camera", "bestview+drawing"),
         *("sync+camera", "sync+drawing", "camera+camera", "camera+drawing"),
     ]
-    assert all(BESTVIEW not in it for it in process_sets(BESTVIEW))
+    assert all(BESTVIEW not in processes for processes in process_sets(BESTVIEW))
     named = [fault.name for fault in FAULTS]
     assert len(set(named)) == len(named)
     for mode, left_out in (("kill", ()), ("freeze", ()), ("restart", (DRAWING,))):
-        assert {f"{mode} {title(it)}" for it in process_sets(*left_out)} <= set(named)
+        assert {f"{mode} {title(processes)}" for processes in process_sets(*left_out)} <= set(named)
 
 
 def test_the_cameras_that_fail_are_those_that_are_watched() -> None:

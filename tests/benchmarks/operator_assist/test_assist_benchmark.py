@@ -120,7 +120,7 @@ def test_who_was_lost_long_ago_is_seen_again_when_they_were_still_there() -> Non
     shown = _tracks(truth, [[1] * 60 + [0] * 140, [2] * FRAMES])
     operator = SimulatedOperator(OperatorProfile(delay_s=1.0), FlagSelector(ALL, FPS), truth, FPS, seed=1)
     operator.receive(120, [_event((1,), 60, 0.9)])
-    first = next(it for newest in range(120, 200) if (it := operator.point(newest, shown)) is not None)
+    first = next(event for newest in range(120, 200) if (event := operator.point(newest, shown)) is not None)
     assert (first.object, operator.flags[0].fish) == (1, 0)
     assert first.frame in range(45, 60)
 
@@ -129,7 +129,7 @@ def test_flags_go_to_the_riskiest_and_once_to_the_same_two() -> None:
     selector = FlagSelector(FlagSettings(per_minute=2), FPS)
     selector.begin()
     first = selector.raised(10, [_event((1, 2), 10, 0.2), _event((3, 4), 10, 0.8), _event((5, 6), 10, 0.5)])
-    assert [it.objects for it in first] == [(3, 4), (5, 6)]
+    assert [event.objects for event in first] == [(3, 4), (5, 6)]
     assert selector.raised(15, [_event((4, 3), 15, 0.9), _event((1, 2), 15, 0.2)]) == []
 
 
@@ -212,12 +212,12 @@ def test_the_table_has_the_thesis_beside_it_for_as_many_minutes() -> None:
     truth = _truth()
     flag = OperatorFlag(_event((1, 2), 100, 0.5), 1, raised=99, until=100)
     outcome_counts = count([(_watched(truth, RIGHT), _watched(truth, EXCHANGED, [flag]))], OperatorProfile())
-    rows = {it[0].strip(): it[1:] for it in texts(outcome_counts, thesis=True)}
+    rows = {row[0].strip(): row[1:] for row in texts(outcome_counts, thesis=True)}
     as_56_clips = str(56 * 20 * 25 // FRAMES)
     assert rows["flagged, tracked correctly"] == ["0", "0", "53"]
     assert rows["flagged, tracked wrongly"] == ["1", as_56_clips, "-"]
     assert rows["failures with help"] == ["1", as_56_clips, "39"]
-    assert {len(it) for it in texts(outcome_counts, thesis=False)} == {2}
+    assert {len(row) for row in texts(outcome_counts, thesis=False)} == {2}
 
 
 @pytest.mark.slow

@@ -94,7 +94,9 @@ def errors_on_floor(found: Sequence[Floats]) -> Floats:
     random = np.random.default_rng(0)
     places = random.uniform((0.3 * width, 0.3 * depth), (0.7 * width, 0.7 * depth), (50, 2))
     standing = np.column_stack([places, np.zeros(len(places))])
-    seen = [to_ground(it, _view(scene, at).project(standing)[0]) for at, it in enumerate(found)]
+    seen = [
+        to_ground(homography, _view(scene, at).project(standing)[0]) for at, homography in enumerate(found)
+    ]
     x = np.concatenate(seen) @ np.array([1, 1j])
     y = np.tile(places @ np.array([1, 1j]), len(found))
     x, y = x - x.mean(), y - y.mean()

@@ -56,4 +56,4 @@ async def text(hall: Hall, path: str) -> str:
 
 
 def numbers(playlist: str) -> list[int]:
-    return [int(it) for it in re.findall(r"^([0-9]+)\.m4s$", playlist, re.MULTILINE)]
+    return [int(number) for number in re.findall(r"^([0-9]+)\.m4s$", playlist, re.MULTILINE)]

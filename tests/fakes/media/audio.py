@@ -86,7 +86,7 @@ def flashing(recording: Path) -> tuple[AccessUnit, ...]:
     """Return the recording's pictures as a camera of the hall sends them."""
     encoder = Encoder(SiteSettings(width=64, height=48, fps=FPS), EncodeSettings(gop=GOP))
     with av.open(str(recording)) as container:
-        pictures = [it.to_ndarray(format="bgr24") for it in container.decode(video=0)]
+        pictures = [frame.to_ndarray(format="bgr24") for frame in container.decode(video=0)]
     return tuple(encoder.encode(pulse, picture) for pulse, picture in enumerate(pictures))
 
 
@@ -134,7 +134,9 @@ def beeps(stream: bytes, kind: str | None = None) -> list[float]:
 def flashes(stream: bytes, kind: str | None = None) -> list[float]:
     """Return when flashes begin in a stream, seconds."""
     with av.open(io.BytesIO(stream), format=kind) as container:
-        bright = [it.time for it in container.decode(video=0) if it.to_ndarray(format="gray").mean() > 128]
+        bright = [
+            frame.time for frame in container.decode(video=0) if frame.to_ndarray(format="gray").mean() > 128
+        ]
     return _begins(np.array(bright, dtype=np.float64))
 
 

@@ -92,8 +92,8 @@ class _Handler(socketserver.StreamRequestHandler):
 
 
 def _described(key: AccessUnit) -> bytes:
-    sets = [it for it in nal_units(key.data) if nal_type(it) in (NAL_SPS, NAL_PPS)]
-    sprop = ",".join(base64.b64encode(it).decode() for it in sets)
+    sets = [unit for unit in nal_units(key.data) if nal_type(unit) in (NAL_SPS, NAL_PPS)]
+    sprop = ",".join(base64.b64encode(parameter_set).decode() for parameter_set in sets)
     lines = [
         "v=0",
         "o=- 0 0 IN IP4 127.0.0.1",

@@ -15,7 +15,7 @@ async def faults(visit: Visit) -> list[Any]:
     await visit.page.add_script_tag(path=AXE)
     found = await visit.get("axe.run()")
     return [
-        (it["id"], it["help"], [node["html"] for node in it["nodes"]])
-        for it in found["violations"]
-        if it["impact"] in SERIOUS
+        (violation["id"], violation["help"], [node["html"] for node in violation["nodes"]])
+        for violation in found["violations"]
+        if violation["impact"] in SERIOUS
     ]

@@ -105,7 +105,7 @@ class FakeSite:
         if held is not None:
             return CAMERAS.index(held)
         if preferred is not None:
-            seen = [CAMERAS.index(preferred) or it not in self.blind for it in (pulse, pulse - GOP)]
+            seen = [CAMERAS.index(preferred) or at not in self.blind for at in (pulse, pulse - GOP)]
             return CAMERAS.index(preferred) if all(seen) else self.camera(person, pulse)
         return self.camera(person, pulse)
 

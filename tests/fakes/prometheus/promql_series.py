@@ -70,7 +70,7 @@ def _given(node: promql.Expr, printed: Printed) -> set[Series]:
         case promql.AggregateExpr():
             return _summed(node, printed)
         case promql.BinaryExpr():
-            sides = [it for it in (node.lhs, node.rhs) if not isinstance(it, promql.NumberLiteral)]
+            sides = [side for side in (node.lhs, node.rhs) if not isinstance(side, promql.NumberLiteral)]
             if node.modifier is not None and node.modifier.matching is not None:
                 raise ValueError(f"not known here: {node.modifier}")
             return set.intersection(*(_given(side, printed) for side in sides))
@@ -85,7 +85,11 @@ def _selected(node: promql.VectorSelector, printed: Printed) -> set[Series]:
     }
     if any(matcher.op != promql.MatchOp.Equal for matcher in node.matchers.matchers):
         raise ValueError(f"not known here: {node.prettify()}")
-    return {it for it in printed.samples.get(node.name or "", ()) if wanted.items() <= dict(it).items()}
+    return {
+        label_set
+        for label_set in printed.samples.get(node.name or "", ())
+        if wanted.items() <= dict(label_set).items()
+    }
 
 
 def _called(node: promql.Call, printed: Printed) -> set[Series]:

@@ -89,7 +89,7 @@ def own(camera: str, codec: Codec = "h264") -> list[Picture]:
     decoder = av.VideoCodecContext.create(codec, "r")
     units = encoded(CAMERAS.index(camera), EPOCHS * GOP, codec=codec)
     packets = [*(av.Packet(unit.data) for unit in units), None]
-    return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
+    return [frame.to_ndarray(format="yuv420p") for packet in packets for frame in decoder.decode(packet)]
 
 
 def decoded(data: bytes) -> dict[int, Picture]:

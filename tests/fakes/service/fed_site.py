@@ -55,8 +55,8 @@ def see(hall: Hall) -> None:
 
 @pytest.fixture
 async def hall() -> AsyncIterator[Hall]:
-    async for it in opened():
-        yield it
+    async for site in opened():
+        yield site
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ def sent(camera: str) -> tuple[AccessUnit, ...]:
 def alone(camera: str) -> list[NDArray[np.uint8]]:
     decoder = av.CodecContext.create("h264", "r")
     packets = [*(av.Packet(unit.data) for unit in sent(camera)), None]
-    return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
+    return [frame.to_ndarray(format="yuv420p") for packet in packets for frame in decoder.decode(packet)]
 
 
 def shown(gop: int) -> tuple[str, int]:

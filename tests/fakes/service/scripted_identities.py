@@ -28,9 +28,9 @@ class ScriptedRegistry:
         return self._updates.pop(0)
 
 
-def boxes(it: PersonTracker, camera: str, pulse: int) -> dict[int, Box]:
+def boxes(people: PersonTracker, camera: str, pulse: int) -> dict[int, Box]:
     """Return all boxes in one frame by person number."""
-    [rows] = it.boxes(camera, pulse, 1)
+    [rows] = people.boxes(camera, pulse, 1)
     numbers = [number for number, *_ in rows]
     assert numbers == sorted(set(numbers))
     return {number: (left, top, right, bottom) for number, left, top, right, bottom in rows}

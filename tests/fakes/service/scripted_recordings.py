@@ -107,7 +107,7 @@ def gop_record(
     arrived = {}
     for camera in cameras:
         taken = [filled_buffers()[0][camera].get(pulse) for pulse in range(first, first + frames)]
-        arrived[camera] = RecordedGop(first, tuple(it.fragment for it in taken if it is not None))
+        arrived[camera] = RecordedGop(first, tuple(frame.fragment for frame in taken if frame is not None))
     boxes = {camera: [[(1, 1.0, 2.0, 3.0, 4.0)]] * GOP for camera in cameras}
     return GopRecord(
         GopChoices(first=first, frames=GOP, choices=dict(choices), boxes=boxes, cuts=[]), arrived
@@ -137,4 +137,6 @@ def pictures(path: Path) -> Iterator[tuple[int, Picture]]:
 
 
 def playable_files(folder: Path) -> list[Path]:
-    return [it for it in sorted([*folder.rglob("*.m3u8"), *folder.rglob("*.mp4")]) if it.name != "init.mp4"]
+    return [
+        path for path in sorted([*folder.rglob("*.m3u8"), *folder.rglob("*.mp4")]) if path.name != "init.mp4"
+    ]

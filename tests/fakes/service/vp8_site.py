@@ -35,4 +35,6 @@ def feed(hall: Hall, epoch: int) -> None:
 def own(camera: int) -> list[NDArray[np.uint8]]:
     decoder = av.CodecContext.create("vp8", "r")
     units = encoded(camera, codec="vp8")
-    return [it.to_ndarray(format="yuv420p") for unit in units for it in decoder.decode(av.Packet(unit.data))]
+    return [
+        frame.to_ndarray(format="yuv420p") for unit in units for frame in decoder.decode(av.Packet(unit.data))
+    ]

@@ -91,7 +91,10 @@ def followed(method: PredictionMethod[Any], scene: Crossing) -> list[bool]:
     people = [method.initialize(image, scene.where(person, 0)) for person in range(len(scene.clothes))]
     for frame in range(1, FRAMES):
         method.predict(scene.picture(frame), people)
-    return [float(iou(it.box, scene.where(person, FRAMES - 1))) > 0.4 for person, it in enumerate(people)]
+    return [
+        float(iou(person_track.box, scene.where(person, FRAMES - 1))) > 0.4
+        for person, person_track in enumerate(people)
+    ]
 
 
 def times_kept(methods: Sequence[PredictionMethod[Any]], scenes: Sequence[Crossing]) -> int:

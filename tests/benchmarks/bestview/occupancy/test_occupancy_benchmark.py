@@ -119,7 +119,7 @@ def test_paths_are_the_optimum_of_the_flow_program(lattice: Lattice) -> None:
 def test_a_later_path_may_take_a_part_of_an_earlier_one_over() -> None:
     costs = np.array([[-9, 20, -1], [-5, -9, 20], [-1, 20, -9]])
     lattice = Lattice(costs, corridor(3), np.full(3, INFINITE))
-    assert min(cost_of(lattice, it) for it in all_paths(lattice)) == -27, "alone: from 0 through 1 to 2"
+    assert min(cost_of(lattice, path) for path in all_paths(lattice)) == -27, "alone: from 0 through 1 to 2"
     assert [path.places.tolist() for path in shortest_paths(lattice)] == [[0, 0, 0], [2, 1, 2]]
 
 
@@ -149,7 +149,7 @@ def marginals_by_trying(
     weights, sets = [], list(product((0, 1), repeat=places))
     for there in sets:
         people = tuple(np.flatnonzero(there))
-        log = sum(np.log(model.prior if it else 1 - model.prior) for it in there)
+        log = sum(np.log(model.prior if is_present else 1 - model.prior) for is_present in there)
         for camera, sight in zip(rectangles, sights, strict=True):
             picture = covered(camera, people)
             distance = np.abs(picture - sight.foreground).sum()
@@ -189,7 +189,10 @@ def test_who_hides_behind_somebody_in_one_picture_is_found_by_the_other() -> Non
     """Two people stand in line before the first camera; the second sees them side by side."""
     first = np.array([[10, 1, 13, 8], [10, 2, 13, 9], [2, 2, 5, 9]])
     second = np.array([[4, 2, 7, 9], [14, 2, 17, 9], [19, 2, 22, 9]])
-    sights = [ForegroundObservation(covered(it, (0, 1)), np.ones((HIGH, WIDE))) for it in (first, second)]
+    sights = [
+        ForegroundObservation(covered(rectangle, (0, 1)), np.ones((HIGH, WIDE)))
+        for rectangle in (first, second)
+    ]
     q = OccupancyMap([first, second], OccupancySettings()).compute(sights)
     assert (q > 0.9).tolist() == [True, True, False]
 
@@ -202,7 +205,7 @@ def test_what_does_not_count_in_a_picture_changes_nothing() -> None:
     dirty = np.where(weight > 0, clear, 1.0)
     recall = ForegroundObservation(covered(rectangles[1], (1,)), np.ones((HIGH, WIDE)))
     occupancy = OccupancyMap(rectangles, OccupancySettings())
-    one, other = (occupancy.compute([ForegroundObservation(it, weight), recall]) for it in (clear, dirty))
+    one, other = (occupancy.compute([ForegroundObservation(mask, weight), recall]) for mask in (clear, dirty))
     np.testing.assert_array_equal(one, other)
 
 

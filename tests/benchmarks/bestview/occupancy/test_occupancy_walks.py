@@ -41,7 +41,9 @@ def test_the_grid_covers_what_is_seen_and_its_border_is_the_gate() -> None:
     assert floor.gates[neighbors < 9].all()
     assert not floor.gates.all()
     for place, around in enumerate(floor.moves):
-        assert all(place in floor.moves[it] for it in around if it < len(floor.places)), "there and back"
+        assert all(place in floor.moves[neighbor] for neighbor in around if neighbor < len(floor.places)), (
+            "there and back"
+        )
         assert place in around
     step = np.unique(np.diff(np.unique(floor.places[:, 0])).round(9))
     assert step == pytest.approx([0.2 * floor.person])
