@@ -24,13 +24,11 @@ class Benchmark:
     name: str
     about: str
     arguments: tuple[str, ...] = ()
-    shared: bool = True
-    """Whether it has the common options and prints its own command."""
 
     def command(self, options: argparse.Namespace) -> list[str]:
         """Return the arguments of Python that run it."""
-        words = ["-m", f"benchmarks.{self.name}", "--out", str(options.out), *self.arguments]
-        return [*words, "--data", str(options.data)] if self.shared else words
+        common = ["--out", str(options.out), *self.arguments, "--data", str(options.data)]
+        return ["-m", f"benchmarks.{self.name}", *common]
 
 
 BENCHMARKS = (
@@ -58,7 +56,7 @@ BENCHMARKS = (
     Benchmark("live_cameras", "real-time tracking of four live cameras, cost by stage; 2 minutes"),
     Benchmark("endurance", "memory and time over 50 000 frames; 10 minutes"),
     Benchmark("soak", "one hour of a whole site at 22 times the speed; 4 minutes", ("--hours", "1")),
-    Benchmark("overload", "more cameras than the machine carries, and recovery; up to 15 minutes"),
+    Benchmark("overload", "more cameras than the machine can handle, and recovery; up to 15 minutes"),
     Benchmark("overload.responsiveness", "response times of an overloaded site; 7 minutes"),
     Benchmark("calibration", "accuracy of cameras calibrated from walking people; 5 minutes"),
     Benchmark("scaling", "many simulated cameras on one best-view process; 4 minutes"),
@@ -76,12 +74,9 @@ _NAME_WIDTH = max(len(benchmark.name) for benchmark in BENCHMARKS)
 
 def run(benchmark: Benchmark, options: argparse.Namespace) -> int:
     """Run a benchmark and return its exit code."""
-    words = benchmark.command(options)
     print(f"\n== {benchmark.name}: {benchmark.about}\n", flush=True)
-    if not benchmark.shared:
-        print(f"$ OPENBLAS_NUM_THREADS=1 python {' '.join(words)}", flush=True)
     return subprocess.run(
-        [sys.executable, *words], cwd=ROOT, env=one_thread_environment(), check=False
+        [sys.executable, *benchmark.command(options)], cwd=ROOT, env=one_thread_environment(), check=False
     ).returncode
 
 
@@ -98,7 +93,7 @@ def main() -> None:
         print(f"{benchmark.name:{_NAME_WIDTH}} {benchmark.about}")
     if chosen.list:
         return
-    selected = [b for b in BENCHMARKS if not chosen.only or b.name in chosen.only]
+    selected = [benchmark for benchmark in BENCHMARKS if not chosen.only or benchmark.name in chosen.only]
     codes = [(benchmark.name, run(benchmark, chosen)) for benchmark in selected]
     print()
     for name, code in codes:

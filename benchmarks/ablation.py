@@ -2,7 +2,7 @@
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.ablation --data ../shared/data --out out/bench --jobs 2
 
-A part is switched off by settings of the configuration's section `track`; to add one, add a row to ABLATIONS.
+An ablation is a set of settings of the configuration's section `track`; to add one, add a row to ABLATIONS.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ class InputSequence:
 
 def input_sequences(recordings: list[Recording]) -> list[InputSequence]:
     """Return each sequence, and once more with its video (needed for appearance) where there is one."""
-    alone = [InputSequence(recording) for recording in recordings]
-    return alone + [
+    without_pictures = [InputSequence(recording) for recording in recordings]
+    return without_pictures + [
         InputSequence(recording, pictures=True)
         for recording in recordings
         if recording.video and recording.video.is_file()
@@ -89,9 +89,9 @@ def score(ablation: Ablation, sequence: InputSequence) -> Scores:
     return sequence.recording.score(track(sequence.recording, ablation.settings, pictures=sequence.pictures))
 
 
-def cell(name: str, without: Scores, default: Scores | None) -> str:
-    """Format a score, as a difference to the default's where that is given."""
-    value = getattr(without, name)
+def cell(name: str, scores: Scores, default: Scores | None) -> str:
+    """Format a score, as a difference from the default's if there is one."""
+    value = getattr(scores, name)
     if default is not None:
         value -= getattr(default, name)
     sign = "" if default is None else "+"
@@ -115,8 +115,8 @@ def tables(report: Report, names: list[str], scores_by_name: dict[str, list[Scor
             ]
             for ablation, scores in with_total.items()
         ]
-        last = ["total" if name == "switches" else "mean"] * several
-        report.table(f"{_NAMES[name]}, and its change by each ablation", ["", *names, *last], rows)
+        last_column = ["total" if name == "switches" else "mean"] * several
+        report.table(f"{_NAMES[name]}, and its change by each ablation", ["", *names, *last_column], rows)
 
 
 def _reference_scores(ablation: str, with_total: dict[str, list[Scores]]) -> Sequence[Scores | None]:
@@ -127,15 +127,15 @@ def _reference_scores(ablation: str, with_total: dict[str, list[Scores]]) -> Seq
 
 def run(recordings: list[Recording], out: Path, jobs: int) -> None:
     """Measure, print and save."""
-    sequence = input_sequences(recordings)
+    sequences = input_sequences(recordings)
     report = Report()
-    pairs = [(ablation, input_sequence) for ablation in (DEFAULT, *ABLATIONS) for input_sequence in sequence]
+    pairs = [(ablation, sequence) for ablation in (DEFAULT, *ABLATIONS) for sequence in sequences]
     with ProcessPoolExecutor(jobs) as pool:
         scores = iter(list(pool.map(score, *zip(*pairs, strict=True))))
     tables(
         report,
-        [input_sequence.name for input_sequence in sequence],
-        {ablation.name: [next(scores) for _ in sequence] for ablation in (DEFAULT, *ABLATIONS)},
+        [sequence.name for sequence in sequences],
+        {ablation.name: [next(scores) for _ in sequences] for ablation in (DEFAULT, *ABLATIONS)},
     )
     report.save(out / "ablation.txt")
 
@@ -144,7 +144,7 @@ def main() -> None:
     """Run the benchmark."""
     options = parser(__doc__, "ablation")
     options.add_argument("--sequence", action="append", help="only this one; may be repeated")
-    options.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at once")
+    options.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="parallel processes")
     chosen = options.parse_args()
     try:
         run(find_recordings(chosen.data, chosen.sequence), chosen.out, chosen.jobs)

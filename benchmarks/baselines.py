@@ -2,11 +2,10 @@
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.baselines --data ../shared/data --out out/bench
 
-Every camera is searched once, as `myview track` does it, and what was found is given to each tracker, with
-the pictures. All begin and end objects by the detections. `lp`, `kalman` and `track-graph` follow them by the
-detections as well; the others by what pictures show, so that what they lose, or take a place in the
-background for, is their own. Perfect association of the same detections is the ceiling. The time is the
-tracker's alone.
+People are detected once per view, as in `myview track`; each tracker gets these detections and the pictures.
+All trackers initiate and terminate objects by detections. `lp`, `kalman` and `track-graph` also run_tracker
+them by detections, the others by appearance: they alone can drift onto the background. Perfect association of
+the same detections is the upper bound. Times are the tracker's alone.
 """
 
 from __future__ import annotations
@@ -33,13 +32,13 @@ from tracking.solvers import DEFAULT_SOLVER
 
 CEILING = "perfect association"
 _SHOWN = ("hota", "mota", "idf1", "recall", "precision", "switches", "tracks", "objects")
-_AHEAD, _AHEAD_EVERY = 500, 20
+_PRESCAN_FRAMES, _PRESCAN_STEP = 500, 20
 _VIEWS = (("pets09", "view1", 7.0), ("terrace", "c0", 25.0), ("terrace", "c1", 25.0))
-"""Scene, view, frames a second: what a file says of itself need not be what was filmed."""
+"""Scene, view and true frame rate; the rate in a file can differ from it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SearchedView:
+class DetectedView:
     """One camera's frames with their detections, and the ground truth."""
 
     name: str
@@ -59,8 +58,8 @@ class SearchedView:
         ]
 
 
-def views(data: Path, most: int | None) -> list[SearchedView]:
-    """Detect people in the first `most` frames of every available view.
+def detect_views(data: Path, max_frames: int | None) -> list[DetectedView]:
+    """Detect people in the first `max_frames` frames of every available view.
 
     Raises:
         CannotRunError: no view is available.
@@ -72,23 +71,25 @@ def views(data: Path, most: int | None) -> list[SearchedView]:
             frames = [
                 frame
                 for frame in detect_frames(config_for_video(video, None, None))
-                if most is None or frame.number < most
+                if max_frames is None or frame.number < max_frames
             ]
             rows = [row for row in read_rows(truth) if row.frame <= len(frames)]
-            found.append(SearchedView(f"{scene} {name}", frames, rows, rate))
+            found.append(DetectedView(f"{scene} {name}", frames, rows, rate))
     if not found:
-        raise CannotRunError(f"needs pets09 or terrace in {data}; --data or MYVIEW_TEST_DATA say where")
+        raise CannotRunError(f"needs pets09 or terrace in {data}; --data or MYVIEW_TEST_DATA give the folder")
     return found
 
 
-def follow(name: str, view: SearchedView) -> tuple[list[MotRow], float]:
+def run_tracker(name: str, view: DetectedView) -> tuple[list[MotRow], float]:
     """Return a tracker's tracks, and its milliseconds per frame."""
     frames = view.frames
     tracker = create_tracker(
         name, WindowSettings(), CostSettings(), lambda: create_solver(DEFAULT_SOLVER), fps=view.fps
     )
-    if isinstance(tracker, PrescanTracker):  # as a recording is looked at ahead
-        tracker.prepare(frame.image for frame in frames[:_AHEAD:_AHEAD_EVERY] if frame.image is not None)
+    if isinstance(tracker, PrescanTracker):  # as `myview track` does
+        tracker.prepare(
+            frame.image for frame in frames[:_PRESCAN_FRAMES:_PRESCAN_STEP] if frame.image is not None
+        )
     rows: list[MotRow] = []
     began = time.perf_counter()
     for frame in frames:
@@ -101,13 +102,13 @@ def measure(options: argparse.Namespace) -> None:
     """Measure, print and save."""
     report = Report()
     table: dict[str, dict[str, Scores]] = {}
-    took: dict[str, list[float]] = {}
-    for view in views(options.data, options.frames):
+    times: dict[str, list[float]] = {}
+    for view in detect_views(options.data, options.frames):
         found = table[view.name] = {}
         for name in tracker_names():
-            rows, milliseconds = follow(name, view)
+            rows, milliseconds = run_tracker(name, view)
             found[name] = evaluate(view.truth, rows)
-            took.setdefault(name, []).append(milliseconds)
+            times.setdefault(name, []).append(milliseconds)
         found[CEILING] = evaluate(view.truth, oracle_association(view.detections, view.truth))
         report.table(
             view.name,
@@ -115,9 +116,9 @@ def measure(options: argparse.Namespace) -> None:
             [[name, *format_scores(scores, _SHOWN)] for name, scores in found.items()],
         )
     report.table(
-        "What following takes: milliseconds a frame, the median of the views",
+        "Tracking time: milliseconds per frame, median over views",
         ["", "ms"],
-        [[name, f"{statistics.median(values):.1f}"] for name, values in took.items()],
+        [[name, f"{statistics.median(values):.1f}"] for name, values in times.items()],
     )
     plot(table, CEILING, options.out / "baselines.png")
     report.save(options.out / "baselines.txt")
@@ -128,7 +129,7 @@ def main() -> None:
     mpl.use("Agg")
     cv2.setNumThreads(1)
     options = parser(__doc__, "baselines")
-    options.add_argument("--frames", type=int, help="of each view at most")
+    options.add_argument("--frames", type=int, help="maximum of each view")
     try:
         measure(options.parse_args())
     except CannotRunError as problem:

@@ -2,9 +2,9 @@
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.codecs --out out/bench
 
-A camera's process without its network, on a recording of the synthetic room in the site's own H.264. Times
-are processor time; the ways take turns, round by round, and the median of the rounds is printed. Quality is
-against the pictures of the recording, which of the camera's own H.264 are the same.
+Runs a camera's pipeline, without network, on an H.264 recording of the synthetic room. Times are processor
+time; the variants alternate, and the median over rounds is printed. Quality is that against the recording's
+pictures, which passthrough does not change.
 """
 
 from __future__ import annotations
@@ -50,17 +50,17 @@ class StreamCost:
     """Cost and quality of a stream; milliseconds of processor time per frame."""
 
     capture_ms: float
-    """To read and decode the picture."""
+    """Reading and decoding the picture."""
     encode_ms: float
     track_ms: float
-    """To find and follow the people in it."""
+    """Detecting and tracking people."""
     kbps: float
     quality: float
-    """Decibels (PSNR) against the recording; infinite: the same."""
+    """Decibels (PSNR) against the recording; infinite if identical."""
 
     @property
     def total_ms(self) -> float:
-        """The total."""
+        """The time of all stages."""
         return self.capture_ms + self.encode_ms + self.track_ms
 
 
@@ -70,7 +70,7 @@ VARIANTS = (
     StreamVariant("H.264, max_kbps 500", {"max_kbps": 500}),
     StreamVariant("VP8 (quantizer 16, speed 10)", {"codec": "vp8"}),
     StreamVariant("VP8, quantizer 24", {"codec": "vp8", "quantizer": 24}),
-    StreamVariant("its own H.264, passed through", {}, "pass"),
+    StreamVariant("H.264, passed through", {}, "pass"),
 )
 
 
@@ -88,31 +88,31 @@ def record(path: Path, site: SiteSettings, frames: int) -> Path:
 def measure(variant: StreamVariant, recording: Path, site: SiteSettings, frames: int) -> StreamCost:
     """Run a camera pipeline over a recording, and measure it."""
     pipeline = CameraPipeline(_config(variant, recording, site), "c0")
-    spent, sizes, error = np.zeros(3), 0, 0.0
+    spent, size, error = np.zeros(3), 0, 0.0
     decoder = av.CodecContext.create(variant.encode.get("codec", "h264"), "r")
-    assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — tells mypy what it is
+    assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — narrows the type for mypy
     decoder.thread_count = 1
     for pulse in range(frames):
-        at = [time.process_time()]
+        times = [time.process_time()]
         image = pipeline.take(pulse)
-        assert image is not None  # noqa: S101 — the recording is so long
-        at.append(time.process_time())
+        assert image is not None  # noqa: S101 — the recording is long enough
+        times.append(time.process_time())
         unit = pipeline.encode(pulse, image)
-        at.append(time.process_time())
+        times.append(time.process_time())
         pipeline.track(pulse, image)
-        at.append(time.process_time())
-        spent += np.diff(at)
-        sizes += len(unit.data)
+        times.append(time.process_time())
+        spent += np.diff(times)
+        size += len(unit.data)
         (picture,) = decoder.decode(av.Packet(unit.data))
-        error += _squared(picture.to_ndarray(format="bgr24"), image)
+        error += _mean_squared_error(picture.to_ndarray(format="bgr24"), image)
     pipeline.close()
     capture_ms, encode_ms, track_ms = _MS * spent / frames
     quality = 10 * np.log10(_PEAK**2 * frames / error) if error else float("inf")
-    return StreamCost(capture_ms, encode_ms, track_ms, sizes * 8 * site.fps / frames / 1e3, float(quality))
+    return StreamCost(capture_ms, encode_ms, track_ms, size * 8 * site.fps / frames / 1e3, float(quality))
 
 
-def _squared(one: NDArray[Any], other: NDArray[Any]) -> float:
-    return float(np.mean((one.astype(np.float32) - other.astype(np.float32)) ** 2))
+def _mean_squared_error(first: NDArray[Any], second: NDArray[Any]) -> float:
+    return float(np.mean((first.astype(np.float32) - second.astype(np.float32)) ** 2))
 
 
 def _config(variant: StreamVariant, recording: Path, site: SiteSettings) -> Config:
@@ -125,7 +125,7 @@ def _config(variant: StreamVariant, recording: Path, site: SiteSettings) -> Conf
 
 
 def median_cost(costs: Sequence[StreamCost]) -> StreamCost:
-    """Return the median of each number."""
+    """Return the median of each time; size and quality are the same in all rounds."""
     return StreamCost(
         statistics.median(cost.capture_ms for cost in costs),
         statistics.median(cost.encode_ms for cost in costs),
@@ -136,10 +136,10 @@ def median_cost(costs: Sequence[StreamCost]) -> StreamCost:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Run the benchmark."""
     options = parser(__doc__ or "", "codecs")
     options.add_argument("--size", default="640x360", help="of the picture, WIDTHxHEIGHT")
-    options.add_argument("--frames", type=int, default=150, help="measured in a round")
+    options.add_argument("--frames", type=int, default=150, help="per round")
     options.add_argument("--rounds", type=int, default=3)
     chosen = options.parse_args()
     width, height = map(int, chosen.size.split("x"))
@@ -153,7 +153,7 @@ def main() -> None:
     rows = []
     for variant, *costs in zip(VARIANTS, *rounds, strict=True):
         cost = median_cost(costs)
-        quality = "the same" if np.isinf(cost.quality) else f"{cost.quality:.1f}"
+        quality = "identical" if np.isinf(cost.quality) else f"{cost.quality:.1f}"
         times = [
             f"{cost.capture_ms:.2f}",
             f"{cost.encode_ms:.2f}",
@@ -162,7 +162,7 @@ def main() -> None:
         ]
         rows.append([variant.name, *times, f"{cost.kbps:.0f}", quality])
     report.table(
-        f"One camera, {chosen.size} at {site.fps:g} a second; milliseconds of processor time a frame",
+        f"One camera, {chosen.size} at {site.fps:g} fps; milliseconds of processor time per frame",
         ["stream", "capture", "encode", "track", "total", "kbit/s", "PSNR, dB"],
         rows,
     )

@@ -36,7 +36,7 @@ _START = 200
 """The scene's first frame: people are in sight."""
 _MANY = 10
 _POLL_S = 0.003
-"""Seconds between two checks for a rendered GOP: seldom enough to cost nothing."""
+"""Seconds between two checks for a rendered GOP: too seldom to matter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class RenderingCost:
     start_s: float
     """Seconds until the first GOP is rendered."""
     worker_ms: float
-    service: float
+    service_ms: float
     megabytes: float
     """Resident memory of the render worker."""
 
@@ -66,12 +66,12 @@ class RoomStream:
     def __init__(self, site: SiteSettings, encode: EncodeSettings) -> None:
         scene = Scene("room", 3, 4, 1, site.width, site.height, site.fps)
         self.site, self.gop = site, encode.gop
-        self._images = [scene.image(0, _START + place) for place in range(_FRAMES)]
-        truth = [scene.truth(_START + place)[0] for place in range(_FRAMES)]
+        self._images = [scene.image(0, _START + frame) for frame in range(_FRAMES)]
+        truth = [scene.truth(_START + frame)[0] for frame in range(_FRAMES)]
         self._boxes = [
             [
-                (int(who), float(x0), float(y0), float(x1), float(y1))
-                for who, (x0, y0, x1, y1) in zip(camera_truth.ids, camera_truth.boxes, strict=True)
+                (int(number), float(x0), float(y0), float(x1), float(y1))
+                for number, (x0, y0, x1, y1) in zip(camera_truth.ids, camera_truth.boxes, strict=True)
             ]
             for camera_truth in truth
         ]
@@ -108,7 +108,7 @@ class RoomStream:
 
 
 async def measure(room: RoomStream, load: ViewerLoad, gops: int) -> RenderingCost:
-    """Have a worker render; every GOP is published when the previous one is done."""
+    """Let a worker render GOPs, each published when the previous one is rendered."""
     stream = Broadcaster()
     source = RenderedStream("the room", stream, room.overlay, room.settings, live=True, queue_gops=8)
     source.use()
@@ -121,17 +121,17 @@ async def measure(room: RoomStream, load: ViewerLoad, gops: int) -> RenderingCos
     stream.publish(chunks[0])
     await source.still("plain", _last_pulse(room, chunks[0]))
     start, pid = time.perf_counter() - began, source.pid
-    assert pid is not None  # noqa: S101 — it has just rendered
-    worker_ms, service = _processor_seconds(pid), time.process_time()
+    assert pid is not None  # noqa: S101 — the worker is running
+    worker_before, service_before = _processor_seconds(pid), time.process_time()
     for chunk in chunks[1:]:
         stream.publish(chunk)
-        while source.newest < _last_pulse(room, chunk):  # noqa: ASYNC110 — a service does not wait for this
+        while source.newest < _last_pulse(room, chunk):  # noqa: ASYNC110 — only the benchmark polls
             await asyncio.sleep(_POLL_S)
     frames = gops * room.gop
     cost = RenderingCost(
         start,
-        _MS * (_processor_seconds(pid) - worker_ms) / frames,
-        _MS * (time.process_time() - service) / frames,
+        _MS * (_processor_seconds(pid) - worker_before) / frames,
+        _MS * (time.process_time() - service_before) / frames,
         _resident_megabytes(pid),
     )
     stream.close()
@@ -150,7 +150,7 @@ def _last_pulse(room: RoomStream, chunk: BytesChunk) -> int:
 
 
 def _processor_seconds(pid: int) -> float:
-    """Return a process's processor time, in nanoseconds the kernel counts (Linux)."""
+    """Return a process's processor time, seconds, at nanosecond resolution (Linux)."""
     return int(Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()[0]) / 1e9
 
 
@@ -170,17 +170,17 @@ def viewer_loads(fps: float) -> list[ViewerLoad]:
         ViewerLoad("JPEG, one viewer", 0, [plain]),
         ViewerLoad(f"JPEG, {_MANY} viewers", 0, [plain] * _MANY),
         ViewerLoad("JPEG with boxes, one viewer", 0, [boxed]),
-        ViewerLoad("JPEG, 5 a second", 0, [MjpegVariant(5.0, boxed=False)]),
-        ViewerLoad("all of these at once", _MANY, [plain] * _MANY + [boxed] * _MANY),
+        ViewerLoad("JPEG, 5 fps", 0, [MjpegVariant(5.0, boxed=False)]),
+        ViewerLoad("all of these together", _MANY, [plain] * _MANY + [boxed] * _MANY),
     ]
 
 
 def main() -> None:
-    """Measure and print."""
+    """Run the benchmark."""
     options = parser(__doc__ or "", "overlay")
     options.add_argument("--size", default="640x360", help="of the picture, WIDTHxHEIGHT")
-    options.add_argument("--gops", type=int, default=30, help="measured in a run")
-    options.add_argument("--runs", type=int, default=3, help="the median of so many is printed")
+    options.add_argument("--gops", type=int, default=30, help="per run")
+    options.add_argument("--runs", type=int, default=3, help="number of runs; their median is printed")
     chosen = options.parse_args()
     width, height = map(int, chosen.size.split("x"))
     report = Report()
@@ -193,15 +193,15 @@ def main() -> None:
             [
                 load.name,
                 f"{worker_ms:.2f}",
-                f"{statistics.median(cost.service for cost in costs):.3f}",
+                f"{statistics.median(cost.service_ms for cost in costs):.3f}",
                 f"{100 * worker_ms * room.site.fps / _MS:.1f}",
                 f"{statistics.median(cost.start_s for cost in costs):.2f}",
                 f"{max(cost.megabytes for cost in costs):.0f}",
             ]
         )
     report.table(
-        f"Pictures of one stream of {chosen.size} at {room.site.fps:g} a second",
-        ["viewers", "worker, ms a frame", "service, ms a frame", "% of a core", "start, s", "MB"],
+        f"Pictures of one stream of {chosen.size} at {room.site.fps:g} fps",
+        ["viewers", "worker, ms/frame", "service, ms/frame", "% of a core", "start, s", "MB"],
         rows,
     )
     report.save(chosen.out / "overlay.txt")

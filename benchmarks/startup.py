@@ -2,8 +2,8 @@
 
     python -m benchmarks.startup --out out/bench
 
-Clones the committed tree into a temporary folder; nothing is installed before. Packages come from the
-index, or from the caches of pip and uv where they are: `tests/bare_machine.sh` has none.
+Clones the committed tree into a temporary folder, where nothing is installed. Packages come from the index or
+from the caches of pip and uv; `tests/bare_machine.sh` runs without caches.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 from benchmarks.common.environment import ROOT, parser
 from benchmarks.common.report import Report
 
-_GIVE_UP_S = 600.0
+_TIMEOUT_S = 600.0
 _ANSI = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -85,9 +85,9 @@ def measure(clone: Path) -> list[StartupStep]:
 
 @contextlib.contextmanager
 def _demo(clone: Path) -> Iterator[Iterator[str]]:
-    """Run `make demo`; yield the lines that it prints, and terminate it in the end."""
+    """Run `make demo`; yield its output lines, and terminate it at the end."""
     environment = {**os.environ, "PYTHONUNBUFFERED": "1", "BROWSER": "true"}
-    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # or every process would compile everything for itself
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # else every process would compile all modules again
     process = subprocess.Popen(
         ["make", "demo"],
         cwd=clone,
@@ -98,7 +98,7 @@ def _demo(clone: Path) -> Iterator[Iterator[str]]:
         start_new_session=True,
     )
     signal.signal(signal.SIGALRM, lambda *_: os.killpg(process.pid, signal.SIGTERM))
-    signal.setitimer(signal.ITIMER_REAL, _GIVE_UP_S)
+    signal.setitimer(signal.ITIMER_REAL, _TIMEOUT_S)
     try:
         yield iter(process.stdout or ())
     finally:
@@ -108,14 +108,14 @@ def _demo(clone: Path) -> Iterator[Iterator[str]]:
         process.communicate()
 
 
-def plot(parts: Sequence[StartupStep], path: Path) -> None:
+def plot(steps: Sequence[StartupStep], path: Path) -> None:
     """Draw a bar for every step, each starting where the previous one ended."""
     figure = Figure(figsize=(8, 3), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    names = [part.name for part in parts]
+    names = [step.name for step in steps]
     axes.barh(
-        names, [part.seconds for part in parts], left=[part.done_after - part.seconds for part in parts]
+        names, [step.seconds for step in steps], left=[step.done_after - step.seconds for step in steps]
     )
     axes.invert_yaxis()
     axes.set_xlabel("seconds since `make demo`")
@@ -124,16 +124,16 @@ def plot(parts: Sequence[StartupStep], path: Path) -> None:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Run the benchmark."""
     chosen = parser(__doc__ or "", "startup").parse_args()
     report = Report()
     with tempfile.TemporaryDirectory(prefix="myview-startup-") as folder:
         clone = Path(folder) / "clone"
         subprocess.run(["git", "clone", "--quiet", "--local", str(ROOT), str(clone)], check=True)
-        parts = measure(clone)
-    rows = [[part.name, f"{part.seconds:.1f}", f"{part.done_after:.1f}"] for part in parts]
+        steps = measure(clone)
+    rows = [[step.name, f"{step.seconds:.1f}", f"{step.done_after:.1f}"] for step in steps]
     report.table("From a fresh clone to the first picture, seconds", ["step", "took", "done after"], rows)
-    plot(parts, chosen.out / "startup.png")
+    plot(steps, chosen.out / "startup.png")
     report.save(chosen.out / "startup.txt")
 
 

@@ -88,7 +88,7 @@ def scenes(options: argparse.Namespace, folder: Path, report: Report) -> Iterato
             try:
                 yield find(options.data)
             except CannotRunError as problem:
-                report.say(f"{name}: left out: {problem}")
+                report.line(f"{name}: skipped: {problem}")
     for cameras, people, seconds in QUICK_ROOMS if options.quick else ROOMS:
         if "room" in wanted or f"room-{cameras}-{people}" in wanted:
             yield room(folder, cameras, people, seconds)
@@ -149,7 +149,7 @@ def find_other_trackers(options: argparse.Namespace, report: Report) -> OtherTra
     try:
         return peer_environment(default_folder())
     except OtherTrackersUnavailableError as problem:
-        report.say(f"without other trackers, which cannot be installed here: {problem}")
+        report.line(f"without other trackers, which cannot be installed here: {problem}")
         return None
 
 
@@ -163,7 +163,7 @@ def self_calibrated_scene(
         )
         return SearchedScene(calibrated_scene, calibrated_scene.detect())
     except CannotCalibrateError as problem:
-        report.say(f"{scene.name}: not calibrated by its own tracks: {problem}")
+        report.line(f"{scene.name}: not calibrated by its own tracks: {problem}")
         return None
 
 
@@ -208,14 +208,14 @@ def measure(options: argparse.Namespace) -> None:
             )
             if not options.no_sweeps:
                 swept[scene.name] = sweep(scene, truth, quick=options.quick)
-    report.say(
+    report.line(
         "joint, mean: IDF1. Cuts, Best: cuts a minute, selected and optimal. Shot: shortest, in frames."
     )
-    report.say(
+    report.line(
         "Identities: pairs of boxes in two cameras at once, or in one camera so many seconds apart. Recall: "
         "the share of pairs on one person with one id; precision: of pairs with one id on one person."
     )
-    report.say(
+    report.line(
         "Not visible in the selected view, though in another: selection, a camera that shows them had them "
         "under their own id; identity, only under another id; detection, no camera had a box on them."
     )

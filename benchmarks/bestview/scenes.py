@@ -103,7 +103,7 @@ def auditorium(data: Path) -> BenchmarkScene:
     """
     folder = data / "auditorium"
     if not folder.is_dir():
-        raise CannotRunError(f"needs {folder}; --data or MYVIEW_TEST_DATA say where")
+        raise CannotRunError(f"needs {folder}; --data or MYVIEW_TEST_DATA give the folder")
     width, height = _AUDITORIUM_SIZE
     content = {
         "site": {"name": "bench", "fps": _AUDITORIUM_FPS, "width": width, "height": height},

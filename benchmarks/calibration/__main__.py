@@ -1,9 +1,9 @@
-"""Accuracy of calibration from walking people, and what it is worth for identities.
+"""Accuracy of calibration from walking people, and its effect on identities.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.calibration --data ../shared/data --out out/bench
 
-The cameras of the synthetic room are known. In the recordings, foot points of the same person are compared
-by the ground truth.
+In the synthetic room, the true cameras are known. In recordings, foot points of the same person, by the
+ground truth, are compared between cameras.
 """
 
 from __future__ import annotations
@@ -17,7 +17,12 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from benchmarks.calibration.calibration_errors import GroundAgreement, agreement, error_of_known, in_common
+from benchmarks.calibration.calibration_errors import (
+    GroundAgreement,
+    camera_overlaps,
+    foot_point_errors,
+    ground_agreements,
+)
 from benchmarks.common.environment import CannotRunError, parser
 from benchmarks.common.public_detections import Recording, track
 from benchmarks.common.recorded_views import RecordedViews, find_views
@@ -33,10 +38,10 @@ from server.service.calibration.floor_plan import floor_plan_cameras, plot_floor
 from synthetic import Scene, write_recording
 from tracking.motchallenge import write_rows
 
-_PERSON = 1.75
+_PERSON_M = 1.75
 _SHIFT_S = 3.0
 _ROOM_S, _ROOM_SIZE, _ROOM_FPS = 60.0, (640, 360), 25.0
-_MOVED = {"c1": 7, "c2": -4}
+_FRAME_OFFSETS = {"c1": 7, "c2": -4}
 """Frames by which the room's cameras are desynchronized."""
 _AUDITORIUM = ("HC3", "HC4", "IP2", "IP5")
 
@@ -51,18 +56,18 @@ class RoomWalk:
     from_tracks: tuple[Walk, ...]
 
 
-def draw(folder: Path, people: int) -> RoomWalk:
+def render_room(folder: Path, people: int) -> RoomWalk:
     """Render a minute of the synthetic room, and track it."""
     scene = Scene("room", 3, people, 1, *_ROOM_SIZE, _ROOM_FPS)
     write_recording(scene, folder, _ROOM_S, lambda _done, _total: None)
     tracks = _tracked(find_views(folder.parent, folder.name), folder / "tracked", None)
-    picture = VideoFormat(_ROOM_SIZE, _ROOM_FPS)
+    video_format = VideoFormat(_ROOM_SIZE, _ROOM_FPS)
     matrices = json.loads((folder / "ground.json").read_text(encoding="ascii"))["homography"]
     return RoomWalk(
         people,
         {name: np.array(matrix) for name, matrix in matrices.items()},
-        walks_from_tracks([folder / "gt"], picture).walks,
-        walks_from_tracks([tracks], picture).walks,
+        walks_from_tracks([folder / "gt"], video_format).walks,
+        walks_from_tracks([tracks], video_format).walks,
     )
 
 
@@ -73,11 +78,11 @@ def _tracked(views: RecordedViews, out: Path, config: Path | None) -> Path:
     return out
 
 
-def out_of_step(walk: Walk) -> Walk:
-    """Shift a camera's walk by its time offset."""
-    late = _MOVED.get(walk.camera, 0)
+def desynchronize(walk: Walk) -> Walk:
+    """Shift a camera's tracks by its frame offset."""
+    offset = _FRAME_OFFSETS.get(walk.camera, 0)
     return replace(
-        walk, tracks=tuple(WalkTrack(track.first_frame - late, track.boxes) for track in walk.tracks)
+        walk, tracks=tuple(WalkTrack(track.first_frame - offset, track.boxes) for track in walk.tracks)
     )
 
 
@@ -85,25 +90,25 @@ def room_rows(report: Report, folder: Path, out: Path) -> None:
     """Compare the calibration with the true cameras of the synthetic room."""
     rows = []
     for people in (1, 4):
-        room = draw(folder / f"room{people}", people)
-        for name, walks in (("true boxes", room.from_boxes), ("own tracks", room.from_tracks)):
+        room = render_room(folder / f"room{people}", people)
+        for name, walks in (("true boxes", room.from_boxes), ("MyView's tracks", room.from_tracks)):
             found = calibrate_from_walks(
-                [out_of_step(walk) for walk in walks], walk_settings(_ROOM_FPS, _SHIFT_S), _PERSON
+                [desynchronize(walk) for walk in walks], walk_settings(_ROOM_FPS, _SHIFT_S), _PERSON_M
             )
-            off = error_of_known(found, room.truth, [out_of_step(walk) for walk in walks])
+            errors = foot_point_errors(found, room.truth, [desynchronize(walk) for walk in walks])
             rows.append(
                 [
                     f"{people} walking, {name}",
                     f"{found.heights.median:.2f}",
-                    f"{np.median(off):.2f}",
-                    f"{np.quantile(off, 0.9):.2f}",
+                    f"{np.median(errors):.2f}",
+                    f"{np.quantile(errors, 0.9):.2f}",
                     *(
                         f"{camera.offset:+.1f} ± {2 * camera.offset_error:.1f}"
                         for camera in found.cameras[1:]
                     ),
                 ]
             )
-            _plot(found, out / f"calibration_room{people}_{name.split()[0]}.png")
+            _plot(found, out / f"calibration_room{people}_{name.split()[-1]}.png")
     heading = [
         "room, 60 s",
         "feet distance, heights",
@@ -116,21 +121,23 @@ def room_rows(report: Report, folder: Path, out: Path) -> None:
 
 
 def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
-    """Compare with the published calibration, by people with known identities."""
+    """Compare with the published calibration, by foot points of people with known identities."""
     views = find_views(data, "terrace")
     truth, settings = data / "terrace" / "gt", folder / "terrace.yaml"
     settings.write_text(yaml.safe_dump({"site": views.site, "cameras": views.cameras}), encoding="utf-8")
     size = (views.site["width"], views.site["height"])
     tracks = _tracked(views, folder / "terrace", settings)
     walked = walks_from_tracks([tracks], VideoFormat(size, views.site["fps"]))
-    found = calibrate_from_walks(walked.walks, walk_settings(walked.fps, _SHIFT_S), _PERSON)
+    found = calibrate_from_walks(walked.walks, walk_settings(walked.fps, _SHIFT_S), _PERSON_M)
     _plot(found, out / "calibration_terrace.png")
-    ours = folder / "terrace.json"
-    ours.write_text(ground_file_text("m", {camera.camera: camera.homography for camera in found.cameras}))
+    estimated = folder / "terrace.json"
+    estimated.write_text(
+        ground_file_text("m", {camera.camera: camera.homography for camera in found.cameras})
+    )
     assert views.ground is not None  # noqa: S101 — the recording has one
     rows: list[list[str]] = []
-    for name, ground in (("published", views.ground), ("from its own tracks", ours)):
-        seen = agreement(ground, truth, size)["c0", "c1"]
+    for name, ground in (("published", views.ground), ("from MyView's tracks", estimated)):
+        agreement = ground_agreements(ground, truth, size)["c0", "c1"]
         config = config_for_videos(
             views.videos, base=yaml.safe_load(settings.read_text()), folder=folder, ground=ground
         )
@@ -138,59 +145,59 @@ def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
         done.mkdir()
         render(config, done, lambda _: None)
         joint = evaluate_recordings(read_recordings([done], [truth]), 0.5).joint
-        rows.append([name, *_cells(seen), f"{100 * joint.idf1:.1f}"])
+        rows.append([name, *_cells(agreement), f"{100 * joint.idf1:.1f}"])
     heading = ["terrace, two views", "feet distance, heights", "90 %", "nearest correct, %", "joint IDF1"]
     report.table("Against the published calibration, at the true boxes", heading, rows)
-    moved = ", ".join(
+    offsets = ", ".join(
         f"{camera.camera} {camera.offset:+.1f} ± {2 * camera.offset_error:.1f}" for camera in found.cameras
     )
-    report.say(f"terrace: offsets in frames: {moved}")
+    report.line(f"terrace: offsets in frames: {offsets}")
 
 
 def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
-    """Calibrate from public detections, many people at once."""
+    """Calibrate from public detections of many simultaneous people."""
     tracks, source = folder / "auditorium", data / "auditorium"
     if not source.is_dir():
         raise CannotRunError(f"needs {source}")
     size = (1920, 1080)
-    common = in_common(source / "gt", _AUDITORIUM, size)
+    overlaps = camera_overlaps(source / "gt", _AUDITORIUM, size)
     report.table(
-        "auditorium, true boxes of one person in two cameras at once",
+        "auditorium, true boxes of a person in two cameras at the same time",
         ["cameras", "people", "boxes", "distance from a fitted plane, box heights"],
         [
             [
                 f"{one}, {other}",
                 str(overlap.people),
                 str(overlap.boxes),
-                f"{overlap.off:.2f}" if overlap.boxes else "-",
+                f"{overlap.residual:.2f}" if overlap.boxes else "-",
             ]
-            for (one, other), overlap in common.items()
+            for (one, other), overlap in overlaps.items()
         ],
     )
     tracks.mkdir()
     for camera in _AUDITORIUM:
-        given = Recording(camera, source / "det" / f"{camera}.txt.gz", source / "gt" / f"{camera}.txt.gz")
-        write_rows(tracks / f"{camera}.txt", track(given))
+        recording = Recording(camera, source / "det" / f"{camera}.txt.gz", source / "gt" / f"{camera}.txt.gz")
+        write_rows(tracks / f"{camera}.txt", track(recording))
     walked = walks_from_tracks([tracks], VideoFormat(size, 30.0))
-    found = calibrate_from_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON)
+    found = calibrate_from_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON_M)
     _plot(found, out / "calibration_auditorium.png")
     ground = folder / "auditorium.json"
     ground.write_text(ground_file_text("m", {camera.camera: camera.homography for camera in found.cameras}))
     rows = [
-        [f"{one}, {other}", *_cells(seen)]
-        for (one, other), seen in agreement(ground, source / "gt", size).items()
+        [f"{one}, {other}", *_cells(agreement)]
+        for (one, other), agreement in ground_agreements(ground, source / "gt", size).items()
     ]
     report.table(
         "auditorium, at the true boxes",
         ["cameras", "feet distance, heights", "90 %", "nearest correct, %"],
         rows,
     )
-    for it in found.uncalibrated:
-        report.say(f"auditorium: {it.camera} is left out: {it.reason}")
+    for uncalibrated in found.uncalibrated:
+        report.line(f"auditorium: {uncalibrated.camera} is not calibrated: {uncalibrated.reason}")
 
 
-def _cells(seen: GroundAgreement) -> Sequence[str]:
-    return [f"{seen.median:.2f}", f"{seen.most:.2f}", f"{100 * seen.right:.0f}"]
+def _cells(agreement: GroundAgreement) -> Sequence[str]:
+    return [f"{agreement.median:.2f}", f"{agreement.p90:.2f}", f"{100 * agreement.nearest_correct:.0f}"]
 
 
 def _plot(found: WalkCalibration, path: Path) -> None:
@@ -209,7 +216,7 @@ def main() -> None:
             try:
                 rows(report, chosen.data, folder, chosen.out)
             except (CannotRunError, CalibrationError) as problem:
-                report.say(f"{name}: left out: {problem}")
+                report.line(f"{name}: skipped: {problem}")
     report.save(chosen.out / "calibration.txt")
 
 

@@ -1,4 +1,4 @@
-"""Errors of a calibration: against known cameras, or by people with known identities."""
+"""Errors of a calibration, against the true cameras or between foot points of the same people."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tracking.motchallenge import read_rows
 
 Floats = NDArray[np.float64]
 _EDGE = 3.0
-"""Pixels from the picture's edge within which a box may be cut."""
+"""Pixels from the picture's edge within which a box may be truncated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,13 +28,13 @@ class GroundAgreement:
 
     Attributes:
         median: in person heights.
-        most: the ninth decile.
-        right: share of people whose nearest neighbor in the other camera is the same person.
+        p90: the 90th percentile, in person heights.
+        nearest_correct: share of people whose nearest neighbor in the other camera is the same person.
     """
 
     median: float
-    most: float
-    right: float
+    p90: float
+    nearest_correct: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,63 +42,65 @@ class CameraOverlap:
     """The people that two cameras show at the same time, by the ground truth.
 
     Attributes:
-        people: that are in both at once at some time.
-        boxes: whole boxes of them.
-        off: median distance of their foot points from a plane fitted to the nearer half of them, in heights
-            of the other camera's boxes; NaN where there are too few, or all on a line.
+        people: number of people that both show in the same frame. boxes: number of their untruncated boxes.
+        residual: median distance of their foot points from a plane fitted to the nearer half of them, in
+        heights
+            of the other camera's boxes; NaN if there are too few, or all are on a line.
     """
 
     people: int
     boxes: int
-    off: float
+    residual: float
 
 
-def error_of_known(found: WalkCalibration, truth: Mapping[str, Floats], walks: Sequence[Walk]) -> Floats:
+def foot_point_errors(found: WalkCalibration, truth: Mapping[str, Floats], walks: Sequence[Walk]) -> Floats:
     """Return the errors of all foot points, meters, after the best rotation and shift of the floor."""
-    ours, theirs = [], []
+    estimated, true = [], []
     matrices = {camera.camera: camera.homography for camera in found.cameras}
     for walk in walks:
         if walk.camera in matrices:
             image = np.concatenate([foot_points(track.boxes) for track in walk.tracks])
-            ours.append(to_ground(matrices[walk.camera], image) @ np.array([1, 1j]))
-            theirs.append(to_ground(truth[walk.camera], image) @ np.array([1, 1j]))
-    x, y = np.concatenate(ours), np.concatenate(theirs)
+            estimated.append(to_ground(matrices[walk.camera], image) @ np.array([1, 1j]))
+            true.append(to_ground(truth[walk.camera], image) @ np.array([1, 1j]))
+    x, y = np.concatenate(estimated), np.concatenate(true)
     known = np.isfinite(x) & np.isfinite(y)
     x, y = x[known] - x[known].mean(), y[known] - y[known].mean()
     return np.asarray(np.abs(x * np.exp(1j * np.angle((np.conj(x) * y).sum())) - y), dtype=np.float64)
 
 
-def agreement(ground: Path, truth: Path, size: tuple[int, int]) -> dict[tuple[str, str], GroundAgreement]:
-    """Compare every two cameras of a file of homographies at the boxes of people whom both show."""
+def ground_agreements(
+    ground: Path, truth: Path, size: tuple[int, int]
+) -> dict[tuple[str, str], GroundAgreement]:
+    """Compare each pair of cameras of a file of homographies by the boxes of people visible in both."""
     matrices = json.loads(ground.read_text(encoding="utf-8"))["homography"]
     people = {name: _people(path, size) for name in matrices if (path := _file(truth, name)) is not None}
     found = {}
     for one, other in combinations(people, 2):
         both = sorted(people[one].keys() & people[other].keys())
         if both:
-            found[one, other] = _of_two(
+            found[one, other] = _compare_pair(
                 np.array(matrices[one]), people[one], np.array(matrices[other]), people[other], both
             )
     return found
 
 
-def in_common(
+def camera_overlaps(
     truth: Path, cameras: Sequence[str], size: tuple[int, int]
 ) -> dict[tuple[str, str], CameraOverlap]:
-    """Return for every pair of cameras the people by whom they could be aligned."""
+    """Return for each pair of cameras the people by which they can be aligned."""
     people = {name: _people(path, size) for name in cameras if (path := _file(truth, name)) is not None}
     found = {}
     for one, other in combinations(people, 2):
         both = sorted(people[one].keys() & people[other].keys())
         here, there = (np.array([people[name][key] for key in both]) for name in (one, other))
-        off = _off_plane(here, there) if both else float("nan")
-        found[one, other] = CameraOverlap(len({person for _, person in both}), len(both), off)
+        residual = _plane_residual(here, there) if both else float("nan")
+        found[one, other] = CameraOverlap(len({person for _, person in both}), len(both), residual)
     return found
 
 
-def _off_plane(here: Floats, there: Floats) -> float:
+def _plane_residual(here: Floats, there: Floats) -> float:
     """Fit a plane to the nearer half repeatedly (least trimmed squares), starting with all points."""
-    source, target, tall = foot_points(here), foot_points(there), there[:, 3] - there[:, 1]
+    source, target, heights = foot_points(here), foot_points(there), there[:, 3] - there[:, 1]
     kept = np.ones(len(here), dtype=bool)
     median = float("nan")
     for _ in range(_TRIMS):
@@ -106,9 +108,11 @@ def _off_plane(here: Floats, there: Floats) -> float:
             plane = fit_homography(source[kept], target[kept])
         except ValueError:
             return median
-        off = np.nan_to_num(np.hypot(*(apply_homography(plane, source) - target).T) / tall, nan=np.inf)
-        median = float(np.nanmin([median, np.median(off)]))
-        kept = off <= np.median(off)
+        distances = np.nan_to_num(
+            np.hypot(*(apply_homography(plane, source) - target).T) / heights, nan=np.inf
+        )
+        median = float(np.nanmin([median, np.median(distances)]))
+        kept = distances <= np.median(distances)
     return median
 
 
@@ -118,26 +122,37 @@ _Boxes = Mapping[tuple[int, int], tuple[float, float, float, float]]
 """By frame and person."""
 
 
-def _of_two(
+def _compare_pair(
     one: Floats, here: _Boxes, other: Floats, there: _Boxes, both: Sequence[tuple[int, int]]
 ) -> GroundAgreement:
-    mine, its = (np.array([boxes[key] for key in both]) for boxes in (here, there))
-    tall = float(np.nanmedian(np.concatenate([person_heights(one, mine), person_heights(other, its)])))
-    at = to_ground(one, foot_points(mine))
-    apart = np.nan_to_num(np.hypot(*(at - to_ground(other, foot_points(its))).T) / tall, nan=np.inf)
+    boxes, other_boxes = (np.array([boxes_by_key[key] for key in both]) for boxes_by_key in (here, there))
+    height = float(
+        np.nanmedian(np.concatenate([person_heights(one, boxes), person_heights(other, other_boxes)]))
+    )
+    positions = to_ground(one, foot_points(boxes))
+    distances = np.hypot(*(positions - to_ground(other, foot_points(other_boxes))).T) / height
+    distances = np.nan_to_num(distances, nan=np.inf)
     by_frame = defaultdict(list)
     for frame, person in there:
         by_frame[frame].append(person)
-    places = dict(zip(there, to_ground(other, foot_points(np.array(list(there.values())))), strict=True))
-    right = 0
-    for (frame, person), place in zip(both, at, strict=True):
-        far = {candidate: np.hypot(*(places[frame, candidate] - place)) for candidate in by_frame[frame]}
-        right += min(far, key=lambda candidate: np.nan_to_num(far[candidate], nan=np.inf)) == person
-    return GroundAgreement(float(np.median(apart)), float(np.quantile(apart, 0.9)), right / len(both))
+    other_positions = dict(
+        zip(there, to_ground(other, foot_points(np.array(list(there.values())))), strict=True)
+    )
+    correct = 0
+    for (frame, person), position in zip(both, positions, strict=True):
+        candidates = {
+            candidate: np.hypot(*(other_positions[frame, candidate] - position))
+            for candidate in by_frame[frame]
+        }
+        nearest = min(candidates, key=lambda person: np.nan_to_num(candidates[person], nan=np.inf))
+        correct += nearest == person
+    return GroundAgreement(
+        float(np.median(distances)), float(np.quantile(distances, 0.9)), correct / len(both)
+    )
 
 
 def _people(path: Path, size: tuple[int, int]) -> _Boxes:
-    """Return the boxes of a file that are not cut by the picture's edges."""
+    """Return the boxes of a file that the picture's edges do not truncate."""
     return {
         (row.frame, row.id): row.box
         for row in read_rows(path)

@@ -24,8 +24,8 @@ FLAGS = (
 
 def chromium_path() -> Path | None:
     """Return the path of Chromium; None: it is not on the PATH."""
-    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
-    return None if found is None else Path(found)
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+    return None if program is None else Path(program)
 
 
 def check_chromium() -> None:

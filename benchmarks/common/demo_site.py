@@ -11,7 +11,7 @@ from playwright.async_api import Error, Page
 from server.cli.demo import run_demo
 from server.cli.generated_config import free_port
 
-_AGAIN_MS = 1000
+_RETRY_MS = 1000
 
 
 @contextlib.asynccontextmanager
@@ -26,10 +26,10 @@ async def demo_at(fps: float) -> AsyncIterator[str]:
         await asyncio.gather(running, return_exceptions=True)
 
 
-async def open_when_there(page: Page, url: str) -> None:
+async def open_when_ready(page: Page, url: str) -> None:
     """Open a page, retrying until its server answers."""
     while True:
         with contextlib.suppress(Error):
             await page.goto(url)
             return
-        await page.wait_for_timeout(_AGAIN_MS)
+        await page.wait_for_timeout(_RETRY_MS)

@@ -20,7 +20,7 @@ ONE_THREAD = {
     "OMP_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
 }
-"""The matrices are small: more threads only spin, and take the cores of other processes."""
+"""The matrices are small: more threads only spin on the cores of other processes."""
 
 
 class CannotRunError(Exception):
@@ -29,23 +29,24 @@ class CannotRunError(Exception):
 
 def parser(about: str, name: str) -> argparse.ArgumentParser:
     """Return a command line parser with the common options."""
-    found = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=about.splitlines()[0])
-    found.add_argument("--out", type=Path, default=ROOT / "out" / "bench", help="folder for plots and tables")
-    found.add_argument(
+    options = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=about.splitlines()[0])
+    options.add_argument(
+        "--out", type=Path, default=ROOT / "out" / "bench", help="folder for plots and tables"
+    )
+    options.add_argument(
         "--data",
         type=Path,
         default=Path(os.environ.get("MYVIEW_TEST_DATA", ROOT.parent / "shared" / "data")),
         help="folder of recordings, one folder per scene",
     )
-    return found
+    return options
 
 
 def command_line() -> str:
     """Return the command line of the running benchmark."""
     module = Path(sys.argv[0]).resolve().relative_to(ROOT).with_suffix("")
     name = ".".join(module.parts).removesuffix(".__main__")
-    words = ["python", "-m", name, *sys.argv[1:]]
-    return " ".join(words)
+    return " ".join(["python", "-m", name, *sys.argv[1:]])
 
 
 def one_thread_environment() -> dict[str, str]:
@@ -73,14 +74,14 @@ def _processor() -> str:
 
 
 def _commit() -> str:
-    done = _git("rev-parse", "--short", "HEAD")
+    commit = _git("rev-parse", "--short", "HEAD")
     changed = _git("status", "--porcelain", "--untracked-files=no")
-    return (done or "unknown") + ("+changes" if changed else "")
+    return (commit or "unknown") + ("+changes" if changed else "")
 
 
-def _git(*words: str) -> str:
+def _git(*arguments: str) -> str:
     try:
-        done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False)
+        done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
     except OSError:
         return ""
     return done.stdout.strip()
@@ -88,5 +89,5 @@ def _git(*words: str) -> str:
 
 def finish(problem: CannotRunError, name: str) -> NoReturn:
     """Print why a benchmark is skipped, and exit."""
-    print(f"{name}: left out: {problem}")
+    print(f"{name}: skipped: {problem}")
     sys.exit(SKIPPED)

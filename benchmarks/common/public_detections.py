@@ -34,13 +34,13 @@ class Recording:
 
 
 def find_recordings(data: Path, names: list[str] | None = None) -> list[Recording]:
-    """Return the recordings in the data folder, or the named ones of them.
+    """Return the recordings in the data folder, or those named.
 
     Raises:
         CannotRunError: there are none.
     """
     campus, pets, auditorium = data / "mot15" / "TUD-Campus", data / "pets09", data / "auditorium"
-    known = [
+    candidates = [
         Recording("TUD-Campus", campus / "det.txt", campus / "gt.txt"),
         Recording("pets09", pets / "det" / "view1.txt", pets / "gt" / "view1.txt", pets / "view1.mp4"),
         *(
@@ -48,21 +48,23 @@ def find_recordings(data: Path, names: list[str] | None = None) -> list[Recordin
             for camera in ("HC3", "HC4", "IP2", "IP5")
         ),
     ]
-    found = [recording for recording in known if recording.detections.is_file() and recording.truth.is_file()]
+    found = [
+        recording for recording in candidates if recording.detections.is_file() and recording.truth.is_file()
+    ]
     if names:
         found = [recording for recording in found if recording.name in names]
     if not found:
-        which = ", ".join(names or [recording.name for recording in known])
-        raise CannotRunError(f"needs detections and ground truth ({which}) in {data}")
+        missing = ", ".join(names or [recording.name for recording in candidates])
+        raise CannotRunError(f"needs detections and ground truth ({missing}) in {data}")
     return found
 
 
 def track(
-    sequence: Recording, settings: TrackSettings | None = None, *, pictures: bool = False
+    recording: Recording, settings: TrackSettings | None = None, *, pictures: bool = False
 ) -> list[MotRow]:
     """Return MyView's tracks, as `myview track --det` writes them.
 
-    With `pictures` appearance is computed from the video; without, only boxes and confidences are known.
+    With `pictures`, appearance is computed from the video; without, tracking uses boxes and confidences only.
     """
     with tempfile.TemporaryDirectory() as folder:
         out, config = Path(folder) / "tracks.txt", Path(folder) / "settings.yaml"
@@ -70,6 +72,6 @@ def track(
             yaml.safe_dump({"track": {key: dict(section) for key, section in (settings or {}).items()}}),
             encoding="utf-8",
         )
-        video = sequence.video if pictures else None
-        track_one(video, sequence.detections, out, config, None, lambda _: None)
+        video = recording.video if pictures else None
+        track_one(video, recording.detections, out, config, None, lambda _: None)
         return read_rows(out)

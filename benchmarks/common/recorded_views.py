@@ -37,7 +37,7 @@ class RecordedViews:
 
     @property
     def site(self) -> dict[str, Any]:
-        """The section `site` of the configuration, with rate and size of the first view."""
+        """The section `site` of the configuration, with frame rate and size of the first view."""
         first = read_video_info(self.videos[0])
         return {"name": "bench", "fps": first.fps, "width": first.size[0], "height": first.size[1]}
 
@@ -61,7 +61,9 @@ def find_views(data: Path, name: str) -> RecordedViews:
     folder = data / name
     videos = tuple(sorted(folder.glob("c*.mp4")))
     if not videos:
-        raise CannotRunError(f"needs the recordings {folder}/c*.mp4; --data or MYVIEW_TEST_DATA say where")
+        raise CannotRunError(
+            f"needs the recordings {folder}/c*.mp4; --data or MYVIEW_TEST_DATA give the folder"
+        )
     ground = folder / "ground.json"
     return RecordedViews(name, videos, ground if ground.exists() else None)
 

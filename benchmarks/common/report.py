@@ -21,10 +21,10 @@ class Report:
     def __init__(self) -> None:
         self._screen = Console(width=_WIDTH, highlight=False)
         self._saved = Console(width=_WIDTH_SAVED, record=True, highlight=False, file=StringIO())
-        self.say(machine())
-        self.say(f"$ OPENBLAS_NUM_THREADS=1 {command_line()}")
+        self.line(machine())
+        self.line(f"$ OPENBLAS_NUM_THREADS=1 {command_line()}")
 
-    def say(self, text: str) -> None:
+    def line(self, text: str) -> None:
         """Print a line."""
         for console in (self._screen, self._saved):
             console.print(text, markup=False)
@@ -32,9 +32,9 @@ class Report:
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Print a table; only text in the first and the last column is left-aligned."""
         table = Table(title=title, title_justify="left", show_header=any(columns))
-        for place, column in enumerate(columns):
-            words = place in {0, len(columns) - 1} and not _is_number(rows[0][place])
-            table.add_column(column, justify="left" if words else "right")
+        for index, column in enumerate(columns):
+            is_text = index in {0, len(columns) - 1} and not _is_number(rows[0][index])
+            table.add_column(column, justify="left" if is_text else "right")
         for row in rows:
             table.add_row(*row)
         for console in (self._screen, self._saved):

@@ -14,7 +14,7 @@ Watched = tuple[type | ModuleType, str, str]
 
 
 class Stopwatch:
-    """Adds up the seconds of each stage, without the stages that it calls.
+    """Adds up the seconds of each stage, without those of stages called from it.
 
     Time is the processor time of the process, which includes a library's own threads.
     """

@@ -3,11 +3,11 @@
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.detectors --data ../shared/data --out out/bench
 
 On recordings with ground truth, at an overlap (IoU) of one half. *Oracle* is the joint IDF1 over the cameras
-of a scene when every box gets the true identity and boxes on nobody are left out: the upper bound of
-association. Below each detector are the tracks that the network program makes of its hypotheses. Of scenes
-without ground truth, pictures with the drawn boxes are saved. Times are processor time.
+of a scene if every box has the true identity and false positives are dropped: the upper bound of association.
+Below each detector are the network program's tracks of its hypotheses. For scenes without ground truth,
+pictures with drawn boxes are saved. Times are processor time.
 
-Other trackers (`benchmarks.other_trackers`, in a virtual environment of their own) get the same boxes: of
+Other trackers (`benchmarks.other_trackers`, in a separate virtual environment) get the same boxes, but of
 MyView's only the confident ones.
 """
 
@@ -51,18 +51,18 @@ from tracking.motchallenge import MotRow, format_rows
 
 TRACKERS = ("SORT", "ByteTrack", "C-BIoU")
 SCENES = ("terrace", "pets09")
-BY_EYE = "campus4"
+INSPECTED = "campus4"
 
 
 @dataclass(frozen=True, slots=True)
 class ScoreRow:
-    """The boxes of all views that are scored in a row of the table."""
+    """A row of the table, with the scored boxes of all views."""
 
     name: str
     boxes: dict[str, list[MotRow]]
     tracks: bool
-    ours: bool = True
-    """MyView's own boxes or tracks, whose time is measured."""
+    timed: bool = True
+    """Whether the time is measured: not that of other trackers."""
 
 
 def rows_of(
@@ -73,7 +73,7 @@ def rows_of(
     """Yield the rows of one detector: its hypotheses, the confident ones, and all trackers' tracks of them.
 
     Raises:
-        OtherTrackersUnavailableError: another tracker failed.
+        OtherTrackersUnavailableError: one of the other trackers failed.
     """
     hypotheses = {name: run.hypotheses for name, run in runs.items()}
     yield ScoreRow(detector_spec.name, hypotheses, tracks=False)
@@ -92,7 +92,7 @@ def rows_of(
                 f"  {tracker.name}",
                 tracks_of_tracker(other_trackers, tracker, hypotheses),
                 tracks=True,
-                ours=False,
+                timed=False,
             )
 
 
@@ -123,7 +123,7 @@ def measure_scene(
         table += [
             _cells(row, truths, list(runs.values())) for row in rows_of(detector_spec, runs, other_trackers)
         ]
-    names = [f"{what} {view.name}" for view in views for what in ("rec.", "prec.")]
+    names = [f"{score} {view.name}" for view in views for score in ("rec.", "prec.")]
     columns = ["boxes", *names, "IDF1", "oracle", "ms", "frames/s"]
     rows, width, _ = next(views[0].images(1)).shape
     report.table(f"{scene}: {width}x{rows}, {_frames(views, options)} frames", columns, table)
@@ -142,7 +142,7 @@ def _cells(row: ScoreRow, truths: dict[str, list[MotRow]], runs: list[DetectorRu
         f"{share:.2f}" for view_scores in scored for share in (view_scores.recall, view_scores.precision)
     ]
     joint = f"{100 * oracle(truths, row.boxes):.0f}"
-    times = [f"{1e3 * seconds / frames:.1f}", f"{frames / seconds:.0f}"] if row.ours else ["", ""]
+    times = [f"{1e3 * seconds / frames:.1f}", f"{frames / seconds:.0f}"] if row.timed else ["", ""]
     return [row.name, *shares, idf1, joint, *times]
 
 
@@ -152,7 +152,7 @@ def _frames(views: list[ScoredView], options: argparse.Namespace) -> str:
 
 
 def measure(options: argparse.Namespace) -> None:
-    """Measure, print and save."""
+    """Measure all scenes; print and save the tables."""
     cv2.setNumThreads(1)
     report = Report()
     other_trackers = None
@@ -160,16 +160,16 @@ def measure(options: argparse.Namespace) -> None:
         try:
             other_trackers = peer_environment(default_folder())
         except OtherTrackersUnavailableError as problem:
-            report.say(f"without other trackers, which cannot be installed here: {problem}")
+            report.line(f"other trackers are skipped, they cannot be installed: {problem}")
     for scene in options.scene or SCENES:
         measure_scene(report, scene, options, other_trackers)
-    report.say("IDF1: mean over the views. ms, frames/s: processor time per frame of one view, one core.")
+    report.line("IDF1: mean over the views. ms, frames/s: processor time per frame of one view, one core.")
     if not options.scene:
         try:
-            for path in save_pictures(views_of(options.data, BY_EYE), options.out / "detectors"):
-                report.say(f"for inspection: {path}")
+            for path in save_pictures(views_of(options.data, INSPECTED), options.out / "detectors"):
+                report.line(f"for inspection: {path}")
         except CannotRunError as problem:
-            report.say(f"{BY_EYE}: left out: {problem}")
+            report.line(f"{INSPECTED}: skipped: {problem}")
     report.save(options.out / "detectors.txt")
 
 
@@ -177,9 +177,11 @@ def main() -> None:
     """Run the benchmark."""
     options = parser(__doc__, "detectors")
     options.add_argument("--scene", action="append", choices=SCENES, help="only this one; may be repeated")
-    options.add_argument("--detector", action="append", help="only those with this in their names")
+    options.add_argument(
+        "--detector", action="append", help="only detectors whose name contains this; may be repeated"
+    )
     options.add_argument("--no-peers", action="store_true", help="leave out the other trackers")
-    options.add_argument("--frames", type=int, help="only so many frames of each view")
+    options.add_argument("--frames", type=int, help="maximum of each view")
     try:
         measure(options.parse_args())
     except CannotRunError as problem:

@@ -23,15 +23,15 @@ def save_pictures(views: list[ScoredView], folder: Path) -> Iterator[Path]:
     """Write a sheet per view: each detector's hypotheses (gray) and tracks (a color for each) over time."""
     folder.mkdir(parents=True, exist_ok=True)
     for view in views:
-        images = [image for n, image in enumerate(view.images(_FRAMES)) if n % _EVERY == _EVERY - 1]
+        images = [image for frame, image in enumerate(view.images(_FRAMES)) if frame % _EVERY == _EVERY - 1]
         rows = []
         for detector_spec in DETECTORS[:3]:
-            runs = run_detector(detector_spec, view, _FRAMES)
+            run = run_detector(detector_spec, view, _FRAMES)
             drawn = []
-            for k, image in enumerate(images):
-                number = _EVERY * (k + 1)
-                hypotheses = [row for row in runs.hypotheses if row.frame == number]
-                drawn.append(_draw(image, hypotheses, [row for row in runs.tracks if row.frame == number]))
+            for index, image in enumerate(images):
+                number = _EVERY * (index + 1)
+                hypotheses = [row for row in run.hypotheses if row.frame == number]
+                drawn.append(_draw(image, hypotheses, [row for row in run.tracks if row.frame == number]))
             rows.append(np.concatenate(drawn, axis=1))
         path = folder / f"{view.name}.png"
         cv2.imwrite(str(path), np.concatenate(rows, axis=0))
@@ -47,6 +47,6 @@ def _draw(image: Image, hypotheses: list[MotRow], tracks: list[MotRow]) -> Image
     return canvas
 
 
-def _box(canvas: Image, row: MotRow, color: tuple[int, int, int], thick: int) -> None:
+def _box(canvas: Image, row: MotRow, color: tuple[int, int, int], thickness: int) -> None:
     left, top, right, bottom = (round(side) for side in row.box)
-    cv2.rectangle(canvas, (left, top), (right, bottom), color, thick)
+    cv2.rectangle(canvas, (left, top), (right, bottom), color, thickness)

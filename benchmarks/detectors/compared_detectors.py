@@ -30,7 +30,7 @@ CONFIDENT = 0.4
 class BlobDetector:
     """The standard approach: MOG2 without shadows, opening and closing, connected components."""
 
-    LEAST_HEIGHT = 0.1  # of the picture's
+    MIN_HEIGHT = 0.1  # in picture heights
 
     def __init__(self, view: ScoredView) -> None:
         self._view = view
@@ -38,7 +38,7 @@ class BlobDetector:
         self._visible: Image | None = None
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
-        """Return a box for every component that is tall enough."""
+        """Return the boxes of connected components that are tall enough."""
         rows, columns = image.shape[:2]
         if self._visible is None:
             self._visible = visible_mask(rows, columns, self._view.ignore)
@@ -46,8 +46,7 @@ class BlobDetector:
         mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8))
         mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((9, 5), dtype=np.uint8))
         _, _, stats, _ = cv2.connectedComponentsWithStats(mask)
-        least = self.LEAST_HEIGHT * rows
-        tall = stats[1:][stats[1:, cv2.CC_STAT_HEIGHT] >= least].astype(np.float64)
+        tall = stats[1:][stats[1:, cv2.CC_STAT_HEIGHT] >= self.MIN_HEIGHT * rows].astype(np.float64)
         boxes = np.concatenate([tall[:, :2], tall[:, :2] + tall[:, 2:4]], axis=1)
         return Detections(boxes, np.ones(len(boxes)), np.empty((len(boxes), 0)))
 
@@ -59,7 +58,7 @@ class ComparedDetector:
     name: str
     make: Callable[[ScoredView], Detector]
     with_other_trackers: bool = True
-    """Whether other trackers get its boxes, too."""
+    """Whether other trackers also get its boxes."""
 
 
 def _background(view: ScoredView) -> BackgroundSettings:
@@ -98,18 +97,18 @@ def run_detector(detector_spec: ComparedDetector, view: ScoredView, frames: int 
     tracker = OnlineTracker(WindowSettings(), CostSettings(), create_solver("columns"))
     boxes: list[MotRow] = []
     tracks: list[MotRow] = []
-    count, detecting, following = 0, 0.0, 0.0
+    count, detect_s, track_s = 0, 0.0, 0.0
     for number, image in enumerate(view.images(frames)):
         start = time.process_time()
         found = detector.detect(image, number)
         middle = time.process_time()
         result = tracker.push(number, found)
-        detecting, following = detecting + middle - start, following + time.process_time() - middle
+        detect_s, track_s = detect_s + middle - start, track_s + time.process_time() - middle
         boxes += rows_of(number, found)
         tracks += final_rows(result)
         count += 1
     tracks += final_rows(tracker.flush())
-    return DetectorRun(boxes, tracks, count, detecting, following)
+    return DetectorRun(boxes, tracks, count, detect_s, track_s)
 
 
 def rows_of(number: int, found: Detections) -> list[MotRow]:
@@ -121,7 +120,7 @@ def rows_of(number: int, found: Detections) -> list[MotRow]:
 
 
 def final_rows(result: WindowResult | None) -> Iterable[MotRow]:
-    """Yield the rows of the frames that become final with a window."""
+    """Yield the rows of the frames that a window makes final."""
     if result is None:
         return
     for track in result.tracks:

@@ -37,10 +37,10 @@ class ScoredView:
         """The ignored polygons."""
         return (WATERMARK,) if self.watermark else ()
 
-    def images(self, most: int | None = None) -> Iterator[Image]:
-        """Yield the frames, at most `most`."""
-        with av.open(str(self.video)) as film:
-            for frame in islice(film.decode(video=0), most):
+    def images(self, max_frames: int | None = None) -> Iterator[Image]:
+        """Yield the first `max_frames` frames as BGR images."""
+        with av.open(str(self.video)) as container:
+            for frame in islice(container.decode(video=0), max_frames):
                 yield np.asarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8)
 
     def people(self, frames: int | None) -> list[MotRow]:
@@ -60,10 +60,12 @@ def views_of(data: Path, scene: str) -> list[ScoredView]:
     views = []
     for video in sorted(folder.glob("*.mp4")):
         truth = folder / "gt" / f"{video.stem}.txt"
-        marked, min_height = scene in {"terrace", "campus4"}, _SMALLEST.get(scene, 0.25)
-        views.append(ScoredView(video.stem, video, truth if truth.exists() else None, marked, min_height))
+        watermark, min_height = scene in {"terrace", "campus4"}, _SMALLEST.get(scene, 0.25)
+        views.append(ScoredView(video.stem, video, truth if truth.exists() else None, watermark, min_height))
     if not views:
-        raise CannotRunError(f"needs the recordings {folder}/*.mp4; --data or MYVIEW_TEST_DATA say where")
+        raise CannotRunError(
+            f"needs the recordings {folder}/*.mp4; --data or MYVIEW_TEST_DATA give the folder"
+        )
     return views
 
 
@@ -77,12 +79,12 @@ class ViewScores:
 
 
 def scores_of_boxes(truth: list[MotRow], boxes: list[MotRow]) -> ViewScores:
-    """Score detections; recall and IDF1 are upper bounds for any association."""
-    best = oracle_association(boxes, truth)
+    """Score detections; recall and IDF1 are upper bounds of any association."""
+    correct = oracle_association(boxes, truth)
     people = sum(row.confidence != 0.0 for row in truth)
-    recall = len(best) / max(people, 1)
-    precision = len(best) / max(len(boxes), 1)
-    return ViewScores(recall, precision, 2.0 * len(best) / max(people + len(best), 1))
+    recall = len(correct) / max(people, 1)
+    precision = len(correct) / max(len(boxes), 1)
+    return ViewScores(recall, precision, 2.0 * len(correct) / max(people + len(correct), 1))
 
 
 def scores_of_tracks(truth: list[MotRow], tracks: list[MotRow]) -> ViewScores:

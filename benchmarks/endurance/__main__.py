@@ -2,9 +2,9 @@
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.endurance --out out/bench
 
-The tracker follows an endless synthetic crowd (people who leave never return, so tracks are initiated and
-forgotten all the time). The pipeline renders, encodes, searches and tracks the synthetic room. Neither may
-grow.
+The tracker follows an endless synthetic crowd; people who leave never return, so tracks are initiated and
+terminated all the time. The pipeline renders the synthetic room, encodes it, detects and tracks people.
+Neither may grow.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from tracking.solvers.base import DEFAULT_SOLVER
 
 _EVERY = 250
 """Frames between two samples."""
-_NUMBERS = 4
-"""Python objects that a sample is: how many frames, megabytes, seconds, blocks."""
-_LEAST = 6 * _EVERY
-"""Frames of which spans and growth can be told: two samples in each third."""
+_OBJECTS_PER_SAMPLE = 4
+"""Python objects of a sample: frames, megabytes, seconds, blocks."""
+_MIN_FRAMES = 6 * _EVERY
+"""Frames needed to measure growth: two samples in each third."""
 _PEOPLE = 5
 _SITE = {
     "site": {"name": "endurance", "fps": 25, "width": WIDTH, "height": HEIGHT},
@@ -44,7 +44,7 @@ class EnduranceRun:
     name: str
     samples: MemorySamples
     objects: int = 0
-    """Numbers given to objects."""
+    """Number of ids assigned to objects."""
 
 
 def run_tracker(frames: int) -> EnduranceRun:
@@ -58,13 +58,13 @@ def run_tracker(frames: int) -> EnduranceRun:
         if result is not None:
             run.objects = max([run.objects, *(track.id for track in result.tracks)])
 
-    _endure(run, frames, step)
+    _repeat(run, frames, step)
     return run
 
 
 def run_pipeline(frames: int) -> EnduranceRun:
     """Run frames through a camera's source, encoder, detector and tracker."""
-    # Loaded only now: the tracker's memory is measured without the server's libraries.
+    # Imported here: the tracker's memory is measured without the server's libraries.
     from server.camera.pipeline import CameraPipeline  # noqa: PLC0415
     from server.config.loader import build_config  # noqa: PLC0415
 
@@ -79,16 +79,16 @@ def run_pipeline(frames: int) -> EnduranceRun:
         if tracks is not None:
             run.objects = max([run.objects, *(track.id for track in tracks.tracks)])
 
-    _endure(run, frames, step)
+    _repeat(run, frames, step)
     pipeline.close()
     return run
 
 
-def _endure(run: EnduranceRun, frames: int, step: Callable[[int], None]) -> None:
+def _repeat(run: EnduranceRun, frames: int, step: Callable[[int], None]) -> None:
     for number in range(frames):
         step(number)
         if (number + 1) % _EVERY == 0:
-            run.samples.take(number + 1)
+            run.samples.add(number + 1)
 
 
 def describe(report: Report, run: EnduranceRun) -> None:
@@ -110,15 +110,15 @@ def describe(report: Report, run: EnduranceRun) -> None:
     report.table(f"{run.name}: {run.samples.frames[-1]} frames, {run.objects} objects", columns, rows)
     settled = run.samples.between(min(SPAN, run.samples.frames[-1] // 3), run.samples.frames[-1])
     start = settled.frames[0] - _EVERY
-    report.say(
+    report.line(
         f"growth after the first {start} frames, in {SPAN}: {settled.growth():+.2f} MB,"
         f" {settled.block_growth():+.0f} blocks,"
-        f" of which {_NUMBERS * SPAN // _EVERY} are these samples themselves"
+        f" of which {_OBJECTS_PER_SAMPLE * SPAN // _EVERY} belong to the samples themselves"
     )
 
 
 def spans(frames: int) -> Iterator[tuple[int, int]]:
-    """Return the spans of the table: :data:`SPAN` frames each, or a third of all if that is less."""
+    """Return the table's spans: :data:`SPAN` frames each, or a third of all frames if that is less."""
     span = min(SPAN, frames // 3)
     return itertools.pairwise(range(0, frames + 1, span))
 
@@ -139,15 +139,15 @@ def plot(runs: list[EnduranceRun], path: Path) -> None:
 def main() -> None:
     """Run the benchmark."""
     options = parser(__doc__, "endurance")
-    options.add_argument("--frames", type=int, default=50_000, help="the tracker's; 0: without")
-    options.add_argument("--pipeline-frames", type=int, default=15_000, help="the pipeline's; 0: without")
+    options.add_argument("--frames", type=int, default=50_000, help="for the tracker; 0: skip it")
+    options.add_argument("--pipeline-frames", type=int, default=15_000, help="for the pipeline; 0: skip it")
     chosen = options.parse_args()
     report = Report()
-    given = ((run_tracker, chosen.frames), (run_pipeline, chosen.pipeline_frames))
+    selected = ((run_tracker, chosen.frames), (run_pipeline, chosen.pipeline_frames))
     runs = []
-    for start, frames in given:
-        if frames >= _LEAST:
-            runs.append(start(frames))
+    for run, frames in selected:
+        if frames >= _MIN_FRAMES:
+            runs.append(run(frames))
             describe(report, runs[-1])
     plot(runs, chosen.out / "endurance.png")
     report.save(chosen.out / "endurance.txt")

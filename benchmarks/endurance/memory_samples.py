@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 SPAN = 10_000
-"""Frames that growth is given for, as the tables count it."""
+"""Frames per which growth is measured."""
 _MEGABYTE = 1e6
 _STATM = Path("/proc/self/statm")
 _RESIDENT = 1
-"""Place of the resident pages (proc(5))."""
+"""Field of the resident pages (proc(5))."""
 
 
 def resident_megabytes() -> float:
@@ -28,16 +28,16 @@ def resident_megabytes() -> float:
 
 @dataclass(slots=True)
 class MemorySamples:
-    """Memory and time after numbers of frames."""
+    """Memory and processor time after some numbers of frames."""
 
     frames: list[int] = field(default_factory=list)
     megabytes: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     """Processor time since the start."""
     blocks: list[int] = field(default_factory=list)
-    """Python's own memory blocks in use: they tell a leak from a heap in pieces."""
+    """Python memory blocks in use, which distinguish a leak from heap fragmentation."""
 
-    def take(self, frames: int) -> None:
+    def add(self, frames: int) -> None:
         """Add a sample, after clearing Python's free lists, which fill slowly."""
         gc.collect()
         self.frames.append(frames)
@@ -47,12 +47,12 @@ class MemorySamples:
 
     def between(self, start: int, stop: int) -> MemorySamples:
         """Return the samples after `start` frames and up to `stop`."""
-        kept = [n for n, frames in enumerate(self.frames) if start < frames <= stop]
+        kept = [index for index, frames in enumerate(self.frames) if start < frames <= stop]
         return MemorySamples(
-            [self.frames[n] for n in kept],
-            [self.megabytes[n] for n in kept],
-            [self.seconds[n] for n in kept],
-            [self.blocks[n] for n in kept],
+            [self.frames[index] for index in kept],
+            [self.megabytes[index] for index in kept],
+            [self.seconds[index] for index in kept],
+            [self.blocks[index] for index in kept],
         )
 
     def milliseconds_per_frame(self) -> float:
@@ -64,7 +64,7 @@ class MemorySamples:
         return self._per_span(self.megabytes)
 
     def block_growth(self) -> float:
-        """Return the growth of memory blocks per :data:`SPAN` frames, likewise."""
+        """Return the growth of memory blocks per :data:`SPAN` frames, by linear regression."""
         return self._per_span(self.blocks)
 
     def _per_span(self, values: Sequence[float]) -> float:

@@ -63,13 +63,13 @@ def describe(report: Report, name: str, delays: StageDelays, shown: ShownFrames,
     ]
     title = f"myview up on {name}: delay of {len(delays.pulses)} frames, ms"
     report.table(title, ["stage", "mean", "p50", "p95", "what"], rows)
-    report.say(
+    report.line(
         f"{delays.shown_share:.1%} of the frames were shown; {delays.unknown} with unknown stages left out"
     )
-    report.say(f"decided without a late camera: {delays.late} of {delays.gops} GOPs")
-    report.say(f"shed since the start: {shed} frames of all cameras")
+    report.line(f"decided without a late camera: {delays.late} of {delays.gops} GOPs")
+    report.line(f"shed since the start: {shed} frames of all cameras")
     used = ", ".join(f"{who} {cores:.2f}" for who, cores in shown.cores.items())
-    report.say(f"cores in use, of {os.cpu_count()}: {used}")
+    report.line(f"cores in use, of {os.cpu_count()}: {used}")
 
 
 def _row(name: str, seconds: np.ndarray, what: str) -> list[str]:
@@ -118,7 +118,7 @@ def measure(options: argparse.Namespace) -> None:
             delays = split(marks, shown)
         except Exception:
             if (log := folder / LOG).exists():
-                report.say(log.read_text(encoding="utf-8"))
+                report.line(log.read_text(encoding="utf-8"))
             raise
     describe(report, views.name, delays, shown, marks.shed)
     plot(delays, shown, options.out / f"latency-{views.name}.png", views.name)

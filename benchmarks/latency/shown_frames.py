@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from playwright.async_api import Browser
 
-from benchmarks.common.process_load import busy_now
+from benchmarks.common.process_load import read_processor_usage
 
 _PLAYING_MS = 60_000
 _READ_EVERY_S = 10.0
@@ -38,7 +38,7 @@ async def watch_page(browser: Browser, url: str, settle_s: float, seconds: float
             "myview.state === 'playing' && myview.delays.length > 0", timeout=_PLAYING_MS
         )
         await asyncio.sleep(settle_s)
-        begin, before = await page.evaluate("Date.now()"), busy_now()
+        begin, before = await page.evaluate("Date.now()"), read_processor_usage()
         at: dict[int, float] = {}
         left = seconds
         while left > 0:
@@ -47,7 +47,7 @@ async def watch_page(browser: Browser, url: str, settle_s: float, seconds: float
             for shown in await page.evaluate("myview.delays"):
                 if shown["shownAt"] >= begin:
                     at.setdefault(shown["pulse"], shown["shownAt"] / 1e3)
-        cores = busy_now().cores_since(before)
+        cores = read_processor_usage().cores_since(before)
         site = await page.evaluate("myview.site")
         number = await page.evaluate("myview.object")
         return ShownFrames(int(number), at, int(site["lookahead_frames"]), float(site["fps"]), cores)

@@ -20,7 +20,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.common.environment import CannotRunError, finish, parser
-from benchmarks.common.process_load import OTHER, ProcessorUsage, busy_now
+from benchmarks.common.process_load import OTHER, ProcessorUsage, read_processor_usage
 from benchmarks.common.recorded_views import ROOM
 from benchmarks.common.report import Report
 from benchmarks.latency.bus_subscriber import BusTimestamps, listening
@@ -100,7 +100,7 @@ async def watch(live: LoopedViews, folder: Path, settle_s: float, seconds: float
     times.mkdir()
 
     async def moment() -> SiteSnapshot:
-        return SiteSnapshot(busy_now(), await read_counts(site.url), read_stages(times))
+        return SiteSnapshot(read_processor_usage(), await read_counts(site.url), read_stages(times))
 
     async with running_site(live, folder, hooked_environment(times)) as site:
         with listening(site.bus) as marks:
@@ -135,10 +135,10 @@ def describe(report: Report, name: str, watched: LiveRun) -> None:
     _describe_waits(report, watched)
     cores = watched.stop.busy.cores_since(watched.start.busy)
     own = sum(used for who, used in cores.items() if who not in {OTHER, _OWN})
-    report.say("cores in use: " + ", ".join(f"{who} {used:.2f}" for who, used in cores.items()))
-    report.say(f"MyView's processes together: {own:.2f} cores of {os.cpu_count()}")
+    report.line("cores in use: " + ", ".join(f"{who} {used:.2f}" for who, used in cores.items()))
+    report.line(f"MyView's processes together: {own:.2f} cores of {os.cpu_count()}")
     keeps_up = "yes" if counts.dropped == 0 and counts.late == 0 else "NO"
-    report.say(f"keeps up: {keeps_up}; frames dropped: {counts.dropped}, windows late: {counts.late}")
+    report.line(f"keeps up: {keeps_up}; frames dropped: {counts.dropped}, windows late: {counts.late}")
 
 
 def _describe_stages(report: Report, used: Mapping[str, Mapping[str, float]]) -> None:
@@ -203,7 +203,7 @@ def measure(options: argparse.Namespace) -> None:
             watched = asyncio.run(watch(live, folder, options.settle, options.seconds))
         except Exception:
             if (log := folder / LOG).exists():
-                report.say(log.read_text(encoding="utf-8"))
+                report.line(log.read_text(encoding="utf-8"))
             raise
     describe(report, name, watched)
     plot(watched, name, options.out / f"live_cameras-{name}.png")

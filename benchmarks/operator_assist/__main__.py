@@ -63,7 +63,7 @@ def measure(options: argparse.Namespace) -> None:
         name: count(_with_operator(alone, kind, person, flags), person) for name, person, flags in people
     }
     name = f"operator_assist-{options.kind}{options.objects or ''}"
-    report.say(f"{len(alone)} clips, {points[0].minutes:.1f} minutes")
+    report.line(f"{len(alone)} clips, {points[0].minutes:.1f} minutes")
     report.table(
         "Failures foreseen by flags",
         ["risk from", "flags/min", "failures/min", "flags per failure", "foreseen", "upper bound"],

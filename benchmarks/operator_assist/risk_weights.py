@@ -74,7 +74,7 @@ def main() -> None:
         weights = [f"{weight:.2f}" for weight in fit_weights(terms, wrong)]
         table.append([reason, str(len(wrong)), f"{100.0 * wrong.mean():.0f} %", *weights])
     report = Report()
-    report.say(f"{len(tracked_clips)} clips, {sum(clip.clip.minutes for clip in tracked_clips):.1f} minutes")
+    report.line(f"{len(tracked_clips)} clips, {sum(clip.clip.minutes for clip in tracked_clips):.1f} minutes")
     report.table(
         "Risk weights",
         [

@@ -55,7 +55,7 @@ def environment(folder: Path, report: Report) -> OtherTrackerEnvironment | None:
     try:
         return peer_environment(folder)
     except OtherTrackersUnavailableError as problem:
-        report.say(f"without other trackers, which cannot be installed here: {problem}")
+        report.line(f"without other trackers, which cannot be installed here: {problem}")
         return None
 
 
@@ -78,7 +78,7 @@ def _peers_tracks(
         try:
             yield peer.name, peers.track(peer, sequence.detections)
         except OtherTrackersUnavailableError as problem:
-            report.say(f"{sequence.name}: without {peer.name}: {problem}")
+            report.line(f"{sequence.name}: without {peer.name}: {problem}")
 
 
 def difference(
@@ -109,7 +109,7 @@ def run(options_data: Path, out: Path, folder: Path, names: list[str] | None, *,
     """Measure, print and save."""
     sequences = find_recordings(options_data, names)
     report = Report()
-    report.say(f"other trackers: {', '.join(PACKAGES)}, with their defaults")
+    report.line(f"other trackers: {', '.join(PACKAGES)}, with their defaults")
     peers = environment(folder, report)
     table: Table = {}
     worst = 0.0
@@ -136,7 +136,7 @@ def run(options_data: Path, out: Path, folder: Path, names: list[str] | None, *,
         report.table(
             "MyView minus the best other tracker in each score", ["", "HOTA", "MOTA", "IDF1", "IDSW"], ahead
         )
-        report.say(f"the TrackEval port differs from these scores by at most {worst:.1g}")
+        report.line(f"the TrackEval port differs from these scores by at most {worst:.1g}")
     report.save(out / "other_trackers.txt")
     plot(table, CEILING, out / "other_trackers.png")
 

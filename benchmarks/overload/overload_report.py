@@ -37,11 +37,11 @@ def describe(report: Report, result: OverloadResult) -> None:
             for step in result.steps
         ],
     )
-    report.say(f"cameras carried without load shedding: {result.cameras_carried}")
+    report.line(f"cameras carried without load shedding: {result.cameras_carried}")
     recovery_s = (
         f"longer than {RECOVERED_S:.0f} s" if result.recovery_s is None else f"{result.recovery_s:.0f} s"
     )
-    report.say(f"after killing all cameras but one: no load shedding after {recovery_s}")
+    report.line(f"after killing all cameras but one: no load shedding after {recovery_s}")
 
 
 def plot(result: OverloadResult, path: Path) -> None:

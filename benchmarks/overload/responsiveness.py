@@ -230,9 +230,9 @@ def run(options: argparse.Namespace) -> None:
         ],
         rows,
     )
-    report.say("first: time to the first response; p50, p95, max.: response times from then on")
-    report.say("lag: of the service's event loop, at most; own: of the measuring process, for comparison")
-    report.say(
+    report.line("first: time to the first response; p50, p95, max.: response times from then on")
+    report.line("lag: of the service's event loop, at most; own: of the measuring process, for comparison")
+    report.line(
         f"frames/s: of all cameras, in the last {1 - _SETTLED:.0%} of the time; some may still be starting"
     )
     report.save(options.out / "responsiveness.txt")

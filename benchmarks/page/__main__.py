@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from playwright.async_api import CDPSession, Page
 
 from benchmarks.common.browser import check_chromium, chromium
-from benchmarks.common.demo_site import demo_at, open_when_there
+from benchmarks.common.demo_site import demo_at, open_when_ready
 from benchmarks.common.environment import CannotRunError, finish, parser
 from benchmarks.common.report import Report
 from benchmarks.page import long_playback as page_hours
@@ -68,7 +68,7 @@ async def visit(url: str, switches: int, minutes: float) -> PageVisit:
     async with chromium() as browser:
         # The page's policy forbids eval, which Playwright needs.
         page = await browser.new_page(viewport={"width": 1280, "height": 800}, bypass_csp=True)
-        await open_when_there(page, url)
+        await open_when_ready(page, url)
         await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
         await asyncio.sleep(_SETTLE_S)
         tools = await page.context.new_cdp_session(page)

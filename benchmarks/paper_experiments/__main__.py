@@ -83,7 +83,7 @@ def run(experiment: Experiment, seeds: int | None, report: Report, out: Path) ->
         ["costs and windows: solver", "wrong per frame", "not its like", "missing", "windows integral"],
         rows,
     )
-    report.say(f"the paper's own recording: {experiment.paper}")
+    report.line(f"the paper's own recording: {experiment.paper}")
 
 
 def main() -> None:
@@ -98,9 +98,9 @@ def main() -> None:
     for experiment in EXPERIMENTS:
         if not chosen.experiment or experiment.name in chosen.experiment:
             run(experiment, chosen.seeds, report, chosen.out)
-    report.say("wrong: a label on another object or on nothing; of these, unlike: on nobody of the same kit")
-    report.say("missing: no label though its object is in view and was detected; ± over the scenes")
-    report.say(
+    report.line("wrong: a label on another object or on nothing; of these, unlike: on nobody of the same kit")
+    report.line("missing: no label though its object is in view and was detected; ± over the scenes")
+    report.line(
         "default: CostSettings and WindowSettings as they are (for the toys with c_a, c_b of sub-images)"
     )
     report.save(chosen.out / "paper_experiments.txt")

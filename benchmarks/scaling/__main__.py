@@ -92,7 +92,7 @@ def describe(report: Report, loads: Sequence[SiteLoad]) -> None:
         ["stage", *(f"{camera}" for camera in cameras), "grows", "what"],
         rows,
     )
-    report.say("messages and bytes: at 25 pulses a second; late: windows decided without their camera")
+    report.line("messages and bytes: at 25 pulses a second; late: windows decided without their camera")
 
 
 def _services(loads: Sequence[SiteLoad]) -> str:
@@ -131,7 +131,7 @@ def measure(options: argparse.Namespace) -> None:
             hall = SimulatedHall(cameras, options.people)
             settle, epochs = (_QUICK_SETTLE, _QUICK_EPOCHS) if quick else (_SETTLE, _EPOCHS)
             loads.append(carry(hall, fps, Path(temporary) / f"{cameras}", settle, epochs, options.share))
-            report.say(f"{cameras} cameras: {loads[-1].milliseconds:.1f} ms a frame")
+            report.line(f"{cameras} cameras: {loads[-1].milliseconds:.1f} ms a frame")
     describe(report, loads)
     plot(loads, options.out / "scaling.png")
     report.save(options.out / "scaling.txt")

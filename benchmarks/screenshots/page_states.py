@@ -24,7 +24,7 @@ from playwright.async_api import Browser, Page
 from playwright.async_api import TimeoutError as LateError
 
 from benchmarks.common.browser import check_chromium, chromium
-from benchmarks.common.demo_site import demo_at, open_when_there
+from benchmarks.common.demo_site import demo_at, open_when_ready
 from benchmarks.common.environment import ROOT, CannotRunError, finish
 from benchmarks.common.process_load import running_pids
 
@@ -160,7 +160,7 @@ async def _sitting(
     page = await browser.new_page(bypass_csp=True)
     if script:
         await page.add_init_script(script)
-    await open_when_there(page, url)
+    await open_when_ready(page, url)
     yield ScreenshotSession(page, out)
     await page.close()
 

@@ -46,7 +46,7 @@ def describe(report: Report, measurements: SoakMeasurements) -> bool:
     """Print the tables; return whether everything stayed flat and no fault occurred."""
     time_scale, visitors = measurements.time_scale, measurements.visitors
     hours = measurements.delays[-1].hours if measurements.delays else 0.0
-    report.say(
+    report.line(
         f"{hours:.2f} hours of the site in {measurements.seconds / 60:.1f} minutes:"
         f" {time_scale.fps:g} pulses a second, {visitors.camera.pulse} frames of each camera"
     )
@@ -71,7 +71,7 @@ def describe(report: Report, measurements: SoakMeasurements) -> bool:
         passed &= all(verdict.flat for _, verdict in growth)
     else:
         passed = False
-        report.say("too few samples to compare the quarters")
+        report.line("too few samples to compare the quarters")
     missing_frames = {
         "of a camera": visitors.camera.missing_frames,
         "of a person": visitors.person.missing_frames,
@@ -81,18 +81,18 @@ def describe(report: Report, measurements: SoakMeasurements) -> bool:
         name: f"{camera['shed'] + camera['missed']} of {camera['frames']}"
         for name, camera in counts.cameras.items()
     }
-    report.say(f"visits: {_join_counts(dict(sorted(visitors.visits.items())))}")
-    report.say(
+    report.line(f"visits: {_join_counts(dict(sorted(visitors.visits.items())))}")
+    report.line(
         f"events received: {visitors.events}; frames missing in a stream: {_join_counts(missing_frames)}"
     )
-    report.say(f"frames missed or not searched: {_join_counts(searched)}")
-    report.say(f"windows late: {counts.late}")
+    report.line(f"frames missed or not searched: {_join_counts(searched)}")
+    report.line(f"windows late: {counts.late}")
     faults = ", ".join(f"{what} ({count})" for what, count in sorted(visitors.faults.items())) or "none"
-    report.say(f"faults of visitors: {faults}")
+    report.line(f"faults of visitors: {faults}")
     if measurements.failure:
-        report.say(f"BROKEN: {measurements.failure}")
+        report.line(f"BROKEN: {measurements.failure}")
     passed &= not any(missing_frames.values()) and not visitors.faults
-    report.say("flat: " + ("yes" if passed else "NO"))
+    report.line("flat: " + ("yes" if passed else "NO"))
     return passed
 
 

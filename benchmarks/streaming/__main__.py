@@ -116,7 +116,7 @@ def measure(options: argparse.Namespace) -> None:
     report = Report()
     films = draw_room(_FILM)
     kbits = np.mean([8 * len(unit.data) for film in films for unit in film]) * SITE.fps / 1e3
-    report.say(
+    report.line(
         f"4 cameras of {SITE.width}x{SITE.height}, GOPs of {ENCODE.gop}, {kbits:.0f} kbit/s on average"
     )
     with tempfile.TemporaryDirectory(prefix="myview-stream-") as temporary:

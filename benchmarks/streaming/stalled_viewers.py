@@ -135,9 +135,9 @@ def describe_stalled(report: Report, found: StallComparison) -> None:
         ["round", "p50", "p99", "arrived", "cores of the service"],
         rows,
     )
-    report.say(f"p99 with stalled viewers / without: {found.ratio:.2f} (medians over rounds)")
+    report.line(f"p99 with stalled viewers / without: {found.ratio:.2f} (medians over rounds)")
     alone, beside = (statistics.median(turn.cores for turn in turns) for turns in (found.alone, found.beside))
-    report.say(f"cores of the service: {beside:.3f} with, {alone:.3f} without (likewise)")
+    report.line(f"cores of the service: {beside:.3f} with, {alone:.3f} without (likewise)")
 
 
 _COLUMNS = {"p50": 1, "p99": 1, "arrived": 3, "cores": 2}

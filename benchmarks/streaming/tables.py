@@ -74,7 +74,7 @@ def _splices(report: Report, found: StreamMeasurements, encoded: TranscodeCost) 
     rows.append(["decoded", f"{encoded.decoded:.0f}", "", "", "one thread"])
     rows.append(["encoded again", f"{encoded.encoded:.0f}", "1", "1", "the site's encoder, from BGR"])
     if found.ffmpeg is None:
-        report.say("ffmpeg: left out: needs ffmpeg; on Debian: apt install ffmpeg")
+        report.line("ffmpeg: skipped: needs ffmpeg; on Debian: apt install ffmpeg")
     else:
         rows.append(["ffmpeg", f"{found.ffmpeg:.0f}", "", "", "switches all four cameras, and encodes"])
     columns = ["", "µs a frame", "times cheaper", "with buffering", "how"]
@@ -99,15 +99,15 @@ def _steps(report: Report, found: StreamMeasurements) -> None:
     columns += ["sent ms", "p50 ms", "p95 ms", "p99 ms", "load"]
     report.table("Viewers of 50 objects: ms from when a GOP is sent to when its end is read", columns, rows)
     if found.bare:
-        report.say(_bare(found.bare))
+        report.line(_bare(found.bare))
     for count in found.too_many:
-        report.say(f"{count} viewers: left out: a process may not open so many files (ulimit -Hn)")
+        report.line(f"{count} viewers: skipped: a process may not open so many files (ulimit -Hn)")
     if found.here:
-        report.say(f"HLS here: {_served(found.here)}")
+        report.line(f"HLS here: {_served(found.here)}")
     if found.nginx:
-        report.say(f"HLS of nginx, the same files: {_served(found.nginx)}")
+        report.line(f"HLS of nginx, the same files: {_served(found.nginx)}")
     else:
-        report.say("HLS of nginx: left out: needs nginx; on Debian: apt install nginx-light")
+        report.line("HLS of nginx: skipped: needs nginx; on Debian: apt install nginx-light")
 
 
 def _bare(cost: BareSocketCost) -> str:

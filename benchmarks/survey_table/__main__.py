@@ -24,7 +24,7 @@ from pathlib import Path
 import cv2
 import matplotlib as mpl
 
-from benchmarks.baselines import SearchedView
+from benchmarks.baselines import DetectedView
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
 from benchmarks.survey_table.measured_row import REAL_TIME, TrackerRow, ViewMeasurement, combine, measure_view
@@ -44,7 +44,7 @@ _QUICK = 150
 """Frames at the end of each view, where people are present."""
 
 
-def recorded_views(data: Path) -> Iterator[SearchedView]:
+def recorded_views(data: Path) -> Iterator[DetectedView]:
     """Yield the available recordings."""
     for scene, name, rate in _RECORDED:
         video, truth = data / scene / f"{name}.mp4", data / scene / "gt" / f"{name}.txt"
@@ -52,7 +52,7 @@ def recorded_views(data: Path) -> Iterator[SearchedView]:
             yield _searched(f"{scene} {name}", video, truth, rate)
 
 
-def render_views(seconds: float) -> Iterator[SearchedView]:
+def render_views(seconds: float) -> Iterator[DetectedView]:
     """Yield renderings of the synthetic scenes with their detections."""
     for name, people, seed in _DRAWN:
         scene = Scene(name, cameras=1, objects=people, seed=seed)
@@ -62,14 +62,14 @@ def render_views(seconds: float) -> Iterator[SearchedView]:
             yield _searched(f"{name}, {people} people", out / "c0.mp4", out / "gt" / "c0.txt", scene.fps)
 
 
-def _searched(name: str, video: Path, truth: Path, fps: float) -> SearchedView:
-    return SearchedView(name, list(detect_frames(config_for_video(video, None, None))), read_rows(truth), fps)
+def _searched(name: str, video: Path, truth: Path, fps: float) -> DetectedView:
+    return DetectedView(name, list(detect_frames(config_for_video(video, None, None))), read_rows(truth), fps)
 
 
-def _shortened(view: SearchedView, frames: int) -> SearchedView:
+def _shortened(view: DetectedView, frames: int) -> DetectedView:
     """Return the last frames of a view."""
     last = view.frames[-frames:]
-    return SearchedView(view.name, last, [row for row in view.truth if row.frame > last[0].number], view.fps)
+    return DetectedView(view.name, last, [row for row in view.truth if row.frame > last[0].number], view.fps)
 
 
 def measure(options: argparse.Namespace) -> None:
@@ -92,7 +92,7 @@ def measure(options: argparse.Namespace) -> None:
         ["", "occlusion", "", "identities", "", "targets", "", "real time", ""],
         [[name, *_with_words(row, WORDS.get(name, SurveyRatings()))] for name, row in rows.items()],
     )
-    report.say(
+    report.line(
         "occlusion: survived with the same id; identities: mean IDF1, switches; targets: people with a "
         f"correct box, of those present; real time: frames a second on the slowest view / {REAL_TIME:.0f}"
     )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import fmean
 
-from benchmarks.baselines import SearchedView, follow
+from benchmarks.baselines import DetectedView, run_tracker
 from tracking.evaluation import Scores, evaluate, find_occlusions, identities_kept
 
 REAL_TIME = 25.0
@@ -52,9 +52,9 @@ class TrackerRow:
         return self.survived / max(self.occlusions, 1)
 
 
-def measure_view(view: SearchedView, tracker: str) -> ViewMeasurement:
+def measure_view(view: DetectedView, tracker: str) -> ViewMeasurement:
     """Measure a tracker on one view."""
-    rows, milliseconds = follow(tracker, view)
+    rows, milliseconds = run_tracker(tracker, view)
     around = round(view.fps)
     found = find_occlusions(view.truth, around)
     scores = evaluate(view.truth, rows)

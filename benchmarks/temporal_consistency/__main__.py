@@ -127,7 +127,7 @@ def measure(options: argparse.Namespace) -> None:
     print_errors(report, full_color, "")
     print_errors(report, low_color, f", {SATURATIONS[1]:.0%} of the color saturation")
     print_edges(report, full_color)
-    report.say(
+    report.line(
         f"{statistics.median(searching):.1f} ms a picture to detect the blobs; "
         f"{time.perf_counter() - began:.0f} s in total"
     )

@@ -108,11 +108,11 @@ def run(options: argparse.Namespace) -> None:
         ],
         rows,
     )
-    report.say(
+    report.line(
         "decision: decoding, quality, costs, selection and bookkeeping, from messages to selected views."
     )
-    report.say("Besides: identities (here by given ids), and encoding choices and boxes")
-    report.say("for the files, the bus and the page.")
+    report.line("Besides: identities (here by given ids), and encoding choices and boxes")
+    report.line("for the files, the bus and the page.")
     options.out.mkdir(parents=True, exist_ok=True)
     plot(
         {"objects": (_MORE_PEOPLE, people), "cameras": (_MORE_CAMERAS, cameras)},

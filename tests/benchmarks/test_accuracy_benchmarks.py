@@ -124,7 +124,7 @@ def test_the_environment_is_used_again(tmp_path: Path, monkeypatch: pytest.Monke
     assert found.python == tmp_path / "bin" / "python"
 
 
-def test_without_recordings_the_benchmarks_are_left_out(
+def test_without_recordings_the_benchmarks_are_skipped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for benchmark in (peers, ablation):
@@ -132,4 +132,4 @@ def test_without_recordings_the_benchmarks_are_left_out(
         with pytest.raises(SystemExit) as ended:
             benchmark.main()
         assert ended.value.code == SKIPPED
-        assert "left out: needs detections and ground truth" in capsys.readouterr().out
+        assert "skipped: needs detections and ground truth" in capsys.readouterr().out

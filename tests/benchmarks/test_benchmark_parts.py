@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from benchmarks.common.environment import SKIPPED, CannotRunError
-from benchmarks.common.process_load import OTHER, busy_now
+from benchmarks.common.process_load import OTHER, read_processor_usage
 from benchmarks.common.recorded_views import find_views
 from benchmarks.common.stopwatch import Stopwatch
 from benchmarks.latency.bus_subscriber import BusTimestamps
@@ -187,9 +187,9 @@ def test_recordings_that_are_not_there_are_named(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not Path("/proc/stat").exists(), reason="needs Linux")
 def test_busy_cores_are_told_apart() -> None:
-    before = busy_now()
+    before = read_processor_usage()
     spin(0.2)
-    cores = busy_now().cores_since(before)
+    cores = read_processor_usage().cores_since(before)
     assert cores["measuring"] > 0.01
     assert OTHER in cores
 
@@ -201,5 +201,5 @@ def test_a_benchmark_without_its_recordings_is_left_out(
     with pytest.raises(SystemExit) as ended:
         render.main()
     assert ended.value.code == SKIPPED
-    assert "render: left out: needs the recordings" in capsys.readouterr().out
+    assert "render: skipped: needs the recordings" in capsys.readouterr().out
     assert not (tmp_path / "out").exists()

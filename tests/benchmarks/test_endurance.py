@@ -15,16 +15,16 @@ from benchmarks.endurance.memory_samples import MemorySamples, resident_megabyte
 from tracking import CostSettings, OnlineTracker, WindowSettings, create_solver
 
 WARM_UP, FRAMES = 400, 900
-MOST_GROWTH = 200_000
-"""Bytes; the detections of one window are about as much."""
+MAX_GROWTH = 200_000
+"""Bytes: about the detections of one window."""
 
 
 @pytest.mark.slow
-def test_the_tracker_holds_no_more_after_hundreds_of_frames() -> None:
+def test_the_trackers_memory_does_not_grow_over_hundreds_of_frames() -> None:
     settings = WindowSettings(forget_after=50, max_objects=8)
     tracker = OnlineTracker(settings, CostSettings(), create_solver("columns"))
     scene = crowd(2, seed=1)
-    objects, held = 0, 0
+    objects, allocated = 0, 0
     try:
         for frame, seen in enumerate(itertools.islice(scene, FRAMES)):
             result = tracker.push(frame, seen)
@@ -35,19 +35,19 @@ def test_the_tracker_holds_no_more_after_hundreds_of_frames() -> None:
             if frame == WARM_UP:
                 tracemalloc.start()
             elif frame == WARM_UP + 50:
-                held = tracemalloc.get_traced_memory()[0]
-        assert tracemalloc.get_traced_memory()[0] - held < MOST_GROWTH
+                allocated = tracemalloc.get_traced_memory()[0]
+        assert tracemalloc.get_traced_memory()[0] - allocated < MAX_GROWTH
     finally:
         tracemalloc.stop()
-    assert objects > 2  # somebody came after somebody had gone
+    assert objects > 2, "people were replaced by others"
 
 
-def test_the_crowd_goes_on_and_changes() -> None:
+def test_the_number_of_people_in_the_crowd_varies() -> None:
     counts = [len(seen) for seen in itertools.islice(crowd(3, seed=2), 300)]
     assert min(counts) < max(counts)
 
 
-def test_growth_is_that_of_a_straight_line() -> None:
+def test_growth_is_the_slope_of_a_regression_line() -> None:
     samples = MemorySamples([1000, 2000, 3000], [50.0, 50.5, 51.0], [1.0, 3.0, 5.0], [700, 700, 700])
     assert samples.growth() == pytest.approx(5.0)
     assert samples.block_growth() == pytest.approx(0.0, abs=1e-6)
@@ -55,23 +55,23 @@ def test_growth_is_that_of_a_straight_line() -> None:
     assert samples.between(1000, 3000).frames == [2000, 3000]
 
 
-def test_a_run_has_three_spans_at_least() -> None:
+def test_a_run_has_at_least_three_spans() -> None:
     assert next(iter(spans(50_000))) == (0, 10_000)
     assert len(list(spans(50_000))) == 5
     assert list(spans(3000)) == [(0, 1000), (1000, 2000), (2000, 3000)]
 
 
-def test_the_memory_of_this_process_is_read() -> None:
-    held = resident_megabytes()
-    # Fresh from the system: an array may be given what was let go of before.
+def test_resident_memory_includes_a_new_mapping() -> None:
+    before = resident_megabytes()
+    # A mapping of its own: an array may reuse freed memory.
     with mmap.mmap(-1, 32_000_000) as block:
         block.write(b"x" * 32_000_000)
-        assert resident_megabytes() - held > 16.0
+        assert resident_megabytes() - before > 16.0
 
 
 @pytest.mark.slow
-def test_a_run_is_described_by_its_spans(capsys: pytest.CaptureFixture[str]) -> None:
-    run = run_tracker(1500)  # the fewest that have six samples
+def test_the_report_of_a_run_has_its_spans(capsys: pytest.CaptureFixture[str]) -> None:
+    run = run_tracker(1500)  # the minimum: six samples
     describe(Report(), run)
     printed = capsys.readouterr().out
     assert "1000 to 1500" in printed

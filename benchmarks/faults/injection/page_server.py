@@ -7,7 +7,7 @@ import signal
 import time
 
 from benchmarks.common.browser import chromium, chromium_path
-from benchmarks.common.demo_site import open_when_there
+from benchmarks.common.demo_site import open_when_ready
 from benchmarks.faults.site.fault_site import Fault, FaultSite, with_up
 
 _PLAYING_MS = 90_000
@@ -29,7 +29,7 @@ async def kill_server_behind_page(fault_site: FaultSite) -> None:
         raise RuntimeError("Chromium is missing")
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)  # the page's policy forbids eval, which asks it here
-        await open_when_there(page, f"{fault_site.url}?object={fault_site.viewers[0].number}")
+        await open_when_ready(page, f"{fault_site.url}?object={fault_site.viewers[0].number}")
         await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
         fault_site.ready_times.clear()  # the start of the browser may have interrupted it
         fault_site.send(signal.SIGKILL, "bestview")

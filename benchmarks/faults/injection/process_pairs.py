@@ -7,12 +7,12 @@ from itertools import combinations
 
 from benchmarks.faults.site.fault_site import FaultSite
 
-BESTVIEW, SYNC, DRAWING = "bestview", "sync", "drawing"
+BESTVIEW, SYNC, RENDERING = "bestview", "sync", "rendering"
 SHOWN = "shown"
 """The camera that most viewers are shown."""
 OTHER = "other"
 """The camera that most other viewers are shown; without any, the next by name."""
-PROCESSES = (BESTVIEW, SYNC, SHOWN, OTHER, DRAWING)
+PROCESSES = (BESTVIEW, SYNC, SHOWN, OTHER, RENDERING)
 
 
 def process_sets(*left_out: str) -> Iterator[tuple[str, ...]]:

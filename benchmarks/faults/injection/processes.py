@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator
 
 import aiohttp
 
-from benchmarks.faults.injection.process_pairs import BESTVIEW, DRAWING, SHOWN, names, process_sets, title
+from benchmarks.faults.injection.process_pairs import BESTVIEW, RENDERING, SHOWN, names, process_sets, title
 from benchmarks.faults.site.fault_site import LEASE_S, Fault, FaultSite, Inject, with_up
 
 _FROZEN_S = 4.0
@@ -76,7 +76,7 @@ async def _pictures(session: aiohttp.ClientSession, path: str) -> AsyncIterator[
 
 def _kill(processes: tuple[str, ...]) -> Fault:
     name, inject, kills_server = f"kill {title(processes)}", kill_processes(*processes), BESTVIEW in processes
-    if DRAWING in processes:
+    if RENDERING in processes:
         inject = while_drawing(inject, kills_server=kills_server)
     return (
         Fault(name, with_up, inject, 15.0, None, kills_server=True)
@@ -87,7 +87,7 @@ def _kill(processes: tuple[str, ...]) -> Fault:
 
 def _freeze(processes: tuple[str, ...]) -> Fault:
     inject = freeze_processes(*processes)
-    if DRAWING in processes:
+    if RENDERING in processes:
         inject = while_drawing(inject, kills_server=False)
     max_gap_s = None if BESTVIEW in processes else LEASE_S + 1.0 if SHOWN in processes else 1.0
     return Fault(f"freeze {title(processes)}", with_up, inject, 9.0, max_gap_s)

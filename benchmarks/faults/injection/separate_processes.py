@@ -12,7 +12,7 @@ from typing import IO, Any
 import yaml
 
 from benchmarks.common.environment import one_thread_environment
-from benchmarks.faults.injection.process_pairs import BESTVIEW, DRAWING, names, process_sets, title
+from benchmarks.faults.injection.process_pairs import BESTVIEW, RENDERING, names, process_sets, title
 from benchmarks.faults.site.fault_site import (
     SETTINGS,
     Fault,
@@ -120,6 +120,6 @@ def _restart(processes: tuple[str, ...]) -> Fault:
 
 # A render worker is terminated only by the best view, its parent.
 FAULTS = (
-    *map(_restart, process_sets(BESTVIEW, DRAWING)),
-    *map(_restart, (processes for processes in process_sets(DRAWING) if BESTVIEW in processes)),
+    *map(_restart, process_sets(BESTVIEW, RENDERING)),
+    *map(_restart, (processes for processes in process_sets(RENDERING) if BESTVIEW in processes)),
 )

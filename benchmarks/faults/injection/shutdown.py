@@ -96,7 +96,7 @@ async def shut_down_while_watched(views: StampedViews, folder: Path) -> list[Pro
 
 
 def _site_processes(fault_site: FaultSite) -> list[tuple[str, int]]:
-    return [(name, pid) for name in (*NAMES, "drawing") for pid in fault_site.pids(name)]
+    return [(name, pid) for name in (*NAMES, "rendering") for pid in fault_site.pids(name)]
 
 
 async def _left_behind(before: list[tuple[str, int]]) -> list[str]:

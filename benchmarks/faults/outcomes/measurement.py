@@ -47,10 +47,10 @@ async def _group(
         files = await asyncio.to_thread(recording_check.read, fault_site.recorded, fault_site.live)
         recording_check.note(outcomes, fault_site.events, files)
     except CannotRunError as error:
-        report.say(f"{faults[0].name}: left out: {error}")
+        report.line(f"{faults[0].name}: skipped: {error}")
     except (ClientError, RuntimeError) as error:
-        report.say(f"{faults[0].name} and what follows it: {error}")
-        report.say(await asyncio.to_thread(_log_of, folder))
+        report.line(f"{faults[0].name} and what follows it: {error}")
+        report.line(await asyncio.to_thread(_log_of, folder))
         outcomes += [FaultOutcome(fault, failed="the site did not run") for fault in faults[len(outcomes) :]]
     return outcomes
 

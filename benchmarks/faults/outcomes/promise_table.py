@@ -38,7 +38,7 @@ def describe(report: Report, outcomes: Sequence[FaultOutcome]) -> None:
             if not process.clean
         ]
         for note in [note for note in notes if note][:_NOTES]:
-            report.say(f"{outcome.fault.name}: {note}")
+            report.line(f"{outcome.fault.name}: {note}")
     for outcome in outcomes:
         late = [
             late
@@ -48,9 +48,9 @@ def describe(report: Report, outcomes: Sequence[FaultOutcome]) -> None:
         ]
         if late:
             said = f"{min(late)} to {max(late)} frames behind their pulses, half of them {median_low(late)}"
-            report.say(f"{outcome.fault.name}: pictures of the network camera are {said} at most")
+            report.line(f"{outcome.fault.name}: pictures of the network camera are {said} at most")
     broken = [outcome.fault.name for outcome in outcomes if not keeps_promises(outcome)]
-    report.say(f"{len(outcomes) - len(broken)} of {len(outcomes)} keep all promises" + _list(broken))
+    report.line(f"{len(outcomes) - len(broken)} of {len(outcomes)} keep all promises" + _list(broken))
 
 
 def keeps_promises(outcome: FaultOutcome) -> bool:

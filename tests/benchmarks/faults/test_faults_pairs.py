@@ -7,8 +7,8 @@ from pathlib import Path
 from benchmarks.faults.__main__ import FAULTS
 from benchmarks.faults.injection.process_pairs import (
     BESTVIEW,
-    DRAWING,
     OTHER,
+    RENDERING,
     SHOWN,
     names,
     process_sets,
@@ -21,14 +21,14 @@ from client import Gop
 
 def test_each_process_fails_and_any_two_of_them() -> None:
     assert [title(processes) for processes in process_sets()] == [
-        *("bestview", "sync", "camera", "drawing"),
+        *("bestview", "sync", "camera", "rendering"),
         *("bestview+sync", "bestview+camera", "bestview+drawing"),
         *("sync+camera", "sync+drawing", "camera+camera", "camera+drawing"),
     ]
     assert all(BESTVIEW not in processes for processes in process_sets(BESTVIEW))
     named = [fault.name for fault in FAULTS]
     assert len(set(named)) == len(named)
-    for mode, left_out in (("kill", ()), ("freeze", ()), ("restart", (DRAWING,))):
+    for mode, left_out in (("kill", ()), ("freeze", ()), ("restart", (RENDERING,))):
         assert {f"{mode} {title(processes)}" for processes in process_sets(*left_out)} <= set(named)
 
 
