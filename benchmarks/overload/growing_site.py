@@ -15,7 +15,7 @@ from typing import IO
 import yaml
 
 from benchmarks.common.environment import ROOT, one_thread_environment
-from benchmarks.streaming.stream_site import end
+from benchmarks.streaming.stream_site import terminate
 from server.cli.generated_config import free_port
 from synthetic import Scene, write_recording
 
@@ -79,7 +79,7 @@ def run_growing_site(most: int, folder: Path) -> Iterator[GrowingSite]:
             _wait_until_up(site.url)
             yield site
         finally:
-            end([*site.cameras.values(), *started])
+            terminate([*site.cameras.values(), *started])
 
 
 def _start(log: IO[bytes], *words: str) -> subprocess.Popen[bytes]:

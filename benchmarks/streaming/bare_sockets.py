@@ -27,61 +27,63 @@ class BareSocketCost:
     """Cost of a loop over the sockets of a number of viewers."""
 
     viewers: int
-    each: float
-    """Microseconds of processor time for a viewer's GOP: hardly more than a system call."""
-    given: float
+    microseconds: float
+    """Processor time to send a GOP to a viewer: hardly more than a system call."""
+    sent_ms: float
     """Median milliseconds until the last socket has accepted a GOP."""
     delays: tuple[float, float, float]
     """Milliseconds from the start of the loop to when a GOP's end was read: p50, p95, p99."""
 
 
-def bare_sends(film: Sequence[AccessUnit], count: int, seconds: float) -> BareSocketCost:
+def measure_bare_sends(film: Sequence[AccessUnit], count: int, seconds: float) -> BareSocketCost:
     """Send a film's GOPs to `count` viewers in real time."""
     with (
-        ExitStack() as open_ones,
+        ExitStack() as stack,
         socket.create_server(("127.0.0.1", 0), backlog=_BACKLOG) as server,
         viewers(server.getsockname()[1]) as crowd,
-        ThreadPoolExecutor(1) as aside,
+        ThreadPoolExecutor(1) as pool,
     ):
-        watching = aside.submit(crowd.watch, ["/"] * count)
-        sockets = [open_ones.enter_context(server.accept()[0]) for _ in range(count)]
+        watching = pool.submit(crowd.watch, ["/"] * count)
+        sockets = [stack.enter_context(server.accept()[0]) for _ in range(count)]
         watching.result()
-        hearing = aside.submit(crowd.read, seconds)
-        rounds = list(_rounds(film, sockets, hearing))
-        heard = hearing.result()
+        pending = pool.submit(crowd.read, seconds)
+        sent_gops = list(_send_gops(film, sockets, pending))
+        reading = pending.result()
     low, middle, high = np.percentile(
-        send_delays(heard, {sending.first: sending.began for sending in rounds}), [50, 95, 99]
+        send_delays(reading, {sent_gop.first: sent_gop.began for sent_gop in sent_gops}), [50, 95, 99]
     )
     return BareSocketCost(
         count,
-        1e6 * statistics.median(sending.busy for sending in rounds) / count,
-        1e3 * statistics.median(sending.given for sending in rounds),
+        1e6 * statistics.median(sent_gop.processor_s for sent_gop in sent_gops) / count,
+        1e3 * statistics.median(sent_gop.sent_s for sent_gop in sent_gops),
         (float(low), float(middle), float(high)),
     )
 
 
 @dataclass(frozen=True, slots=True)
-class _Round:
+class _SentGop:
+    """A GOP that was sent to all sockets: first pulse, start and duration, processor time."""
+
     first: int
     began: float
-    given: float
-    busy: float
+    sent_s: float
+    processor_s: float
 
 
-def _rounds(
-    film: Sequence[AccessUnit], sockets: Sequence[socket.socket], hearing: Future[CrowdReading]
-) -> Iterator[_Round]:
-    """Send GOP after GOP while the viewers read."""
+def _send_gops(
+    film: Sequence[AccessUnit], sockets: Sequence[socket.socket], pending: Future[CrowdReading]
+) -> Iterator[_SentGop]:
+    """Send one GOP after another in real time while the viewers read."""
     first = 0
-    while not hearing.done():
+    while not pending.done():
         gop = _gop(film, first)
         began, busy = time.monotonic(), time.thread_time()
         for viewer in sockets:
             viewer.sendall(gop)
-        given = time.monotonic() - began
-        yield _Round(first, began, given, time.thread_time() - busy)
+        sent_s = time.monotonic() - began
+        yield _SentGop(first, began, sent_s, time.thread_time() - busy)
         first += ENCODE.gop
-        time.sleep(max(0.0, ENCODE.gop / SITE.fps - given))
+        time.sleep(max(0.0, ENCODE.gop / SITE.fps - sent_s))
 
 
 def _gop(film: Sequence[AccessUnit], first: int) -> bytes:

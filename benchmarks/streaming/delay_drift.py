@@ -1,4 +1,4 @@
-"""Delay drift over an hour of pulses, fed as fast as the service can take them."""
+"""Delay drift over an hour of pulses, fed as fast as the service can process them."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ _PTS_AT = 9
 
 @dataclass(frozen=True, slots=True)
 class DelayDrift:
-    """The change of delay and cost from the beginning to the end."""
+    """The range of the delay, and the cost over time."""
 
     pulses: int
     gops: int
     """GOPs sent."""
-    least: int
+    min_delay: int
     """Smallest delay: pulses from a GOP's first picture to the pulse with which it was sent."""
-    most: int
-    """Largest delay, likewise."""
-    off: int
+    max_delay: int
+    """Largest delay, in pulses."""
+    max_time_error: int
     """Largest difference of a GOP's timestamps in MP4 and transport stream from its pulse, 1/90000 s."""
     costs: tuple[float, ...]
     """Processor milliseconds per pulse, in each tenth of the time."""
@@ -70,16 +70,16 @@ class PacedCameras:
             return
         places = self._hall.places(max(0, number + 1 - WINDOW), number)
         for name, tracker in zip(self._hall.ids, self._trackers, strict=True):
-            word = msgspec.json.encode(tracker.message(number // STRIDE, places))
-            service.ingest.tracks(self._message(name, "tracks", word, b""))
+            payload = msgspec.json.encode(tracker.message(number // STRIDE, places))
+            service.ingest.tracks(self._message(name, "tracks", payload, b""))
         service.decide()
 
-    def _message(self, camera: str, what: str, payload: bytes, attachment: bytes) -> Message:
-        return Message(self._keys.camera(camera, what), payload, attachment)
+    def _message(self, camera: str, topic: str, payload: bytes, attachment: bytes) -> Message:
+        return Message(self._keys.camera(camera, topic), payload, attachment)
 
 
 async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> DelayDrift:
-    """Feed pulses to the service without a bus, and watch a decided camera's stream."""
+    """Feed pulses to the service without a bus, and measure the stream of a decided camera."""
     hall = SimulatedHall(CAMERAS, _PER_CAMERA)
     cameras = [
         CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
@@ -90,31 +90,33 @@ async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> DelayDrif
     service.on_decision.append(decided.append)
     viewer = service.splicer.decided_cameras[hall.ids[0]].subscribe().chunks()
     delays: list[int] = []
-    off, costs, part, began = 0, list[float](), pulses // _PARTS, time.process_time()
+    max_time_error, costs, part, began = 0, list[float](), pulses // _PARTS, time.process_time()
     for number in range(pulses):
         source.pulse(number)
         for choices in decided:
-            piece = await anext(viewer)
+            chunk = await anext(viewer)
             delays.append(number - choices.first)
-            off = max(off, *(abs(stamp - ticks(choices.first, SITE.fps)) for stamp in times(piece)))
+            max_time_error = max(
+                max_time_error, *(abs(stamp - ticks(choices.first, SITE.fps)) for stamp in timestamps(chunk))
+            )
         decided.clear()
         if number % part == part - 1:
             now = time.process_time()
             costs.append(1e3 * (now - began) / part)
             began = now
     service.close()
-    return DelayDrift(pulses, len(delays), min(delays), max(delays), off, tuple(costs))
+    return DelayDrift(pulses, len(delays), min(delays), max(delays), max_time_error, tuple(costs))
 
 
-def times(piece: Chunk) -> tuple[int, int]:
-    """Parse the presentation time of a chunk, 1/90000 s: in the MP4, and in the transport stream."""
-    assert isinstance(piece, MediaChunk)  # noqa: S101 — streams are made of nothing else
-    at = piece.data.index(b"tfdt") + len(b"tfdt") + 4
-    stamp = piece.mpegts.index(_VIDEO) + _PTS_AT
+def timestamps(chunk: Chunk) -> tuple[int, int]:
+    """Parse the presentation times of a chunk, 1/90000 s, in its MP4 and its transport stream."""
+    assert isinstance(chunk, MediaChunk)  # noqa: S101 — streams consist of these
+    at = chunk.data.index(b"tfdt") + len(b"tfdt") + 4
+    stamp = chunk.mpegts.index(_VIDEO) + _PTS_AT
     first, middle, last = (
-        piece.mpegts[stamp],
-        piece.mpegts[stamp + 1 : stamp + 3],
-        piece.mpegts[stamp + 3 : stamp + 5],
+        chunk.mpegts[stamp],
+        chunk.mpegts[stamp + 1 : stamp + 3],
+        chunk.mpegts[stamp + 3 : stamp + 5],
     )
     high, low = int.from_bytes(middle, "big") >> 1, int.from_bytes(last, "big") >> 1
-    return int.from_bytes(piece.data[at : at + 8], "big"), (first >> 1 & 7) << 30 | high << 15 | low
+    return int.from_bytes(chunk.data[at : at + 8], "big"), (first >> 1 & 7) << 30 | high << 15 | low

@@ -1,4 +1,4 @@
-"""The alternatives: ffmpeg that switches inputs and re-encodes, nginx that serves the segments."""
+"""Alternatives to compare with: ffmpeg that switches inputs and re-encodes, nginx that serves segments."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.streaming.simulated_cameras import ENCODE, SITE
-from benchmarks.streaming.stream_site import StreamSite, end
+from benchmarks.streaming.stream_site import StreamSite, terminate
 from server.camera.encoding.encoder import AccessUnit
 from server.cli.generated_config import free_port
 
@@ -38,7 +38,7 @@ http {{
 def ffmpeg_switching(films: Sequence[Sequence[AccessUnit]], frames: int, folder: Path) -> float | None:
     """Return the processor microseconds per frame of ffmpeg that cuts between all cameras every two seconds.
 
-    It decodes every camera and re-encodes the result. None: ffmpeg is missing.
+    It decodes every camera and re-encodes the result. None if ffmpeg is missing.
     """
     program = shutil.which("ffmpeg")
     if program is None:
@@ -55,9 +55,9 @@ def ffmpeg_switching(films: Sequence[Sequence[AccessUnit]], frames: int, folder:
     encode = ["-c:v", "libx264", "-preset", ENCODE.preset, "-tune", "zerolatency", "-crf", f"{ENCODE.crf}"]
     output = ["-g", f"{ENCODE.gop}", "-threads", "1", "-f", "null", "-"]
     words = [program, "-nostdin", "-v", "error", "-filter_threads", "1", "-filter_complex_threads", "1"]
-    before = _children()
+    before = _children_seconds()
     subprocess.run([*words, *inputs, "-filter_complex", graph, "-map", "[out]", *encode, *output], check=True)
-    return 1e6 * (_children() - before) / frames
+    return 1e6 * (_children_seconds() - before) / frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class HlsServingCost:
     """Cost of serving HLS over persistent connections."""
 
     requests: int
-    """Pairs of a playlist and a segment, which a viewer fetches every second."""
+    """Number of pairs of a playlist and a segment, of which a viewer fetches one per second."""
     microseconds: float
     """Processor time of a pair."""
     kilobytes: float
@@ -77,30 +77,30 @@ class HlsServingCost:
         return 1e6 / self.microseconds
 
 
-def hls_here(site: StreamSite, number: int, seconds: float) -> HlsServingCost:
+def hls_from_service(site: StreamSite, number: int, seconds: float) -> HlsServingCost:
     """Fetch an object's playlist and newest segment from the best-view process repeatedly."""
-    before = site.used
+    before = site.processor_seconds
     pairs, size = _fetch(site.http, f"/objects/{number}/hls/", seconds)
-    return HlsServingCost(pairs, 1e6 * (site.used - before) / pairs, size / 1e3)
+    return HlsServingCost(pairs, 1e6 * (site.processor_seconds - before) / pairs, size / 1e3)
 
 
-def hls_of_nginx(site: StreamSite, number: int, seconds: float, folder: Path) -> HlsServingCost | None:
-    """Fetch copies of the same files from nginx. None: nginx is missing."""
+def hls_from_nginx(site: StreamSite, number: int, seconds: float, folder: Path) -> HlsServingCost | None:
+    """Fetch copies of the same files from nginx; None if nginx is missing."""
     program = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
     if program is None:
         return None
     folder.mkdir()
     connection = http.client.HTTPConnection("127.0.0.1", site.http)
-    listed = _get(connection, f"/objects/{number}/hls/index.m3u8")
-    (folder / "index.m3u8").write_bytes(listed)
-    newest = _newest(listed)
+    playlist = _get(connection, f"/objects/{number}/hls/index.m3u8")
+    (folder / "index.m3u8").write_bytes(playlist)
+    newest = _newest_segment(playlist)
     (folder / newest).write_bytes(_get(connection, f"/objects/{number}/hls/{newest}"))
     connection.close()
     port = free_port()
     with _nginx(program, folder, port) as worker:
-        before = _used(worker)
+        before = _processor_seconds(worker)
         pairs, size = _fetch(port, "/", seconds)
-        return HlsServingCost(pairs, 1e6 * (_used(worker) - before) / pairs, size / 1e3)
+        return HlsServingCost(pairs, 1e6 * (_processor_seconds(worker) - before) / pairs, size / 1e3)
 
 
 @contextlib.contextmanager
@@ -113,13 +113,13 @@ def _nginx(program: str, folder: Path, port: int) -> Iterator[int]:
     try:
         yield _worker(process.pid)
     finally:
-        end([process])
+        terminate([process])
 
 
 def _worker(parent: int) -> int:
     children = Path(f"/proc/{parent}/task/{parent}/children")
-    give_up = time.monotonic() + _START_S
-    while time.monotonic() < give_up:
+    deadline = time.monotonic() + _START_S
+    while time.monotonic() < deadline:
         if found := children.read_text(encoding="ascii").split():
             return int(found[0])
         time.sleep(0.05)
@@ -131,15 +131,15 @@ def _fetch(port: int, folder: str, seconds: float) -> tuple[int, int]:
     connection = http.client.HTTPConnection("127.0.0.1", port)
     pairs, size, until = 0, 0, time.monotonic() + seconds
     while time.monotonic() < until:
-        newest = _newest(_get(connection, f"{folder}index.m3u8"))
+        newest = _newest_segment(_get(connection, f"{folder}index.m3u8"))
         size = len(_get(connection, f"{folder}{newest}"))
         pairs += 1
     connection.close()
     return pairs, size
 
 
-def _newest(playlist: bytes) -> str:
-    """Return the newest complete segment: parts of the growing one follow it, in tags."""
+def _newest_segment(playlist: bytes) -> str:
+    """Return the last complete segment, which tags of the current one's parts may follow."""
     return next(line for line in reversed(playlist.decode().splitlines()) if not line.startswith("#"))
 
 
@@ -152,11 +152,11 @@ def _get(connection: http.client.HTTPConnection, path: str) -> bytes:
     return data
 
 
-def _children() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+def _children_seconds() -> float:
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
-def _used(pid: int) -> float:
+def _processor_seconds(pid: int) -> float:
     words = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
     return (int(words[11]) + int(words[12])) * _TICK_S

@@ -1,4 +1,4 @@
-"""Check that every frame of a stream is the selected camera's, to the pixel, in every container format."""
+"""Check that each frame of a stream is the selected camera's, pixel by pixel, in each container format."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ class FrameCorrectness:
 
     frames: int
     cuts: int
-    contained: int
-    """Correct frames in the MP4, or in VP8's WebM."""
-    ts: int | None
+    in_file: int
+    """Correct frames in MP4, or in WebM for VP8."""
+    in_ts: int | None
     """Correct frames in the transport stream; VP8 has none."""
-    alike: int
-    """Pulses at which two cameras have equal frames, so that a wrong one would go unnoticed."""
+    ambiguous: int
+    """Pulses at which two cameras have equal frames, so that a wrong frame would go unnoticed."""
 
     @property
-    def all_right(self) -> bool:
-        """Whether every frame is correct, and a wrong one would have been noticed."""
-        ts = self.frames if self.ts is None else self.ts
-        return self.contained == ts == self.frames and not self.alike
+    def all_correct(self) -> bool:
+        """Whether all frames are correct, and none is ambiguous."""
+        in_ts = self.frames if self.in_ts is None else self.in_ts
+        return self.in_file == in_ts == self.frames and not self.ambiguous
 
 
 def films(frames: int, seed: int, encode: EncodeSettings = _ENCODE) -> list[list[AccessUnit]]:
     """Encode pictures of random colors for each camera, all different."""
-    rng, made = np.random.default_rng(seed), []
+    rng, encoded = np.random.default_rng(seed), []
     for _ in range(_CAMERAS):
         encoder = Encoder(_SITE, encode)
         film = []
@@ -55,80 +55,82 @@ def films(frames: int, seed: int, encode: EncodeSettings = _ENCODE) -> list[list
             size = (_SITE.height // _BLOCK, _SITE.width // _BLOCK, 3)
             blocks = rng.integers(0, 255, size, dtype=np.uint8)
             film.append(encoder.encode(pulse, blocks.repeat(_BLOCK, axis=0).repeat(_BLOCK, axis=1)))
-        made.append(film)
-    return made
+        encoded.append(film)
+    return encoded
 
 
 def schedule(gops: int, cuts: int, seed: int) -> list[int]:
     """Choose a camera for every GOP, with exactly `cuts` cuts."""
     rng = np.random.default_rng(seed)
-    at = set(rng.choice(np.arange(1, gops), cuts, replace=False).tolist())
+    cut_gops = set(rng.choice(np.arange(1, gops), cuts, replace=False).tolist())
     chosen = [0]
     for gop in range(1, gops):
-        step = int(rng.integers(1, _CAMERAS)) if gop in at else 0
+        step = int(rng.integers(1, _CAMERAS)) if gop in cut_gops else 0
         chosen.append((chosen[-1] + step) % _CAMERAS)
     return chosen
 
 
-async def judge(
+async def check_frames(
     frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings = _ENCODE
 ) -> FrameCorrectness:
-    """Splice frames, decode a viewer's stream, and compare with each camera's own decode."""
-    made = films(frames, seed, encode)
+    """Splice frames, decode a viewer's stream, and compare with the decoded streams of the cameras."""
+    encoded = films(frames, seed, encode)
     chosen = schedule(frames // encode.gop, cuts, seed)
-    pieces, cut = await _watch(made, chosen, encode)
-    own = [_own(film, encode.codec) for film in made]
-    head = cut.stream_format.init_segment(_SITE.size, _SITE.fps)
+    chunks, fixture = await _watch(encoded, chosen, encode)
+    digests = [_digests(film, encode.codec) for film in encoded]
+    head = fixture.stream_format.init_segment(_SITE.size, _SITE.fps)
     assert head is not None  # noqa: S101 — keyframes have been spliced
-    contained = head + b"".join(piece.data for piece in pieces)
-    has_ts = cut.stream_format.container == "mp4"
-    ts = b"".join(piece.mpegts for piece in pieces if isinstance(piece, MediaChunk)) if has_ts else b""
+    file = head + b"".join(chunk.data for chunk in chunks)
+    has_ts = fixture.stream_format.container == "mp4"
+    ts = b"".join(chunk.mpegts for chunk in chunks if isinstance(chunk, MediaChunk)) if has_ts else b""
     expected = [
-        own[camera][gop * encode.gop + n] for gop, camera in enumerate(chosen) for n in range(encode.gop)
+        digests[camera][gop * encode.gop + offset]
+        for gop, camera in enumerate(chosen)
+        for offset in range(encode.gop)
     ]
     return FrameCorrectness(
         frames=len(expected),
         cuts=sum(a != b for a, b in pairwise(chosen)),
-        contained=_equal(contained, "mp4" if has_ts else "matroska", expected),
-        ts=_equal(ts, "mpegts", expected) if has_ts else None,
-        alike=sum(len(set(pulse)) < _CAMERAS for pulse in zip(*own, strict=True)),
+        in_file=_count_equal(file, "mp4" if has_ts else "matroska", expected),
+        in_ts=_count_equal(ts, "mpegts", expected) if has_ts else None,
+        ambiguous=sum(len(set(pulse)) < _CAMERAS for pulse in zip(*digests, strict=True)),
     )
 
 
 async def _watch(
-    made: Sequence[Sequence[AccessUnit]], chosen: Sequence[int], encode: EncodeSettings
+    encoded: Sequence[Sequence[AccessUnit]], chosen: Sequence[int], encode: EncodeSettings
 ) -> tuple[list[Chunk], SplicerFixture]:
     """Return the stream of one viewer of one object, from the first GOP to the last."""
     names = [f"c{number}" for number in range(_CAMERAS)]
     cameras = [CameraSettings(id=name, source="rtsp://nowhere/") for name in names]
-    cut = SplicerFixture(made, Config(site=_SITE, encode=encode, cameras=cameras))
-    pieces: list[Chunk] = []
+    fixture = SplicerFixture(encoded, Config(site=_SITE, encode=encode, cameras=cameras))
+    chunks: list[Chunk] = []
     viewer = None
     for gop, camera in enumerate(chosen):
-        cut.shelve(gop)
-        cut.splicer.publish_decision(cut.decide(gop, [camera]))
+        fixture.buffer_gop(gop)
+        fixture.splicer.publish_decision(fixture.decide(gop, [camera]))
         if viewer is None:
-            viewer = cut.splicer.persons[1].subscribe().chunks()
-        pieces.append(await anext(viewer))
-    return pieces, cut
+            viewer = fixture.splicer.persons[1].subscribe().chunks()
+        chunks.append(await anext(viewer))
+    return chunks, fixture
 
 
-def _own(film: Sequence[AccessUnit], codec: str) -> list[bytes]:
-    """Decode a camera's own stream; return a digest of each frame's pixels."""
+def _digests(film: Sequence[AccessUnit], codec: str) -> list[bytes]:
+    """Decode a camera's stream; return a digest of each frame's pixels."""
     decoder = av.CodecContext.create(codec, "r")
-    assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — tells mypy what it is
+    assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — narrows the type for mypy
     packets = [*(av.Packet(unit.data) for unit in film), None]
     return [_digest(frame) for packet in packets for frame in decoder.decode(packet)]
 
 
-def _equal(data: bytes, form: str, expected: Sequence[bytes]) -> int:
+def _count_equal(data: bytes, container_format: str, expected: Sequence[bytes]) -> int:
     """Count the frames of a stream that equal the expected ones of their pulses."""
-    right = 0
-    with av.open(io.BytesIO(data), "r", format=form) as container:
+    correct = 0
+    with av.open(io.BytesIO(data), "r", format=container_format) as container:
         for frame in container.decode(video=0):
             pulse = round(float(frame.time or 0.0) * _SITE.fps)
-            right += pulse < len(expected) and _digest(frame) == expected[pulse]
-    return right
+            correct += pulse < len(expected) and _digest(frame) == expected[pulse]
+    return correct
 
 
 def _digest(frame: av.VideoFrame) -> bytes:

@@ -3,7 +3,7 @@
     python -m benchmarks.streaming.simulated_cameras SITE.yaml PICTURES PER_CAMERA
 
 publishes the messages of all cameras of a site on each pulse, through the real bus. The pictures are encoded
-once, by the site's encoder, and sent in a loop: the best-view service never decodes them.
+once by the site's encoder and sent in a loop, since the best-view service never decodes them.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from synthetic import Scene
 
 CAMERAS = 4
 SITE = SiteSettings(name="stream", width=352, height=288, fps=25)
-"""CIF."""
+"""CIF resolution."""
 ENCODE = EncodeSettings()
 _START = 200
 """The scene's first frame: people are in sight."""
@@ -40,7 +40,7 @@ def draw_room(frames: int) -> list[list[AccessUnit]]:
     films = []
     for camera in range(CAMERAS):
         encoder = Encoder(SITE, ENCODE)
-        films.append([encoder.encode(place, scene.image(camera, _START + place)) for place in range(frames)])
+        films.append([encoder.encode(frame, scene.image(camera, _START + frame)) for frame in range(frames)])
     return films
 
 
@@ -59,9 +59,9 @@ async def serve(config: Config, films: list[list[AccessUnit]], hall: SimulatedHa
     boot = time.time_ns() // 1_000_000
     trackers = [SimulatedTracker(hall, camera, boot) for camera in range(hall.cameras)]
     keys, bus = ZenohKeys(config.site.name), Bus.client(config.zenoh)
-    there = asyncio.Event()
-    bus.watch_alive(keys.bestview("alive"), lambda _, alive: there.set() if alive else None)
-    await there.wait()
+    service_alive = asyncio.Event()
+    bus.watch_alive(keys.bestview("alive"), lambda _, alive: service_alive.set() if alive else None)
+    await service_alive.wait()
     for name in hall.ids:
         bus.declare_alive(keys.camera(name, "alive"))
     client = PulseClient(config.sync.host, config.sync.port, hall.ids[0], fps_hint=config.site.fps)

@@ -29,30 +29,31 @@ _US = 1e6
 
 
 class SplicerFixture:
-    """A splicer with frame buffers that are filled from films, and made-up decisions."""
+    """A splicer with frame buffers filled from films, and given decisions."""
 
     def __init__(self, films: Sequence[Sequence[AccessUnit]], config: Config) -> None:
         self._films, self.gop = films, config.encode.gop
         self.stream_format = stream_format = stream_format_for(
             config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
         )
-        self._shelves = {
+        self._buffers = {
             name: FrameBuffer(config.site.fps, 4 * self.gop, stream_format) for name in config.camera_ids
         }
-        self.splicer = Splicer(self._shelves, stream_format, config)
+        self.splicer = Splicer(self._buffers, stream_format, config)
 
-    def shelve(self, gop: int) -> None:
+    def buffer_gop(self, gop: int) -> None:
         """Put a GOP of every camera into the frame buffers; films are looped."""
-        for frame_buffer, film in zip(self._shelves.values(), self._films, strict=True):
+        for frame_buffer, film in zip(self._buffers.values(), self._films, strict=True):
             for pulse in range(gop * self.gop, (gop + 1) * self.gop):
                 unit = film[pulse % len(film)]
                 frame_buffer.put(pulse, 1, unit.data, key=unit.key)
 
     def decide(self, gop: int, cameras: Sequence[int]) -> GopDecision:
         """Return a decision with a camera for each object."""
-        names = list(self._shelves)
+        names = list(self._buffers)
         choices = tuple(
-            ObjectChoice(n, names[camera], None, away=False) for n, camera in enumerate(cameras, start=1)
+            ObjectChoice(number, names[camera], None, away=False)
+            for number, camera in enumerate(cameras, start=1)
         )
         return GopDecision(gop * self.gop, self.gop, choices, {}, {}, (), _NO_REASON)
 
@@ -68,39 +69,39 @@ class SpliceCost:
     """Cost of splicing, processor microseconds; medians over GOPs."""
 
     objects: int
-    shelved: float
-    """To buffer a frame of a camera, once for all viewers."""
+    buffered: float
+    """Buffering a frame of a camera, once for all viewers."""
     spliced: float
-    """To splice a frame of an object."""
+    """Splicing a frame of an object."""
 
     @property
-    def shelved_share(self) -> float:
-        """The share of buffering all cameras in an object's frame."""
-        return CAMERAS * self.shelved / self.objects
+    def buffered_share(self) -> float:
+        """Buffering of all cameras, as a share for a frame of an object."""
+        return CAMERAS * self.buffered / self.objects
 
 
 async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int) -> SpliceCost:
     """Measure splicing with one viewer for every object."""
-    cut, rng = SplicerFixture(films, cif_config()), np.random.default_rng(0)
-    shelved, decided = [], []
+    fixture, rng = SplicerFixture(films, cif_config()), np.random.default_rng(0)
+    buffered, spliced = [], []
     viewers: list[AsyncIterator[Chunk]] = []
     for gop in range(gops + 1):
-        decision = cut.decide(gop, rng.integers(0, CAMERAS, objects).tolist())
+        decision = fixture.decide(gop, rng.integers(0, CAMERAS, objects).tolist())
         began = time.process_time()
-        cut.shelve(gop)
+        fixture.buffer_gop(gop)
         between = time.process_time()
-        cut.splicer.publish_decision(decision)
+        fixture.splicer.publish_decision(decision)
         sizes = [len((await anext(viewer)).data) for viewer in viewers]
         end = time.process_time()
-        if gop:  # the first GOP creates the streams
+        if gop:  # the first GOP only creates the streams
             assert len(sizes) == objects  # noqa: S101 — every viewer received a chunk
-            shelved.append(_US * (between - began) / (CAMERAS * cut.gop))
-            decided.append(_US * (end - between) / (objects * cut.gop))
+            buffered.append(_US * (between - began) / (CAMERAS * fixture.gop))
+            spliced.append(_US * (end - between) / (objects * fixture.gop))
         else:
-            viewers = [person.subscribe().chunks() for person in cut.splicer.persons.values()]
+            viewers = [person.subscribe().chunks() for person in fixture.splicer.persons.values()]
             for viewer in viewers:
                 await anext(viewer)
-    return SpliceCost(objects, statistics.median(shelved), statistics.median(decided))
+    return SpliceCost(objects, statistics.median(buffered), statistics.median(spliced))
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,18 +110,18 @@ class TranscodeCost:
 
     decoded: float
     encoded: float
-    """With the conversion to the encoder's color space and back, as where boxes are burnt in."""
+    """Includes color conversion to BGR and back, which burning in boxes needs."""
 
     @property
-    def whole(self) -> float:
-        """The total of a frame."""
+    def total(self) -> float:
+        """Decoding and encoding a frame."""
         return self.decoded + self.encoded
 
 
-def encode_again(film: Sequence[AccessUnit], gops: int) -> TranscodeCost:
+def transcode(film: Sequence[AccessUnit], gops: int) -> TranscodeCost:
     """Decode a film and encode it with the site's encoder."""
     decoder, encoder = av.CodecContext.create("h264", "r"), Encoder(SITE, ENCODE)
-    assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — tells mypy what h264 is
+    assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — narrows the type for mypy
     decoder.thread_count = 1
     decoder.flags |= Flags.low_delay
     decoded, encoded = [], []
@@ -130,8 +131,8 @@ def encode_again(film: Sequence[AccessUnit], gops: int) -> TranscodeCost:
         units = [film[pulse % len(film)] for pulse in range(first, first + ENCODE.gop)]
         frames = [frame for unit in units for frame in decoder.decode(av.Packet(unit.data))]
         between = time.process_time()
-        for place, frame in enumerate(frames):
-            encoder.encode(first + place, frame.to_ndarray(format="bgr24").astype(np.uint8, copy=False))
+        for pulse, frame in enumerate(frames, start=first):
+            encoder.encode(pulse, frame.to_ndarray(format="bgr24").astype(np.uint8, copy=False))
         end = time.process_time()
         if gop:
             decoded.append(_US * (between - began) / ENCODE.gop)

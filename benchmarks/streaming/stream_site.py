@@ -19,7 +19,7 @@ import yaml
 
 from benchmarks.common.environment import ROOT, one_thread_environment
 from benchmarks.scaling.simulated_hall import SimulatedHall
-from benchmarks.streaming import timed_service as stream_service
+from benchmarks.streaming import timed_service
 from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE, save
 from benchmarks.streaming.viewer_crowd import CrowdReading
 from server.camera.encoding.encoder import AccessUnit
@@ -27,10 +27,10 @@ from server.cli.generated_config import free_port
 
 PER_CAMERA = 20
 """People per camera on average: some sixty in the hall."""
-_PATIENCE_S = 90.0
+_TIMEOUT_S = 90.0
 _POLL_S = 0.2
 _LOG = "site.log"
-_MANY = 100_000
+_NO_LIMIT = 100_000
 _TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 
 
@@ -41,16 +41,16 @@ class ViewerProcess:
         self.process = process
 
     def watch(self, paths: Sequence[str], seconds: float = 0.0) -> CrowdReading:
-        """Watch these paths instead, and read for a while."""
-        return self._ask({"watch": list(paths), "for": seconds})
+        """Replace the viewers by one for each path, and read for some seconds."""
+        return self._run({"watch": list(paths), "for": seconds})
 
     def read(self, seconds: float) -> CrowdReading:
-        """Read for a while."""
-        return self._ask({"for": seconds})
+        """Read for some seconds."""
+        return self._run({"for": seconds})
 
-    def _ask(self, command: object) -> CrowdReading:
+    def _run(self, command: object) -> CrowdReading:
         assert self.process.stdin is not None  # noqa: S101 — it was started with pipes
-        assert self.process.stdout is not None  # noqa: S101 — likewise
+        assert self.process.stdout is not None  # noqa: S101 — it was started with pipes
         self.process.stdin.write(msgspec.json.encode(command) + b"\n")
         self.process.stdin.flush()
         return msgspec.json.decode(self.process.stdout.readline(), type=CrowdReading)
@@ -64,38 +64,38 @@ class StreamSite:
         self.pid = service.pid
 
     @property
-    def used(self) -> float:
-        """Processor seconds of the best-view process so far."""
+    def processor_seconds(self) -> float:
+        """Processor seconds of the best-view process since its start."""
         words = Path(f"/proc/{self.pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
         return (int(words[11]) + int(words[12])) * _TICK_S
 
     @property
-    def sent(self) -> dict[int, stream_service.SendTimes]:
-        """When each GOP was sent to the viewers."""
-        return stream_service.read(self.folder / "sent")
+    def sent(self) -> dict[int, timed_service.SendTimes]:
+        """When each GOP was sent to the viewers, by its first pulse."""
+        return timed_service.read(self.folder / "sent")
 
-    def objects(self, at_least: int) -> list[int]:
-        """Wait until there are so many objects, and return their numbers.
+    def objects(self, count: int) -> list[int]:
+        """Wait until there are `count` objects, and return all objects' numbers.
 
         Raises:
             RuntimeError: they do not appear in time; the text has the logs.
         """
-        give_up = time.monotonic() + _PATIENCE_S
-        while time.monotonic() < give_up:
+        deadline = time.monotonic() + _TIMEOUT_S
+        while time.monotonic() < deadline:
             with contextlib.suppress(urllib.error.URLError, ConnectionError):
                 address = f"http://127.0.0.1:{self.http}/api/objects"
-                with urllib.request.urlopen(address, timeout=_PATIENCE_S) as answer:
+                with urllib.request.urlopen(address, timeout=_TIMEOUT_S) as answer:
                     numbers = [entry["object"] for entry in json.load(answer)["objects"]]
-                if len(numbers) >= at_least:
+                if len(numbers) >= count:
                     return numbers
             time.sleep(_POLL_S)
-        said = (self.folder / _LOG).read_text(encoding="utf-8", errors="replace")
-        raise RuntimeError(f"{at_least} people did not appear; the site's log:\n{said[-2000:]}")
+        log = (self.folder / _LOG).read_text(encoding="utf-8", errors="replace")
+        raise RuntimeError(f"{count} people did not appear; the site's log:\n{log[-2000:]}")
 
 
 @contextlib.contextmanager
 def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[StreamSite]:
-    """Run a site on these films."""
+    """Run a site whose cameras send these films."""
     folder.mkdir(parents=True)
     save([list(film) for film in films], folder / "films")
     sync, bus, http = (free_port() for _ in range(3))
@@ -106,7 +106,7 @@ def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[Str
         "encode": {"gop": ENCODE.gop},
         "sync": {"port": sync, "start_timeout_s": 3.0},
         "zenoh": {"connect": address, "listen": address},
-        "http": {"port": http, "viewers_max": _MANY, "viewers_per_object": _MANY},
+        "http": {"port": http, "viewers_max": _NO_LIMIT, "viewers_per_object": _NO_LIMIT},
         "cameras": [
             {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
             for name, ground in zip(hall.ids, hall.grounds, strict=True)
@@ -114,16 +114,16 @@ def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[Str
     }
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
     with (folder / _LOG).open("wb") as log:
-        started = [_start(log, "server.cli.main", "sync", str(config))]
+        processes = [_start(log, "server.cli.main", "sync", str(config))]
         service = _start(
             log, "benchmarks.streaming.timed_service", str(folder / "sent"), "bestview", str(config)
         )
         cameras = [str(config), str(folder / "films"), f"{PER_CAMERA}"]
-        started += [service, _start(log, "benchmarks.streaming.simulated_cameras", *cameras)]
+        processes += [service, _start(log, "benchmarks.streaming.simulated_cameras", *cameras)]
         try:
             yield StreamSite(http, service, folder)
         finally:
-            end(started)
+            terminate(processes)
 
 
 @contextlib.contextmanager
@@ -135,13 +135,13 @@ def viewers(port: int) -> Iterator[ViewerProcess]:
     try:
         yield ViewerProcess(process)
     finally:
-        end([process])
-        for end_of_pipe in (process.stdin, process.stdout):
-            assert end_of_pipe is not None  # noqa: S101 — it was started with pipes
-            end_of_pipe.close()
+        terminate([process])
+        for stream in (process.stdin, process.stdout):
+            assert stream is not None  # noqa: S101 — it was started with pipes
+            stream.close()
 
 
-def end(processes: Sequence[subprocess.Popen[bytes]]) -> None:
+def terminate(processes: Sequence[subprocess.Popen[bytes]]) -> None:
     """Terminate processes; kill those that do not exit."""
     for process in processes:
         process.terminate()
@@ -153,6 +153,8 @@ def end(processes: Sequence[subprocess.Popen[bytes]]) -> None:
             process.wait()
 
 
-def _start(log: IO[bytes], *words: str) -> subprocess.Popen[bytes]:
+def _start(log: IO[bytes], *arguments: str) -> subprocess.Popen[bytes]:
     environment = {**one_thread_environment(), "MYVIEW_SUPERVISED": "1"}
-    return subprocess.Popen([sys.executable, "-m", *words], cwd=ROOT, env=environment, stdout=log, stderr=log)
+    return subprocess.Popen(
+        [sys.executable, "-m", *arguments], cwd=ROOT, env=environment, stdout=log, stderr=log
+    )

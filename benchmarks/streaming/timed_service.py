@@ -1,6 +1,6 @@
-"""The real best-view process, wrapped so that it records when each GOP was sent, and how long that took.
+"""The real best-view process, which records when each GOP was sent, and how long that took.
 
-    python -m benchmarks.streaming.timed_service NOTES bestview SITE.yaml
+    python -m benchmarks.streaming.timed_service TIMES bestview SITE.yaml
 
 is `myview bestview SITE.yaml` with one method wrapped; nothing else is changed.
 """
@@ -18,16 +18,16 @@ from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import GopDecision
 
 
-def note(path: Path) -> None:
+def record_send_times(path: Path) -> None:
     """Write a line for each GOP: its first pulse, and when sending it began and ended."""
     original = Splicer.publish_decision
-    notes = path.open("a", encoding="ascii", buffering=1)
+    times = path.open("a", encoding="ascii", buffering=1)
 
     @functools.wraps(original)
     def run(self: Splicer, decision: GopDecision) -> None:
         began = time.monotonic()
         original(self, decision)
-        notes.write(f"{decision.first} {began} {time.monotonic()}\n")
+        times.write(f"{decision.first} {began} {time.monotonic()}\n")
 
     Splicer.publish_decision = run  # type: ignore[method-assign]
 
@@ -47,5 +47,5 @@ def read(path: Path) -> dict[int, SendTimes]:
 
 
 if __name__ == "__main__":
-    note(Path(sys.argv.pop(1)))
+    record_send_times(Path(sys.argv.pop(1)))
     command_line()

@@ -3,7 +3,7 @@
     python -m benchmarks.streaming.viewer_crowd PORT
 
 Commands are lines of JSON on standard input, each answered by a line. `{"watch": ["/objects/1/best.mp4", …]}`
-lets a viewer watch each, instead of those before; `{"for": 5.0}` reads for so long and returns what arrived.
+replaces the viewers by one for each path; `{"for": 5.0}` reads for that time and returns what arrived.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-_RECEIVED = 262_144
-_TOGETHER = 100
-"""Connections that are opened between two reads: not more than a server's backlog."""
+_BUFFER = 262_144
+_BATCH = 100
+"""Connections opened between two reads: fewer than a server's backlog."""
 _TFDT = b"tfdt"
 _TIME_AT = 8
 """Offset of the time from the box type: version and flags are between."""
@@ -29,18 +29,18 @@ _TIME_AT = 8
 
 @dataclass(frozen=True, slots=True)
 class CrowdReading:
-    """What all viewers received in a while."""
+    """What all viewers received during a read."""
 
     megabytes: float
     seconds: float
-    busy: float
+    processor_s: float
     """Processor seconds of this process."""
-    gone: int
+    disconnected: int
     """Viewers whose connection was closed."""
     ticks: list[int] = field(default_factory=list)
     """Media time of the last fragment in each received chunk."""
-    at: list[float] = field(default_factory=list)
-    """Time of arrival of each chunk, seconds of the monotonic clock, which all processes share."""
+    arrivals: list[float] = field(default_factory=list)
+    """Time of arrival of each chunk, seconds of the monotonic clock, which is common to all processes."""
 
 
 class ViewerCrowd:
@@ -50,19 +50,19 @@ class ViewerCrowd:
         self._port = port
         self._selector = selectors.DefaultSelector()
         self._viewers: list[socket.socket] = []
-        self._buffer = bytearray(_RECEIVED)
-        self._gone = 0
+        self._buffer = bytearray(_BUFFER)
+        self._disconnected = 0
 
     def watch(self, paths: Sequence[str]) -> None:
-        """Let one viewer watch each path, instead of those who watched before."""
+        """Replace the viewers by one for each path."""
         self.leave()
-        for place, path in enumerate(paths):
+        for index, path in enumerate(paths):
             viewer = socket.create_connection(("127.0.0.1", self._port))
             viewer.sendall(f"GET {path} HTTP/1.1\r\nHost: here\r\n\r\n".encode())
             viewer.settimeout(0.0)
             self._selector.register(viewer, selectors.EVENT_READ)
             self._viewers.append(viewer)
-            if place % _TOGETHER == _TOGETHER - 1:
+            if index % _BATCH == _BATCH - 1:
                 self.read(0.02)
 
     def leave(self) -> None:
@@ -71,13 +71,13 @@ class ViewerCrowd:
             with contextlib.suppress(KeyError):
                 self._selector.unregister(viewer)
             viewer.close()
-        self._viewers, self._gone = [], 0
+        self._viewers, self._disconnected = [], 0
 
     def read(self, seconds: float) -> CrowdReading:
-        """Read all streams for a while."""
-        ticks, at = array.array("q"), array.array("d")
+        """Read all streams for some seconds."""
+        ticks, arrivals = array.array("q"), array.array("d")
         buffer, total = self._buffer, 0
-        began, busy = time.monotonic(), time.process_time()
+        began, processor_s = time.monotonic(), time.process_time()
         while (left := began + seconds - time.monotonic()) > 0:
             for key, _ in self._selector.select(left):
                 viewer = key.fileobj
@@ -87,14 +87,14 @@ class ViewerCrowd:
                 found = buffer.rfind(_TFDT, 0, size)
                 if 0 <= found < size - 16:
                     ticks.append(int.from_bytes(buffer[found + _TIME_AT : found + _TIME_AT + 8], "big"))
-                    at.append(time.monotonic())
+                    arrivals.append(time.monotonic())
         return CrowdReading(
             total / 1e6,
             time.monotonic() - began,
-            time.process_time() - busy,
-            self._gone,
+            time.process_time() - processor_s,
+            self._disconnected,
             ticks.tolist(),
-            at.tolist(),
+            arrivals.tolist(),
         )
 
     def _receive(self, viewer: socket.socket) -> int:
@@ -106,7 +106,7 @@ class ViewerCrowd:
             size = 0
         if not size:
             self._selector.unregister(viewer)
-            self._gone += 1
+            self._disconnected += 1
         return size
 
 

@@ -1,4 +1,4 @@
-"""Cost of watching for the real best-view process: many objects, many viewers, and the first picture."""
+"""Cost of viewers for the real best-view process: many objects, many viewers, time to the first picture."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.streaming.simulated_cameras import ENCODE, SITE
-from benchmarks.streaming.splice_cost import encode_again
+from benchmarks.streaming.splice_cost import transcode
 from benchmarks.streaming.stream_site import StreamSite, ViewerProcess
 from benchmarks.streaming.timed_service import SendTimes
 from benchmarks.streaming.viewer_crowd import CrowdReading
@@ -24,7 +24,7 @@ from server.media.rendering_messages import TIMESCALE
 
 _SETTLE_S = 2.0
 _PAUSE_S = 0.037
-"""Seconds between requests, so that they fall on all phases of a GOP."""
+"""Seconds between requests, chosen so that they fall on all phases of a GOP."""
 _ENCODED_GOPS = 20
 _RECEIVED = 65_536
 
@@ -38,7 +38,7 @@ class WatchingCost:
     one: float
     all: float
     encoded: float
-    """Computed cores of one encoder for each object instead."""
+    """Computed cores of one encoder per object."""
     rounds: int
 
     @property
@@ -47,8 +47,8 @@ class WatchingCost:
         return self.all / self.one
 
     @property
-    def against_encoding(self) -> float:
-        """Computed cores with an encoder for each object divided by the measured ones."""
+    def encoding_ratio(self) -> float:
+        """Computed cores with an encoder per object, divided by the measured cores."""
         return (self.unwatched + self.encoded) / self.all
 
 
@@ -60,19 +60,19 @@ def watch_objects(
     seconds: float,
     rounds: int,
 ) -> WatchingCost:
-    """Measure with no, one and all objects watched, one viewer each, and re-encoding, in turn.
+    """Measure with no, one and all objects watched, one viewer each, and re-encoding.
 
-    Other load on the machine affects all of them alike, hence in turn.
+    The measurements alternate, so that other load on the machine affects all of them equally.
     """
     cores: dict[int, list[float]] = {0: [], 1: [], len(numbers): []}
-    again = []
+    encoder_cores = []
     for _ in range(rounds):
-        again.append(SITE.fps * encode_again(film, _ENCODED_GOPS).whole / 1e6)
+        encoder_cores.append(SITE.fps * transcode(film, _ENCODED_GOPS).total / 1e6)
         for count, found in cores.items():
             viewers.watch([_path(number) for number in numbers[:count]], _SETTLE_S)
-            found.append(_used(site, viewers, seconds)[0])
+            found.append(_measure_cores(site, viewers, seconds)[0])
     unwatched, one, all_watched = (statistics.median(found) for found in cores.values())
-    encoded = len(numbers) * statistics.median(again)
+    encoded = len(numbers) * statistics.median(encoder_cores)
     return WatchingCost(len(numbers), unwatched, one, all_watched, encoded, rounds)
 
 
@@ -83,7 +83,7 @@ class ViewerStep:
     viewers: int
     cores: float
     """Cores of the best-view process, including its other work."""
-    crowd: float
+    reader_cores: float
     """Cores of the reading process."""
     kbits: float
     """Bit rate of a viewer's stream, kbit/s."""
@@ -91,7 +91,7 @@ class ViewerStep:
     """Share of the sent GOPs that arrived."""
     delays: tuple[float, float, float]
     """Milliseconds from when a GOP was sent to when its end was read: p50, p95, p99."""
-    given: float
+    sent_ms: float
     """Median milliseconds until the last viewer's socket has accepted a GOP."""
     load: float
     """Load average of the machine."""
@@ -104,39 +104,39 @@ def step_up(
     steps = []
     for count in counts:
         viewers.watch([_path(numbers[place % len(numbers)]) for place in range(count)], _SETTLE_S)
-        cores, heard = _used(site, viewers, seconds)
+        cores, reading = _measure_cores(site, viewers, seconds)
         sent = site.sent
-        delays = send_delays(heard, {first: sent_gop.began for first, sent_gop in sent.items()})
-        low, middle, high = np.percentile(delays, [50, 95, 99]).tolist()
+        delays = send_delays(reading, {first: sent_gop.began for first, sent_gop in sent.items()})
+        p50, p95, p99 = np.percentile(delays, [50, 95, 99]).tolist()
         steps.append(
             ViewerStep(
                 viewers=count,
                 cores=cores,
-                crowd=heard.busy / heard.seconds,
-                kbits=8e3 * heard.megabytes / heard.seconds / count,
-                arrived=len(delays) / (count * heard.seconds * SITE.fps / ENCODE.gop),
-                delays=(low, middle, high),
-                given=statistics.median(_given(heard, sent)),
+                reader_cores=reading.processor_s / reading.seconds,
+                kbits=8e3 * reading.megabytes / reading.seconds / count,
+                arrived=len(delays) / (count * reading.seconds * SITE.fps / ENCODE.gop),
+                delays=(p50, p95, p99),
+                sent_ms=statistics.median(_send_durations(reading, sent)),
                 load=os.getloadavg()[0],
             )
         )
     return steps
 
 
-def _given(heard: CrowdReading, sent: dict[int, SendTimes]) -> list[float]:
-    """Return the milliseconds that sending took, of the received GOPs."""
-    gops = {round(tick * SITE.fps / TIMESCALE) // ENCODE.gop * ENCODE.gop for tick in heard.ticks}
+def _send_durations(reading: CrowdReading, sent: dict[int, SendTimes]) -> list[float]:
+    """Return the milliseconds that sending each received GOP took."""
+    gops = {round(tick * SITE.fps / TIMESCALE) // ENCODE.gop * ENCODE.gop for tick in reading.ticks}
     return [1e3 * (sent_gop.ended - sent_gop.began) for first, sent_gop in sent.items() if first in gops]
 
 
-def send_delays(heard: CrowdReading, sent: dict[int, float]) -> NDArray[np.float64]:
+def send_delays(reading: CrowdReading, sent: dict[int, float]) -> NDArray[np.float64]:
     """Return the milliseconds from when each GOP was sent to when its end was read."""
     gop = ENCODE.gop
-    last = (round(tick * SITE.fps / TIMESCALE) for tick in heard.ticks)
+    last_pulses = (round(tick * SITE.fps / TIMESCALE) for tick in reading.ticks)
     return np.array(
         [
-            1e3 * (at - sent[pulse - gop + 1])
-            for pulse, at in zip(last, heard.at, strict=True)
+            1e3 * (arrival - sent[pulse - gop + 1])
+            for pulse, arrival in zip(last_pulses, reading.arrivals, strict=True)
             if pulse % gop == gop - 1 and pulse - gop + 1 in sent
         ]
     )
@@ -153,10 +153,10 @@ def _first_picture(port: int, number: int) -> float:
     with socket.create_connection(("127.0.0.1", port)) as viewer:
         viewer.sendall(f"GET {_path(number)} HTTP/1.0\r\n\r\n".encode())
         while not (end := end_of_first_fragment(data.partition(b"\r\n\r\n")[2])):
-            some = viewer.recv(_RECEIVED)
-            if not some:
+            received = viewer.recv(_RECEIVED)
+            if not received:
                 raise RuntimeError(f"the stream of object {number} ended before its first picture")
-            data += some
+            data += received
     film = data.partition(b"\r\n\r\n")[2][:end]
     with av.open(io.BytesIO(film), "r") as container:
         next(container.decode(video=0))
@@ -164,7 +164,7 @@ def _first_picture(port: int, number: int) -> float:
 
 
 def end_of_first_fragment(data: bytes) -> int:
-    """Return the end of the first `mdat` box; 0: it is incomplete."""
+    """Return the end of the first `mdat` box; 0 if it is incomplete."""
     at = 0
     while at + 8 <= len(data):
         size, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
@@ -174,10 +174,10 @@ def end_of_first_fragment(data: bytes) -> int:
     return 0
 
 
-def _used(site: StreamSite, viewers: ViewerProcess, seconds: float) -> tuple[float, CrowdReading]:
-    before = site.used
-    heard = viewers.read(seconds)
-    return (site.used - before) / heard.seconds, heard
+def _measure_cores(site: StreamSite, viewers: ViewerProcess, seconds: float) -> tuple[float, CrowdReading]:
+    before = site.processor_seconds
+    reading = viewers.read(seconds)
+    return (site.processor_seconds - before) / reading.seconds, reading
 
 
 def _path(number: int) -> str:

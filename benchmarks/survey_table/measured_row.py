@@ -1,4 +1,4 @@
-"""The measurements of a tracker for the survey's Table 1, on one view and over all views."""
+"""Measurements of a tracker for the survey's Table 1, on one view and over all views."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Merges of people in one blob, and identity errors after they part.
+"""Merges of people into one blob, and identity errors after they part.
 
 People are merged while two or more share one difference blob (Khalaf and Intille, section 4.1). A merge of n
-people is n chances of a wrong identity afterwards.
+people has n chances of a wrong id afterwards.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from itertools import groupby, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-NOBODY = -1
+NO_BLOB = -1
 """The blob number of a person without a blob."""
 
 
 @dataclass(frozen=True, slots=True)
 class PersonMerge:
-    """A person's time in a merge, between two times alone: ranges of stages."""
+    """A person's stages in a merge, and alone before and after it: half-open ranges."""
 
     person: int
     before: tuple[int, int]
@@ -30,19 +30,19 @@ class PersonMerge:
 
 def find_merges(blobs: NDArray[np.int64]) -> list[PersonMerge]:
     """Return the merges that begin and end in a recording, one for each person, by `(T, P)` blobs."""
-    return [merge for person in range(blobs.shape[1]) for merge in _of(person, _alone(blobs, person))]
+    return [merge for person in range(blobs.shape[1]) for merge in _merges_of(person, _alone(blobs, person))]
 
 
-def events(found: Sequence[PersonMerge], blobs: NDArray[np.int64]) -> int:
+def count_merges(found: Sequence[PersonMerge], blobs: NDArray[np.int64]) -> int:
     """Count the distinct merges: people in one blob at one time are in the same merge."""
-    group = list(range(len(found)))
-    at: dict[tuple[int, int], int] = {}
-    for place, merge in enumerate(found):
+    groups = list(range(len(found)))
+    first_in_blob: dict[tuple[int, int], int] = {}
+    for index, merge in enumerate(found):
         for stage in range(*merge.inside):
-            first = at.setdefault((stage, int(blobs[stage, merge.person])), place)
-            old, new = group[place], group[first]
-            group = [new if name == old else name for name in group]
-    return len(set(group))
+            first = first_in_blob.setdefault((stage, int(blobs[stage, merge.person])), index)
+            old, new = groups[index], groups[first]
+            groups = [new if group == old else group for group in groups]
+    return len(set(groups))
 
 
 def count_wrong_ids(
@@ -51,16 +51,18 @@ def count_wrong_ids(
     """Return the merges after which a person has another id; `tracked` are the blobs by id of each stage.
 
     A person's id is the most frequent one in their blob while they are alone, before and after. A person
-    without an id before cannot lose it.
+    without an id before is not counted.
     """
     wrong = []
     for merge in found:
-        before = _number(merge.person, merge.before, blobs, tracked)
-        wrong.append(before is not None and before != _number(merge.person, merge.after, blobs, tracked))
+        before = _most_frequent_id(merge.person, merge.before, blobs, tracked)
+        wrong.append(
+            before is not None and before != _most_frequent_id(merge.person, merge.after, blobs, tracked)
+        )
     return wrong
 
 
-def _number(
+def _most_frequent_id(
     person: int, stages: tuple[int, int], blobs: NDArray[np.int64], tracked: Sequence[Mapping[int, int]]
 ) -> int | None:
     counts = Counter(
@@ -71,16 +73,16 @@ def _number(
 
 
 def _alone(blobs: NDArray[np.int64], person: int) -> list[bool | None]:
-    """Return for each stage whether a person is alone in their blob; None: no blob."""
-    mine = blobs[:, person]
-    sharing = (blobs == mine[:, None]).sum(axis=1)
+    """Return for each stage whether a person is alone in their blob; None if they have no blob."""
+    own_blobs = blobs[:, person]
+    people = (blobs == own_blobs[:, None]).sum(axis=1)
     return [
-        None if blob == NOBODY else bool(count == 1)
-        for blob, count in zip(mine.tolist(), sharing.tolist(), strict=True)
+        None if blob == NO_BLOB else bool(count == 1)
+        for blob, count in zip(own_blobs.tolist(), people.tolist(), strict=True)
     ]
 
 
-def _of(person: int, alone: Sequence[bool | None]) -> Iterator[PersonMerge]:
+def _merges_of(person: int, alone: Sequence[bool | None]) -> Iterator[PersonMerge]:
     """Return a person's runs of stages in merges that lie between two runs alone."""
     known = [(stage, state) for stage, state in enumerate(alone) if state is not None]
     runs = [(state, list(run)) for state, run in groupby(known, key=lambda pair: pair[1])]

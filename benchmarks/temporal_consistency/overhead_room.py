@@ -1,4 +1,4 @@
-"""The overhead room: the blobs of each half second, and the true blob of each person."""
+"""The overhead room: its blobs each half second, and the true blob of each person."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.temporal_consistency.blob_merges import NOBODY
+from benchmarks.temporal_consistency.blob_merges import NO_BLOB
 from bestview import to_ground
 from synthetic import CameraTruth, Scene
 from tracking.baselines.temporal_consistency import BlobSettings
@@ -38,10 +38,10 @@ class BlobSequence:
     """The blobs of a sequence.
 
     Attributes:
-        stages: from the first in which all people are alone.
+        stages: from the first stage in which all people are alone.
         blobs: `(T, P)`, the true blob of each person in each stage.
         pixels_per_meter: pixels per meter.
-        seconds: to detect the blobs of all stages.
+        seconds: processing time of detection, all stages.
     """
 
     clip: OverheadClip
@@ -54,23 +54,26 @@ class BlobSequence:
 def render_sequence(
     clip: OverheadClip, stage_s: float, saturations: Sequence[float] = (1.0,)
 ) -> list[BlobSequence]:
-    """Render a sequence, one picture per stage, and detect its blobs.
-
-    Once for each color saturation in `saturations`.
-    """
+    """Render a sequence, one picture per stage, and detect its blobs at each color saturation."""
     scene = _scene(clip, clip.people, stage_s)
     empty = _scene(clip, 0, stage_s)
-    eyes = [
+    readers = [
         _BlobReader(scene.homography(0), [empty.image(0, frame) for frame in range(_EMPTY)], saturation)
         for saturation in saturations
     ]
     for frame in range(round(clip.minutes * 60.0 / stage_s)):
         image, truth = scene.image(0, frame), scene.truth(frame)[0]
-        for eye in eyes:
-            eye.look(frame, image, truth, clip.people)
+        for reader in readers:
+            reader.add(frame, image, truth, clip.people)
     return [
-        BlobSequence(clip, tuple(eye.stages), np.stack(eye.rows), eye.finder.pixels_per_meter, eye.seconds)
-        for eye in eyes
+        BlobSequence(
+            clip,
+            tuple(reader.stages),
+            np.stack(reader.rows),
+            reader.detector.pixels_per_meter,
+            reader.seconds,
+        )
+        for reader in readers
     ]
 
 
@@ -79,26 +82,26 @@ class _BlobReader:
 
     def __init__(self, homography: Floats | None, empty: Sequence[Image], saturation: float) -> None:
         if homography is None:
-            raise ValueError("people from above need a floor")
-        across = np.array([[0.0, SIZE[1] / 2.0], [SIZE[0], SIZE[1] / 2.0]])
-        left, right = to_ground(homography, across)
-        self.finder = BlobDetector(SIZE, float(np.hypot(*(right - left))), BlobSettings())
-        self._color = saturation
-        self.finder.prepare([desaturated(image, saturation) for image in empty])
+            raise ValueError("the overhead scene needs a homography")
+        middle_line = np.array([[0.0, SIZE[1] / 2.0], [SIZE[0], SIZE[1] / 2.0]])
+        left, right = to_ground(homography, middle_line)
+        self.detector = BlobDetector(SIZE, float(np.hypot(*(right - left))), BlobSettings())
+        self._saturation = saturation
+        self.detector.prepare([desaturated(image, saturation) for image in empty])
         self.stages: list[Stage] = []
         self.rows: list[NDArray[np.int64]] = []
         self.seconds = 0.0
 
-    def look(self, frame: int, image: Image, truth: CameraTruth, people: int) -> None:
-        """Add a picture; stages before all people were alone once are dropped."""
+    def add(self, frame: int, image: Image, truth: CameraTruth, people: int) -> None:
+        """Add a picture; stages before all people are alone for the first time are dropped."""
         began = time.perf_counter()
-        found = self.finder.detect(desaturated(image, self._color), learn=True)
+        found = self.detector.detect(desaturated(image, self._saturation), learn=True)
         self.seconds += time.perf_counter() - began
-        row = np.full(people, NOBODY, dtype=np.int64)
+        row = np.full(people, NO_BLOB, dtype=np.int64)
         for number, box in zip(truth.ids.tolist(), truth.boxes, strict=True):
-            row[number - 1] = _blob_of(box, found)
-        apart = len(set(row.tolist()) - {NOBODY}) == people
-        if found and (self.rows or apart):
+            row[number - 1] = _blob_index(box, found)
+        all_alone = len(set(row.tolist()) - {NO_BLOB}) == people
+        if found and (self.rows or all_alone):
             self.stages.append(Stage(frame, found))
             self.rows.append(row)
 
@@ -116,12 +119,12 @@ def _scene(clip: OverheadClip, people: int, stage_s: float) -> Scene:
     return Scene("overhead", 1, people, clip.seed, width, height, 1.0 / stage_s)
 
 
-def _blob_of(box: Floats, found: tuple[Blob, ...]) -> int:
+def _blob_index(box: Floats, found: tuple[Blob, ...]) -> int:
     """Return the blob that fills most of the center of a person's box."""
     middle, half = (box[:2] + box[2:]) / 2.0, (box[2:] - box[:2]) / 4.0
     core = np.rint(np.concatenate([middle - half, middle + half])).astype(int)
     filled = [_filled(blob, core) for blob in found]
-    return int(np.argmax(filled)) if filled and max(filled) > 0 else NOBODY
+    return int(np.argmax(filled)) if filled and max(filled) > 0 else NO_BLOB
 
 
 def _filled(blob: Blob, core: NDArray[np.int64]) -> int:

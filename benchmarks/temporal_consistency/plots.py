@@ -10,9 +10,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 PUBLISHED = {2: (4, 3, 0, 0, 0), 3: (54, 22, 3, 0, 0), 4: (48, 19, 17, 14, 12)}
-"""Merges, and errors by window, of their Fig. 5."""
+"""Merges, and errors by window (Khalaf and Intille, Fig. 5)."""
 PUBLISHED_EDGES = {2: (1, 36, 7), 3: (1, 5398, 780), 4: (1, 50047, 4290)}
-"""Least, most and mean number of edges a stage, of their Fig. 6."""
+"""Minimum, maximum and mean number of edges per stage (Fig. 6)."""
 _COLORS = {2: "#4c72b0", 3: "#dd8452", 4: "#55a868"}
 
 
@@ -38,16 +38,16 @@ def plot(tallies: Mapping[int, PlottedCounts], low_color: Mapping[int, PlottedCo
 
 def _errors(axes: Any, tallies: Mapping[int, PlottedCounts], low_color: Mapping[int, PlottedCounts]) -> None:
     """Draw the share of wrong identities after a merge over the stages of the window."""
-    for people, tally in tallies.items():
-        shares = [100 * errors / max(tally.chances, 1) for errors in tally.errors.values()]
-        axes.plot(list(tally.errors), shares, "-", color=_COLORS[people], label=f"{people} people")
+    for people, counts in tallies.items():
+        shares = [100 * errors / max(counts.chances, 1) for errors in counts.errors.values()]
+        axes.plot(list(counts.errors), shares, "-", color=_COLORS[people], label=f"{people} people")
         shares = [
             100 * errors / max(low_color[people].chances, 1) for errors in low_color[people].errors.values()
         ]
-        axes.plot(list(tally.errors), shares, "--", color=_COLORS[people])
+        axes.plot(list(counts.errors), shares, "--", color=_COLORS[people])
         merges, *published = PUBLISHED[people]
         points = [100 * errors / merges for errors in published]
-        axes.plot(list(tally.errors), points, "o", color=_COLORS[people], alpha=0.6)
+        axes.plot(list(counts.errors), points, "o", color=_COLORS[people], alpha=0.6)
     axes.set_xlabel("stages of the window, half a second each")
     axes.set_ylabel("wrong identities after a merge, % of people")
     axes.set_title("Fig. 5 (dashed: little color; dots: published, % of merges)", fontsize=10)
@@ -57,12 +57,12 @@ def _errors(axes: Any, tallies: Mapping[int, PlottedCounts], low_color: Mapping[
 
 def _edges(axes: Any, tallies: Mapping[int, PlottedCounts]) -> None:
     """Draw the edges per stage, pruned and not, as cumulative shares."""
-    for people, tally in tallies.items():
-        saturation = _COLORS[people]
-        axes.plot(*_cumulative(tally.edges), "-", color=saturation, label=f"{people} people")
-        axes.plot(*_cumulative(tally.unpruned), "--", color=saturation)
+    for people, counts in tallies.items():
+        color = _COLORS[people]
+        axes.plot(*_cumulative(counts.edges), "-", color=color, label=f"{people} people")
+        axes.plot(*_cumulative(counts.unpruned), "--", color=color)
         _, most, mean = PUBLISHED_EDGES[people]
-        axes.plot([mean, most], [0.02, 1.0], "o", color=saturation, alpha=0.6)
+        axes.plot([mean, most], [0.02, 1.0], "o", color=color, alpha=0.6)
     axes.set_xscale("log")
     axes.set_xlabel("edges of a stage")
     axes.set_ylabel("cumulative share of the stages")

@@ -40,14 +40,14 @@ _ALL = QualitySettings(
 
 @dataclass(frozen=True, slots=True)
 class SimulatedCrowd:
-    """Walking people, each in view of `seen_by` of the cameras."""
+    """Walking people, each visible to `seen_by` of the cameras."""
 
     people: int
     cameras: int
     seen_by: int
 
     def epochs(self, config: Config, count: int) -> Iterator[Epoch]:
-        """Yield the cameras' messages: each window anew, as the tracker sends it."""
+        """Yield the cameras' messages: a complete window per epoch, as the tracker sends it."""
         rng = np.random.default_rng(_SEED)
         window, stride = config.track.window.window, config.track.window.stride
         cameras = [rng.permutation(self.cameras)[: self.seen_by] for _ in range(self.people)]
@@ -57,7 +57,7 @@ class SimulatedCrowd:
         for number in range(count):
             last = end_of_epoch(number, stride)
             first = max(0, last - window + 1)
-            said: dict[str, list[TrackMessage]] = {camera: [] for camera in config.camera_ids}
+            tracks: dict[str, list[TrackMessage]] = {camera: [] for camera in config.camera_ids}
             for person in range(self.people):
                 feet = begin[person] + walk[person] * np.arange(first, last + 1)[:, None]
                 tall = height[person]
@@ -69,9 +69,11 @@ class SimulatedCrowd:
                     appearance=[AppearanceHistogram(first=first, last=first, histogram=[float(person + 1)])],
                 )
                 for camera in cameras[person]:
-                    said[config.camera_ids[camera]].append(track)
+                    tracks[config.camera_ids[camera]].append(track)
             yield Epoch(
-                number, last, {camera: _message(camera, number, first, last, said[camera]) for camera in said}
+                number,
+                last,
+                {camera: _message(camera, number, first, last, tracks[camera]) for camera in tracks},
             )
 
 
@@ -80,24 +82,24 @@ class StageSeconds:
     """Processor time per frame by stage, seconds."""
 
     decoding: float
-    """Boxes out of messages."""
+    """Boxes from messages."""
     quality: float
-    """Of views, from boxes."""
+    """View quality from boxes."""
     costs: float
-    """Laid out by person."""
+    """Costs arranged by person."""
     selection: float
-    """The program."""
-    rest: float
-    """Whose each shot is, and what is said of it."""
+    """The selection program."""
+    bookkeeping: float
+    """Everything else of a decision."""
     people: float
-    """Identity bookkeeping, with given ids."""
+    """Identities, with given ids."""
     publishing: float
-    """Boxes and choices written down as messages."""
+    """Boxes and choices, encoded as messages."""
 
     @property
     def decision(self) -> float:
-        """From messages to the selected views."""
-        return self.decoding + self.quality + self.costs + self.selection + self.rest
+        """The time from messages to selected views."""
+        return self.decoding + self.quality + self.costs + self.selection + self.bookkeeping
 
 
 class _AppearanceRegistry:
@@ -117,8 +119,8 @@ def decision_times(crowd: SimulatedCrowd, gop: int, epochs: int, *, all_terms: b
     config = _config(crowd, gop, asdict(_ALL) if all_terms else {})
     ground = np.array([[1.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.002, 1.0]])
     decider = ViewDecider(config, dict.fromkeys(config.camera_ids, ground), lambda _camera, _pulse: True)
-    decider.people._registry = _AppearanceRegistry()  # type: ignore[assignment]  # noqa: SLF001 — joining is measured elsewhere
-    board, watch = DecisionState(25.0), Stopwatch()
+    decider.people._registry = _AppearanceRegistry()  # type: ignore[assignment]  # noqa: SLF001 — association is measured elsewhere
+    state, watch = DecisionState(25.0), Stopwatch()
     stages: tuple[Watched, ...] = (
         (WindowReader, "read", "decoding"),
         (ViewQualityBuffer, "put", "quality"),
@@ -126,7 +128,7 @@ def decision_times(crowd: SimulatedCrowd, gop: int, epochs: int, *, all_terms: b
         (LookaheadWindow, "part", "costs"),
         (LookaheadPart, "gops", "costs"),
         (decider_module, "select_views_by_gop", "selection"),
-        (ViewDecider, "step", "rest"),
+        (ViewDecider, "step", "bookkeeping"),
         (PersonTracker, "update", "people"),
         (PersonTracker, "boxes", "publishing"),
         (DecisionState, "put", "publishing"),
@@ -137,7 +139,7 @@ def decision_times(crowd: SimulatedCrowd, gop: int, epochs: int, *, all_terms: b
             continue
         with watch.watching(*stages):
             for decision in decider.step(epoch):
-                board.put(decision)
+                state.put(decision)
     frames = epochs * config.track.window.stride
     return StageSeconds(**{stage: spent / frames for stage, spent in watch.seconds.items()})
 

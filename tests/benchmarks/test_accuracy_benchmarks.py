@@ -28,7 +28,7 @@ def scores(hota: float, idf1: float, switches: int) -> Scores:
 
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
-    """Return a folder of recordings with one in it: two people walk past each other, far apart."""
+    """Return a data folder with one recording: two people pass each other at a distance."""
     people = [
         MotRow(frame, number, left, 100.0 * number, 40.0, 90.0)
         for frame in range(1, FRAMES + 1)
@@ -52,7 +52,7 @@ def recording(data: Path) -> Recording:
     return find_recordings(data)[0]
 
 
-def test_what_is_measured_is_what_the_command_writes(recording: Recording, tmp_path: Path) -> None:
+def test_measured_tracks_are_those_that_the_command_writes(recording: Recording, tmp_path: Path) -> None:
     out = tmp_path / "tracks.txt"
     track_one(None, recording.detections, out, None, None, lambda _: None)
     assert track(recording) == read_rows(out)
@@ -60,19 +60,19 @@ def test_what_is_measured_is_what_the_command_writes(recording: Recording, tmp_p
 
 
 @pytest.mark.parametrize("term", ABLATIONS, ids=lambda term: term.name)
-def test_a_term_is_switched_off_by_settings_that_there_are(term: Ablation, recording: Recording) -> None:
+def test_the_settings_of_an_ablation_exist(term: Ablation, recording: Recording) -> None:
     track(recording, term.settings)
 
 
-def test_a_setting_that_there_is_not_is_refused(recording: Recording) -> None:
+def test_an_unknown_setting_is_refused(recording: Recording) -> None:
     with pytest.raises(UserError, match="luck"):
         track(recording, {"costs": {"luck": 1.0}})
 
 
-def test_without_a_term_the_difference_is_told() -> None:
-    default, without = scores(0.5, 0.6, 7), scores(0.45, 0.62, 12)
+def test_the_cell_of_an_ablation_is_the_difference() -> None:
+    default, ablated = scores(0.5, 0.6, 7), scores(0.45, 0.62, 12)
     assert [cell(name, default, None) for name in ("hota", "idf1", "switches")] == ["50.0", "60.0", "7"]
-    assert [cell(name, without, default) for name in ("hota", "idf1", "switches")] == ["-5.0", "+2.0", "+5"]
+    assert [cell(name, ablated, default) for name in ("hota", "idf1", "switches")] == ["-5.0", "+2.0", "+5"]
 
 
 def test_the_ablation_has_a_row_for_each_term(
@@ -84,7 +84,7 @@ def test_the_ablation_has_a_row_for_each_term(
     assert printed.count(DEFAULT.name) == printed.count(ABLATIONS[0].name) == len(ablation.SCORES)
 
 
-def test_myview_is_compared_with_the_best_peer_of_each_score() -> None:
+def test_myview_is_compared_with_the_best_other_tracker_of_each_score() -> None:
     table = {
         "street": {
             "MyView": scores(0.5, 0.6, 7),
@@ -96,7 +96,7 @@ def test_myview_is_compared_with_the_best_peer_of_each_score() -> None:
     assert peers.lead(table) == [["street", "+10.0", "+10.0", "-10.0", "+1"]]
 
 
-def test_without_the_peers_myview_is_measured_all_the_same(
+def test_without_other_trackers_myview_is_still_measured(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
@@ -108,16 +108,16 @@ def test_without_the_peers_myview_is_measured_all_the_same(
     assert (tmp_path / "out" / "other_trackers.png").stat().st_size > 1000
 
 
-def test_half_an_environment_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    left_over = tmp_path / "environment" / "bin"
-    left_over.mkdir(parents=True)
+def test_an_incomplete_environment_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    incomplete = tmp_path / "environment" / "bin"
+    incomplete.mkdir(parents=True)
     monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
     with pytest.raises(OtherTrackersUnavailableError):
         peer_environment.peer_environment(tmp_path / "environment")
-    assert not left_over.exists()
+    assert not incomplete.exists()
 
 
-def test_the_environment_is_used_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_complete_environment_is_reused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / ".done").touch()
     monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
     found = peer_environment.peer_environment(tmp_path)

@@ -70,58 +70,58 @@ def live_marks() -> BusTimestamps:
     return marks
 
 
-def seen(at: dict[int, float]) -> ShownFrames:
+def shown(at: dict[int, float]) -> ShownFrames:
     return ShownFrames(object=7, at=at, lookahead=LOOKAHEAD, fps=FPS, cores={})
 
 
-def test_every_frame_of_a_gop_waits_equally_long_for_the_look_ahead() -> None:
-    delays = split(live_marks(), seen({pulse: due(pulse) + 0.95 for pulse in range(20)}))
+def test_all_frames_of_a_gop_wait_equally_for_the_look_ahead() -> None:
+    delays = split(live_marks(), shown({pulse: due(pulse) + 0.95 for pulse in range(20)}))
     expected = [0.01, 0.005, 0.005, 0.76 - 0.02, 0.05, 0.01, 0.95 - 0.82]
     assert np.array_equal(delays.pulses, np.arange(20))
     assert np.allclose(delays.stages, expected)
 
 
-def test_the_stages_add_up_to_the_whole() -> None:
+def test_the_stages_add_up_to_the_total() -> None:
     at = {pulse: due(pulse) + 1.0 + 0.01 * (pulse % 3) for pulse in range(20)}
-    delays = split(live_marks(), seen(at))
+    delays = split(live_marks(), shown(at))
     assert delays.stages.shape == (20, len(STAGES))
     assert np.allclose(delays.totals, [at[pulse] - due(pulse) for pulse in range(20)])
 
 
 def test_frames_that_were_not_shown_are_counted() -> None:
-    delays = split(live_marks(), seen({pulse: due(pulse) + 1.0 for pulse in range(20) if pulse % 4}))
+    delays = split(live_marks(), shown({pulse: due(pulse) + 1.0 for pulse in range(20) if pulse % 4}))
     assert delays.shown_share == pytest.approx(15 / 19)
     assert len(delays.pulses) == 15
 
 
-def test_a_camera_that_is_late_counts_as_waiting_for_the_decision() -> None:
+def test_a_late_camera_counts_as_waiting_for_the_decision() -> None:
     marks = live_marks()
     marks.tracks(window("c1", LOOKAHEAD - 1, due(LOOKAHEAD - 1) + 0.4))
-    delays = split(marks, seen({pulse: due(pulse) + 1.0 for pulse in range(20)}))
+    delays = split(marks, shown({pulse: due(pulse) + 1.0 for pulse in range(20)}))
     assert delays.late == 1
     assert np.allclose(delays.stages[:GOP, 4:6], [0.03, 0.03])
     assert np.allclose(delays.stages[GOP:, 4:6], [0.05, 0.01])
 
 
-def test_a_decision_that_no_camera_was_in_time_for_is_all_waiting() -> None:
+def test_a_decision_without_any_camera_in_time_is_only_waiting() -> None:
     marks = live_marks()
     for camera in ("c0", "c1"):
         marks.tracks(window(camera, LOOKAHEAD - 1, due(LOOKAHEAD - 1) + 0.4))
-    delays = split(marks, seen({pulse: due(pulse) + 1.0 for pulse in range(10)}))
+    delays = split(marks, shown({pulse: due(pulse) + 1.0 for pulse in range(10)}))
     assert delays.late == 1
     assert np.allclose(delays.stages[:, 4:6], [0.0, 0.06])
 
 
-def test_frames_whose_way_is_not_known_are_counted() -> None:
+def test_frames_with_missing_timestamps_are_counted() -> None:
     marks = live_marks()
     del marks.frames["c0", 3]
-    delays = split(marks, seen({pulse: due(pulse) + 1.0 for pulse in range(20)}))
+    delays = split(marks, shown({pulse: due(pulse) + 1.0 for pulse in range(20)}))
     assert (delays.unknown, len(delays.pulses)) == (1, 19)
 
 
 def test_a_page_that_showed_nothing_is_an_error() -> None:
     with pytest.raises(ValueError, match="no shown frame has all timestamps"):
-        split(live_marks(), seen({}))
+        split(live_marks(), shown({}))
 
 
 def spin(seconds: float) -> None:
@@ -130,8 +130,8 @@ def spin(seconds: float) -> None:
         pass
 
 
-class HandClock:
-    """A clock of the processor's time that a test moves on."""
+class ManualClock:
+    """A processor clock that a test advances."""
 
     seconds = 0.0
 
@@ -139,7 +139,7 @@ class HandClock:
         return self.seconds
 
 
-CLOCK = HandClock()
+CLOCK = ManualClock()
 
 
 class Work:
@@ -152,7 +152,7 @@ class Work:
         CLOCK.seconds += 6.0
 
 
-def test_a_stage_inside_a_stage_counts_only_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_time_of_a_nested_stage_is_counted_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("benchmarks.common.stopwatch.time", CLOCK)
     watch = Stopwatch()
     with watch.watching((Work, "outer", "outside"), (Work, "inner", "inside")):
@@ -160,7 +160,7 @@ def test_a_stage_inside_a_stage_counts_only_there(monkeypatch: pytest.MonkeyPatc
     assert watch.seconds == {"outside": 2.0, "inside": 6.0}
 
 
-def test_what_was_watched_is_itself_again_afterwards() -> None:
+def test_timed_functions_are_restored() -> None:
     before = Work.inner
     watch = Stopwatch()
     with pytest.raises(ZeroDivisionError), watch.watching((Work, "inner", "inside")):
@@ -168,7 +168,7 @@ def test_what_was_watched_is_itself_again_afterwards() -> None:
     assert Work.inner is before
 
 
-def test_a_picture_with_too_many_colors_is_made_small_and_stays_itself() -> None:
+def test_a_picture_with_many_colors_is_compressed_with_little_error() -> None:
     across, down = np.meshgrid(np.arange(640), np.arange(400))
     noise = np.random.default_rng(1).integers(0, 12, (400, 640, 3))
     pixels = (np.stack([across / 3, down / 2, (across + down) / 5], axis=2) + noise).astype(np.uint8)
@@ -176,17 +176,17 @@ def test_a_picture_with_too_many_colors_is_made_small_and_stays_itself() -> None
     Image.fromarray(pixels).save(png, "PNG")
     small = small_png(png.getvalue())
     assert len(small) < 300_000 < len(png.getvalue())
-    off = np.abs(np.asarray(Image.open(io.BytesIO(small)).convert("RGB")).astype(int) - pixels)
-    assert off.mean() < 12
+    error = np.abs(np.asarray(Image.open(io.BytesIO(small)).convert("RGB")).astype(int) - pixels)
+    assert error.mean() < 12
 
 
-def test_recordings_that_are_not_there_are_named(tmp_path: Path) -> None:
+def test_missing_recordings_are_named(tmp_path: Path) -> None:
     with pytest.raises(CannotRunError, match="campus4"):
         find_views(tmp_path, "campus4")
 
 
 @pytest.mark.skipif(not Path("/proc/stat").exists(), reason="needs Linux")
-def test_busy_cores_are_told_apart() -> None:
+def test_processor_usage_is_split_by_process() -> None:
     before = read_processor_usage()
     spin(0.2)
     cores = read_processor_usage().cores_since(before)
@@ -194,7 +194,7 @@ def test_busy_cores_are_told_apart() -> None:
     assert OTHER in cores
 
 
-def test_a_benchmark_without_its_recordings_is_left_out(
+def test_a_benchmark_without_its_recordings_is_skipped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["render", "--data", str(tmp_path), "--out", str(tmp_path / "out")])

@@ -11,10 +11,10 @@ SITE = SiteSettings(width=160, height=96)
 FRAMES = 20
 
 
-def test_what_passes_through_is_the_same_and_costs_no_encoding(tmp_path: Path) -> None:
+def test_passthrough_is_lossless_and_costs_no_encoding(tmp_path: Path) -> None:
     recording = record(tmp_path / "room.h264", SITE, FRAMES)
     costs = {variant.name: measure(variant, recording, SITE, FRAMES) for variant in VARIANTS}
-    passthrough = costs.pop("its own H.264, passed through")
+    passthrough = costs.pop("H.264, passed through")
     assert passthrough.quality == float("inf")
     assert passthrough.kbps == recording.stat().st_size * 8 * SITE.fps / FRAMES / 1000
     for cost in costs.values():
@@ -23,7 +23,7 @@ def test_what_passes_through_is_the_same_and_costs_no_encoding(tmp_path: Path) -
     assert costs["VP8, quantizer 24"].kbps < costs["VP8 (quantizer 16, speed 10)"].kbps
 
 
-def test_the_median_of_the_rounds_is_taken_of_each_time() -> None:
+def test_each_time_is_its_median_over_rounds() -> None:
     rounds = [StreamCost(1, 6, 2, 9, 40), StreamCost(3, 4, 1, 9, 40), StreamCost(2, 5, 3, 9, 40)]
     assert median_cost(rounds) == StreamCost(2, 5, 2, 9, 40)
     assert median_cost(rounds).total_ms == 9

@@ -17,23 +17,23 @@ FOUND = [MotRow(1, -1, 11, 10, 20, 50), MotRow(1, -1, 11, 12, 20, 50), MotRow(2,
 VIEW = ScoredView("c0", Path("c0.mp4"), None, watermark=False, min_height=0.2)
 
 
-def test_boxes_are_right_once_for_each_person_in_each_frame() -> None:
+def test_a_person_matches_one_box_per_frame() -> None:
     scores = scores_of_boxes(TRUTH, FOUND)
     assert (scores.recall, scores.precision) == pytest.approx((1 / 3, 1 / 3))
     assert scores.idf1 == pytest.approx(2 / 4)
 
 
-def test_the_oracle_leaves_out_boxes_on_nobody() -> None:
+def test_the_oracle_ignores_false_positives() -> None:
     assert oracle({"c0": TRUTH}, {"c0": FOUND}) == pytest.approx(2 / 4)
     assert oracle({"c0": TRUTH, "c1": TRUTH}, {"c0": TRUTH, "c1": []}) == pytest.approx(2 * 3 / (6 + 3))
 
 
-def test_a_track_on_everybody_is_perfect() -> None:
+def test_the_true_tracks_have_perfect_scores() -> None:
     scores = scores_of_tracks(TRUTH, TRUTH)
     assert (scores.recall, scores.precision, scores.idf1) == pytest.approx((1, 1, 1))
 
 
-def test_blobs_are_boxes_of_what_moves() -> None:
+def test_blobs_are_boxes_of_moving_objects() -> None:
     detector = BlobDetector(VIEW)
     found = None
     for frame in range(60):
@@ -47,6 +47,6 @@ def test_blobs_are_boxes_of_what_moves() -> None:
     np.testing.assert_allclose(row.box, (58, 30, 83, 90), atol=4)
 
 
-def test_scenes_that_are_not_there_are_said_to_be_missing(tmp_path: Path) -> None:
+def test_a_missing_scene_is_named(tmp_path: Path) -> None:
     with pytest.raises(CannotRunError, match="needs the recordings"):
         views_of(tmp_path, "terrace")

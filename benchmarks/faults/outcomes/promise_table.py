@@ -113,7 +113,8 @@ def _fresh(outcome: FaultOutcome) -> str:
     if not outcome.fault.kills_server:
         return f"{outcome.gap_after:.2f} ({outcome.gap_before:.2f})"
     page = "" if outcome.page_recovery_s is None else f", page {outcome.page_recovery_s:.2f}"
-    return f"{'never' if outcome.recovery_s is None else f'{outcome.recovery_s:.2f}'}{page} ({outcome.gap_after:.2f})"
+    recovery = "never" if outcome.recovery_s is None else f"{outcome.recovery_s:.2f}"
+    return f"{recovery}{page} ({outcome.gap_after:.2f})"
 
 
 def _promised(outcome: FaultOutcome) -> str:
