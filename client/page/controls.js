@@ -30,13 +30,13 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
   /** @type {[string, string, () => void][]} element, key, what both do */
   const controls = [
     ['toggle-boxes', 'b', () => toggle('toggle-boxes', (viewer.boxesOn = !viewer.boxesOn))],
-    ['toggle-follow', 'z', () => toggle('toggle-follow', (viewer.now.framing.on = !viewer.now.framing.on))],
+    ['toggle-follow', 'z', () => toggle('toggle-follow', (viewer.currentFrame.follow.on = !viewer.currentFrame.follow.on))],
     ['toggle-why', 'w', toggleWhy],
     ['toggle-sound', 'm', toggleSound],
     ['prefer', 'p', () => viewer.prefer()],
     ['automatic', '0', () => viewer.hold(null)],
-    ['pause', ' ', () => viewer.travel.pause()],
-    ['live', 'End', () => viewer.travel.live()],
+    ['pause', ' ', () => viewer.timeShift.pause()],
+    ['live', 'End', () => viewer.timeShift.live()],
     ['full-screen', 'f', fullScreen],
     ['snapshot', 's', snapshot],
     ['copy-link', 'l', copyLink],
@@ -48,8 +48,8 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
     ...Object.fromEntries([1, 2, 3, 4, 5, 6, 7, 8, 9].map((number) => [number, () => holdNumber(number)])),
     ArrowRight: () => viewer.step(1),
     ArrowLeft: () => viewer.step(-1),
-    ',': () => viewer.travel.skip(-SKIP_S),
-    '.': () => viewer.travel.skip(SKIP_S),
+    ',': () => viewer.timeShift.skip(-SKIP_S),
+    '.': () => viewer.timeShift.skip(SKIP_S),
     h: () => banner.toggle(),
     Escape: () => (more.open = false),
   });
@@ -99,7 +99,7 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
 
   /** @param {MouseEvent} event */
   function personAt(event) {
-    return viewer.site ? overlay.hit(viewer.now.boxes, viewer.site, event) : null;
+    return viewer.site ? overlay.hit(viewer.currentFrame.boxes, viewer.site, event) : null;
   }
 
   /** @param {Event} event */
@@ -109,8 +109,8 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
 
   strip.surface.canvas.addEventListener('click', ({ offsetX }) => {
     const pulse = strip.pulseAt(offsetX);
-    if (pulse === null) viewer.travel.live();
-    else viewer.travel.watchFrom(pulse);
+    if (pulse === null) viewer.timeShift.live();
+    else viewer.timeShift.watchFrom(pulse);
   });
   for (const name of ['play', 'pause']) {
     video.addEventListener(name, () => {
@@ -127,6 +127,6 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
     if (banner.pointing.object !== null || isInBanner(event)) return;
     const object = personAt(event);
     if (object !== null) viewer.choose(object);
-    else if (video.paused) viewer.travel.pause();
+    else if (video.paused) viewer.timeShift.pause();
   });
 }

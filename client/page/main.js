@@ -16,7 +16,7 @@ import { SignIn } from './shared/sign_in.js';
 import { Span } from './timeline/span.js';
 import { Strip } from './timeline/band.js';
 import { Tiles } from './people/tiles.js';
-import { Timekeeper } from './player/timekeeper.js';
+import { SitePoller } from './player/server_clock.js';
 import { Viewer } from './viewer.js';
 import { Why } from './people/selection_costs.js';
 
@@ -43,7 +43,7 @@ const strip = new Strip(element('strip'));
 const span = new Span(element('span'), element('strip'), readOut);
 const reason = new Reason(element('reason'));
 const explaining = new Explaining(viewer, strip, new Why(element('why')));
-const timekeeper = new Timekeeper(viewer);
+const sitePoller = new SitePoller(viewer);
 const painter = new Painter(video, viewer, overlay, markCamera, () => pointing.frame());
 const pointing = new Pointing(stage, element('cross'), viewer, overlay, tellPointing);
 const banner = new Banner(viewer, pointing);
@@ -62,7 +62,7 @@ function show() {
     cameras.mark(viewer.probe.camera, override);
     element('automatic').hidden = element('prefer').hidden = override.camera === null;
     element('prefer').setAttribute('aria-pressed', String(override.prefers));
-    element('live').hidden = viewer.travel.moment === null;
+    element('live').hidden = viewer.timeShift.moment === null;
   }
   if (viewer.people) {
     people.show(viewer.people, viewer.object, viewer.tiles, viewer.palette, (person) => viewer.isGone(person));
@@ -80,22 +80,22 @@ function readOut() {
   const status = viewer.status();
   const { probe, site, palette, decisions, override } = viewer;
   stage.dataset.state = status.state;
-  stage.classList.toggle('pictured', viewer.now.any && !['unknown', 'empty'].includes(status.state));
+  stage.classList.toggle('pictured', viewer.currentFrame.exists && !['unknown', 'empty'].includes(status.state));
   write(title, status.title);
   write(text, status.text);
   write(element('notice'), viewer.notice.text);
   banner.show();
   const delay = median(probe.delays.slice(-DELAY_FRAMES).map(({ delayMs }) => delayMs ?? NaN));
-  element('delay').textContent = viewer.now.flowing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
-  if (!viewer.now.mapped) reason.put('This browser reports no frame times: no boxes, no past, no reasons.');
-  if (!site || !viewer.now.mapped || probe.pulse === null || viewer.object === null) return strip.clear();
-  const live = viewer.travel.moment === null;
+  element('delay').textContent = viewer.currentFrame.advancing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
+  if (!viewer.currentFrame.mapped) reason.put('This browser reports no frame times: no boxes, no past, no reasons.');
+  if (!site || !viewer.currentFrame.mapped || probe.pulse === null || viewer.object === null) return strip.clear();
+  const live = viewer.timeShift.moment === null;
   const views = (/** @type {number} */ from) => viewer.views(from);
   void viewer.kept.about(viewer.object);
   const seconds = span.offer((decisions.end - viewer.kept.first) / site.fps);
   strip.draw({ pulse: probe.pulse, live, fps: site.fps, seconds, decided: decisions.end, views, palette });
   explaining.follow();
-  const best = viewer.said(probe.pulse).camera(viewer.object, probe.pulse);
+  const best = viewer.decisionsAt(probe.pulse).camera(viewer.object, probe.pulse);
   const words = override.words(best, probe.camera, live);
   if (words === null) void reason.about(viewer.object, probe.camera, live ? null : probe.pulse);
   else reason.put(words);
@@ -149,7 +149,7 @@ await signIn.begin();
 new ServerEvents({
   opened: () => {
     viewer.setConnected(true);
-    void timekeeper.begin();
+    void sitePoller.connected();
     banner.flags.clear(); // those that are open are told again
     void lookWhoMay();
   },

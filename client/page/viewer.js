@@ -6,18 +6,18 @@ import { Decisions } from './timeline/decisions.js';
 import { Kept } from './timeline/available_past.js';
 import { learnNames } from './people/names.js';
 import { Notice } from './shared/notice.js';
-import { NowShown } from './player/current_frame.js';
+import { CurrentFrame } from './player/current_frame.js';
 import { Override } from './people/view_preference.js';
 import { Palette } from './people/palette.js';
-import { playerOf } from './player/players.js';
+import { createPlayer } from './player/create_player.js';
 import { Probe } from './player/probe.js';
-import { Recall } from './timeline/past_decisions.js';
+import { PastDecisions } from './timeline/past_decisions.js';
 import { describe } from './shared/status.js';
-import { Travel } from './timeline/time_shift.js';
+import { TimeShift } from './timeline/time_shift.js';
 
 /** @import {Camera, Gop, Person, Site} from './shared/contract.js' */
 /** @import {View} from './timeline/available_past.js' */
-/** @import {Form} from './player/players.js' */
+/** @import {StreamFormat} from './player/create_player.js' */
 /** @import {Status} from './shared/status.js' */
 
 const LANDING_MS = 1500; // for which the old picture may go on after somebody else was chosen
@@ -35,7 +35,7 @@ export class Viewer {
   object = watchedInAddress().object;
   override = new Override(watchedInAddress());
   beside = new Beside(watchedInAddress().beside);
-  now = new NowShown(this);
+  currentFrame = new CurrentFrame(this);
   notice = new Notice();
   palette = new Palette([]);
   decisions = new Decisions(1);
@@ -43,8 +43,8 @@ export class Viewer {
   probe = new Probe();
   connected = false;
   supported = true;
-  /** @type {Form} */
-  form = { container: 'mp4', codec: '', pulse0: null, gopS: 0 };
+  /** @type {StreamFormat} */
+  format = { container: 'mp4', codec: '', pulse0: null, gopS: 0 };
   boxesOn = true;
   #asked = this.object !== null; // by the viewer, not by default
   #chosenAt = -Infinity;
@@ -55,16 +55,16 @@ export class Viewer {
    */
   constructor(video, changed) {
     this.changed = changed;
-    this.recall = new Recall(1, changed);
-    this.travel = new Travel(video, this);
-    this.player = playerOf(video, {
-      landed: changed,
-      ended: (refused) => this.travel.ended(refused),
-      resumed: () => this.travel.resumed(),
+    this.pastDecisions = new PastDecisions(1, changed);
+    this.timeShift = new TimeShift(video, this);
+    this.player = createPlayer(video, {
+      switched: changed,
+      ended: (refused) => this.timeShift.ended(refused),
+      resumed: () => this.timeShift.resumed(),
     });
     this.probe.object = this.object;
     onAddress((watched) => {
-      if (this.override.take(watched)) this.travel.moveOn();
+      if (this.override.take(watched)) this.timeShift.moveOn();
       this.beside.numbers = watched.beside;
       if (watched.object !== null) this.#turnTo(watched.object, true);
       this.changed();
@@ -77,18 +77,18 @@ export class Viewer {
     const anew = !old || old.fps !== site.fps || Math.abs((old.pulse0 ?? 0) - (site.pulse0 ?? 0)) > RESTART_S;
     if (anew) {
       this.decisions = new Decisions(site.fps);
-      this.recall = new Recall(site.fps, this.changed);
+      this.pastDecisions = new PastDecisions(site.fps, this.changed);
       this.kept.forget();
       this.#rename();
-      this.travel.beginAnew();
+      this.timeShift.beginAnew();
     }
     this.override.configure(site.cameras);
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
     const codec = [site.codec, site.sound].filter(Boolean).join(',');
-    this.form = { container: site.container ?? 'mp4', codec, pulse0: site.pulse0, gopS: site.gop / site.fps };
+    this.format = { container: site.container ?? 'mp4', codec, pulse0: site.pulse0, gopS: site.gop / site.fps };
     // Before the first key frame nobody knows yet what there is to be played.
-    this.supported = site.codec === null || this.player.configure(this.form);
+    this.supported = site.codec === null || this.player.configure(this.format);
     this.#play();
     this.changed();
   }
@@ -106,7 +106,7 @@ export class Viewer {
   }
 
   #rename() {
-    for (const said of [this.decisions, this.recall.decisions]) said.rename(this.people ?? []);
+    for (const said of [this.decisions, this.pastDecisions.decisions]) said.rename(this.people ?? []);
   }
 
   /** @param {Camera[]} cameras */
@@ -155,7 +155,7 @@ export class Viewer {
   /** @param {() => void} change by which camera the chosen person is seen */
   #change(change) {
     if (this.object === null) return;
-    this.travel.moveOn();
+    this.timeShift.moveOn();
     change();
     this.#write(true);
     this.#play();
@@ -193,8 +193,8 @@ export class Viewer {
    * @param {number} pulse
    * @returns {Decisions} what is known of that moment, lately decided or asked for again
    */
-  said(pulse) {
-    return pulse < this.decisions.begin ? this.recall.decisions : this.decisions;
+  decisionsAt(pulse) {
+    return pulse < this.decisions.begin ? this.pastDecisions.decisions : this.decisions;
   }
 
   /**
@@ -209,7 +209,7 @@ export class Viewer {
 
   /** @returns {Status} */
   status() {
-    const { flowing } = this.now;
+    const { advancing, exists } = this.currentFrame;
     const landing = performance.now() - this.#chosenAt < LANDING_MS;
     const status = describe({
       supported: this.supported,
@@ -219,8 +219,8 @@ export class Viewer {
       object: this.object,
       listed: this.chosen !== undefined,
       visible: this.chosen?.visible ?? false,
-      paused: this.player.video.paused && this.now.any,
-      moving: flowing && (landing || this.player.shown?.object === this.object),
+      paused: this.player.video.paused && exists,
+      moving: advancing && (landing || this.player.shown?.object === this.object),
     });
     this.probe.state = status.state;
     return status;
@@ -268,10 +268,10 @@ export class Viewer {
       this.#play();
       return;
     }
-    this.travel.moveOn();
+    this.timeShift.moveOn();
     this.object = object;
     this.#chosenAt = performance.now();
-    this.probe.choose(object);
+    this.probe.select(object);
     this.#play();
     this.changed();
   }
@@ -286,8 +286,8 @@ export class Viewer {
   #play() {
     if (!this.site?.codec || !this.supported || !this.people) return;
     if (this.object === null || !this.chosen) return this.player.stop();
-    const past = this.travel.moment;
+    const past = this.timeShift.moment;
     const { held, preferred } = this.override;
-    this.player.choose({ object: this.object, camera: held, prefer: past ? null : preferred, past });
+    this.player.select({ object: this.object, camera: held, prefer: past ? null : preferred, past });
   }
 }

@@ -1,13 +1,13 @@
 /** Others beside the chosen person: a small player each, live, with boxes on their own frames as in the large one. */
 
-import { take, watchFrames } from '../player/frames.js';
+import { captureFrame, watchFrames } from '../player/frames.js';
 import { label, person } from './names.js';
 import { Overlay } from '../player/overlay.js';
-import { playerOf } from '../player/players.js';
+import { createPlayer } from '../player/create_player.js';
 
 /** @import {Decisions} from '../timeline/decisions.js' */
 /** @import {Frame} from '../player/frames.js' */
-/** @import {Form} from '../player/players.js' */
+/** @import {StreamFormat} from '../player/create_player.js' */
 /** @import {Site} from '../shared/contract.js' */
 
 /**
@@ -15,7 +15,7 @@ import { playerOf } from '../player/players.js';
  *
  * @typedef {object} Shared
  * @property {Site | null} site
- * @property {Form} form
+ * @property {StreamFormat} format
  * @property {Decisions} decisions
  * @property {boolean} boxesOn
  */
@@ -85,8 +85,8 @@ class Tile {
     this.number.className = 'number';
     this.element.append(this.video, canvas, this.number);
     this.overlay = new Overlay(canvas);
-    const [landed, resumed] = [() => this.repaint(), () => this.play()];
-    this.player = playerOf(this.video, { landed, resumed, ended: () => undefined });
+    const [switched, resumed] = [() => this.repaint(), () => this.play()];
+    this.player = createPlayer(this.video, { switched, resumed, ended: () => undefined });
     watchFrames(this.video, () => shared.boxesOn, (frame) => this.#paint(frame), this.#enough.signal);
   }
 
@@ -99,8 +99,8 @@ class Tile {
   }
 
   play() {
-    if (!this.player.configure(this.shared.form)) return;
-    this.player.choose({ object: this.object, camera: null, prefer: null, past: null });
+    if (!this.player.configure(this.shared.format)) return;
+    this.player.select({ object: this.object, camera: null, prefer: null, past: null });
     // Nobody pauses it by hand: a browser did, unseen.
     if (this.player.shown && this.video.paused && !document.hidden) this.video.play().catch(() => undefined);
   }
@@ -112,14 +112,14 @@ class Tile {
   }
 
   repaint() {
-    if (this.player.shown) this.#paint({ ...take(this.video, this.#mediaTime, this.shared.boxesOn), shownAt: 0 });
+    if (this.player.shown) this.#paint({ ...captureFrame(this.video, this.#mediaTime, this.shared.boxesOn), shownAt: 0 });
   }
 
   /** @param {Frame} frame */
   #paint({ mediaTime, image }) {
     const { site, decisions, boxesOn } = this.shared;
     this.#mediaTime = mediaTime;
-    if (site && boxesOn && !this.player.landing) {
+    if (site && boxesOn && !this.player.switching) {
       const pulse = Math.round(this.player.mediaTime(mediaTime) * site.fps); // may be not known: NaN
       const camera = decisions.camera(this.object, pulse);
       this.overlay.draw(camera === null ? [] : decisions.boxes(camera, pulse), this.object, site, image, null);

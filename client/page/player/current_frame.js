@@ -1,80 +1,80 @@
-/** The frame now shown: which moment it is, who is in it and where, and which part of it is looked at. */
+/** The displayed frame: its pulse, its boxes, and the viewport in which it is shown. */
 
-import { Framing } from './viewport.js';
+import { PersonViewport } from './viewport.js';
 
 /** @import {Box} from '../shared/contract.js' */
 /** @import {Decisions} from '../timeline/decisions.js' */
-/** @import {Part} from './viewport_follow.js' */
+/** @import {Viewport} from './viewport.js' */
 /** @import {Frame} from './frames.js' */
-/** @import {Subject} from './subject.js' */
+/** @import {StreamSelection} from './stream_selection.js' */
 /** @import {Viewer} from '../viewer.js' */
 
-const STANDING_MS = 1500; // without a new frame the picture counts as standing
+const STALLED_MS = 1500; // without a new frame the video counts as stalled
 
-export class NowShown {
-  /** As the browser counts it, seconds. */
+export class CurrentFrame {
+  /** Media time as the browser reports it, seconds. */
   mediaTime = 0;
-  /** It is known which pulse that is. */
+  /** Whether the frame's pulse is known. */
   mapped = true;
   /** @type {Box[]} */
   boxes = [];
-  /** @type {Part | null} where the person is followed; null: all of it */
-  part = null;
-  framing = new Framing();
-  /** @type {number | null} milliseconds that the server's clock is ahead; set from outside */
+  /** @type {Viewport | null} the part of the frame that is shown; null: all of it */
+  viewport = null;
+  follow = new PersonViewport();
+  /** @type {number | null} milliseconds that the server's clock is ahead, set by SitePoller */
   clockOffset = null;
-  #at = -Infinity;
+  #shownAt = -Infinity; // performance.now()
 
   /** @param {Viewer} viewer */
   constructor(viewer) {
     this.viewer = viewer;
   }
 
-  /** @param {Frame} frame */
-  take({ mediaTime, shownAt }) {
-    const { site, player, probe, travel } = this.viewer;
+  /** @param {Frame} frame now displayed */
+  update({ mediaTime, shownAt }) {
+    const { site, player, probe, timeShift } = this.viewer;
     const pulse = Math.round(player.mediaTime(mediaTime) * (site?.fps ?? 1));
-    const passed = mediaTime - this.mediaTime;
+    const elapsed = mediaTime - this.mediaTime;
     this.mediaTime = mediaTime;
     this.mapped = !Number.isNaN(pulse);
-    if (!this.mapped) return this.#takeUnmapped(shownAt);
-    // The same moment may be shown again, of somebody else.
+    if (!this.mapped) return this.#updateUnmapped(shownAt);
+    // After a switch to another person the same pulse may be shown again.
     if (pulse !== probe.pulse) {
-      this.#at = performance.now();
-      travel.stale = false;
+      this.#shownAt = performance.now();
+      timeShift.stale = false;
       probe.frame({ pulse, shownAt, delayMs: this.#delay(pulse, shownAt) });
     }
     if (!site || !player.shown) return;
     const { object, past } = player.shown;
-    if (past) this.viewer.recall.want(pulse, this.viewer.decisions.begin);
-    const said = this.viewer.said(pulse);
-    const camera = cameraOf(player.shown, said, pulse);
+    if (past) this.viewer.pastDecisions.request(pulse, this.viewer.decisions.begin);
+    const decisions = this.viewer.decisionsAt(pulse);
+    const camera = cameraOf(player.shown, decisions, pulse);
     probe.view(object, camera, shownAt);
-    this.boxes = probe.boxes = camera === null ? [] : said.boxes(camera, pulse);
+    this.boxes = probe.boxes = camera === null ? [] : decisions.boxes(camera, pulse);
     const box = this.boxes.find(([number]) => number === object);
-    this.part = this.framing.step(`${object} ${camera}`, box, site, passed);
+    this.viewport = this.follow.step(`${object} ${camera}`, box, site, elapsed);
   }
 
-  /** @returns {boolean} whether a picture has been shown */
-  get any() {
-    return this.#at > -Infinity;
+  /** @returns {boolean} whether a frame has been displayed */
+  get exists() {
+    return this.#shownAt > -Infinity;
   }
 
-  /** @returns {boolean} whether new frames are being shown */
-  get flowing() {
-    return performance.now() - this.#at < STANDING_MS;
+  /** @returns {boolean} whether new frames are being displayed */
+  get advancing() {
+    return performance.now() - this.#shownAt < STALLED_MS;
   }
 
   /**
-   * It is not known which frame this is: it is shown, and nothing is said of it.
+   * Show a frame of unknown pulse: without camera, boxes and viewport.
    *
    * @param {number} shownAt
    */
-  #takeUnmapped(shownAt) {
+  #updateUnmapped(shownAt) {
     const { player, probe } = this.viewer;
-    this.#at = performance.now();
+    this.#shownAt = performance.now();
     this.boxes = [];
-    this.part = null;
+    this.viewport = null;
     if (player.shown) probe.view(player.shown.object, null, shownAt);
   }
 
@@ -90,11 +90,11 @@ export class NowShown {
 }
 
 /**
- * @param {Subject} subject
- * @param {Decisions} said
+ * @param {StreamSelection} selection
+ * @param {Decisions} decisions
  * @param {number} pulse
  */
-function cameraOf({ object, camera, prefer }, said, pulse) {
+function cameraOf({ object, camera, prefer }, decisions, pulse) {
   if (camera !== null) return camera;
-  return prefer === null ? said.camera(object, pulse) : said.preferring(object, prefer, pulse);
+  return prefer === null ? decisions.camera(object, pulse) : decisions.preferring(object, prefer, pulse);
 }

@@ -1,95 +1,95 @@
 /**
- * Tells of every frame as it is shown: which one, and when; and takes it, to be painted with its boxes.
+ * Reports every displayed frame with its media time, and captures it so that it can be painted with its boxes.
  *
- * requestVideoFrameCallback knows the very frame, but the browser may already show the next one by the
- * time a canvas over it is painted: boxes would be a frame late now and then. A VideoFrame carries its
- * own time, so a picture painted from it and the boxes of that time always belong together. Where a
- * browser lacks one or the other, the next best is used: right to a frame or so.
+ * requestVideoFrameCallback reports the frame, but the browser may already show the next one when a canvas
+ * over it is painted, so that boxes lag by a frame. A VideoFrame carries its own timestamp: a frame painted
+ * from it always matches the boxes of that time. Browsers without either are accurate to about a frame.
  */
 
-const SAME_PLAYBACK_S = 0.5; // a VideoFrame whose time is further off than this counts time otherwise
-const ARRIVING_MS = 1000; // for two frames to be shown after a seek
-const ARRIVING_BUSY_MS = 5000; // likewise, by a visible page of a browser with much else to do
+const SAME_TIMELINE_S = 0.5; // a VideoFrame timestamp further off counts from another origin
+const SEEK_TIMEOUT_MS = 1000; // for two frames to be displayed after a seek, on a hidden page
+const SEEK_TIMEOUT_VISIBLE_MS = 5000; // likewise, on a visible page of a busy browser
 
 /**
  * @typedef {object} Frame
  * @property {number} mediaTime seconds
- * @property {number} shownAt milliseconds as of Date.now()
- * @property {VideoFrame | null} image to be closed by who asked for it
+ * @property {number} shownAt Date.now() milliseconds
+ * @property {VideoFrame | null} image to be closed by the receiver
  */
 
 /**
  * @param {HTMLVideoElement} video
- * @param {() => boolean} wanted whether the image is
- * @param {(frame: Frame) => void} tell
- * @param {AbortSignal} [enough] after which nothing is told
+ * @param {() => boolean} needsImage whether to capture the frame's image
+ * @param {(frame: Frame) => void} onFrame
+ * @param {AbortSignal} [signal] stops the reports
  */
-export function watchFrames(video, wanted, tell, enough) {
-  if (!('requestVideoFrameCallback' in video)) return watchTime(video, wanted, tell, enough);
+export function watchFrames(video, needsImage, onFrame, signal) {
+  if (!('requestVideoFrameCallback' in video)) return pollFrames(video, needsImage, onFrame, signal);
   /** @type {VideoFrameRequestCallback} */
   const shown = (_now, { mediaTime, expectedDisplayTime }) => {
-    if (enough?.aborted) return;
+    if (signal?.aborted) return;
     video.requestVideoFrameCallback(shown);
     const shownAt = Date.now() + expectedDisplayTime - performance.now();
-    tell({ ...take(video, mediaTime, wanted()), shownAt });
+    onFrame({ ...captureFrame(video, mediaTime, needsImage()), shownAt });
   };
   video.requestVideoFrameCallback(shown);
 }
 
 /**
- * Says when the picture is surely of what a seek has led to. A busy browser says that it has arrived a moment before
- * the picture changes, and of the first frame that it tells of then it cannot be said which side it is from.
+ * Call back when the displayed frame is certainly from after a seek. A busy browser may fire `seeked` before the
+ * displayed frame changes, so the first frame reported after it may still be from before the seek.
  *
- * @param {HTMLVideoElement} video that says so just now
- * @param {() => void} then
+ * @param {HTMLVideoElement} video that has just fired `seeked`
+ * @param {() => void} callback
  */
-export function arrived(video, then) {
-  if (video.paused || !('requestVideoFrameCallback' in video)) return then();
-  let waits = true;
-  const end = () => {
-    if (waits) then();
-    waits = false;
+export function afterSeek(video, callback) {
+  if (video.paused || !('requestVideoFrameCallback' in video)) return callback();
+  let waiting = true;
+  const finish = () => {
+    if (waiting) callback();
+    waiting = false;
   };
-  // A hidden page is told of no frame; a visible one that is late has no new picture yet.
-  setTimeout(() => (document.hidden ? end() : setTimeout(end, ARRIVING_BUSY_MS - ARRIVING_MS)), ARRIVING_MS);
-  video.requestVideoFrameCallback(() => video.requestVideoFrameCallback(end));
+  // A hidden page gets no frame callbacks; on a visible page a missing callback means that the old frame is displayed.
+  const timeout = () => (document.hidden ? finish() : setTimeout(finish, SEEK_TIMEOUT_VISIBLE_MS - SEEK_TIMEOUT_MS));
+  setTimeout(timeout, SEEK_TIMEOUT_MS);
+  video.requestVideoFrameCallback(() => video.requestVideoFrameCallback(finish));
 }
 
 /**
  * @param {HTMLVideoElement} video
- * @param {number} mediaTime of the frame that was last told of, seconds
- * @param {boolean} wanted
+ * @param {number} mediaTime of the frame reported last, seconds
+ * @param {boolean} needsImage
  * @returns {{mediaTime: number, image: VideoFrame | null}}
  */
-export function take(video, mediaTime, wanted) {
-  if (!wanted || !globalThis.VideoFrame || video.readyState < HTMLMediaElement.HAVE_CURRENT_DATA) {
+export function captureFrame(video, mediaTime, needsImage) {
+  if (!needsImage || !globalThis.VideoFrame || video.readyState < HTMLMediaElement.HAVE_CURRENT_DATA) {
     return { mediaTime, image: null };
   }
   try {
     const image = new VideoFrame(video);
     const time = image.timestamp / 1e6;
-    if (Math.abs(time - mediaTime) < SAME_PLAYBACK_S) return { mediaTime: time, image };
+    if (Math.abs(time - mediaTime) < SAME_TIMELINE_S) return { mediaTime: time, image };
     image.close();
   } catch {
-    // No picture to take yet.
+    // No frame is available yet.
   }
   return { mediaTime, image: null };
 }
 
 /**
  * @param {HTMLVideoElement} video
- * @param {() => boolean} wanted
- * @param {(frame: Frame) => void} tell
- * @param {AbortSignal} [enough]
+ * @param {() => boolean} needsImage
+ * @param {(frame: Frame) => void} onFrame
+ * @param {AbortSignal} [signal]
  */
-function watchTime(video, wanted, tell, enough) {
+function pollFrames(video, needsImage, onFrame, signal) {
   let last = -1;
-  const look = () => {
-    if (enough?.aborted) return;
-    requestAnimationFrame(look);
+  const poll = () => {
+    if (signal?.aborted) return;
+    requestAnimationFrame(poll);
     if (video.currentTime === last || video.readyState < HTMLMediaElement.HAVE_CURRENT_DATA) return;
     last = video.currentTime;
-    tell({ ...take(video, last, wanted()), shownAt: Date.now() });
+    onFrame({ ...captureFrame(video, last, needsImage()), shownAt: Date.now() });
   };
-  requestAnimationFrame(look);
+  requestAnimationFrame(poll);
 }

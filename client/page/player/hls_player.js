@@ -1,93 +1,94 @@
 /**
- * The best view where there are no Media Source Extensions: HLS, which such browsers play by themselves.
+ * Plays the best view by the browser's native HLS, where there are no Media Source Extensions.
  *
- * Another person is another source. A browser counts the time of such a source as it likes; where it tells what time
- * of day its beginning is (getStartDate), frames have their pulses, and else there are no boxes.
+ * Each person is another source. The browser chooses the origin of a source's media time; where it reports the
+ * wall-clock time of that origin (getStartDate), frames are mapped to pulses, otherwise there are no boxes.
  */
 
 import { Backoff } from '../shared/backoff.js';
-import { Going } from './autoplay.js';
+import { Playback } from './playback.js';
 import { pause } from '../shared/requests.js';
-import { playlistOf, same } from './subject.js';
+import { isSameSelection, playlistUrl } from './stream_selection.js';
 
-/** @import {Listener} from './player.js' */
-/** @import {Form} from './players.js' */
-/** @import {Subject} from './subject.js' */
+/** @import {PlayerListener} from './mse_player.js' */
+/** @import {StreamFormat} from './create_player.js' */
+/** @import {StreamSelection} from './stream_selection.js' */
 
 const TYPE = 'application/vnd.apple.mpegurl';
-const FAR_S = 15; // behind the newest that the browser would go to
-const BEHIND_S = 3; // it, so that there is something to play
-const SAME_S = 1; // a frame whose time is further from the element's has that of the stream itself
+const MAX_BEHIND_S = 15; // behind the live edge, when playback is resumed
+const LIVE_BUFFER_S = 3; // kept to the live edge after a jump there
+const SAME_TIMELINE_S = 1; // a frame time further from the element's is the stream's own
 
 export class HlsPlayer {
-  /** @type {Subject | null} whose picture the element shows */
+  /** @type {StreamSelection | null} what the element displays */
   shown = null;
-  /** @type {Subject | null} */
-  #subject = null;
+  /** @type {StreamSelection | null} */
+  #selection = null;
   #backoff = new Backoff();
-  #going;
-  #pulse0 = NaN; // unix seconds at which media time 0 of the site was
+  #playback;
+  #pulse0 = NaN; // Unix seconds of the site's media time 0
 
   /**
    * @param {HTMLVideoElement} video
-   * @param {Listener} listener
+   * @param {PlayerListener} listener
    */
   constructor(video, listener) {
     this.video = video;
     this.listener = listener;
-    this.#going = new Going(video, () => this.shown && !this.landing && listener.resumed());
-    video.addEventListener('loadeddata', () => this.#showing());
-    video.addEventListener('ended', () => this.#end());
+    this.#playback = new Playback(video, () => this.shown && !this.switching && listener.resumed());
+    video.addEventListener('loadeddata', () => this.#loaded());
+    video.addEventListener('ended', () => this.#ended());
     video.addEventListener('error', () => this.#fail());
   }
 
   /**
-   * @param {Form} form
-   * @returns {boolean} whether this browser can play such streams at all
+   * @param {StreamFormat} format
+   * @returns {boolean} whether this browser can play the format
    */
   configure({ container, pulse0 }) {
     this.#pulse0 = pulse0 ?? NaN;
     return container === 'mp4' && this.video.canPlayType(TYPE) !== '';
   }
 
-  /** @param {Subject} subject whom to show from now on */
-  choose(subject) {
-    if (this.#subject && same(this.#subject, subject)) return;
-    this.#subject = subject;
+  /** @param {StreamSelection} selection to play from now on */
+  select(selection) {
+    if (this.#selection && isSameSelection(this.#selection, selection)) return;
+    this.#selection = selection;
     this.#load();
   }
 
-  /** Let the picture go on; live, from where it is live. */
+  /** Resume; a live stream that is far behind jumps to the live edge. */
   play() {
     const { video } = this;
     const { seekable } = video;
     const edge = seekable.length ? seekable.end(seekable.length - 1) : 0;
-    if (video.paused && !this.#subject?.past && edge - video.currentTime > FAR_S) video.currentTime = edge - BEHIND_S;
-    this.#going.on();
+    const late = edge - video.currentTime > MAX_BEHIND_S;
+    if (video.paused && !this.#selection?.past && late) video.currentTime = edge - LIVE_BUFFER_S;
+    this.#playback.start();
   }
 
-  /** @returns {boolean} whether it is open just now if the picture is still of who was shown before */
-  get landing() {
-    return this.#subject !== null && this.#subject !== this.shown;
+  /** @returns {boolean} whether the element may still display the previous selection */
+  get switching() {
+    return this.#selection !== null && this.#selection !== this.shown;
   }
 
   /**
-   * @param {number} time of a frame, as the browser tells it
-   * @returns {number} media time of the site, pulse / fps; NaN: not known
+   * @param {number} time of a frame, as the browser reports it
+   * @returns {number} media time of the site, pulse / fps; NaN: unknown
    */
   mediaTime(time) {
-    if (Math.abs(time - this.video.currentTime) > SAME_S) return time;
+    if (Math.abs(time - this.video.currentTime) > SAME_TIMELINE_S) return time;
     const { getStartDate } = /** @type {{getStartDate?: () => Date}} */ (/** @type {unknown} */ (this.video));
     return time + (getStartDate?.call(this.video).getTime() ?? NaN) / 1000 - this.#pulse0;
   }
 
-  /** Leave the stream; the last frame stays. */
+  /** Stop playing; the last frame stays. */
   stop() {
     this.video.pause();
-    this.#subject = null;
+    this.#selection = null;
   }
 
-  /** Leave the stream and the element, for good. */
+  /** Release the stream and the element. */
   close() {
     this.stop();
     this.video.removeAttribute('src');
@@ -95,37 +96,37 @@ export class HlsPlayer {
   }
 
   #load() {
-    if (!this.#subject) return;
-    this.video.src = playlistOf(this.#subject);
+    if (!this.#selection) return;
+    this.video.src = playlistUrl(this.#selection);
     this.play();
   }
 
-  #showing() {
+  #loaded() {
     this.#backoff.reset();
-    this.shown = this.#subject;
-    if (this.shown) this.listener.landed();
+    this.shown = this.#selection;
+    if (this.shown) this.listener.switched();
   }
 
-  #end() {
-    if (this.#subject?.past) this.listener.ended(false);
-    else void this.#again();
+  #ended() {
+    if (this.#selection?.past) this.listener.ended(false);
+    else void this.#retry();
   }
 
-  /** A video element does not tell what the server said. */
+  /** A video element does not expose the HTTP status, so a past playlist is requested once more for it. */
   async #fail() {
-    const subject = this.#subject;
-    if (!subject) return;
-    if (subject.past) {
-      const answer = await fetch(playlistOf(subject), { method: 'HEAD', cache: 'no-store' }).catch(() => null);
-      if (subject !== this.#subject) return;
+    const selection = this.#selection;
+    if (!selection) return;
+    if (selection.past) {
+      const answer = await fetch(playlistUrl(selection), { method: 'HEAD', cache: 'no-store' }).catch(() => null);
+      if (selection !== this.#selection) return;
       if (answer && answer.status >= 400 && answer.status < 500) return this.listener.ended(true);
     }
-    void this.#again();
+    void this.#retry();
   }
 
-  async #again() {
-    const subject = this.#subject;
+  async #retry() {
+    const selection = this.#selection;
     await pause(this.#backoff.next());
-    if (subject === this.#subject) this.#load();
+    if (selection === this.#selection) this.#load();
   }
 }

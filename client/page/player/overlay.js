@@ -1,73 +1,73 @@
-/** A frame, or a part of it, and its boxes: the chosen person in the accent, the others thin and neutral. */
+/** Draws a frame, or its viewport, with its boxes: the selected person in the accent color, others thin and neutral. */
 
 import { label } from '../people/names.js';
 import { Surface } from './surface.js';
 
 /** @import {Box} from '../shared/contract.js' */
-/** @import {Part, Size} from './viewport_follow.js' */
+/** @import {Size, Viewport} from './viewport.js' */
 
 const ACCENT = '#3fdc7f';
 const NEUTRAL = 'rgba(255, 255, 255, 0.75)';
-const SHADE = 'rgba(0, 0, 0, 0.55)'; // under every line: boxes must be seen on white walls too
-const CHOSEN_WIDTH = 2.5;
+const SHADE = 'rgba(0, 0, 0, 0.55)'; // under every line, so that boxes are visible on white walls
+const SELECTED_WIDTH = 2.5;
 const OTHER_WIDTH = 1;
 const FONT = '600 12px system-ui, sans-serif';
 const LABEL_HEIGHT = 17;
 
 export class Overlay {
-  /** @type {Part | null} what was drawn last; null: the whole picture */
-  #part = null;
+  /** @type {Viewport | null} drawn last; null: the whole picture */
+  #viewport = null;
 
   /**
-   * @param {HTMLCanvasElement} canvas lies exactly over the video element
+   * @param {HTMLCanvasElement} canvas exactly over the video element
    */
   constructor(canvas) {
     this.surface = new Surface(canvas);
   }
 
   clear() {
-    this.#part = null;
+    this.#viewport = null;
     this.surface.clear();
   }
 
   /**
-   * @param {Box[]} boxes of the camera and the frame now shown
-   * @param {number | null} chosen
+   * @param {Box[]} boxes of the displayed frame
+   * @param {number | null} selected number of the person
    * @param {Size} picture pixels that the boxes are measured in
-   * @param {VideoFrame | null} image the frame; null leaves the view of the video element below
-   * @param {Part | null} part of the picture that is to fill the canvas; null: all of it
+   * @param {VideoFrame | null} image the frame; null: leave the canvas transparent over the video element
+   * @param {Viewport | null} viewport that fills the canvas; null: the whole picture
    */
-  draw(boxes, chosen, picture, image, part) {
-    this.#part = part;
+  draw(boxes, selected, picture, image, viewport) {
+    this.#viewport = viewport;
     const context = this.surface.clear();
     const { scale, left, top } = this.#place(picture);
     context.translate(left, top);
     if (image) context.drawImage(image, 0, 0, picture.width * scale, picture.height * scale);
-    const [mine, others] = [true, false].map((is) => boxes.filter(([object]) => (object === chosen) === is));
-    for (const box of others) drawBox(context, box, scale, false);
-    for (const box of mine) drawBox(context, box, scale, true); // last: on top
+    for (const onTop of [false, true]) {
+      for (const box of boxes) if ((box[0] === selected) === onTop) drawBox(context, box, scale, onTop);
+    }
   }
 
   /**
    * @param {Box[]} boxes
    * @param {Size} picture
    * @param {{offsetX: number, offsetY: number}} point CSS pixels from the canvas's corner
-   * @returns {number | null} the smallest box's object at that point: who stands in front of a crowd
+   * @returns {number | null} object of the smallest box at that point
    */
   hit(boxes, picture, { offsetX, offsetY }) {
-    const { x, y } = this.inPicture(offsetX, offsetY, picture);
-    const under = boxes.filter(([, l, t, r, b]) => l <= x && x < r && t <= y && y < b);
-    under.sort((a, b) => area(a) - area(b));
-    return under.length ? under[0][0] : null;
+    const { x, y } = this.toPicture(offsetX, offsetY, picture);
+    const hits = boxes.filter(([, left, top, right, bottom]) => left <= x && x < right && top <= y && y < bottom);
+    hits.sort((a, b) => area(a) - area(b));
+    return hits.length ? hits[0][0] : null;
   }
 
   /**
    * @param {number} x CSS pixels from the canvas's corner
    * @param {number} y
    * @param {Size} picture
-   * @returns {{x: number, y: number, scale: number}} that place in the picture, and CSS pixels for each of its pixels
+   * @returns {{x: number, y: number, scale: number}} the point in the picture, and CSS pixels per pixel of the picture
    */
-  inPicture(x, y, picture) {
+  toPicture(x, y, picture) {
     const { scale, left, top } = this.#place(picture);
     return { x: (x - left) / scale, y: (y - top) / scale, scale };
   }
@@ -76,33 +76,33 @@ export class Overlay {
    * @param {number} x pixels of the picture
    * @param {number} y
    * @param {Size} picture
-   * @returns {{x: number, y: number}} that place in the canvas, CSS pixels from its corner
+   * @returns {{x: number, y: number}} the point on the canvas, CSS pixels from its corner
    */
-  onScreen(x, y, picture) {
+  toCanvas(x, y, picture) {
     const { scale, left, top } = this.#place(picture);
     return { x: left + x * scale, y: top + y * scale };
   }
 
   /**
    * @param {Size} picture
-   * @returns {string} what makes the video element below show the part that was drawn last (CSS)
+   * @returns {string} CSS transform that makes the video element below show the viewport drawn last
    */
   transform(picture) {
-    if (!this.#part) return 'none';
+    if (!this.#viewport) return 'none';
     const [before, after] = [this.#place(picture, null), this.#place(picture)];
-    const larger = after.scale / before.scale;
-    const [x, y] = [after.left - larger * before.left, after.top - larger * before.top];
-    return `translate(${x}px, ${y}px) scale(${larger})`;
+    const zoom = after.scale / before.scale;
+    const [x, y] = [after.left - zoom * before.left, after.top - zoom * before.top];
+    return `translate(${x}px, ${y}px) scale(${zoom})`;
   }
 
   /**
-   * Where the picture lies in the canvas: the part as large as fits, in the middle.
+   * Return where the picture lies on the canvas: the viewport centered, as large as fits.
    *
    * @param {Size} picture
    */
-  #place(picture, part = this.#part) {
+  #place(picture, viewport = this.#viewport) {
     const { width, height } = this.surface;
-    const shown = part ?? { left: 0, top: 0, ...picture };
+    const shown = viewport ?? { left: 0, top: 0, ...picture };
     const scale = Math.min(width / shown.width, height / shown.height);
     const left = (width - shown.width * scale) / 2 - shown.left * scale;
     return { scale, left, top: (height - shown.height * scale) / 2 - shown.top * scale };
@@ -118,19 +118,19 @@ function area([, left, top, right, bottom]) {
  * @param {CanvasRenderingContext2D} context
  * @param {Box} box
  * @param {number} scale CSS pixels per pixel of the picture
- * @param {boolean} chosen
+ * @param {boolean} selected
  */
-function drawBox(context, [object, left, top, right, bottom], scale, chosen) {
+function drawBox(context, [object, left, top, right, bottom], scale, selected) {
   const [x, y] = [left * scale, top * scale];
   const [width, height] = [(right - left) * scale, (bottom - top) * scale];
-  const line = chosen ? CHOSEN_WIDTH : OTHER_WIDTH;
+  const line = selected ? SELECTED_WIDTH : OTHER_WIDTH;
   context.lineWidth = line + 2;
   context.strokeStyle = SHADE;
   context.strokeRect(x, y, width, height);
   context.lineWidth = line;
-  context.strokeStyle = chosen ? ACCENT : NEUTRAL;
+  context.strokeStyle = selected ? ACCENT : NEUTRAL;
   context.strokeRect(x, y, width, height);
-  drawNumber(context, label(object), x, y, chosen);
+  drawNumber(context, label(object), x, y, selected);
 }
 
 /**
@@ -138,15 +138,15 @@ function drawBox(context, [object, left, top, right, bottom], scale, chosen) {
  * @param {string} text
  * @param {number} x
  * @param {number} y of the box's top
- * @param {boolean} chosen
+ * @param {boolean} selected
  */
-function drawNumber(context, text, x, y, chosen) {
+function drawNumber(context, text, x, y, selected) {
   context.font = FONT;
   context.textBaseline = 'middle';
   const width = context.measureText(text).width + 9;
-  const top = y >= LABEL_HEIGHT ? y - LABEL_HEIGHT : y; // inside where there is no room above
-  context.fillStyle = chosen ? ACCENT : SHADE;
+  const top = y >= LABEL_HEIGHT ? y - LABEL_HEIGHT : y; // inside the box if there is no room above
+  context.fillStyle = selected ? ACCENT : SHADE;
   context.fillRect(x - 1, top, width, LABEL_HEIGHT);
-  context.fillStyle = chosen ? '#06240f' : '#fff';
+  context.fillStyle = selected ? '#06240f' : '#fff';
   context.fillText(text, x + 3.5, top + LABEL_HEIGHT / 2 + 1);
 }

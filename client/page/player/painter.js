@@ -1,6 +1,6 @@
-/** Paints every frame as it is shown: its boxes, and the part of it that is followed. */
+/** Paints every displayed frame with its boxes, inside the viewport that follows the person. */
 
-import { take, watchFrames } from './frames.js';
+import { captureFrame, watchFrames } from './frames.js';
 
 /** @import {Overlay} from './overlay.js' */
 /** @import {Viewer} from '../viewer.js' */
@@ -13,43 +13,43 @@ export class Painter {
    * @param {HTMLVideoElement} video
    * @param {Viewer} viewer
    * @param {Overlay} overlay
-   * @param {(camera: string | null) => void} cut another camera is shown
-   * @param {() => void} shown a frame is
+   * @param {(camera: string | null) => void} onCut another camera is displayed
+   * @param {() => void} onFrame a frame is displayed
    */
-  constructor(video, viewer, overlay, cut, shown) {
+  constructor(video, viewer, overlay, onCut, onFrame) {
     this.video = video;
     this.viewer = viewer;
     this.overlay = overlay;
-    watchFrames(video, () => this.#wanted, (frame) => {
-      if (viewer.player.landing) return frame.image?.close(); // told of again, when it is known whose it is
-      viewer.now.take(frame);
+    watchFrames(video, () => this.#painting, (frame) => {
+      if (viewer.player.switching) return frame.image?.close(); // repainted when the switch is complete
+      viewer.currentFrame.update(frame);
       this.#paint(frame.image);
-      shown();
+      onFrame();
       if (viewer.probe.camera === this.#camera) return;
       this.#camera = viewer.probe.camera;
-      cut(this.#camera);
+      onCut(this.#camera);
     });
   }
 
-  /** Between frames: another choice, boxes on or off, another size. */
+  /** Paint the current frame again after a change of selection, boxes or size. */
   repaint() {
     const { video, viewer } = this;
-    if (viewer.probe.pulse === null || viewer.player.landing) return;
-    const frame = take(video, viewer.now.mediaTime, this.#wanted);
-    if (frame.image) viewer.now.take({ ...frame, shownAt: Date.now() });
+    if (viewer.probe.pulse === null || viewer.player.switching) return;
+    const frame = captureFrame(video, viewer.currentFrame.mediaTime, this.#painting);
+    if (frame.image) viewer.currentFrame.update({ ...frame, shownAt: Date.now() });
     this.#paint(frame.image);
   }
 
-  /** Whether the picture is painted here, and not only shown by the video element. */
-  get #wanted() {
-    return this.viewer.boxesOn || this.viewer.now.framing.on;
+  /** Whether frames are painted here, and not only displayed by the video element. */
+  get #painting() {
+    return this.viewer.boxesOn || this.viewer.currentFrame.follow.on;
   }
 
-  /** @param {VideoFrame | null} image of the frame now shown */
+  /** @param {VideoFrame | null} image of the displayed frame */
   #paint(image) {
     const { site, object, boxesOn } = this.viewer;
-    const { boxes, part } = this.viewer.now;
-    if (site && this.#wanted) this.overlay.draw(boxesOn ? boxes : [], object, site, image, part);
+    const { boxes, viewport } = this.viewer.currentFrame;
+    if (site && this.#painting) this.overlay.draw(boxesOn ? boxes : [], object, site, image, viewport);
     else this.overlay.clear();
     this.video.style.transform = site && !image ? this.overlay.transform(site) : 'none';
     image?.close();

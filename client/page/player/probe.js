@@ -1,10 +1,10 @@
 /**
- * window.myview: what the page shows, for tests and benchmarks to read.
+ * window.myview: the state of the page, for tests and benchmarks.
  *
  * @typedef {object} Delay
  * @property {number} pulse
  * @property {number} shownAt milliseconds, Date.now()
- * @property {number | null} delayMs from the moment the pulse was due to the moment its frame is shown
+ * @property {number | null} delayMs from when the pulse was due until its frame is displayed
  */
 
 /** @import {Box, Flag, Site} from '../shared/contract.js' */
@@ -17,33 +17,33 @@ const EVENTS_KEPT = 512;
  * @template T
  * @param {T[]} list
  * @param {T} entry
- * @param {number} most
+ * @param {number} capacity
  */
-function keep(list, entry, most) {
+function push(list, entry, capacity) {
   list.push(entry);
-  if (list.length > most) list.shift();
+  if (list.length > capacity) list.shift();
 }
 
 export class Probe {
   /** @type {Site | null} */
   site = null;
-  /** @type {number | null} the frame now shown */
+  /** @type {number | null} of the displayed frame */
   pulse = null;
-  /** @type {number | null} the chosen person */
+  /** @type {number | null} the selected person */
   object = null;
-  /** @type {string | null} the camera whose frame is shown */
+  /** @type {string | null} the camera of the displayed frame */
   camera = null;
-  /** @type {Box[]} in it */
+  /** @type {Box[]} in the displayed frame */
   boxes = [];
-  /** @type {Flag[]} that can be answered, the most urgent first */
+  /** @type {Flag[]} open, most urgent first */
   flags = [];
-  /** @type {{object: number | null, taken: number}} whom the operator points at, and how many places were taken */
-  pointing = { object: null, taken: 0 };
+  /** @type {{object: number | null, accepted: number}} the person pointed at, and the number of accepted points */
+  pointing = { object: null, accepted: 0 };
   /** @type {State} */
   state = 'starting';
-  /** @type {Delay[]} of the last frames shown, oldest first */
+  /** @type {Delay[]} of the last displayed frames, oldest first */
   delays = [];
-  /** @type {{object: number, from: string, to: string, pulse: number, shownAt: number}[]} as shown */
+  /** @type {{object: number, from: string, to: string, pulse: number, shownAt: number}[]} */
   cuts = [];
   /** @type {{object: number, chosenAt: number, shownAt: number | null}[]} Date.now() milliseconds */
   switches = [];
@@ -51,7 +51,7 @@ export class Probe {
   /** @param {Delay} delay */
   frame(delay) {
     this.pulse = delay.pulse;
-    keep(this.delays, delay, DELAYS_KEPT);
+    push(this.delays, delay, DELAYS_KEPT);
   }
 
   /**
@@ -62,17 +62,17 @@ export class Probe {
   view(object, camera, shownAt) {
     const from = this.camera;
     const last = this.switches.at(-1);
-    const fresh = last?.shownAt === null && last.object === object;
-    if (fresh) last.shownAt = shownAt;
+    const isSwitch = last?.shownAt === null && last.object === object;
+    if (isSwitch) last.shownAt = shownAt;
     this.camera = camera;
-    if (!fresh && from && camera && from !== camera && this.pulse !== null) {
-      keep(this.cuts, { object, from, to: camera, pulse: this.pulse, shownAt }, EVENTS_KEPT);
+    if (!isSwitch && from && camera && from !== camera && this.pulse !== null) {
+      push(this.cuts, { object, from, to: camera, pulse: this.pulse, shownAt }, EVENTS_KEPT);
     }
   }
 
   /** @param {number} object */
-  choose(object) {
+  select(object) {
     this.object = object;
-    keep(this.switches, { object, chosenAt: Date.now(), shownAt: null }, EVENTS_KEPT);
+    push(this.switches, { object, chosenAt: Date.now(), shownAt: null }, EVENTS_KEPT);
   }
 }

@@ -7,7 +7,7 @@ const AHEAD_S = 6; // so much before it is needed
 const PATIENCE_MS = 10_000;
 const REST_MS = 2000; // after an answer that did not help
 
-export class Recall {
+export class PastDecisions {
   #asking = false;
   #tired = -Infinity; // until when nothing is asked
 
@@ -27,7 +27,7 @@ export class Recall {
    * @param {number} pulse that is shown
    * @param {number} known from this pulse on the page knows by itself
    */
-  want(pulse, known) {
+  request(pulse, known) {
     const ahead = Math.round(AHEAD_S * this.fps);
     const missing = [pulse, pulse + ahead].find((it) => it < known && !this.decisions.at(it));
     if (missing === undefined || this.#asking || performance.now() < this.#tired) return;

@@ -10,7 +10,7 @@
 
 const LIVE_S = 2; // who is less behind the newest decision than this is live
 
-export class Travel {
+export class TimeShift {
   /** @type {Moment | null} where the past that is watched began; null: it is live */
   moment = null;
   /** Whether the picture is of pulses that have begun anew since. */
@@ -36,11 +36,11 @@ export class Travel {
    * @param {boolean} resumed it is where the picture was paused
    */
   watchFrom(wanted, resumed = false) {
-    const { site, object, probe, decisions, form } = this.viewer;
+    const { site, object, probe, decisions, format } = this.viewer;
     if (!site || object === null || probe.pulse === null) return;
     const pulse = Math.max(0, wanted);
     if (this.stale || pulse >= decisions.end - LIVE_S * site.fps) return this.live();
-    if (form.container === 'webm') return this.#lose(); // of such a site nothing is kept
+    if (format.container === 'webm') return this.#lose(); // of such a site nothing is kept
     this.moment = { pulse, time: pulse / site.fps };
     this.#resumed = resumed;
     this.viewer.goOn();

@@ -62,7 +62,7 @@ async def test_the_pointer_is_followed_in_the_picture_of_the_camera_in_doubt(bro
         await visit.until(f"myview.camera === '{CAMERAS[2]}'")
         there, down, x, y = await middle(visit, 2)
         await visit.page.mouse.move(there, down)
-        await visit.until("myview.pointing.taken >= 5")
+        await visit.until("myview.pointing.accepted >= 5")
         assert {(it["object"], it["camera"]) for it in site.pointed} == {(2, CAMERAS[2])}
         told = [it["pulse"] for it in points(site)]
         assert told == sorted(set(told)), "every frame once"
@@ -94,7 +94,7 @@ async def test_what_is_over_is_seen_again_to_point_at_it_and_then_what_happens_n
         await expect(visit.page.locator("#live")).to_be_visible()
         there, down, *_ = await middle(visit, 2)
         await visit.page.mouse.move(there, down)
-        await visit.until("myview.pointing.taken >= 5")
+        await visit.until("myview.pointing.accepted >= 5")
         # However long the pointer took to get there: the past is as far behind as it was.
         assert over["pulse"] - 2 * 25 < points(site)[0]["pulse"] < site.edge - 3 * 25
         await visit.page.keyboard.press("Escape")
@@ -134,7 +134,7 @@ async def test_by_keyboard_one_can_point_at_whoever_is_watched(browser: Browser)
         await visit.page.keyboard.press("ArrowLeft")
         before = len(site.pointed)
         await visit.page.keyboard.press("Enter")
-        await visit.until(f"myview.pointing.taken > {before}")
+        await visit.until(f"myview.pointing.accepted > {before}")
         assert await visit.get("myview.object") == 1, "arrows move the cross"
         last = points(site)[-1]
         assert (last["x"], last["y"]) == pytest.approx((x, y), abs=WIDTH / 8)
@@ -185,7 +185,7 @@ async def test_a_finger_points_while_it_is_down(browser: Browser) -> None:
         await touch("pointermove", 0)
         await expect(visit.page.locator("#cross")).to_be_hidden()
         await touch("pointerdown", 1)
-        await visit.until("myview.pointing.taken >= 2")
+        await visit.until("myview.pointing.accepted >= 2")
         await touch("pointerup", 0)
         await expect(visit.page.locator("#cross")).to_be_hidden()
 

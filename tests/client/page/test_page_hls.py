@@ -1,4 +1,4 @@
-"""Where there are no Media Source Extensions, as on older iPhones: HLS, which the browser plays by itself."""
+"""Native HLS, where there are no Media Source Extensions, as on older iPhones."""
 
 from __future__ import annotations
 
@@ -15,21 +15,23 @@ from fakes.programs import needs_chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
-AS_A_PHONE = "delete window.MediaSource; delete window.ManagedMediaSource; window.begun = () => NaN;"
-TELLS = "HTMLMediaElement.prototype.getStartDate = function () { return new Date(window.begun(this.src)) };"
-"""Of what Safari adds to a video element; the rest of HLS Chromium plays by itself."""
+WITHOUT_MSE = "delete window.MediaSource; delete window.ManagedMediaSource; window.startTime = () => NaN;"
+WITH_START_DATE = (
+    "HTMLMediaElement.prototype.getStartDate = function () { return new Date(window.startTime(this.src)) };"
+)
+"""Safari's extension of a video element; Chromium plays HLS natively otherwise."""
 
 
 @contextlib.asynccontextmanager
-async def visiting_by_phone(browser: Browser, script: str) -> AsyncIterator[Visit]:
+async def visiting_with_hls(browser: Browser, script: str) -> AsyncIterator[Visit]:
     async with visiting(browser, FakeSite(recorded=600), script=script) as visit:
         if not await visit.get("video.canPlayType('application/vnd.apple.mpegurl')"):
-            pytest.skip("this Chromium does not play HLS by itself")
+            pytest.skip("this Chromium does not play HLS natively")
         yield visit
 
 
-async def test_the_best_view_is_played_and_what_cannot_be_known_is_said(browser: Browser) -> None:
-    async with visiting_by_phone(browser, AS_A_PHONE) as visit:
+async def test_without_frame_times_the_best_view_plays_without_boxes(browser: Browser) -> None:
+    async with visiting_with_hls(browser, WITHOUT_MSE) as visit:
         await visit.until("myview.state === 'playing'")
         assert set(visit.server.site.listed) == {"/objects/1/hls/index.m3u8"}
         assert visit.server.site.opened == []
@@ -45,12 +47,12 @@ async def test_the_best_view_is_played_and_what_cannot_be_known_is_said(browser:
         await visit.until("myview.state === 'playing' && video.currentSrc.includes('/objects/2/hls/')")
 
 
-async def test_where_the_browser_tells_the_time_frames_have_their_pulses(browser: Browser) -> None:
-    async with visiting_by_phone(browser, AS_A_PHONE + TELLS) as visit:
+async def test_with_a_start_date_frames_are_mapped_to_pulses(browser: Browser) -> None:
+    async with visiting_with_hls(browser, WITHOUT_MSE + WITH_START_DATE) as visit:
         await visit.until("myview.state === 'playing'")
-        # Chromium counts from the beginning of the first segment that it fetched.
+        # Chromium's media time 0 is the start of the first segment that it fetched.
         first, pulse0 = visit.server.site.fetched[0], visit.server.site.pulse0
-        await visit.get(f"""void (window.begun = (source) => {{
+        await visit.get(f"""void (window.startTime = (source) => {{
             const from = Number(new URL(source).searchParams.get('from')?.slice(1) ?? {first});
             return ({pulse0} + (from - from % {SEGMENT}) / {FPS}) * 1000;
         }})""")
@@ -73,8 +75,8 @@ async def test_where_the_browser_tells_the_time_frames_have_their_pulses(browser
         await visit.until("!video.currentSrc.includes('from') && myview.state === 'playing'")
 
 
-async def test_a_browser_that_plays_neither_is_told_so(browser: Browser) -> None:
-    nothing = AS_A_PHONE + "HTMLMediaElement.prototype.canPlayType = () => '';"
-    async with visiting(browser, script=nothing) as visit:
+async def test_a_browser_with_neither_shows_that_it_is_unsupported(browser: Browser) -> None:
+    neither = WITHOUT_MSE + "HTMLMediaElement.prototype.canPlayType = () => '';"
+    async with visiting(browser, script=neither) as visit:
         await visit.until("myview.state === 'unsupported'")
         await expect(visit.page.get_by_role("status")).to_contain_text("No live video here")

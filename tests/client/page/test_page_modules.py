@@ -1,4 +1,4 @@
-"""What the page makes of a stream's bytes, in a browser. Its arithmetic is tested without one: units/."""
+"""Parsing and buffering of a stream's bytes, in a browser. Modules without the DOM are tested in units/."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ async def run(page: Page, module: str, code: str) -> Any:
 
 
 @pytest.mark.parametrize("size", [1, 7, 1000, 65_536])
-async def test_a_stream_is_cut_into_the_same_segments_however_it_arrives(page: Page, size: int) -> None:
-    cut = await run(
+async def test_a_stream_is_split_into_the_same_segments_for_any_chunk_size(page: Page, size: int) -> None:
+    split = await run(
         page,
         "player/media/mp4.js",
         f"""
@@ -50,20 +50,21 @@ async def test_a_stream_is_cut_into_the_same_segments_however_it_arrives(page: P
         for (let at = 0; at < all.length; at += {size}) {{
           segments.push(...splitter.push(all.subarray(at, at + {size})));
         }}
-        const joined = m.join(segments.map((s) => s.bytes));
+        const joined = m.concat(segments.map((segment) => segment.bytes));
         const same = joined.length === all.length && joined.every((byte, i) => byte === all[i]);
-        return {{ same, kinds: segments.map((s) => s.kind), starts: segments.map((s) => s.start) }};
+        const [kinds, starts] = ['kind', 'start'].map((key) => segments.map((segment) => segment[key]));
+        return {{ same, kinds, starts }};
         """,
     )
-    assert cut["same"]
-    assert cut["kinds"] == ["init"] + 20 * ["media"]
-    assert cut["starts"][1:] == [pytest.approx((FIRST + i) / FPS, abs=1e-6) for i in range(20)]
+    assert split["same"]
+    assert split["kinds"] == ["init"] + 20 * ["media"]
+    assert split["starts"][1:] == [pytest.approx((FIRST + i) / FPS, abs=1e-6) for i in range(20)]
 
 
 @pytest.mark.parametrize(
     "damage", ["new Array(64).fill(0)", "[...'<html>not found</html>'].map((c) => c.charCodeAt())"]
 )
-async def test_what_is_no_video_is_refused(page: Page, damage: str) -> None:
+async def test_data_that_is_not_mp4_is_rejected(page: Page, damage: str) -> None:
     error = await run(
         page,
         "player/media/mp4.js",
@@ -75,13 +76,13 @@ async def test_what_is_no_video_is_refused(page: Page, damage: str) -> None:
     assert "not an MP4" in error
 
 
-async def test_old_video_is_let_go(page: Page) -> None:
+async def test_old_video_is_removed_from_the_buffer(page: Page) -> None:
     seconds = 90
     ranges = await run(
         page,
-        "player/media/buffer.js",
+        "player/media/media_source.js",
         f"""
-        const {{ SegmentSplitter, join }} = await import('/page/player/media/mp4.js');
+        const {{ SegmentSplitter, concat }} = await import('/page/player/media/mp4.js');
         const source = new MediaSource();
         const video = document.createElement('video');
         video.src = URL.createObjectURL(source);
@@ -90,8 +91,8 @@ async def test_old_video_is_let_go(page: Page) -> None:
         const response = await fetch('/recording.mp4?first={FIRST}&end={FIRST + seconds * FPS}');
         const segments = new SegmentSplitter().push(new Uint8Array(await response.arrayBuffer()));
         for (let i = 0; i < segments.length; i += 25) {{
-          const some = segments.slice(i, i + 25);
-          await buffer.append(join(some.map((s) => s.bytes)), some.at(-1).start);
+          const group = segments.slice(i, i + 25);
+          await buffer.append(concat(group.map((segment) => segment.bytes)), group.at(-1).start);
         }}
         return buffer.ranges;
         """,

@@ -75,7 +75,7 @@ export class Banner {
     write(this.#point, on ? 'Done' : `Point at ${target === null ? '' : label(target)}`);
     this.#toggle.setAttribute('aria-pressed', String(on));
     probe.flags = urgent;
-    probe.pointing = { object: pointing.object, taken: pointing.taken };
+    probe.pointing = { object: pointing.object, accepted: pointing.accepted };
     if (!on && (this.#held !== null || this.#back)) this.#leave();
   }
 
@@ -97,9 +97,9 @@ export class Banner {
       viewer.hold(camera);
       this.#held = camera;
     } // else as the operator wished
-    if (!over || !viewer.site || viewer.travel.moment) return;
-    viewer.travel.watchFrom(pulse - Math.round(BEFORE_S * viewer.site.fps));
-    this.#back = viewer.travel.moment !== null; // it stays live where that is as good
+    if (!over || !viewer.site || viewer.timeShift.moment) return;
+    viewer.timeShift.watchFrom(pulse - Math.round(BEFORE_S * viewer.site.fps));
+    this.#back = viewer.timeShift.moment !== null; // it stays live where that is as good
   }
 
   /** What was held to point is let go, unless somebody has held another meanwhile; and what was past is live. */
@@ -109,7 +109,7 @@ export class Banner {
     this.#back = false;
     if (this.pointing.object !== null) this.pointing.end();
     if (held !== null && this.viewer.override.camera === held) this.viewer.hold(null);
-    if (back && this.viewer.travel.moment) this.viewer.travel.live();
+    if (back && this.viewer.timeShift.moment) this.viewer.timeShift.live();
     this.show();
   }
 }

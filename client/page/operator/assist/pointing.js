@@ -25,7 +25,7 @@ export class Pointing {
   /** The server lets whoever looks at this page point, and its cameras take it. */
   possible = false;
   /** Places that the server has taken. */
-  taken = 0;
+  accepted = 0;
   /** @type {Place | null} where the pointer is; null: not over the picture */
   #at = null;
   #samples = new Samples();
@@ -117,12 +117,12 @@ export class Pointing {
 
   /** @returns {Place} where the cross begins: on the one who is pointed at, if they are in the picture */
   #start() {
-    const { site, now } = this.viewer;
+    const { site, currentFrame } = this.viewer;
     const { width, height } = this.stage.getBoundingClientRect();
-    const box = now.boxes.find(([object]) => object === this.object);
+    const box = currentFrame.boxes.find(([object]) => object === this.object);
     if (!site || !box) return { x: width / 2, y: height / 2, tolerance: REACH.other };
     const [, left, top, right, bottom] = box;
-    return { ...this.overlay.onScreen((left + right) / 2, (top + bottom) / 2, site), tolerance: REACH.other };
+    return { ...this.overlay.toCanvas((left + right) / 2, (top + bottom) / 2, site), tolerance: REACH.other };
   }
 
   /** @param {Place | null} at */
@@ -134,10 +134,10 @@ export class Pointing {
 
   /** @param {Place} at in the frame that is shown */
   #sample({ x, y, tolerance }) {
-    const { site, probe, now, player } = this.viewer;
-    if (this.object === null || !site || !now.mapped || player.landing) return;
+    const { site, probe, currentFrame, player } = this.viewer;
+    if (this.object === null || !site || !currentFrame.mapped || player.switching) return;
     if (probe.pulse === null || probe.camera === null) return;
-    const { scale, ...place } = this.overlay.inPicture(x, y, site);
+    const { scale, ...place } = this.overlay.toPicture(x, y, site);
     if (!(place.x >= 0 && place.x <= site.width && place.y >= 0 && place.y <= site.height)) return;
     this.#samples.add(this.object, probe.camera, { pulse: probe.pulse, ...place, tolerance: tolerance / scale });
   }
@@ -148,7 +148,7 @@ export class Pointing {
     try {
       for (let said = this.#samples.take(); said; said = this.#samples.take()) {
         const { accepted } = await ask('position_corrections', 'POST', said);
-        this.taken += accepted;
+        this.accepted += accepted;
         this.tell(null);
       }
     } catch (error) {

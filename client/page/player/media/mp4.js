@@ -1,65 +1,68 @@
 /**
- * Cuts a progressive fragmented MP4 (ISO/IEC 14496-12) into whole segments.
+ * Splits a fragmented MP4 stream (ISO/IEC 14496-12) into whole segments.
  *
- * Only whole segments are ever appended to a SourceBuffer, so that a stream can be left at any byte
- * and another continued in its place.
+ * Only whole segments are appended to a SourceBuffer, so that a stream can be cancelled at any byte and another
+ * continue in its place.
  */
 
-const LARGEST_BOX = 64 * 1024 * 1024; // bytes; beyond any frame: such a size is damage, not video
-const SOUND = 0x736f756e; // "soun"
+const MAX_BOX = 64 * 1024 * 1024; // bytes; a larger size means damaged data
+const AUDIO_HANDLER = 0x736f756e; // "soun"
 
 /**
  * @typedef {object} Segment
- * @property {'init' | 'media' | 'sound'} kind media: pictures
+ * @property {'init' | 'media' | 'audio'} kind media: video
  * @property {Uint8Array} bytes
- * @property {number} start seconds of media time of the first picture; 0 for all else
+ * @property {number} start media time of the first frame, seconds; 0 for init and audio
  */
 
 export class SegmentSplitter {
-  /** @type {Uint8Array} bytes of a segment that is not whole yet */
-  #rest = new Uint8Array(0);
+  /** @type {Uint8Array} bytes of an incomplete segment */
+  #pending = new Uint8Array(0);
   #timescale = 0;
-  /** @type {number | null} number of the track of sound */
-  #sound = null;
+  /** @type {number | null} id of the audio track */
+  #audioTrack = null;
 
   /**
    * @param {Uint8Array} chunk
-   * @returns {Segment[]} what has become whole
-   * @throws {Error} when the bytes are no MP4
+   * @returns {Segment[]} the segments that are now complete
+   * @throws {Error} when the data is not MP4
    */
   push(chunk) {
-    this.#rest = join([this.#rest, chunk]);
+    this.#pending = concat([this.#pending, chunk]);
     const segments = [];
     let from = 0;
-    for (const box of boxes(this.#rest)) {
+    for (const box of boxes(this.#pending)) {
       if (box.type !== 'moov' && box.type !== 'mdat') continue;
-      segments.push(this.#segment(box.type, this.#rest.slice(from, box.end)));
+      segments.push(this.#segment(box.type, this.#pending.slice(from, box.end)));
       from = box.end;
     }
-    this.#rest = this.#rest.slice(from);
+    this.#pending = this.#pending.slice(from);
     return segments;
   }
 
   /**
-   * @param {string} last type of the box that closes the segment
+   * @param {string} last type of the box that ends the segment
    * @param {Uint8Array} bytes
    * @returns {Segment}
    */
   #segment(last, bytes) {
     if (last === 'moov') {
       this.#timescale = timescale(find(bytes, ['moov', 'trak', 'mdia', 'mdhd']));
-      this.#sound = soundTrack(bytes);
+      this.#audioTrack = audioTrackId(bytes);
       return { kind: 'init', bytes, start: 0 };
     }
     const track = find(bytes, ['moof', 'traf', 'tfhd']).getUint32(4);
-    if (track === this.#sound) return { kind: 'sound', bytes, start: 0 };
+    if (track === this.#audioTrack) return { kind: 'audio', bytes, start: 0 };
     const ticks = decodeTime(find(bytes, ['moof', 'traf', 'tfdt']));
     return { kind: 'media', bytes, start: ticks / this.#timescale };
   }
 }
 
-/** @param {Uint8Array[]} parts */
-export function join(parts) {
+/**
+ * @param {Uint8Array[]} parts
+ * @returns {Uint8Array}
+ */
+export function concat(parts) {
   const whole = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
   let at = 0;
   for (const part of parts) {
@@ -70,7 +73,7 @@ export function join(parts) {
 }
 
 /**
- * The whole boxes at the start of some bytes, in order.
+ * Yield the complete boxes at the start of some bytes, in order.
  *
  * @param {Uint8Array} bytes
  */
@@ -85,7 +88,7 @@ function* boxes(bytes) {
       size = Number(view.getBigUint64(at + 8));
       header = 16;
     }
-    if (size < header || size > LARGEST_BOX) throw new Error(`not an MP4 box of ${size} bytes`);
+    if (size < header || size > MAX_BOX) throw new Error(`not an MP4 box of ${size} bytes`);
     if (at + size > bytes.length) return;
     const type = String.fromCharCode(...bytes.subarray(at + 4, at + 8));
     yield { type, body: bytes.subarray(at + header, at + size), end: at + size };
@@ -112,10 +115,10 @@ function find(bytes, path) {
  * @param {Uint8Array} init
  * @returns {number | null}
  */
-function soundTrack(init) {
+function audioTrackId(init) {
   const moov = [...boxes(init)].find((box) => box.type === 'moov');
   for (const { type, body } of boxes(moov?.body ?? new Uint8Array(0))) {
-    if (type !== 'trak' || find(body, ['mdia', 'hdlr']).getUint32(8) !== SOUND) continue;
+    if (type !== 'trak' || find(body, ['mdia', 'hdlr']).getUint32(8) !== AUDIO_HANDLER) continue;
     const tkhd = find(body, ['tkhd']);
     return tkhd.getUint32(tkhd.getUint8(0) === 1 ? 20 : 12);
   }

@@ -1,81 +1,85 @@
-/** One person's stream being downloaded, and asked for again whenever it fails. */
+/** Downloads a person's stream as whole segments, and requests it again whenever it fails. */
 
 import { Backoff } from '../../shared/backoff.js';
-import { download } from './segment_download.js';
+import { atLeastTwoGops } from '../latency_control.js';
+import { SegmentSplitter } from './mp4.js';
+import { ClusterSplitter } from './webm.js';
 import { pause, Refused } from '../../shared/requests.js';
-import { streamOf } from '../subject.js';
+import { streamUrl } from '../stream_selection.js';
 
 /** @import {Segment} from './mp4.js' */
 /** @import {Moment} from '../../timeline/time_shift.js' */
-/** @import {Subject} from '../subject.js' */
+/** @import {StreamSelection} from '../stream_selection.js' */
+
+const IDLE_S = 6; // a live stream without data for this long is treated as broken
 
 /**
- * @typedef {object} Taker
- * @property {(run: Run, segments: Segment[]) => Promise<void>} take
- * @property {(refused: boolean) => void} ended there is nothing more of this past, or nothing is kept of it at all
- * @property {() => number} reached media time up to which the past has come
+ * @typedef {object} DownloadListener
+ * @property {(download: StreamDownload, segments: Segment[]) => Promise<void>} received
+ * @property {(refused: boolean) => void} ended a past stream has ended; refused: there is no such recording
+ * @property {() => number} bufferedEnd media time up to which the stream is buffered
  */
 
-export class Run {
-  /** Media time of the first frame since it was last asked for; NaN before that came. */
+export class StreamDownload {
+  /** Media time of the first frame since the last request; NaN: none was received. */
   start = NaN;
-  /** performance.now() of when that frame was in the buffer; NaN before. */
-  since = NaN;
-  /** Whether any frame has come yet. */
-  begun = false;
-  /** Whether the picture now comes from it. */
-  landed = false;
-  /** @type {Segment[]} sound that has come before the first picture */
-  early = [];
-  #leave = new AbortController();
+  /** performance.now() when that frame was in the buffer; NaN before. */
+  bufferedAt = NaN;
+  /** Whether a frame was received. */
+  hasFrames = false;
+  /** Whether the element displays this stream. */
+  onScreen = false;
+  /** @type {Segment[]} audio received before the first video segment */
+  earlyAudio = [];
+  #controller = new AbortController();
 
   /**
-   * @param {Subject} subject
-   * @param {number} gopS seconds of a GOP, which may come all at once
+   * @param {StreamSelection} selection
+   * @param {number} gopS seconds of a GOP, which may arrive in one burst
    */
-  constructor(subject, gopS) {
-    this.subject = subject;
+  constructor(selection, gopS) {
+    this.selection = selection;
     this.gopS = gopS;
   }
 
-  get left() {
-    return this.#leave.signal.aborted;
+  get cancelled() {
+    return this.#controller.signal.aborted;
   }
 
-  leave() {
-    this.#leave.abort();
+  cancel() {
+    this.#controller.abort();
   }
 
   /**
-   * Until it is left, or a past is over.
+   * Download until cancelled, or until a past stream ends.
    *
    * @param {string} container
-   * @param {Taker} taker
+   * @param {DownloadListener} listener
    */
-  async follow(container, { take, ended, reached }) {
-    const { signal } = this.#leave;
+  async run(container, { received, ended, bufferedEnd }) {
+    const { signal } = this.#controller;
     const backoff = new Backoff();
-    let from = this.subject.past;
-    while (!this.left) {
+    let from = this.selection.past;
+    while (!this.cancelled) {
       let refused = false;
       let broken = false;
       try {
-        for await (const segments of download(streamOf(this.subject, container, from), signal, this.gopS)) {
-          await take(this, segments);
-          if (this.left) return;
+        for await (const segments of downloadSegments(streamUrl(this.selection, container, from), signal, this.gopS)) {
+          await received(this, segments);
+          if (this.cancelled) return;
           backoff.reset();
         }
       } catch (error) {
-        // Whatever it was (the server away, the person not known yet), the answer is to try again.
-        if (!this.left) console.info(`the stream of ${this.subject.object}: ${error}`);
+        // Server unreachable, person unknown and the like: retry.
+        if (!this.cancelled) console.info(`stream of person ${this.selection.object}: ${error}`);
         refused = error instanceof Refused && error.forGood;
         broken = !refused;
       }
-      if (this.left) return;
+      if (this.cancelled) return;
       if (from && !broken) return ended(refused);
-      if (from && this.begun) from = onwards(from, reached());
-      this.start = this.since = NaN;
-      this.early = [];
+      if (from && this.hasFrames) from = advance(from, bufferedEnd());
+      this.start = this.bufferedAt = NaN;
+      this.earlyAudio = [];
       await pause(backoff.next(), signal);
     }
   }
@@ -83,9 +87,45 @@ export class Run {
 
 /**
  * @param {Moment} from
- * @param {number} time seconds, of media
- * @returns {Moment} that one, by the same frames to a second
+ * @param {number} time media time, seconds
+ * @returns {Moment} the moment at that time, or `from` where that is not later
  */
-function onwards(from, time) {
+function advance(from, time) {
   return from.time > 0 && time > from.time ? { pulse: Math.floor((time * from.pulse) / from.time), time } : from;
+}
+
+/**
+ * Yield the whole segments of a stream in groups, as they arrive; return when the stream ends.
+ *
+ * @param {string} address of an MP4, or of a WebM by its extension
+ * @param {AbortSignal} signal
+ * @param {number} gopS seconds of a GOP
+ * @returns {AsyncGenerator<Segment[], void>}
+ * @throws {Error} when there is no such stream, or it fails or is idle for too long
+ */
+async function* downloadSegments(address, signal, gopS) {
+  const request = new AbortController();
+  const idleMs = 1000 * atLeastTwoGops(IDLE_S, gopS);
+  let timer = setTimeout(() => request.abort(), idleMs);
+  const abort = () => request.abort(); // AbortSignal.any is missing on the oldest supported iPhones
+  signal.addEventListener('abort', abort);
+  if (signal.aborted) abort();
+  try {
+    const response = await fetch(address, { cache: 'no-store', signal: request.signal });
+    if (!response.ok || !response.body) throw new Refused(address, response.status);
+    const reader = response.body.getReader();
+    const splitter = address.split('?')[0].endsWith('.webm') ? new ClusterSplitter() : new SegmentSplitter();
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) return;
+      clearTimeout(timer);
+      timer = setTimeout(() => request.abort(), idleMs);
+      const segments = splitter.push(value);
+      if (segments.length) yield segments;
+    }
+  } finally {
+    clearTimeout(timer);
+    signal.removeEventListener('abort', abort);
+    request.abort(); // close the connection when the consumer stops early
+  }
 }

@@ -1,4 +1,4 @@
-/** A live WebM, cut into whole segments wherever the network cuts it. */
+/** Splitting a live WebM stream into whole segments. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -20,7 +20,7 @@ const HEAD = [
 const PICTURES = [picture(40, 300), picture(80, 5), picture(3_600_120, 20_000)];
 const STREAM = Uint8Array.from([...HEAD, ...PICTURES.flat()]);
 
-test('segments are whole, in order, with their times, however the bytes come', () => {
+test('segments are whole, in order and timed, for any chunk size', () => {
   for (const step of [1, 7, 100, 5000, STREAM.length]) {
     const splitter = new ClusterSplitter();
     const segments = [];
@@ -33,7 +33,7 @@ test('segments are whole, in order, with their times, however the bytes come', (
   }
 });
 
-test('what is no WebM is refused', () => {
+test('data that is not WebM is rejected', () => {
   assert.throws(() => new ClusterSplitter().push(Uint8Array.from([0, 0, 0, 24, 102])), /not a WebM/);
   const huge = Uint8Array.from([0x1f, 0x43, 0xb6, 0x75, 0x08, 255, 255, 255, 255]);
   assert.throws(() => new ClusterSplitter().push(huge), /of \d+ bytes/);

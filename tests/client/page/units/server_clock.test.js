@@ -1,11 +1,11 @@
-/** The server's clock, guessed from questions and answers. */
+/** The offset of the server's clock, estimated from requests and answers. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { ServerClock } from '../../../../client/page/player/clock.js';
+import { ServerClock } from '../../../../client/page/player/server_clock.js';
 
-test('the quickest answer is believed', () => {
+test('the sample with the shortest round trip counts', () => {
   const clock = new ServerClock();
   clock.add(0, 800, 7);
   clock.add(1000, 1010, 3.505);
@@ -13,7 +13,7 @@ test('the quickest answer is believed', () => {
   assert.equal(clock.offset, 2500);
 });
 
-test('of long ago nothing is kept, and of another server neither', () => {
+test('old samples are dropped, and those of another server', () => {
   const clock = new ServerClock();
   assert.equal(clock.offset, null);
   clock.add(0, 2, 1.001);
@@ -23,7 +23,7 @@ test('of long ago nothing is kept, and of another server neither', () => {
   assert.equal(clock.offset, null);
 });
 
-test('it is wrong by half the round trip at most', () => {
+test('the error is at most half the round trip', () => {
   for (let sent = 0; sent < 50; sent += 7) {
     for (const [there, back] of [[0, 40], [40, 0], [3, 4], [200, 10]]) {
       const clock = new ServerClock();

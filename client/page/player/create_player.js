@@ -1,0 +1,24 @@
+/** Creates the kind of player that the browser supports. */
+
+import { HlsPlayer } from './hls_player.js';
+import { MediaSourceClass } from './media/media_source.js';
+import { MsePlayer } from './mse_player.js';
+
+/** @import {PlayerListener} from './mse_player.js' */
+
+/**
+ * @typedef {object} StreamFormat of all streams of a site
+ * @property {string} container mp4 or webm
+ * @property {string} codec RFC 6381: of the video, followed by a comma and that of the audio if there is any
+ * @property {number | null} pulse0 Unix seconds of media time 0
+ * @property {number} gopS seconds of a GOP, which may arrive in one burst
+ */
+
+/**
+ * @param {HTMLVideoElement} video
+ * @param {PlayerListener} listener
+ * @returns {MsePlayer | HlsPlayer}
+ */
+export function createPlayer(video, listener) {
+  return MediaSourceClass ? new MsePlayer(video, listener) : new HlsPlayer(video, listener);
+}

@@ -1,0 +1,33 @@
+/** When the video element switches to a newly started stream, and at which media time. */
+
+import { atLeastTwoGops } from './latency_control.js';
+
+/** @import {StreamDownload} from './media/stream_download.js' */
+
+const RESTARTED_S = 10; // a stream that starts this far back belongs to a site whose pulses have restarted
+const CATCH_UP_MS = 300; // how long a new stream may take to reach the displayed media time
+const INSIDE_S = 0.001; // a seek to the very start of a range may round to just before it
+
+/**
+ * @param {number} start media time of a stream's first frame
+ * @param {number} time displayed media time
+ * @param {number} gopS seconds of a GOP
+ * @returns {boolean} whether the site's pulses have restarted
+ */
+export function hasRestarted(start, time, gopS) {
+  return start < time - atLeastTwoGops(RESTARTED_S, gopS);
+}
+
+/**
+ * @param {StreamDownload} stream with frames in the buffer
+ * @param {number} end media time up to which it is buffered
+ * @param {number} time displayed media time
+ * @param {number} now performance.now()
+ * @returns {number | null} media time to seek to; null: wait until more is buffered
+ */
+export function switchTime({ start, bufferedAt, gopS, selection: { past } }, end, time, now) {
+  if (past) return end > past.time ? Math.max(past.time, start) + INSIDE_S : null;
+  if (start <= time && time < end) return time;
+  const unreachable = time < start || hasRestarted(start, time, gopS);
+  return unreachable || now - bufferedAt >= CATCH_UP_MS ? start + INSIDE_S : null;
+}
