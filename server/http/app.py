@@ -1,4 +1,4 @@
-"""The HTTP application: its middlewares, routes and shared parts; and serving it."""
+"""The HTTP application: middlewares, routes, shared state, background tasks, and the server."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from server.http.access.authentication import Authenticator
 from server.http.access.authorization import ACCESS, AccessControl, authorize, forbid_shared_caching
 from server.http.access.cors import answer_preflight
 from server.http.access.csrf import forbid_cross_origin_reads
-from server.http.api import handlers, openapi, recordings, site_handlers
+from server.http.api import openapi, recordings
+from server.http.api import routes as api
 from server.http.api.events import EVENTS, Events
-from server.http.api.query_validation import validate_query
 from server.http.api.shard_redirect import redirect_to_shard
 from server.http.app_keys import ON_DISK, SERVICE
 from server.http.connections.connection_limit import FOR_OPERATORS, connection_limit
@@ -36,7 +36,7 @@ from server.http.metrics import http_collector
 from server.http.metrics.http_collector import add_metrics
 from server.http.operator import routes as operator
 from server.http.streams import jpeg, video
-from server.http.streams.container_check import check_container
+from server.http.streams.request_validation import check_container, validate_query
 from server.http.tls import Certificate
 from server.http.viewers.fair_share import FairShare
 from server.http.viewers.hls_sessions import HLS_SESSIONS, HlsSessions
@@ -48,14 +48,13 @@ from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
-_BODY_MOST = 65_536
-"""Bytes of a request's body: it is JSON; larger bodies would let clients fill the memory."""
-_SHUTDOWN_S = 1.0
-"""How long viewers have to take what was sent before the server ends."""
+_BODY_MAX_BYTES = 65_536
+"""Limit of a request's body, which is JSON; larger bodies would let clients fill the memory."""
+_SHUTDOWN_TIMEOUT_S = 1.0
+"""How long the server waits at shutdown until viewers have received what was sent."""
 _ROUTES = (
-    handlers,
+    api,
     session_routes,
-    site_handlers,
     recordings,
     http_collector,
     video,
@@ -73,7 +72,7 @@ def make_app(
     """Build the application on top of a service; ``on_disk`` returns how the configuration file differs.
 
     Raises:
-        UserError: the file of tokens cannot be read, or something in it is wrong.
+        UserError: the token file cannot be read or is invalid.
     """
     app = web.Application(
         middlewares=[
@@ -85,7 +84,7 @@ def make_app(
             check_container,
             redirect_to_shard,
         ],
-        client_max_size=_BODY_MOST,
+        client_max_size=_BODY_MAX_BYTES,
     )
     app[SERVICE], app[ON_DISK], app[FAILURES] = service, on_disk, LogThrottle()
     app[EVENTS], app[TRAFFIC] = Events(service), Traffic()
@@ -118,16 +117,20 @@ async def serving(app: web.Application, settings: HttpSettings) -> AsyncIterator
         UserError: the port cannot be listened on, or the certificate cannot be read.
     """
     certificate = Certificate.of(settings.tls)
-    handling = {"access_log": None, "logger": AIOHTTP_LOG, "keepalive_timeout": settings.keepalive_timeout_s}
-    # Bodies are not decompressed: a few bytes that expand to many would block all streams.
-    runner = web.AppRunner(app, shutdown_timeout=_SHUTDOWN_S, handler_cancellation=True)
+    handling = {
+        "access_log": None,
+        "logger": AIOHTTP_LOG,
+        "keepalive_timeout": settings.keepalive_timeout_s,
+    }
+    # Bodies are not decompressed: a small body that expands to a huge one would block all streams.
+    runner = web.AppRunner(app, shutdown_timeout=_SHUTDOWN_TIMEOUT_S, handler_cancellation=True)
     await runner.setup()
-    assert runner.server is not None  # noqa: S101 — tells mypy that it was made
+    assert runner.server is not None  # noqa: S101 — setup() has created it
     runner.server.request_handler = refuse_expectations(runner.server.request_handler)
     context = None if certificate is None else certificate.context
     limits = _limits(app[SERVICE].config.model_copy(update={"http": settings}))
     listener = Listener(runner.server, ConnectionLimiter(limits), context, auto_decompress=False, **handling)
-    watching_certificate = (
+    certificate_task = (
         None if certificate is None else asyncio.create_task(certificate.run(), name="certificate")
     )
     try:
@@ -141,13 +144,13 @@ async def serving(app: web.Application, settings: HttpSettings) -> AsyncIterator
                 ) from error
             yield port
     finally:
-        if watching_certificate is not None:
-            watching_certificate.cancel()
+        if certificate_task is not None:
+            certificate_task.cancel()
         await runner.cleanup()
 
 
 def _limits(config: Config) -> ConnectionLimits:
-    """Return the limits of the configuration, lowered to as many connections as files may be open."""
+    """Return the configured connection limits, lowered to fit the limit of open files."""
     http, descriptors = config.http, descriptor_limit()
     most = connection_limit(config, descriptors)
     if most < http.connections:

@@ -1,4 +1,4 @@
-"""What the HTTP application carries for all of its handlers."""
+"""Keys of what the HTTP application provides to all handlers."""
 
 from __future__ import annotations
 
@@ -11,4 +11,4 @@ from server.service.service import BestViewService
 
 SERVICE = web.AppKey("service", BestViewService)
 ON_DISK: web.AppKey[Callable[[], ConfigFileState]] = web.AppKey("on disk")
-"""How the configuration file on disk differs from the configuration in force."""
+"""Returns how the configuration file differs from the configuration in force."""

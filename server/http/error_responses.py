@@ -1,4 +1,4 @@
-"""Errors of handlers as answers: one line of JSON each, and breaking off what has already begun."""
+"""Error responses: one line of JSON for each error; an answer that has begun is broken off."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from server.service.facade.errors import (
 log = logging.getLogger(__name__)
 
 FAILURES = web.AppKey("failures", LogThrottle)
-"""Throttles the log of handlers that fail."""
+"""Throttles the log of handler errors."""
 _BEGUN = web.RequestKey("begun", web.StreamResponse)
-"""The answer to a request, once its head has been sent."""
+"""The response to a request whose head has been sent."""
 _RESET_ON_CLOSE = struct.pack("ii", 1, 0)
 """SO_LINGER on, for 0 seconds: the connection is reset instead of closed."""
 _STATUS: dict[type[RefusedError], int] = {
@@ -40,7 +40,7 @@ _STATUS: dict[type[RefusedError], int] = {
 async def answer_errors(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
-    """Answer every error with one line of JSON; a traceback is for the log."""
+    """Answer every error with one line of JSON; tracebacks go to the log."""
     try:
         return await handler(request)
     except RefusedError as error:
@@ -56,7 +56,7 @@ async def answer_errors(
             log.exception("answering %s %s failed%s", request.method, request.path, more)
         begun: web.StreamResponse | None = request.get(_BEGUN)
         if begun is None:
-            return error_response(500, "internal server error; the server's log says more")
+            return error_response(500, "internal server error; see the server's log")
         break_off(request)
         return begun
 
@@ -74,19 +74,19 @@ def _http_error(request: web.Request, error: web.HTTPException) -> web.Response:
 
 
 def refusal(error: RefusedError) -> web.Response:
-    """Return the answer to a query or command that the service refuses."""
+    """Return the response to a query or command that the service refuses."""
     if isinstance(error, UnknownObjectError) and error.is_recovering:
         return unavailable(str(error))
     return error_response(_STATUS[type(error)], str(error))
 
 
 async def note_begun(request: web.Request, response: web.StreamResponse) -> None:
-    """Note that the head of an answer is being sent: no other answer is possible any more."""
+    """Record that the head of a response is being sent: an error can no longer change its status."""
     request[_BEGUN] = response
 
 
 def break_off(request: web.Request) -> None:
-    """Reset the connection in the middle of an answer: with HTTP/1.0 any orderly end would look complete."""
+    """Reset the connection: after an orderly close an HTTP/1.0 client would take the answer for complete."""
     connection = request.get_extra_info("socket")
     if connection is not None:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET_ON_CLOSE)

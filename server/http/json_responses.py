@@ -1,4 +1,4 @@
-"""JSON in and out: answers, one-line errors, and the body of a request."""
+"""JSON responses, one-line errors, and parsing of request bodies."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ Body = TypeVar("Body")
 
 
 class Problem(msgspec.Struct, frozen=True):
-    """Why there is no answer."""
+    """An error."""
 
     error: str
 
 
 def json_response(content: Any, status: int = 200) -> web.Response:
-    """Return content as a JSON answer that any origin may read and that is not cached."""
+    """Return content as a JSON response that any origin may read and that is not cached."""
     return web.Response(
         body=msgspec.json.encode(content),
         status=status,
@@ -38,17 +38,17 @@ def error_response(status: int, error: str) -> web.Response:
 
 
 def unavailable(error: str) -> web.Response:
-    """Return 503 with when to try again."""
+    """Return 503 with a Retry-After header."""
     response = error_response(503, error)
     response.headers["Retry-After"] = RETRY_AFTER_S
     return response
 
 
 async def read_json(request: web.Request, kind: type[Body]) -> Body:
-    """Read the body of a request.
+    """Parse the JSON body of a request.
 
     Raises:
-        web.HTTPBadRequest: it is not JSON of that kind.
+        web.HTTPBadRequest: the body is not valid JSON of this type.
     """
     try:
         with _reading_body(request):
@@ -63,15 +63,15 @@ class TracksBody(Protocol):
     """A connection's protocol that tracks whether a body is still being received."""
 
     def body_pending(self) -> None:
-        """Note that the request is not complete yet."""
+        """Report that the request's body is still to come."""
 
     def body_received(self) -> None:
-        """Note that it is."""
+        """Report that the body is complete."""
 
 
 @contextmanager
 def _reading_body(request: web.Request) -> Iterator[None]:
-    """Let the connection pool know inside that the request is not complete: it may time out."""
+    """Report inside that the body is being received, so that the connection may time out."""
     protocol = request.protocol
     if not isinstance(protocol, TracksBody):
         yield

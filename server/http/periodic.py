@@ -1,4 +1,4 @@
-"""Periodic tasks, for as long as the server runs."""
+"""Periodic background tasks."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ log = logging.getLogger(__name__)
 
 
 async def run_periodically(every_s: float, step: Callable[[], Awaitable[None]], what: str) -> NoReturn:
-    """Run a step every so many seconds; ``what`` it does is logged where it fails.
+    """Run a step every ``every_s`` seconds; ``what`` names it in the log.
 
-    An error does not end the loop: no one awaits its task, so the end would go unnoticed. Equal errors in a
-    row are logged once.
+    An error does not end the loop: its task is not awaited, so its end would go unnoticed. Consecutive equal
+    errors are logged once.
     """
     failed = ""
     while True:

@@ -1,4 +1,4 @@
-"""Static files: the web page, which the client package owns."""
+"""Static files of the web page, from the package ``client``."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ routes = web.RouteTableDef()
 
 _FOLDER = Path(str(files("client") / "page")).resolve()
 _HEADERS = {
-    "Cache-Control": "no-cache",  # ask again each time: an upgraded server must not meet an old page
+    "Cache-Control": "no-cache",  # revalidate each time: an upgraded server must not meet an old page
     "Content-Security-Policy": (
         "default-src 'self'; media-src 'self' blob:; img-src 'self' data: blob:; "
-        "frame-ancestors 'none'"  # or another site's page could lead a click here, and operate by it
+        "frame-ancestors 'none'"  # against clickjacking of the operator's page
     ),
     "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "same-origin",  # an address may say who is watched
+    "Referrer-Policy": "same-origin",  # a URL may contain the number of the watched person
 }
 
 
 def page_file(name: str) -> web.FileResponse:
-    """Return a file of the page that is known to exist."""
+    """Return a file of the page; it must exist."""
     return web.FileResponse(_FOLDER / name, headers=_HEADERS)
 
 
@@ -45,9 +45,9 @@ async def get_file(request: web.Request) -> web.StreamResponse:
 
 
 def _file(name: str) -> Path | None:
-    """Find one of the page's files; nothing outside its folder."""
+    """Return the path of a file of the page; None: it is outside the folder, or does not exist."""
     try:
         path = (_FOLDER / name).resolve()
         return path if path.is_relative_to(_FOLDER) and path.is_file() else None
-    except (OSError, ValueError):  # a name that no file can have: too long, or with a null in it
+    except (OSError, ValueError):  # no valid file name: too long, or with a null character
         return None

@@ -1,4 +1,4 @@
-"""HTTPS from certificate files, which are read again when they change."""
+"""HTTPS: the server's certificate, reloaded when its files change."""
 
 from __future__ import annotations
 
@@ -17,43 +17,43 @@ _CHECK_EVERY_S = 5.0
 
 
 class Certificate:
-    """A certificate and its key. New connections use the newest that could be read."""
+    """A certificate and its key; new connections use the newest valid version."""
 
     def __init__(self, certificate: Path, key: Path) -> None:
         """Read both files.
 
         Raises:
-            UserError: they cannot be read, or do not belong together.
+            UserError: they cannot be read, or do not belong to each other.
         """
         self._certificate, self._key = certificate, key
         self._seen = self._state()
         """The state of the files that are in force."""
         self._error = ""
-        """Why the files as they are now could not be read; logged once."""
+        """The error of the current files, logged once; empty: they are valid."""
         self._newest = self._load()
         self.context = self._newest
-        # A context keeps what it has loaded beside a later key of another kind: each pair has its own.
+        # One context per pair: a context keeps a loaded pair beside a later one with another type of key.
         self.context.sni_callback = self._use_newest
 
     @classmethod
     def of(cls, settings: TlsSettings) -> Certificate | None:
-        """Read the files that a configuration names; None: it names none.
+        """Read the configured files; None: none are configured.
 
         Raises:
-            UserError: it cannot be read.
+            UserError: they cannot be read, or do not belong to each other.
         """
         if settings.certificate is None or settings.key is None:
             return None
         return cls(settings.certificate, settings.key)
 
     def reload_if_changed(self) -> None:
-        """Read the files again if they have changed; what cannot be read leaves the old one in force."""
+        """Reload changed files; while they are invalid, the previous certificate stays in force."""
         now = self._state()
         if now == self._seen:
             return
         try:
             self._newest = self._load()
-        except UserError as error:  # read again at the next check: it may be half of a renewal
+        except UserError as error:  # retried at the next check: a renewal may be half done
             if str(error) != self._error:
                 log.warning("%s; the previous certificate stays in force", error)
             self._error = str(error)
@@ -62,8 +62,8 @@ class Certificate:
             log.info("%s: used for new connections", self._certificate)
 
     async def run(self) -> None:
-        """Check for changed files again and again."""
-        await run_periodically(_CHECK_EVERY_S, self._reload, "reading the certificate again")
+        """Check for changed files periodically."""
+        await run_periodically(_CHECK_EVERY_S, self._reload, "reloading the certificate")
 
     async def _reload(self) -> None:
         self.reload_if_changed()
@@ -80,7 +80,7 @@ class Certificate:
                 raise UserError(f"http.tls.{what}: cannot read {path}: {error.strerror}") from error
         try:
             context.load_cert_chain(self._certificate, self._key, password=_no_password)
-        except (OSError, ValueError) as error:  # of ssl, or one of them has gone this very moment
+        except (OSError, ValueError) as error:  # an SSL error, or a file was removed meanwhile
             reason = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
             raise UserError(
                 f"http.tls: {self._certificate} and {self._key} are not a certificate and its key: {reason}"
@@ -88,7 +88,7 @@ class Certificate:
         return context
 
     def _state(self) -> tuple[FileState | None, ...]:
-        return tuple(file_state(it) for it in (self._certificate, self._key))
+        return tuple(file_state(path) for path in (self._certificate, self._key))
 
 
 def _no_password() -> str:

@@ -1,7 +1,7 @@
-"""Authentication: which token or session a request comes with, and whether that is valid now.
+"""Authentication: find the token or session of a request and check that it is valid.
 
-A token arrives as ``Authorization: Bearer``, as ``?token=``, or by a session, which is a cookie. Unknown,
-revoked and expired ones are refused here, and so are addresses that send too many wrong ones.
+A token comes as ``Authorization: Bearer``, as ``?token=``, or through a session cookie. Unknown, revoked and
+expired tokens are refused here, and addresses that send too many wrong ones are rate limited.
 """
 
 from __future__ import annotations
@@ -16,59 +16,59 @@ from pathlib import Path
 from aiohttp import web
 
 from server.config.tokens_file import Token, token_digest
-from server.http.access.login_rate_limit import LoginRateLimit
 from server.http.access.permissions import Grant
 from server.http.access.sessions import Sessions
 from server.http.access.token_store import TokenStore
+from server.http.access.wrong_token_rate_limit import WrongTokenRateLimit
 from server.http.json_responses import error_response
 
 COOKIE_PREFIX = "myview"
 _VALID_KEPT = 4096
-"""Valid tokens that are remembered with the address they came from: others' failures do not delay them."""
+"""Valid tokens remembered by address; wrong tokens from the same address do not delay them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Credential:
-    """What a request authenticates by: the SHA-256 of a token, and of a session's identifier, if any."""
+    """The SHA-256 of a request's token, and of its session identifier if it has a session."""
 
     token: str
     session: str | None = None
 
 
 class Authenticator:
-    """Finds the credential of a request and the grant that it gives now.
+    """Finds the credential of a request and its current grant.
 
-    ``what`` names the service among those of its machine; ``numbered_since`` returns since when people's
-    numbers mean the same people, unix seconds; ``now`` is a clock that never steps.
+    ``service_name`` distinguishes the service from others on its machine; ``numbered_since`` returns the unix
+    time since which person numbers have kept their meaning; ``now`` is a monotonic clock in seconds.
     """
 
     def __init__(
         self,
         tokens: Path | None,
-        what: str = "site",
+        service_name: str = "site",
         now: Callable[[], float] = time.monotonic,
         numbered_since: Callable[[], float] = lambda: 0.0,
     ) -> None:
-        """Read the file of tokens.
+        """Read the token file.
 
         Raises:
             UserError: it cannot be read, or something in it is wrong.
         """
-        self.cookie = f"{COOKIE_PREFIX}_{what}"
-        """Each service has its own: cookies do not tell the ports of a machine apart (RFC 6265, 8.5)."""
+        self.cookie = f"{COOKIE_PREFIX}_{service_name}"
+        """Each service has its own cookie: all ports of a host share cookies (RFC 6265, 8.5)."""
         self.sessions = Sessions(now)
         self.file = None if tokens is None else TokenStore(tokens)
         self._numbered_since = numbered_since
-        self._rate_limit = LoginRateLimit(now)
+        self._rate_limit = WrongTokenRateLimit(now)
         self._valid: OrderedDict[tuple[str, str], None] = OrderedDict()
         self.wrong_tokens = 0
-        """Since the start. They are counted and not logged: clients could fill a disk with them."""
+        """Wrong tokens since the start; not logged, since clients could fill the disk with such lines."""
 
     def credential_of(self, request: web.Request) -> Credential | web.Response | None:
-        """Return what a request authenticates by; None: nothing. A token that it names precedes a session.
+        """Return the credential of a request; a token takes precedence over a session.
 
         Returns:
-            A response where the token is wrong, or too many wrong ones were sent.
+            None without a token or session; a response if the token is wrong or the address is rate limited.
         """
         kind, _, bearer = request.headers.get("Authorization", "").partition(" ")
         token = bearer.strip() if kind.lower() == "bearer" else request.query.get("token")
@@ -79,7 +79,7 @@ class Authenticator:
         return None if digest is None else Credential(digest, session)
 
     def check_token(self, request: web.Request, token: str) -> Credential | web.Response:
-        """Look up a token; refuse a wrong one with 401, and after several of them with 429."""
+        """Look up a token; answer 401 to a wrong one, and 429 after several wrong ones."""
         digest, address = token_digest(token), request.remote or "?"
         wait = 0.0 if (address, digest) in self._valid else self._rate_limit.wait(address)
         if wait > 0:
@@ -99,20 +99,20 @@ class Authenticator:
         return challenge("unknown or revoked token")
 
     def session_of(self, request: web.Request) -> str:
-        """Return the SHA-256 of a request's session identifier; there need not be such a session."""
+        """Return the SHA-256 of a request's session identifier, whether or not the session exists."""
         return token_digest(request.cookies.get(self.cookie, ""))
 
     def grant_of(self, credential: Credential) -> Grant | str | None:
-        """Return what a credential allows now; None: it is revoked or expired; a text: why it is void."""
+        """Return the current grant of a credential; None: revoked or expired; a string: why it is void."""
         if credential.session is not None and self.sessions.token(credential.session) is None:
             return None
         token = None if self.file is None else self.file.get(credential.token)
         if token is None:
             return None
-        return self._void(token) or Grant.of(token)
+        return self._void_reason(token) or Grant.of(token)
 
-    def _void(self, token: Token) -> str | None:
-        """Return why a token for one person does not count any more: numbers mean other people now."""
+    def _void_reason(self, token: Token) -> str | None:
+        """Return why a token for one person is void: person numbers have restarted since it was made."""
         if token.object is None or token.made is None or token.made.timestamp() >= self._numbered_since():
             return None
         return (
@@ -122,7 +122,7 @@ class Authenticator:
 
 
 def challenge(error: str) -> web.Response:
-    """Return 401 with the way to authenticate (RFC 9110, 15.5.2)."""
+    """Return 401 with a WWW-Authenticate challenge (RFC 9110, 15.5.2)."""
     response = error_response(401, error)
     response.headers["WWW-Authenticate"] = "Bearer"
     return response

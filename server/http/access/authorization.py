@@ -1,8 +1,8 @@
-"""Authorization: whether a request may have its answer, asked of every route in one place.
+"""Authorization: one check, for every route, of what a request's token permits.
 
-Without a file of tokens everybody who reaches the server may watch, and this machine may operate. With one,
-every route that shows anything of the site needs a token. What a revoked or expired token holds open is
-ended.
+Without a token file everyone who reaches the server may watch, and only this machine may operate. With one,
+every route that shows anything of the site needs a token. Open answers end when their token is revoked or
+expires.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ HOW_TO_OPERATE = (
 )
 _CHECK_EVERY_S = 0.5
 _BOUND_TO_GRANT = (Permission.ANY_TOKEN, Permission.OBJECT)
-"""Answers to these depend on the grant: they are ended when it changes, not only when it is gone."""
+"""The answers to these depend on the grant: they end when it changes, not only when it is revoked."""
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -44,9 +44,9 @@ class _OpenRequest:
 
 
 class AccessControl:
-    """Lets permitted requests through, and ends their answers when their credential is no longer valid.
+    """Lets permitted requests through, and ends their answers when their credential becomes invalid.
 
-    ``resolve`` returns the number that a merged one goes by now.
+    ``resolve`` returns the current number of a person whose number may have been merged.
     """
 
     def __init__(self, authenticator: Authenticator, resolve: Callable[[int], int]) -> None:
@@ -56,16 +56,16 @@ class AccessControl:
 
     @property
     def needs_token(self) -> bool:
-        """Whether there is a file of tokens."""
+        """Whether there is a token file."""
         return self.authenticator.file is not None
 
     def grant(self, request: web.Request) -> Grant:
-        """Return what a request is granted, while it is being answered."""
+        """Return the grant of a request that is being answered."""
         opened = self._open_requests.get(id(request))
         return Grant(is_operator=is_local_request(request)) if opened is None else opened.grant
 
     def client_of(self, request: web.Request) -> ClientIdentity:
-        """Return whom a request counts for when slots are shared out, while it is being answered."""
+        """Return the client whose share of slots a request that is being answered counts towards."""
         opened = self._open_requests.get(id(request))
         if opened is not None:
             return ClientIdentity(f"token {opened.credential.token}", opened.grant.is_operator)
@@ -74,7 +74,7 @@ class AccessControl:
         return ClientIdentity(network_of(request.remote or ""))
 
     def is_operator(self, request: web.Request) -> bool:
-        """Return whether a request is an operator's, before it is answered."""
+        """Return whether an operator sent a request that is not being answered yet."""
         if not self.needs_token:
             return is_local_request(request)
         credential = self.authenticator.credential_of(request)
@@ -84,7 +84,7 @@ class AccessControl:
     async def answer(
         self, request: web.Request, permission: Permission, handler: Handler
     ) -> web.StreamResponse:
-        """Answer a request if its credential grants the permission; else with 401, 403 or 429."""
+        """Answer a request if its credential grants the permission; otherwise return 401, 403 or 429."""
         if not self.needs_token:
             grant = Grant(is_operator=is_local_request(request))
             allowed = grant.allows(permission, request, self._resolve)
@@ -106,41 +106,37 @@ class AccessControl:
             del self._open_requests[id(request)]
 
     async def run(self) -> None:
-        """Read the file of tokens again as it changes, and end what is not allowed any more."""
+        """Reload the token file when it changes, and end answers that are no longer permitted."""
         if not self.needs_token:
             return
         try:
-            async with (
-                asyncio.TaskGroup() as both
-            ):  # sessions expire by themselves, however long the disk takes
-                both.create_task(
-                    run_periodically(_CHECK_EVERY_S, self._reload, "reading the file of tokens again")
-                )
-                both.create_task(run_periodically(_CHECK_EVERY_S, self._end, "ending expired requests"))
+            async with asyncio.TaskGroup() as tasks:  # two tasks: a slow disk must not delay expiry
+                tasks.create_task(run_periodically(_CHECK_EVERY_S, self._reload, "reloading the token file"))
+                tasks.create_task(run_periodically(_CHECK_EVERY_S, self._end, "ending expired requests"))
         finally:
             self._file_reader.shutdown(wait=False)
 
     def end_expired(self) -> None:
-        """End all answers whose token or session is revoked or expired."""
-        for it in list(self._open_requests.values()):
-            current = self.authenticator.grant_of(it.credential)
+        """Break off all answers whose token or session is revoked or expired."""
+        for opened in list(self._open_requests.values()):
+            current = self.authenticator.grant_of(opened.credential)
             if (
                 isinstance(current, Grant)
-                and current.allows(it.permission, it.request, self._resolve)
-                and (it.permission not in _BOUND_TO_GRANT or current == it.grant)
+                and current.allows(opened.permission, opened.request, self._resolve)
+                and (opened.permission not in _BOUND_TO_GRANT or current == opened.grant)
             ):
                 continue
-            if it.request.transport is not None:
-                it.request.transport.abort()
+            if opened.request.transport is not None:
+                opened.request.transport.abort()
 
     async def _end(self) -> None:
         self.end_expired()
 
     async def _reload(self) -> None:
-        assert self.authenticator.file is not None  # noqa: S101 — nobody reloads where there is none
+        assert self.authenticator.file is not None  # noqa: S101 — only called with a token file
         try:
-            # A long file takes longer to read than a frame. The thread is its own: all others may wait for
-            # some other disk.
+            # A long file takes longer to read than a frame lasts. This thread reads nothing else: shared
+            # threads may be blocked by another disk.
             reload = self.authenticator.file.reload_if_changed
             await asyncio.get_running_loop().run_in_executor(self._file_reader, reload)
         finally:
@@ -151,7 +147,7 @@ ACCESS = web.AppKey("access", AccessControl)
 
 
 def is_scoped_to_person(request: web.Request) -> bool:
-    """Return whether a request is limited to one person, whose unseen frames are blanked."""
+    """Return whether a request may see one person only; frames without that person are blanked."""
     return request.app[ACCESS].grant(request).scope.object is not None
 
 
@@ -163,7 +159,7 @@ def _unauthenticated(permission: Permission) -> web.Response:
 
 @web.middleware
 async def authorize(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """Answer only what the request's credential permits."""
+    """Answer only requests whose credential permits it."""
     refused = check_csrf(request)
     if refused is not None:
         return refused
@@ -178,7 +174,7 @@ async def authorize(request: web.Request, handler: Handler) -> web.StreamRespons
 
 
 async def forbid_shared_caching(request: web.Request, response: web.StreamResponse) -> None:
-    """Forbid caches on the way to keep an answer for others, where a token is needed to have it."""
-    kept = response.headers.get("Cache-Control", "")
-    if kept.startswith("public") and request.app[ACCESS].needs_token:
-        response.headers["Cache-Control"] = kept.replace("public", "private", 1)
+    """Make cacheable answers private where a token is needed, so that no shared cache keeps them."""
+    cache_control = response.headers.get("Cache-Control", "")
+    if cache_control.startswith("public") and request.app[ACCESS].needs_token:
+        response.headers["Cache-Control"] = cache_control.replace("public", "private", 1)

@@ -1,6 +1,6 @@
-"""Cross-origin requests: pages of other origins may read what is public or what they send a token for.
+"""CORS: pages of other origins may read public answers, and others for which they send a token.
 
-A session does not help them: its cookie is not sent from another site's page.
+They cannot use a session: browsers do not send its cookie from another site's page.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _DAY_S = 86_400
 async def answer_preflight(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
-    """Answer OPTIONS of every route: what a page of another origin may request (Fetch, 3.2.2)."""
+    """Answer the CORS preflight (OPTIONS) of every route (Fetch, 3.2.2)."""
     try:
         return await handler(request)
     except web.HTTPMethodNotAllowed as error:
@@ -27,7 +27,7 @@ async def answer_preflight(
             "Allow": methods,
             "Access-Control-Allow-Origin": "*",
             "Access-Control-Allow-Methods": methods,
-            "Access-Control-Allow-Headers": "*, Authorization",  # a star does not stand for that one
+            "Access-Control-Allow-Headers": "*, Authorization",  # * does not include Authorization
             "Access-Control-Max-Age": str(_DAY_S),
         }
         return web.Response(status=204, headers=headers)

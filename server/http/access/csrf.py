@@ -1,8 +1,8 @@
-"""Cross-site request forgery: pages of other sites can change nothing through a browser that is signed in.
+"""CSRF protection: pages of other sites can change nothing through a browser that is signed in.
 
-Protected are ``/api/session`` and all below ``/api/operator/``. Requests that change something need the
-header ``X-MyView-Changes``, which pages of other origins cannot send: browsers ask beforehand (Fetch, 3.2.2),
-and are refused.
+``/api/session`` and everything below ``/api/operator/`` are protected. Requests that change something need
+the header ``X-MyView-Changes``, which pages of other origins cannot send: the preflight request of their
+browser (Fetch, 3.2.2) is refused.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ CSRF_HEADER = "X-MyView-Changes"
 
 
 def check_csrf(request: web.Request) -> web.Response | None:
-    """Return why a request that another site's page may have sent is refused; None: it is not."""
+    """Return 403 for a request that a page of another site may have sent; None: it is acceptable."""
     if not _is_protected(route_pattern(request)):
         return None
     if request.method == "OPTIONS":
-        return error_response(403, "this address answers no page of another origin")
+        return error_response(403, "pages of other origins may not use this address")
     if request.headers.get("Sec-Fetch-Site", "none") not in {"none", "same-origin"}:
-        return error_response(403, "this is not possible from another site's page")
+        return error_response(403, "requests from pages of other sites are refused here")
     if request.method not in {"GET", "HEAD"} and CSRF_HEADER not in request.headers:
         return error_response(
             403,
@@ -33,13 +33,13 @@ def check_csrf(request: web.Request) -> web.Response | None:
 
 
 async def forbid_cross_origin_reads(request: web.Request, response: web.StreamResponse) -> None:
-    """Remove the header that lets pages of other origins read an answer."""
+    """Remove the CORS header from the answers of protected routes."""
     if _is_protected(route_pattern(request)):
         response.headers.popall("Access-Control-Allow-Origin", None)
 
 
 def route_pattern(request: web.Request) -> str:
-    """Return the pattern of the requested route, or the path where there is no such route."""
+    """Return the pattern of the requested route, or the path if no route matches."""
     resource = request.match_info.route.resource
     return request.path if resource is None else resource.canonical
 

@@ -1,4 +1,4 @@
-"""Whether a request comes from this machine, which may operate where there are no tokens."""
+"""Detection of requests from this machine, which may operate where there are no tokens."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ _PROXY_HEADER = re.compile(
     r"|x-(amzn-trace-id|cloud-trace-context)|(x-(envoy|original|appengine|vercel|arr)|cf|wl-proxy)-.*"
     r"|.*forwarded.*|.*(client|real|remote|connecting|user|cluster)-?(ip|addr)"
 )
-"""Headers that proxies add. Each sends some of them, and hardly two the same ones."""
+"""Headers that proxies add; each proxy has a different selection."""
 
 
 def is_local_request(request: web.Request) -> bool:
-    """Return whether a request comes from this machine: by address, without a proxy, under a local name.
+    """Return whether a request comes from a loopback address, without a proxy, and to a local host name.
 
-    The name is checked since another page's host name can be made to resolve to this machine (DNS rebinding).
+    The host name is checked against DNS rebinding: another site's name may resolve to this machine.
     """
     if request.version < HttpVersion11 or any(map(_is_proxy_header, request.headers)):
         return False  # some proxies speak HTTP/1.0; no browser does
-    named = [f"http://{request.host}"]
-    named += [request.headers[it] for it in ("Origin", "Referer") if it in request.headers]
-    return is_loopback(request.remote or "") and all(map(_names_this_machine, named))
+    urls = [f"http://{request.host}"]
+    urls += [request.headers[name] for name in ("Origin", "Referer") if name in request.headers]
+    return is_loopback(request.remote or "") and all(map(_names_this_machine, urls))
 
 
 def _is_proxy_header(name: str) -> bool:
-    """Return whether a proxy added a forwarding header; some write _ for -."""
+    """Return whether a header is one that proxies add; some write _ for -."""
     return _PROXY_HEADER.fullmatch(name.lower().replace("_", "-")) is not None
 
 

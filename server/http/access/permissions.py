@@ -15,20 +15,20 @@ SESSION_PATH = "/api/session"
 
 
 class Permission(Enum):
-    """What a route requires of whoever requests it."""
+    """What a route requires of a request's token."""
 
     PUBLIC = auto()
-    """Nothing: the answer shows nothing of the site."""
+    """No token: the answer shows nothing of the site."""
     ANY_TOKEN = auto()
-    """Any token: the answer shows what that token may see, and no more."""
+    """Any token: the answer is limited to the token's scope."""
     OBJECT = auto()
-    """To watch the person whose number is in the path."""
+    """Permission to watch the person whose number is in the path."""
     CAMERA = auto()
-    """To watch the camera that is named in the path."""
+    """Permission to watch the camera that is named in the path."""
     SITE = auto()
-    """To watch everything."""
+    """Permission to watch everything."""
     OPERATE = auto()
-    """To operate."""
+    """Permission to operate."""
 
 
 _BY_ROUTE = {
@@ -58,7 +58,7 @@ _BY_PREFIX = {
 
 
 def permission_for(method: str, path: str) -> Permission | None:
-    """Return what a route requires, by its pattern; None: no rule covers it, and so it is refused."""
+    """Return the permission that a route pattern requires; None: no rule covers it, so it is refused."""
     if path == SESSION_PATH and method not in {"GET", "HEAD"}:
         return Permission.PUBLIC  # signing in and out
     by_prefix = (permission for prefix, permission in _BY_PREFIX.items() if path.startswith(prefix))
@@ -67,12 +67,12 @@ def permission_for(method: str, path: str) -> Permission | None:
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """What may be seen of a site: everything, or one person, or one camera."""
+    """The visible part of a site: everything, one person, or one camera."""
 
     object: int | None = None
-    """This person's views alone, whatever number they go by now."""
+    """Only this person's views, also after their number was merged."""
     camera: str | None = None
-    """This camera alone."""
+    """Only this camera."""
 
     @property
     def is_all(self) -> bool:
@@ -85,16 +85,16 @@ ALL = Scope()
 
 @dataclass(frozen=True, slots=True)
 class ClientIdentity:
-    """Whom a request counts for where slots are shared out."""
+    """The client whose share of slots a request counts towards."""
 
     key: str
-    """A token, or an address where there are no tokens."""
+    """The token, or the network where there are no tokens."""
     is_operator: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What a request may see and do."""
+    """What a request may see, and whether it may operate."""
 
     scope: Scope = ALL
     is_operator: bool = False
@@ -103,11 +103,11 @@ class Grant:
 
     @classmethod
     def of(cls, token: Token) -> Grant:
-        """Return what a token grants."""
+        """Return the grant of a token."""
         return cls(Scope(token.object, token.camera), token.role == "operate", token.name)
 
     def allows(self, permission: Permission, request: web.Request, resolve: Callable[[int], int]) -> bool:
-        """Return whether this permission suffices; ``resolve`` maps merged person numbers to current ones."""
+        """Return whether a permission is granted; ``resolve`` maps merged numbers to current ones."""
         scope, names = self.scope, request.match_info
         match permission:
             case Permission.PUBLIC | Permission.ANY_TOKEN:
@@ -126,7 +126,7 @@ class Grant:
                 return self.is_operator
 
     def __str__(self) -> str:
-        """Return it in words."""
+        """Return the grant in words, for errors."""
         if self.is_operator:
             return "operating"
         if self.scope.object is not None:

@@ -17,7 +17,7 @@ class SessionInfo(msgspec.Struct, frozen=True):
     """Permissions of the caller."""
 
     by_token: bool
-    """Whether tokens are configured; else everyone may watch, and the server's own machine may operate."""
+    """Whether tokens are configured; otherwise everyone may watch, and the server's machine may operate."""
     name: str | None
     """The token's name; null without tokens."""
     role: str
@@ -29,7 +29,7 @@ class SessionInfo(msgspec.Struct, frozen=True):
 
 
 class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the sign-in form sends."""
+    """The body of a sign-in request."""
 
     token: str
 
@@ -47,7 +47,7 @@ async def post_session(request: web.Request) -> web.StreamResponse:
     access = request.app[ACCESS]
     authenticator = access.authenticator
     if not access.needs_token:
-        return error_response(400, "there are no tokens (access.tokens): no one has to sign in")
+        return error_response(400, "there are no tokens (access.tokens), so signing in is not needed")
     sign_in = await read_json(request, SignIn)
     credential = authenticator.check_token(request, sign_in.token.strip())
     if isinstance(credential, web.Response):
@@ -71,7 +71,7 @@ async def post_session(request: web.Request) -> web.StreamResponse:
 
 @routes.delete(SESSION_PATH)
 async def delete_session(request: web.Request) -> web.Response:
-    """Sign out; what the session holds open is ended."""
+    """Sign out, and end the session's open streams."""
     access = request.app[ACCESS]
     authenticator = access.authenticator
     authenticator.sessions.close(authenticator.session_of(request))

@@ -1,4 +1,4 @@
-"""The file of tokens, read again when it has changed."""
+"""The token file, reloaded when it changes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ log = logging.getLogger(__name__)
 
 
 class TokenStore:
-    """The tokens in force. A file that cannot be read, or has a mistake in it, leaves them as they are."""
+    """The tokens in force; while the changed file is invalid or unreadable, the previous ones stay."""
 
     def __init__(self, path: Path) -> None:
         """Read the file.
@@ -27,7 +27,7 @@ class TokenStore:
         self._tokens = _by_digest(path)
 
     def reload_if_changed(self) -> None:
-        """Read the file again if it has changed, once it stays the same: it may be half-written."""
+        """Reload a changed file once two checks in a row find it the same: before, it may be half-written."""
         before, self._seen = self._seen, file_state(self._path)
         if self._seen == self._loaded or self._seen != before:
             return
@@ -40,7 +40,7 @@ class TokenStore:
             log.info("%s: %d tokens are in force", self._path, len(self._tokens))
 
     def find(self, digest: str) -> Token | None:
-        """Return the token of a SHA-256 in constant time: all are compared, none ends early."""
+        """Return the token with a SHA-256, comparing all of them in constant time."""
         match = None
         for token in self._tokens.values():
             if hmac.compare_digest(token.sha256, digest):
@@ -48,9 +48,9 @@ class TokenStore:
         return match
 
     def get(self, digest: str) -> Token | None:
-        """Return the token of a SHA-256 that was found before; None: it is revoked."""
+        """Return the token with a SHA-256 that was found before; None: it has been revoked."""
         return self._tokens.get(digest)
 
 
 def _by_digest(path: Path) -> dict[str, Token]:
-    return {it.sha256: it for it in read_tokens(path)}
+    return {token.sha256: token for token in read_tokens(path)}

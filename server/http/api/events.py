@@ -1,4 +1,4 @@
-"""Server-sent events (WHATWG HTML, 9.2): GOPs as they are decided, and people and cameras as they change."""
+"""Server-sent events (WHATWG HTML, 9.2): decided GOPs, flags, and changes of people and cameras."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ from server.service.service import BestViewService
 
 _LISTS_EVERY_S = 1.0
 _GOPS_KEPT = 4
-"""GOP events that a new subscriber is sent: they cover what the streams start with."""
+"""Recent GOP events sent to a new subscriber: they cover the GOPs that streams start with."""
 _QUEUE = 64
-"""Events that a subscriber may fall behind."""
+"""Events by which a subscriber may fall behind."""
 _ENDED_FLAGS_RESENT = 16
-"""Ended flags that are sent again to who fell behind: they may have been sent those while open."""
+"""Ended flags sent again to subscribers that fell behind and may have received them only as open."""
 
 
 def event(name: str, content: Any, event_id: int | None = None) -> bytes:
-    """Encode one event."""
+    """Encode one server-sent event."""
     head = f"event: {name}\n" + (f"id: {event_id}\n" if event_id is not None else "")
     return head.encode() + b"data: " + msgspec.json.encode(content) + b"\n\n"
 
 
 @dataclass(slots=True)
 class _ScopedEvents:
-    """The events for all subscribers of one scope."""
+    """The event stream shared by all subscribers of one scope."""
 
     channel: Broadcaster
     last_sent: dict[str, bytes] = field(default_factory=dict)
-    """By event name, the lists as they were sent last."""
+    """By event name, the list event that was sent last."""
 
 
 class Events:
-    """Publishes GOPs at once, and people and cameras when something about them has changed.
+    """Publishes GOPs and flags at once, and the lists of people and cameras when they change.
 
-    Subscribers of one scope share the same bytes, filtered and encoded once.
+    Events are filtered and encoded once for all subscribers of one scope.
     """
 
     def __init__(self, service: BestViewService) -> None:
@@ -65,11 +65,11 @@ class Events:
 
     @property
     def viewers(self) -> int:
-        """How many subscribers there are."""
-        return sum(it.channel.viewers for it in self._by_scope.values())
+        """The number of subscribers."""
+        return sum(scoped.channel.viewers for scoped in self._by_scope.values())
 
     def join(self, scope: Scope) -> Subscriber:
-        """Add a subscriber, who is sent the present lists and open flags first."""
+        """Add a subscriber; it receives the current lists and open flags first."""
         scoped = self._by_scope.get(scope) or self._add_scope(scope)
         subscriber = scoped.channel.subscribe()
         for flag in self._service.assist.open_flags:
@@ -88,7 +88,7 @@ class Events:
             del self._by_scope[scope]
 
     async def run(self) -> None:
-        """Publish lists as they change, and keep silent connections alive."""
+        """Publish changed lists, and comments that keep silent connections open."""
         await run_periodically(_LISTS_EVERY_S, self._publish_lists, "publishing people and cameras")
 
     def close(self) -> None:
@@ -115,7 +115,7 @@ class Events:
         lists = self._lists(scope)
         for name, content in lists.items():
             if name == "site":
-                continue  # it holds the time of day and so always differs; it is for new subscribers
+                continue  # it has the time of day, so it always differs; only new subscribers need it
             data = event(name, content)
             if scoped.last_sent.get(name) != data:
                 scoped.last_sent[name] = data
@@ -126,7 +126,7 @@ class Events:
         scoped.channel.publish_once(BytesChunk(b": here\n\n", random_access=False))
 
     def _snapshot(self, scope: Scope, lists: dict[str, Any]) -> Iterator[BytesChunk]:
-        """Yield the whole state, for who fell behind: they may have lost what is sent only once."""
+        """Yield the whole state, for subscribers that fell behind and lost events that are sent once."""
         for name, content in lists.items():
             yield BytesChunk(event(name, content), random_access=True)
         assist = self._service.assist

@@ -1,4 +1,4 @@
-"""The API's description: OpenAPI 3.1 built from the routes and the schemas, and a page to read it."""
+"""API description: an OpenAPI 3.1 document built from the routes and schemas, and a readable page."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from aiohttp import web
 
 from server.http.access.permissions import Permission, permission_for
 from server.http.access.session_routes import SessionInfo
-from server.http.api.query_validation import CAMERA_QUERY, OVERLAY, TIME_SHIFT
 from server.http.api.schema import Cameras, FlagList, Objects, Past, SiteInfo
 from server.http.json_responses import Problem
 from server.http.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
+from server.http.streams.request_validation import CAMERA_QUERY, OVERLAY, TIME_SHIFT
 from server.service.facade.view_selection import ViewSelection
 
 routes = web.RouteTableDef()
@@ -33,7 +33,7 @@ _JSON: dict[str, type[msgspec.Struct]] = {
     "/api/cameras/{camera}/past": Past,
     **OPERATOR,
 }
-_OTHER = {
+_MEDIA_TYPES = {
     "/objects/{object}/best.mp4": "video/mp4",
     "/cameras/{camera}/live.mp4": "video/mp4",
     "/objects/{object}/best.webm": "video/webm",
@@ -67,30 +67,48 @@ _UNAVAILABLE = {
     "/readyz",
     "/api/events",
     "/api/past",
-} | {path for path in _OTHER if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))}
-_OF_PEOPLE = {"/api/operator/people", "/api/operator/position_corrections"}
-_FROM_IS_NEEDED = {"/api/past", *OPERATOR_FILES}
-_SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
+} | {
+    path
+    for path in _MEDIA_TYPES
+    if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
+}
+_MAY_BE_UNAVAILABLE_FOR_OPERATORS = {"/api/operator/people", "/api/operator/position_corrections"}
+_FROM_REQUIRED = {"/api/past", *OPERATOR_FILES}
+_RECORDED_SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
 _SCHEMAS: dict[str, Any] = {
     "object": {"type": "integer", "minimum": 0},
     "camera": {"type": "string"},
     "segment": {"type": "integer", "minimum": 0},
     "part": {"type": "integer", "minimum": 0},
-    "_HLS_msn": {"type": "integer", "minimum": 0, "description": "Waits for this segment."},
-    "_HLS_part": {"type": "integer", "minimum": 0, "description": "Waits for this part of the segment."},
-    "overlay": {"enum": [0, 1], "default": 0, "description": "1: boxes are burnt in."},
-    "from": {**_MOMENT, "description": "Begins there: seconds back, a pulse, or a time."},
-    "to": {**_MOMENT, "description": "Ends there, likewise; HLS also live: it goes on."},
-    "at": {**_MOMENT, "description": "Within the last minute, after the first request for this object."},
-    "camera_query": {"type": "string", "description": "Shows this camera instead of the best."},
-    "prefer": {"type": "string", "description": "Shows this camera while it sees the person, else the best."},
-    "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Pictures a second; the site's at most."},
+    "_HLS_msn": {"type": "integer", "minimum": 0, "description": "The answer waits for this segment."},
+    "_HLS_part": {
+        "type": "integer",
+        "minimum": 0,
+        "description": "The answer waits for this part.",
+    },
+    "overlay": {"enum": [0, 1], "default": 0, "description": "1: with boxes burnt in."},
+    "from": {**_MOMENT, "description": "The start: seconds back, a pulse, or a time."},
+    "to": {**_MOMENT, "description": "The end, likewise; for HLS also live: no end."},
+    "at": {
+        **_MOMENT,
+        "description": "Within the last minute, and after the first request for this object.",
+    },
+    "camera_query": {"type": "string", "description": "Show this camera instead of the best one."},
+    "prefer": {
+        "type": "string",
+        "description": "Show this camera while it sees the person.",
+    },
+    "fps": {
+        "type": "number",
+        "exclusiveMinimum": 0,
+        "description": "Pictures a second, at most the site's.",
+    },
 }
 
 
 class ApiDescription:
-    """An application's description of itself, built once when it is first requested."""
+    """The description of an application's API, built when it is first requested."""
 
     def __init__(self, app: web.Application) -> None:
         self._app = app
@@ -102,11 +120,11 @@ class ApiDescription:
 
     @cached_property
     def encoded(self) -> bytes:
-        """The same as JSON."""
+        """The document as JSON."""
         return msgspec.json.encode(self.document)
 
 
-DESCRIPTION = web.AppKey("described", ApiDescription)
+DESCRIPTION = web.AppKey("API description", ApiDescription)
 
 
 def describe(app: web.Application) -> dict[str, Any]:
@@ -119,7 +137,7 @@ def describe(app: web.Application) -> dict[str, Any]:
         if route.method == "HEAD" or route.resource is None:
             continue
         path = route.resource.canonical
-        if path in _JSON or path in _OTHER:
+        if path in _JSON or path in _MEDIA_TYPES:
             operation = _operation(path, inspect.getdoc(route.handler) or "")
             paths.setdefault(path, {})[route.method.lower()] = operation
     return {
@@ -134,13 +152,13 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     if path in _JSON:
         content = {"application/json": {"schema": {"$ref": f"#/components/schemas/{_JSON[path].__name__}"}}}
     else:
-        content = {_OTHER[path]: {}}
+        content = {_MEDIA_TYPES[path]: {}}
     error = {"application/json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
     responses: dict[str, Any] = {"200": {"description": "OK", "content": content}}
     names = re.findall(r"\{(\w+)\}", path)
     if names or path in OPERATOR_RESULTS:
         responses["404"] = {"description": "No object, camera or file of this name.", "content": error}
-    if path in OVERLAY | TIME_SHIFT | CAMERA_QUERY | _SPANS or path.endswith("/choice"):
+    if path in OVERLAY | TIME_SHIFT | CAMERA_QUERY | _RECORDED_SPANS or path.endswith("/choice"):
         responses["400"] = {"description": "Invalid query.", "content": error}
     if path in OPERATOR.keys() | OPERATOR_FILES.keys() | OPERATOR_RESULTS.keys():
         responses["400"] = {"description": "Invalid request.", "content": error}
@@ -152,13 +170,13 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         responses["403"] = {"description": "Outside the token's scope.", "content": error}
         responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
     if path in TIME_SHIFT | OPERATOR_FILES.keys():
-        responses["416"] = {"description": "Nothing is recorded of that time.", "content": error}
-    if path in _UNAVAILABLE | _OF_PEOPLE | _SPANS or "object" in names:
-        responses["503"] = {"description": "Not now; try again later."}
+        responses["416"] = {"description": "That time is not recorded.", "content": error}
+    if path in _UNAVAILABLE | _MAY_BE_UNAVAILABLE_FOR_OPERATORS | _RECORDED_SPANS or "object" in names:
+        responses["503"] = {"description": "Temporarily unavailable; try again later."}
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
     queries = ["prefer"] * (path in CAMERA_QUERY)
     queries += ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
-    queries += ["from", "to"] * (path in TIME_SHIFT | _SPANS | OPERATOR_FILES.keys())
+    queries += ["from", "to"] * (path in TIME_SHIFT | _RECORDED_SPANS | OPERATOR_FILES.keys())
     queries += ["at"] * path.endswith("/choice")
     queries += ["_HLS_msn", "_HLS_part"] * path.endswith(".m3u8")
     if path in CAMERA_QUERY:
@@ -167,25 +185,25 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         )
     parameters += [
         {
-            "name": it,
+            "name": name,
             "in": "query",
-            "required": path in _FROM_IS_NEEDED and it == "from",
-            "schema": _SCHEMAS[it],
+            "required": path in _FROM_REQUIRED and name == "from",
+            "schema": _SCHEMAS[name],
         }
-        for it in queries
+        for name in queries
     ]
     return {"summary": summary.splitlines()[0], "parameters": parameters, "responses": responses}
 
 
 @routes.get("/api/openapi.json")
 async def get_openapi(request: web.Request) -> web.Response:
-    """Describe the API to programs."""
+    """Return the OpenAPI document."""
     return web.Response(body=request.app[DESCRIPTION].encoded, content_type="application/json")
 
 
 @routes.get("/api")
 async def get_readable(request: web.Request) -> web.Response:
-    """Describe the API to people."""
+    """Return a readable page about the API."""
     rows = "".join(
         f"<tr><td><code>GET {html.escape(path)}</code></td>"
         f"<td>{html.escape(item['get']['summary'])}</td></tr>"

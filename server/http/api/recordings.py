@@ -70,8 +70,11 @@ async def _past(request: web.Request, recorded: RecordedStream) -> web.Response:
     except OSError as error:
         return disk_error(error)
     spans = [
-        PastSpan(it.first, it.end - it.first, time_of(it.first), time_of(it.end))
-        for it in recorded.spans(playback.start, end)
+        PastSpan(span.first, span.end - span.first, time_of(span.first), time_of(span.end))
+        for span in recorded.spans(playback.start, end)
     ]
-    views = [PastView(it.camera, it.first, it.end - it.first) for it in recorded.views(playback.start, end)]
+    views = [
+        PastView(view.camera, view.first, view.end - view.first)
+        for view in recorded.views(playback.start, end)
+    ]
     return json_response(Past(spans, views))

@@ -1,4 +1,4 @@
-"""The API's answers about the whole site, from the service's queries."""
+"""API answers about the whole site: its settings, people and cameras."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from server.service.service import BestViewService
 
 
 def site_info(service: BestViewService) -> SiteInfo:
-    """Describe the site."""
+    """Return the site's settings."""
     config, streams = service.config, service.streams
     return SiteInfo(
         name=config.site.name,
@@ -28,26 +28,27 @@ def site_info(service: BestViewService) -> SiteInfo:
 
 
 def objects_info(service: BestViewService) -> Objects:
-    """List all people who have a stream, by number."""
+    """Return all people who have a stream, by number."""
     objects = [
         ObjectInfo(
-            object=it.number,
-            name=it.name,
-            aliases=it.former_numbers,
-            first_seen=it.first_seen,
-            last_seen=it.last_seen,
-            visible=bool(it.cameras),
-            camera=it.camera,
-            cameras=it.cameras,
+            object=person.number,
+            name=person.name,
+            aliases=person.former_numbers,
+            first_seen=person.first_seen,
+            last_seen=person.last_seen,
+            visible=bool(person.cameras),
+            camera=person.camera,
+            cameras=person.cameras,
             thumbnail=None
-            if it.thumbnail_pulse is None
-            else f"objects/{it.number}/thumb.jpg?v={it.thumbnail_pulse}",
+            if person.thumbnail_pulse is None
+            else f"objects/{person.number}/thumb.jpg?v={person.thumbnail_pulse}",
         )
-        for it in service.people.list_people()
+        for person in service.people.list_people()
     ]
-    return Objects(objects, [Elsewhere(it.number, it.server) for it in service.people.list_remote_people()])
+    elsewhere = [Elsewhere(person.number, person.server) for person in service.people.list_remote_people()]
+    return Objects(objects, elsewhere)
 
 
 def cameras_info(service: BestViewService) -> Cameras:
-    """List all cameras."""
+    """Return the state of all cameras."""
     return Cameras(service.cameras.list_cameras())

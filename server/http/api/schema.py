@@ -1,4 +1,4 @@
-"""Answers of the API; ``/api/openapi.json`` is built from them."""
+"""Schemas of the API's answers, also the source of ``/api/openapi.json``."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ class SiteInfo(msgspec.Struct, frozen=True):
     gop: int
     lookahead_frames: int
     codec: str | None
-    """RFC 6381 codec string of every stream; null before the first key frame."""
+    """RFC 6381 codec string of every stream; null before the first keyframe."""
     container: str
     """Container of the streams: mp4, or webm if the codec is vp8."""
     sound: str | None
-    """RFC 6381 codec string of the sound; null: the site has none."""
+    """RFC 6381 codec string of the sound; null: the site has no sound."""
     pulse0: float | None
-    """When pulse 0 was due: unix seconds by the server's clock."""
+    """Unix time at which pulse 0 was due, by the server's clock."""
     now: float
-    """The server's clock, unix seconds."""
+    """Unix time by the server's clock."""
     cameras: list[str]
 
 
@@ -35,7 +35,7 @@ class ObjectInfo(msgspec.Struct, frozen=True):
 
     object: int
     name: str | None
-    """Given by the operator."""
+    """The name entered by an operator."""
     aliases: list[int]
     """Former numbers of this person, which remain valid."""
     first_seen: int
@@ -43,13 +43,13 @@ class ObjectInfo(msgspec.Struct, frozen=True):
     last_seen: int
     """Pulse."""
     visible: bool
-    """Some camera sees the person now."""
+    """Whether a camera sees the person now."""
     camera: str | None
     """The camera that shows the person now."""
     cameras: list[str]
     """The cameras that see the person now."""
     thumbnail: str | None
-    """Address of a thumbnail; it changes with the picture."""
+    """URL of a thumbnail; it changes with the picture."""
 
 
 class Elsewhere(msgspec.Struct, frozen=True):
@@ -95,11 +95,11 @@ class PastView(msgspec.Struct, frozen=True):
 
 
 class Past(msgspec.Struct, frozen=True):
-    """What is recorded."""
+    """Recorded spans of a stream."""
 
     spans: list[PastSpan]
     views: list[PastView]
-    """The cameras shown, in order of time."""
+    """The cameras shown, in chronological order."""
 
 
 class FlagList(msgspec.Struct, frozen=True):

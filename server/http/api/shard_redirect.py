@@ -1,4 +1,4 @@
-"""Redirects to the best-view service that decides for a person, where several share one site."""
+"""Sharding: redirects requests for a person to the best-view service of that person."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _OBJECT_PATH = re.compile(r"/(?:api/)?objects/([0-9]{1,9})/")
 async def redirect_to_shard(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
-    """Answer 307 with the other service's address; 404 where the configuration does not name it."""
+    """Answer 307 with the other service's URL; 404 if view.share.servers does not name it."""
     path = _OBJECT_PATH.match(request.path)
     if path is None:
         return await handler(request)
@@ -29,7 +29,7 @@ async def redirect_to_shard(
         return error_response(
             404,
             f"object {number} is served by best-view service {shard.index} of this site; "
-            "view.share.servers does not say where that is",
+            "view.share.servers does not have its URL",
         )
     headers = {"Location": shard.server + request.path_qs.lstrip("/"), "Access-Control-Allow-Origin": "*"}
     return web.Response(status=307, headers=headers)

@@ -1,6 +1,6 @@
-"""Listener: accepts connections as far as the pool admits them, before TLS and before anything is read.
+"""Listener: accepts connections that the connection limiter admits, before TLS and before reading.
 
-Neither asyncio nor aiohttp limits how many there are, or how long one may take to send a request.
+Neither asyncio nor aiohttp limits the number of connections, or the time until a request is complete.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from server.system.accept_errors import AcceptErrors
 log = logging.getLogger(__name__)
 
 _BACKLOG = 128
-"""Connections that the kernel holds until they are accepted."""
+"""Connections that the kernel queues until they are accepted."""
 _OVERDUE_EVERY_S = 1.0
-_FAILED_PAUSE_S = 0.5
-"""Pause after a connection could not be accepted."""
+_ACCEPT_RETRY_S = 0.5
+"""Pause after accept(2) failed."""
 _NO_SUCH_ADDRESS = frozenset({errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT})
-"""Errors of addresses to skip: localhost is ::1, too, and not every machine speaks IPv6."""
+"""Errors of addresses to skip: localhost is also ::1, but not every machine has IPv6."""
 _TLS_SHUTDOWN_S = 2.0
-"""How long TLS may take to shut down."""
+"""Limit of the time for the TLS shutdown."""
 
 
 class PooledHandler(web.RequestHandler):
-    """A connection's protocol, which tells the pool of its states."""
+    """The protocol of a connection; it reports the connection's state to the limiter."""
 
     __slots__ = ("connection", "pool")
 
@@ -46,13 +46,13 @@ class PooledHandler(web.RequestHandler):
         self.pool, self.connection = pool, connection
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin (called by asyncio), after the TLS handshake."""
-        assert isinstance(transport, asyncio.Transport)  # noqa: S101 — tells mypy that it can be written to
+        """Take over the transport (called by asyncio after the TLS handshake)."""
+        assert isinstance(transport, asyncio.Transport)  # noqa: S101 — TCP and TLS transports are
         self.connection.transport = transport
         super().connection_made(transport)
 
     def connection_lost(self, exc: BaseException | None) -> None:
-        """Leave the pool (called by asyncio)."""
+        """Report the connection as closed (called by asyncio)."""
         super().connection_lost(exc)
         self.pool.closed(self.connection)
 
@@ -67,22 +67,22 @@ class PooledHandler(web.RequestHandler):
             self.pool.idle(self.connection)
 
     def body_pending(self) -> None:
-        """Note that the body of a request is to come."""
+        """Report that the body of a request is still to come."""
         self.pool.receiving(self.connection)
 
     def body_received(self) -> None:
-        """Note that the body of a request has come."""
+        """Report that the body of a request is complete."""
         self.pool.busy(self.connection)
 
 
 class _AcceptedSocket:
-    """A socket that has been accepted, and the task that makes a transport of it."""
+    """An accepted socket, and the task that creates its transport."""
 
     def __init__(self, sock: socket.socket) -> None:
         self.socket = sock
         self.task: asyncio.Task[None] | None = None
         self.started = False
-        """asyncio has taken the socket over and closes it."""
+        """Whether asyncio has taken over the socket and will close it."""
 
     def abort(self) -> None:
         """Close it."""
@@ -97,14 +97,14 @@ class _AcceptedSocket:
 
 
 class Listener:
-    """Accepts connections for a server, as far as the pool admits them; ``settings`` are its handlers'."""
+    """Accepts the connections of a server that the limiter admits; ``settings`` go to each handler."""
 
     def __init__(
         self, server: web.Server, pool: ConnectionLimiter, tls: ssl.SSLContext | None, **settings: Any
     ) -> None:
         self._pool, self._tls = pool, tls
         self._server, self._settings = server, settings
-        self._failing, self._full = AcceptErrors(), LogThrottle()
+        self._accept_errors, self._full = AcceptErrors(), LogThrottle()
         self._accepted: set[asyncio.Task[None]] = set()
 
     @asynccontextmanager
@@ -115,12 +115,15 @@ class Listener:
             OSError: the address cannot be listened on.
         """
         with ExitStack() as sockets:
-            opened = [sockets.enter_context(it) for it in await _listen(host, port)]
-            loops = [run_periodically(0.0, self._accept_from(it), "accepting connections") for it in opened]
+            opened = [sockets.enter_context(listening) for listening in await _listen(host, port)]
+            loops = [
+                run_periodically(0.0, self._accept_from(listening), "accepting connections")
+                for listening in opened
+            ]
             loops.append(
                 run_periodically(_OVERDUE_EVERY_S, self._close_overdue, "closing overdue connections")
             )
-            tasks = [asyncio.create_task(it, name="connections") for it in loops]
+            tasks = [asyncio.create_task(loop, name="connections") for loop in loops]
             try:
                 yield int(opened[0].getsockname()[1])
             finally:
@@ -129,17 +132,17 @@ class Listener:
     def _accept_from(self, listening: socket.socket) -> Callable[[], Coroutine[Any, Any, None]]:
         async def accept() -> None:
             try:
-                # Nothing is awaited until the socket has an owner: otherwise it could be leaked at shutdown.
+                # No await until the socket has an owner: a cancellation would leak it.
                 sock, address = listening.accept()
             except BlockingIOError:
                 await _readable(listening)
                 return
             except ConnectionAbortedError:
-                return  # the client has closed it again
+                return  # the client has closed it already
             except OSError as error:
-                self._failing.failed(error)
+                self._accept_errors.failed(error)
                 self._pool.evict_waiting()
-                await asyncio.sleep(_FAILED_PAUSE_S)
+                await asyncio.sleep(_ACCEPT_RETRY_S)
                 return
             sock.setblocking(False)  # noqa: FBT003 — the name of the method says it
             self._accept_socket(sock, str(address[0]))
@@ -160,7 +163,7 @@ class Listener:
 
     def _done(self, task: asyncio.Task[None], accepted: _AcceptedSocket, connection: Connection) -> None:
         self._accepted.discard(task)
-        if not accepted.started:  # it was cancelled before
+        if not accepted.started:  # cancelled before it ran
             accepted.socket.close()
             self._pool.closed(connection)
 
@@ -197,19 +200,19 @@ class Listener:
 
 
 async def _listen(host: str, port: int) -> list[socket.socket]:
-    """Listen on all addresses that a host name resolves to, as far as this machine has them."""
+    """Listen on all addresses of a host name that this machine has."""
     resolved = await asyncio.get_running_loop().getaddrinfo(
         host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
     )
     opened: list[socket.socket] = []
     skipped: OSError | None = None
-    for family, address in dict.fromkeys((it[0], it[4]) for it in resolved):
+    for family, address in dict.fromkeys((info[0], info[4]) for info in resolved):
         try:
             opened.append(_listening(family, address))
         except OSError as error:
             if error.errno not in _NO_SUCH_ADDRESS:
-                for it in opened:
-                    it.close()
+                for listening in opened:
+                    listening.close()
                 raise
             skipped = error
     if not opened and skipped is not None:
@@ -222,7 +225,7 @@ def _listening(family: socket.AddressFamily, address: tuple[Any, ...]) -> socket
     try:
         listening.setblocking(False)  # noqa: FBT003 — the name of the method says it
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        if family is socket.AF_INET6:  # :: is not also 0.0.0.0, which another may have
+        if family is socket.AF_INET6:  # another process may listen on 0.0.0.0
             listening.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
         listening.bind(address)
         listening.listen(_BACKLOG)

@@ -1,4 +1,4 @@
-"""Malformed requests: answered by status, and kept out of the log, which clients could fill with them."""
+"""Malformed requests: answered with a status, and not logged, since clients could fill the log."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from aiohttp.http_exceptions import HttpProcessingError
 from server.http.json_responses import error_response
 
 AIOHTTP_LOG = logging.getLogger(f"{__name__}.requests")
-"""What aiohttp logs to."""
+"""The logger of aiohttp's server."""
 
 _CLIENT_ERRORS = (HttpProcessingError, web_protocol.RequestPayloadError, ClientError)
-"""Mistakes of clients, which are answered with 400, or by closing the connection."""
+"""Errors caused by clients, answered with 400 or by closing the connection."""
 
 Handler = Callable[[web.BaseRequest], Awaitable[web.StreamResponse]]
 
 
 def _is_server_error(record: logging.LogRecord) -> bool:
-    """Keep records of the server's own errors; aiohttp logs a traceback of clients' mistakes, too."""
+    """Return whether to log a record: aiohttp also logs tracebacks of errors that clients cause."""
     error = record.exc_info[1] if record.exc_info else None
     return not isinstance(error, _CLIENT_ERRORS)
 
@@ -29,9 +29,9 @@ AIOHTTP_LOG.addFilter(_is_server_error)
 
 
 def refuse_expectations(handler: Handler) -> Handler:
-    """Return a server's handler that answers 417 to any Expect header but 100-continue.
+    """Wrap a server's handler so that it answers 417 to any Expect header except 100-continue.
 
-    aiohttp's own answer repeats the header, and fails with a traceback where that is not text.
+    aiohttp would repeat the header in its answer, which fails with a traceback if the header is not text.
     """
 
     async def handle(request: web.BaseRequest) -> web.StreamResponse:

@@ -1,4 +1,4 @@
-"""Overload: where all connections are busy, operators and public routes alone are answered."""
+"""Overload: when all connections are busy, only operators and public routes are answered."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from server.http.json_responses import unavailable
 async def limit_connections(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
-    """Keep a connection open while it is answered; on a reserved one answer few requests, and one each.
+    """Mark the connection as busy; on a reserved one answer only operators and public routes, then close it.
 
-    These are operators', and requests for the page's files, to sign in and for health checks: who is an
-    operator is known after them.
+    Public routes include the page's files, signing in and health checks: without them no operator could sign
+    in.
     """
     protocol = request.protocol
     if not isinstance(protocol, PooledHandler):

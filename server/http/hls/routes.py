@@ -10,8 +10,8 @@ from aiohttp import web
 from server.http.access.authorization import ACCESS, is_scoped_to_person
 from server.http.app_keys import SERVICE
 from server.http.hls.live_playlist import live_playlist, wait_for_part
+from server.http.hls.playlist import with_token
 from server.http.hls.time_shift_playlist import HlsStream, time_shift_playlist, time_shift_segment
-from server.http.hls.token_query import with_token
 from server.http.json_responses import error_response, unavailable
 from server.http.streams.time_range import is_time_shifted
 from server.http.viewers.hls_sessions import HLS_SESSIONS, HlsClient, of_camera, of_live, of_person
@@ -23,9 +23,9 @@ routes = web.RouteTableDef()
 _ANY_ORIGIN = {"Access-Control-Allow-Origin": "*"}
 _OBJECT = "/objects/{object:[0-9]{1,9}}/hls"
 _CAMERA = "/cameras/{camera}/hls"
-_NUMBER = "{segment:[0-9]{1,12}}"
-_AGENT = 200
-"""Characters of the User-Agent that players are told apart by."""
+_SEGMENT = "{segment:[0-9]{1,12}}"
+_AGENT_CHARS = 200
+"""Characters of the User-Agent header by which players are distinguished."""
 
 
 _Handler = Callable[[web.Request], Awaitable[web.Response]]
@@ -33,7 +33,7 @@ _StreamHandler = Callable[[web.Request, HlsStream], Awaitable[web.Response]]
 
 
 def _counted(awaits: str | None = None) -> Callable[[_StreamHandler], _Handler]:
-    """Count the player as a viewer, if there is a slot; ``awaits`` is the kind of data it may block on."""
+    """Count the player as a viewer, or refuse it; ``awaits`` is the kind of data that it may wait for."""
 
     def counted(handler: _StreamHandler) -> _Handler:
         @wraps(handler)
@@ -43,7 +43,7 @@ def _counted(awaits: str | None = None) -> Callable[[_StreamHandler], _Handler]:
                 return await handler(request, stream)
             sessions, player = request.app[HLS_SESSIONS], _client(request)
             if sessions.is_new_viewer(player, awaits):
-                slot_name, connected = _connected(request)
+                slot_name, connected = _connected_viewers(request)
                 viewers = connected + sessions.of(player.stream)
                 refused = refuse_viewer(request, viewers, (player.stream, slot_name))
                 if refused is not None:
@@ -60,7 +60,7 @@ def _counted(awaits: str | None = None) -> Callable[[_StreamHandler], _Handler]:
 @routes.get(_CAMERA + "/index.m3u8")
 @_counted("playlist")
 async def get_playlist(request: web.Request, stream: HlsStream) -> web.Response:
-    """List the newest segments of a stream (HLS), or from a moment on."""
+    """Return the playlist of a stream (HLS), live or from a moment on."""
     if is_time_shifted(request):
         return with_token(request, await time_shift_playlist(request, stream))
     if stream.live is None:
@@ -78,8 +78,8 @@ async def get_init(request: web.Request, stream: HlsStream) -> web.Response:
     return unavailable("no camera has delivered a picture yet") if head is None else _media(request, head)
 
 
-@routes.get(_OBJECT + f"/{_NUMBER}.m4s")
-@routes.get(_CAMERA + f"/{_NUMBER}.m4s")
+@routes.get(_OBJECT + f"/{_SEGMENT}.m4s")
+@routes.get(_CAMERA + f"/{_SEGMENT}.m4s")
 @_counted()
 async def get_segment(request: web.Request, stream: HlsStream) -> web.Response:
     """Return a media segment of a stream (HLS), live or recorded."""
@@ -88,29 +88,29 @@ async def get_segment(request: web.Request, stream: HlsStream) -> web.Response:
     if segment is None:
         segment = await time_shift_segment(request, stream, number)
     if segment is None:
-        return error_response(404, f"no segment {number}: expired, or not there yet")
+        return error_response(404, f"no segment {number}: expired, or not available yet")
     return _media(request, segment.data)
 
 
-@routes.get(_OBJECT + f"/{_NUMBER}.{{part:[0-9]{{1,6}}}}.m4s")
-@routes.get(_CAMERA + f"/{_NUMBER}.{{part:[0-9]{{1,6}}}}.m4s")
+@routes.get(_OBJECT + f"/{_SEGMENT}.{{part:[0-9]{{1,6}}}}.m4s")
+@routes.get(_CAMERA + f"/{_SEGMENT}.{{part:[0-9]{{1,6}}}}.m4s")
 @_counted("part")
 async def get_part(request: web.Request, stream: HlsStream) -> web.Response:
-    """Return a partial segment of a stream (HLS); blocks until a future one is there."""
+    """Return a part of a segment of a stream (HLS); blocks until the next one exists."""
     if stream.live is None:
         raise _unknown(request)
     number, index = int(request.match_info["segment"]), int(request.match_info["part"])
     part = await wait_for_part(stream.live, number, index)
     if part is None:
-        return error_response(404, f"no part {number}.{index}: expired, or not there yet")
+        return error_response(404, f"no part {number}.{index}: expired, or not available yet")
     return _media(request, part.data)
 
 
 def _media(request: web.Request, data: bytes) -> web.Response:
-    """Return bytes that never change, to be cached briefly: a restarted site numbers its segments anew."""
+    """Return immutable media, to be cached briefly: a restarted site may use its segment numbers again."""
     plan = request.app[SERVICE].streams.segment_plan
-    kept_s = int(2 * plan.playlist_length * plan.segment_frames / plan.fps)
-    headers = {**_ANY_ORIGIN, "Cache-Control": f"public, max-age={kept_s}, immutable"}
+    max_age_s = int(2 * plan.playlist_length * plan.segment_frames / plan.fps)
+    headers = {**_ANY_ORIGIN, "Cache-Control": f"public, max-age={max_age_s}, immutable"}
     return web.Response(body=data, content_type="video/mp4", headers=headers)
 
 
@@ -118,7 +118,7 @@ def _stream(request: web.Request) -> HlsStream:
     """Return the stream of a request.
 
     Raises:
-        RefusedError: there is and was none.
+        RefusedError: the stream is neither live nor recorded.
     """
     service = request.app[SERVICE]
     if "camera" in request.match_info:
@@ -134,18 +134,20 @@ def _stream(request: web.Request) -> HlsStream:
 
 
 def _client(request: web.Request) -> HlsClient:
-    """Return the player behind a request: told apart by client, address and User-Agent."""
+    """Return the player that sent a request, identified by client, address and User-Agent."""
     service, names = request.app[SERVICE], request.match_info
     if "camera" in names:
         stream = of_camera(names["camera"])
     else:
         stream = of_person(service.people.current_number(int(names["object"])))
     client = request.app[ACCESS].client_of(request)
-    return HlsClient(stream, client, request.remote or "", request.headers.get("User-Agent", "")[:_AGENT])
+    return HlsClient(
+        stream, client, request.remote or "", request.headers.get("User-Agent", "")[:_AGENT_CHARS]
+    )
 
 
-def _connected(request: web.Request) -> tuple[str, int]:
-    """Return the slot name of the same stream over connections of their own, and how many watch that."""
+def _connected_viewers(request: web.Request) -> tuple[str, int]:
+    """Return the slot name of the stream's viewers outside HLS, and their number."""
     service, names = request.app[SERVICE], request.match_info
     if "camera" in names:
         return of_live(names["camera"]), service.streams.of_camera(names["camera"]).viewers

@@ -1,4 +1,4 @@
-"""Event loop lag: how late tasks of the HTTP process are woken."""
+"""Event loop lag: how late the event loop wakes tasks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _EVERY_S = 0.25
 
 
 class LoopLag:
-    """Sleeps for ``every_s`` again and again, and measures how much later it wakes."""
+    """Measures how late repeated sleeps of ``every_s`` seconds end."""
 
     def __init__(self, every_s: float = _EVERY_S) -> None:
         self._every_s = every_s
@@ -24,7 +24,7 @@ class LoopLag:
         )
 
     async def run(self) -> None:
-        """Measure for as long as the loop runs."""
+        """Measure until cancelled."""
         loop = asyncio.get_running_loop()
         while True:
             due = loop.time() + self._every_s

@@ -1,4 +1,4 @@
-"""``/metrics``: the service's metrics, and HTTP's own: viewers, traffic, refused tokens, event loop lag."""
+"""``/metrics``: the service's metrics, and those of HTTP: viewers, traffic, wrong tokens, event loop lag."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ async def get_metrics(request: web.Request) -> web.Response:
 
 
 class HttpCollector(Collector):
-    """Collects what HTTP itself counts."""
+    """Collects the metrics of the HTTP application."""
 
     def __init__(self, app: web.Application, lag: LoopLag) -> None:
         self._app, self._lag = app, lag
@@ -80,7 +80,7 @@ class HttpCollector(Collector):
 
 
 def add_metrics(app: web.Application) -> None:
-    """Add to an application all that is measured; its parts must have been added before."""
+    """Register all metrics with an application, after its other parts."""
     lag, registry = LoopLag(), CollectorRegistry()
     app[METRICS] = registry
     app[SERVICE].register_metrics(registry, queues={"viewer": lambda: app[TRAFFIC].longest_queue})

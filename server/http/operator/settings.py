@@ -1,4 +1,4 @@
-"""``/api/operator/config`` and ``view_selection``: the configuration in force, and settings to try out."""
+"""``/api/operator/config`` and ``view_selection``: the configuration in force, and trial settings."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ routes = web.RouteTableDef()
 
 _ENDPOINTS = frozenset({"zenoh.connect", "zenoh.listen"})
 _PASSWORD = re.compile(r"cameras[.][^.]+[.]password")
-"""The name of a file, hidden since some write the password itself there."""
+"""Keys of password files; the file name is hidden, since some enter the password itself there."""
 
 
 @routes.get(f"{OPERATOR_PATH}/config")
@@ -40,13 +40,13 @@ async def get_config(request: web.Request) -> web.Response:
 
 @routes.get(f"{OPERATOR_PATH}/view_selection")
 async def get_view_selection(request: web.Request) -> web.Response:
-    """Return the view selection's settings in force, and the configured ones."""
+    """Return the view-selection settings in force, and the configured ones."""
     return json_response(_selection_settings(request.app[SERVICE]))
 
 
 @routes.put(f"{OPERATOR_PATH}/view_selection")
 async def put_view_selection(request: web.Request) -> web.Response:
-    """Try out view-selection settings, until they are changed again or the service ends."""
+    """Change view-selection settings until they are changed again or the service ends."""
     service = request.app[SERVICE]
     operations = service.operations
     changes = await read_json(request, dict[str, float | bool])
@@ -72,7 +72,7 @@ async def delete_view_selection(request: web.Request) -> web.Response:
 
 
 def settings_of(config: Config) -> Iterator[Setting]:
-    """Yield every setting in force, in the reference's order."""
+    """Yield every setting in force, in the order of the reference."""
     for name, field in Config.model_fields.items():
         if name == "cameras":
             for camera in config.cameras:
@@ -85,18 +85,23 @@ def _settings(place: str, section: Any, default: Any) -> Iterator[Setting]:
     """Yield a section's settings; ``default`` is an instance with the defaults, or the class."""
     for name in _names(section):
         if isinstance(default, type) and issubclass(default, BaseModel):
-            usual = default.model_fields[name].get_default(call_default_factory=True)
+            default_value = default.model_fields[name].get_default(call_default_factory=True)
         else:
-            usual = getattr(default, name)
-        yield from _setting(f"{place}.{name}", getattr(section, name), usual)
+            default_value = getattr(default, name)
+        yield from _setting(f"{place}.{name}", getattr(section, name), default_value)
 
 
-def _setting(key: str, value: Any, usual: Any) -> Iterator[Setting]:
+def _setting(key: str, value: Any, default_value: Any) -> Iterator[Setting]:
     if isinstance(value, BaseModel) or dataclasses.is_dataclass(value):
-        yield from _settings(key, value, usual)
+        yield from _settings(key, value, default_value)
     else:
-        default = None if usual is PydanticUndefined else _written(key, usual)
-        yield Setting(key, _written(key, value), default, usual is not PydanticUndefined and value != usual)
+        default = None if default_value is PydanticUndefined else _as_yaml(key, default_value)
+        yield Setting(
+            key,
+            _as_yaml(key, value),
+            default,
+            default_value is not PydanticUndefined and value != default_value,
+        )
 
 
 def _names(section: Any) -> list[str]:
@@ -105,22 +110,22 @@ def _names(section: Any) -> list[str]:
     return [field.name for field in dataclasses.fields(section)]
 
 
-def _written(key: str, value: Any) -> str:
-    """Return a value as YAML, with secrets hidden."""
+def _as_yaml(key: str, value: Any) -> str:
+    """Return a value as YAML, without secrets."""
     if key in _ENDPOINTS:
         return dump_yaml_inline(redact_endpoint(value))
     if value is not None and _PASSWORD.fullmatch(key):
         return dump_yaml_inline(HIDDEN)
-    return dump_yaml_inline(_shown(value))
+    return dump_yaml_inline(_redacted(value))
 
 
-def _shown(value: Any) -> Any:
-    """Return a value with secrets hidden: of URLs only the host, of FFmpeg options only the names."""
+def _redacted(value: Any) -> Any:
+    """Return a value without secrets: only the host of URLs, only the names of FFmpeg options."""
     match value:
         case Mapping():
-            return {redact_address(it): HIDDEN for it in value}
+            return {redact_address(key): HIDDEN for key in value}
         case list() | tuple():
-            return [_shown(it) for it in value]
+            return [_redacted(item) for item in value]
         case bool() | int() | float() | None:
             return value
         case _:
@@ -128,17 +133,12 @@ def _shown(value: Any) -> Any:
 
 
 def _selection_settings(service: BestViewService) -> SelectionSettings:
-    current, file, defaults = (
-        _flat(service.operations.view_settings),
-        _flat(service.config.view),
-        _flat(ViewSettings()),
-    )
+    current = _flat(service.operations.view_settings)
+    file, defaults = _flat(service.config.view), _flat(ViewSettings())
     lines = {key: value for key, value in current.items() if value != defaults[key] or value != file[key]}
-    written = "" if not lines else dump_yaml({"view": _nested(lines)})
+    text = "" if not lines else dump_yaml({"view": _nested(lines)})
     least, most = service.config.least_lookahead, service.operations.max_lookahead
-    return SelectionSettings(
-        values=current, file=file, lines=written, min_lookahead=least, max_lookahead=most
-    )
+    return SelectionSettings(values=current, file=file, lines=text, min_lookahead=least, max_lookahead=most)
 
 
 def _flat(view: ViewSettings) -> dict[str, float | bool]:
@@ -146,7 +146,9 @@ def _flat(view: ViewSettings) -> dict[str, float | bool]:
     for name in LIVE_VIEW_SETTINGS:
         value = getattr(view, name)
         if dataclasses.is_dataclass(value):
-            flat |= {f"{name}.{it.name}": getattr(value, it.name) for it in dataclasses.fields(value)}
+            flat |= {
+                f"{name}.{field.name}": getattr(value, field.name) for field in dataclasses.fields(value)
+            }
         else:
             flat[name] = value
     return flat

@@ -1,4 +1,4 @@
-"""The containers that a stream can be sent in: MP4, MPEG-TS, WebM."""
+"""Containers for streams: MP4, MPEG-TS and WebM."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from server.service.service import BestViewService
 
 @dataclass(frozen=True, slots=True)
 class Container:
-    """How the pieces of a stream are written."""
+    """How a stream is written."""
 
     content_type: str
     head: Callable[[BestViewService], bytes | None]
-    """What a stream begins with; None before the first keyframe."""
+    """Returns the bytes at the start of a stream; None before the first keyframe."""
     packed: Callable[[Chunk], bytes]
-    """Writes one piece."""
+    """Returns the bytes of a chunk."""
 
 
-def _mp4(piece: Chunk) -> bytes:
-    return piece.data_with_audio if isinstance(piece, MediaChunk) else piece.data
+def _mp4(chunk: Chunk) -> bytes:
+    return chunk.data_with_audio if isinstance(chunk, MediaChunk) else chunk.data
 
 
-def _ts(piece: Chunk) -> bytes:
-    return piece.mpegts if isinstance(piece, MediaChunk) else piece.data
+def _ts(chunk: Chunk) -> bytes:
+    return chunk.mpegts if isinstance(chunk, MediaChunk) else chunk.data
 
 
 MP4 = Container("video/mp4", lambda service: service.streams.init_segment(), _mp4)
 TS = Container("video/mp2t", lambda _: b"", _ts)
-WEBM = Container("video/webm", lambda service: service.streams.webm_header(), lambda it: it.data)
-"""Of a site whose codec is VP8, and of no other."""
+WEBM = Container("video/webm", lambda service: service.streams.webm_header(), lambda chunk: chunk.data)
+"""Only for sites whose codec is VP8."""

@@ -1,4 +1,4 @@
-"""Rendered streams over HTTP: multipart JPEG, single JPEG, and the best view with boxes burnt in."""
+"""Rendered streams over HTTP: MJPEG, single JPEGs, and the best view with boxes burnt in."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ _EXPOSED = {"Access-Control-Expose-Headers": PULSE_HEADER}
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
-class _AnsweredError(Exception):
-    """Another answer is to be sent instead."""
+class _ResponseError(Exception):
+    """Ends a handler with another response."""
 
     def __init__(self, response: web.Response) -> None:
         super().__init__(response.text)
@@ -44,18 +44,18 @@ class _AnsweredError(Exception):
 
 
 def _rendering(handler: Handler) -> Handler:
-    """Answer what prevents rendering with 503."""
+    """Wrap a handler: answer 503 if rendering is not possible."""
 
     @wraps(handler)
     async def run(request: web.Request) -> web.StreamResponse:
         try:
             return await handler(request)
-        except _AnsweredError as answered:
-            return answered.response
+        except _ResponseError as error:
+            return error.response
         except RenderPoolFullError:
             return unavailable("the server renders as many streams as allowed (http.pictures_max)")
         except PictureTimeoutError:
-            return unavailable("no picture came in time")
+            return unavailable("no picture was rendered in time")
 
     return run
 
@@ -64,7 +64,7 @@ def _rendering(handler: Handler) -> Handler:
 @routes.get("/cameras/{camera}/live.mjpeg")
 @_rendering
 async def get_mjpeg(request: web.Request) -> web.StreamResponse:
-    """Stream as multipart JPEG, for whatever shows pictures but no video."""
+    """Stream as multipart JPEG, for clients that show pictures but no video."""
     return await _mjpeg(request, _subject(request))
 
 
@@ -72,12 +72,12 @@ async def get_mjpeg(request: web.Request) -> web.StreamResponse:
 @routes.get("/cameras/{camera}/live.jpg")
 @_rendering
 async def get_still(request: web.Request) -> web.StreamResponse:
-    """Return a stream's newest picture."""
+    """Return the newest picture of a stream as JPEG."""
     return await _still(request, _subject(request))
 
 
 def wants_boxes(request: web.Request) -> bool:
-    """Return whether boxes are drawn into the pictures."""
+    """Return whether the request is for pictures with boxes."""
     return request.query.get("overlay") == "1"
 
 
@@ -158,7 +158,7 @@ def _newest(request: web.Request, subject: Subject) -> int:
     except KeyError:
         pulse = None
     if pulse is None:
-        raise _AnsweredError(unavailable(f"there is no picture of {subject} now"))
+        raise _ResponseError(unavailable(f"there is no picture of {subject} now"))
     return pulse
 
 
@@ -167,7 +167,7 @@ def _kind(request: web.Request) -> StillKind:
 
 
 def _rate(request: web.Request) -> float:
-    """Return the requested pictures a second, at most the site's."""
+    """Return the requested pictures a second, at most the site's frame rate."""
     most, text = request.app[SERVICE].config.site.fps, request.query.get("fps")
     if text is None:
         return most
@@ -176,7 +176,7 @@ def _rate(request: web.Request) -> float:
     except ValueError:
         rate = math.nan
     if not 0 < rate < math.inf:
-        raise _AnsweredError(error_response(400, f"fps={text}: must be a number above 0, such as fps=5"))
+        raise _ResponseError(error_response(400, f"fps={text}: must be a number above 0, such as fps=5"))
     return min(rate, most)
 
 
@@ -189,4 +189,4 @@ def _check_slot(request: web.Request, subject: Subject) -> None:
     viewers = 0 if source is None else source.viewers
     refused = refuse_viewer(request, viewers, (_slot_name(subject),))
     if refused is not None:
-        raise _AnsweredError(refused)
+        raise _ResponseError(refused)

@@ -1,4 +1,4 @@
-"""Sending endless answers: video and events, each at its viewer's own pace."""
+"""Sending of streams: video and events, to each viewer at the pace of its connection."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from server.service.facade.streams import Broadcaster, Chunk, Subscriber
 log = logging.getLogger(__name__)
 
 _SEND_BUFFER_BYTES = 65_536
-"""What the kernel may buffer of a stream: else it would hold a minute for slow readers, unseen."""
+"""Limit of unsent data in the kernel: without it, it could buffer a minute of a stream for a slow viewer."""
 _STREAM_HEADERS = {
     "Cache-Control": "no-store",
     "Access-Control-Allow-Origin": "*",
-    "X-Accel-Buffering": "no",  # or a proxy in front collects what should be live
+    "X-Accel-Buffering": "no",  # otherwise a proxy may buffer a live stream
 }
 
 
-PieceWriter = Callable[[Chunk], bytes]
-"""Writes a piece of a stream in some container."""
+ChunkWriter = Callable[[Chunk], bytes]
+"""Returns the bytes of a chunk in a container."""
 
 
-def plain(piece: Chunk) -> bytes:
-    """Return a piece's own bytes."""
-    return piece.data
+def plain(chunk: Chunk) -> bytes:
+    """Return a chunk's bytes unchanged."""
+    return chunk.data
 
 
 async def send_stream(
@@ -38,12 +38,12 @@ async def send_stream(
     channel: Broadcaster,
     head: bytes,
     headers: Mapping[str, str],
-    write_piece: PieceWriter = plain,
+    write_chunk: ChunkWriter = plain,
 ) -> web.StreamResponse:
-    """Send ``head`` and then the channel for as long as both live."""
+    """Send ``head`` and then a channel, until it ends or the viewer leaves."""
     viewer = channel.subscribe()
     try:
-        return await send_viewer(request, viewer, head, headers, write_piece)
+        return await send_viewer(request, viewer, head, headers, write_chunk)
     finally:
         channel.unsubscribe(viewer)
 
@@ -53,48 +53,48 @@ async def send_viewer(
     viewer: Subscriber,
     head: bytes,
     headers: Mapping[str, str],
-    write_piece: PieceWriter = plain,
+    write_chunk: ChunkWriter = plain,
 ) -> web.StreamResponse:
-    """Send ``head`` and what a viewer is sent, who has joined a channel and will leave it."""
+    """Send ``head`` and the chunks of a viewer; the caller subscribes and unsubscribes the viewer."""
 
     def ready(response: web.StreamResponse) -> None:
         if request.transport is not None:
             chunked = response.headers.get("Transfer-Encoding") == "chunked"
-            viewer.direct_send = _direct_writer(request.transport, write_piece, traffic, chunked=chunked)
+            viewer.direct_send = _direct_writer(request.transport, write_chunk, traffic, chunked=chunked)
 
     traffic = request.app[TRAFFIC]
     traffic.join(viewer)
-    pieces = (write_piece(piece) async for piece in viewer.chunks())
+    chunks = (write_chunk(chunk) async for chunk in viewer.chunks())
     try:
-        return await send_bytes(request, pieces, head, headers, ready)
+        return await send_bytes(request, chunks, head, headers, ready)
     finally:
         viewer.direct_send = None
         traffic.leave(viewer)
 
 
 def _direct_writer(
-    transport: asyncio.Transport, write_piece: PieceWriter, traffic: Traffic, *, chunked: bool
+    transport: asyncio.Transport, write_chunk: ChunkWriter, traffic: Traffic, *, chunked: bool
 ) -> Callable[[Chunk], bool]:
-    """Return what writes a piece at once where nothing of the one before is buffered.
+    """Return a function that writes a chunk at once if the transport has no unsent data.
 
-    It is called for every viewer of every GOP, so all lookups are done beforehand.
+    It is called for every viewer and GOP, so all lookups are done beforehand.
     """
-    is_closing, waiting, write = transport.is_closing, transport.get_write_buffer_size, transport.write
+    is_closing, unsent_bytes, write = transport.is_closing, transport.get_write_buffer_size, transport.write
 
-    def take(piece: Chunk) -> bool:
-        if waiting() or is_closing():
+    def send(chunk: Chunk) -> bool:
+        if unsent_bytes() or is_closing():
             return False
-        data = write_piece(piece)
-        write(_chunk(data) if chunked else data)
+        data = write_chunk(chunk)
+        write(_http_chunk(data) if chunked else data)
         traffic.streams += len(data)
         return True
 
-    return take
+    return send
 
 
 @lru_cache(maxsize=8)
-def _chunk(data: bytes) -> bytes:
-    """Return data as a chunk (RFC 9112, 7.1), encoded once for all viewers."""
+def _http_chunk(data: bytes) -> bytes:
+    """Return data in the chunked transfer coding (RFC 9112, 7.1), encoded once for all viewers."""
     return b"%x\r\n%b\r\n" % (len(data), data)
 
 
@@ -105,7 +105,7 @@ async def send_bytes(
     headers: Mapping[str, str],
     ready: Callable[[web.StreamResponse], None] = lambda _: None,
 ) -> web.StreamResponse:
-    """Send ``head`` and all of ``data``; to HEAD, neither. ``ready`` is called when the head is written."""
+    """Send ``head`` and ``data``, or only headers to HEAD; call ``ready`` once ``head`` is written."""
     response = web.StreamResponse(headers={**_STREAM_HEADERS, **headers})
     await response.prepare(request)
     if request.method == "HEAD":
@@ -117,9 +117,9 @@ async def send_bytes(
             await response.write(head)
             traffic.streams += len(head)
         ready(response)
-        async for piece in data:
-            await response.write(piece)
-            traffic.streams += len(piece)
+        async for chunk in data:
+            await response.write(chunk)
+            traffic.streams += len(chunk)
         await response.write_eof()
     except (ConnectionError, TimeoutError) as error:
         log.debug("viewer disconnected: %s", error)
@@ -127,7 +127,7 @@ async def send_bytes(
 
 
 def _limit_send_buffer(request: web.Request) -> None:
-    """Let the kernel buffer no more than can be sent soon: slow viewers lose GOPs and do not fall behind."""
+    """Limit the kernel's send buffer, so that slow viewers lose GOPs instead of falling behind."""
     option = getattr(socket, "TCP_NOTSENT_LOWAT", None)  # not on every system
     connection = request.get_extra_info("socket")
     if option is not None and connection is not None:

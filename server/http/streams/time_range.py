@@ -1,4 +1,4 @@
-"""``from=`` and ``to=``: the range of pulses that a request is about, and whether it is recorded."""
+"""Time ranges of requests: parse ``from=`` and ``to=``, and check that the range is recorded."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class RecordedChoices(GopChoices, frozen=True, kw_only=True):
 
 
 def is_time_shifted(request: web.Request) -> bool:
-    """Return whether a stream starts in the past (time shift)."""
+    """Return whether a stream is requested with from= or to=."""
     return "from" in request.query or "to" in request.query
 
 
@@ -33,22 +33,21 @@ def parse_time_range(
     start: int | None = None,
     endless: str | None = None,
 ) -> PlaybackRange:
-    """Parse from= and to=; ``now`` is the pulse that seconds back are counted from.
+    """Parse from= and to=; ``now`` is the pulse from which seconds back are counted.
 
-    ``start`` stands where from= is missing; None: it must not be. ``endless`` is a word for to= that means no
-    end.
+    ``start`` is the default of from=; None: from= is required. ``endless``: a to= that means no end.
 
     Raises:
-        TimeReferenceError: they are no moments, or the second is not after the first.
+        TimeReferenceError: a value is not a moment, or to= is not after from=.
     """
-    moments: dict[str, int] = {}
+    pulses: dict[str, int] = {}
     for name in ("from", "to"):
         if name in request.query and (name, request.query[name]) != ("to", endless):
             try:
-                moments[name] = service.recordings.pulse_at(request.query[name], now)
+                pulses[name] = service.recordings.pulse_at(request.query[name], now)
             except TimeReferenceError as error:
                 raise TimeReferenceError(f"{name}: {error}") from error
-    start, end = moments.get("from", start), moments.get("to")
+    start, end = pulses.get("from", start), pulses.get("to")
     if start is None:
         raise TimeReferenceError("from: is missing; it is the start, such as ?from=-60")
     if end is not None and end <= start:
@@ -59,7 +58,7 @@ def parse_time_range(
 async def refuse_unreadable(
     stream: RecordedStream, start: int, end: int | None = None
 ) -> web.Response | None:
-    """Forget files that have gone at both ends of a range; return 503 where the disk cannot be read."""
+    """Drop index entries of deleted files at both ends of a range; return 503 if the disk is unreadable."""
     try:
         await stream.check_ends(start, end)
     except OSError as error:
@@ -68,7 +67,7 @@ async def refuse_unreadable(
 
 
 async def refuse_unrecorded(stream: RecordedStream, playback: PlaybackRange) -> web.Response | None:
-    """Return 416 with the recorded ranges if none of this range is recorded; None: some is."""
+    """Return 416 with the recorded ranges if nothing of this range is recorded; None: some of it is."""
     if (unreadable := await refuse_unreadable(stream, playback.start, playback.end)) is not None:
         return unreadable
     first = stream.available_from(playback.start)
@@ -79,9 +78,9 @@ async def refuse_unrecorded(stream: RecordedStream, playback: PlaybackRange) -> 
     except OSError as error:
         return disk_error(error)
     spans = stream.spans(0, sys.maxsize)
-    kept = ", ".join(f"p{it.first} to p{it.end - 1}" for it in spans) or "nothing"
+    recorded = ", ".join(f"p{span.first} to p{span.end - 1}" for span in spans) or "nothing"
     return error_response(
-        416, f"nothing of {stream.name} is recorded from p{playback.start} on; there is {kept}"
+        416, f"nothing of {stream.name} is recorded from p{playback.start} on; there is {recorded}"
     )
 
 
@@ -95,7 +94,7 @@ async def decisions_in(
     if first is None and playback.start < service.recordings.end:
         until = "on" if playback.end is None else f"to p{playback.end - 1}"
         return error_response(416, f"no decisions are recorded from p{playback.start} {until}")
-    return _led_by(first, lines)
+    return _prepend(first, lines)
 
 
 def disk_error(error: OSError) -> web.Response:
@@ -103,7 +102,7 @@ def disk_error(error: OSError) -> web.Response:
     return unavailable(f"cannot read the recording: {error.strerror or error}")
 
 
-async def _led_by(first: bytes | None, lines: AsyncIterator[bytes]) -> AsyncIterator[bytes]:
+async def _prepend(first: bytes | None, lines: AsyncIterator[bytes]) -> AsyncIterator[bytes]:
     if first is not None:
         yield first
     async for line in lines:

@@ -1,4 +1,4 @@
-"""Time shift: streams that begin in the past and go on with the present when they reach it."""
+"""Time shift: streams that begin in the past and continue live when they have caught up."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from server.service.facade.streams import Broadcaster
 
 
 async def time_shifted_best(request: web.Request, container: Container) -> web.StreamResponse:
-    """Stream the best view of a person from a moment on."""
+    """Stream the best view of a person from a past moment on."""
     service, number = request.app[SERVICE], int(request.match_info["object"])
     scoped = is_scoped_to_person(request)
     recorded = service.recordings.of_person(number, scoped=scoped)
@@ -41,7 +41,7 @@ async def time_shifted_best(request: web.Request, container: Container) -> web.S
 
 
 async def time_shifted_camera(request: web.Request, container: Container) -> web.StreamResponse:
-    """Stream one camera from a moment on."""
+    """Stream one camera from a past moment on."""
     service, camera = request.app[SERVICE], request.match_info["camera"]
     recorded = service.recordings.of_camera(camera)
 
@@ -58,7 +58,7 @@ async def _stream(
     live: Callable[[], Broadcaster | None],
     live_name: Callable[[], str],
 ) -> web.StreamResponse:
-    """Stream from a moment on; ``live`` is the stream to go on with, whose viewers hold slots by its name."""
+    """Stream from a past moment on, then continue with ``live``, whose slots are named ``live_name``."""
     service = request.app[SERVICE]
     recordings, head = service.recordings, container.head(service)
     if head is None:
@@ -80,7 +80,7 @@ async def _stream(
     def join_live() -> Broadcaster | None:
         nonlocal is_past
         if is_past:
-            recordings.viewer_left()  # from now on the live channel counts this viewer
+            recordings.viewer_left()  # the live channel counts this viewer from here on
         is_past = False
         slot.stream = live_name()
         return live()
@@ -88,8 +88,8 @@ async def _stream(
     with viewer_slot(request, "past") as slot:
         recordings.viewer_joined()
         try:
-            async with aclosing(recorded.play(playback, join_live)) as pieces:
-                data = (container.packed(piece) async for piece in pieces)
+            async with aclosing(recorded.play(playback, join_live)) as chunks:
+                data = (container.packed(chunk) async for chunk in chunks)
                 return await send_bytes(request, data, head, {"Content-Type": container.content_type})
         finally:
             if is_past:

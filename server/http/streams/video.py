@@ -1,4 +1,4 @@
-"""The streams over HTTP: the best view of a person, and a camera as it is."""
+"""Video streams over HTTP: the best view of a person, and single cameras."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ routes = web.RouteTableDef()
 
 @routes.get("/objects/{object:[0-9]{1,9}}/best.mp4")
 async def get_best(request: web.Request) -> web.StreamResponse:
-    """Stream the best view of a person as fragmented MP4; it goes on across every cut."""
+    """Stream the best view of a person as fragmented MP4, without a break at cuts."""
     if wants_boxes(request) and not is_time_shifted(request):
         return await best_with_boxes(request)
     return await _best(request, MP4)
@@ -29,13 +29,13 @@ async def get_best(request: web.Request) -> web.StreamResponse:
 
 @routes.get("/objects/{object:[0-9]{1,9}}/best.ts")
 async def get_best_ts(request: web.Request) -> web.StreamResponse:
-    """Stream the best view of a person as an MPEG transport stream, likewise."""
+    """Stream the best view of a person as an MPEG transport stream, without a break at cuts."""
     return await _best(request, TS)
 
 
 @routes.get("/objects/{object:[0-9]{1,9}}/best.webm")
 async def get_best_webm(request: web.Request) -> web.StreamResponse:
-    """Stream the best view of a person as WebM, where the site's codec is VP8; across every cut."""
+    """Stream the best view of a person as WebM, if the site's codec is VP8."""
     return await _best(request, WEBM)
 
 
@@ -53,7 +53,7 @@ async def get_live_ts(request: web.Request) -> web.StreamResponse:
 
 @routes.get("/cameras/{camera}/live.webm")
 async def get_live_webm(request: web.Request) -> web.StreamResponse:
-    """Stream one camera as WebM, likewise."""
+    """Stream one camera as WebM, if the site's codec is VP8."""
     return await _live(request, WEBM)
 
 
@@ -70,15 +70,15 @@ async def _best(request: web.Request, container: Container) -> web.StreamRespons
     for camera in (fixed, preferred):
         if camera is not None:
             service.cameras.require(camera)
-    slot_name, others = of_person(person), streams.viewers_of_person(person) - channel.viewers
+    slot_name, other_viewers = of_person(person), streams.viewers_of_person(person) - channel.viewers
     hls_name: str | None = slot_name
     if fixed is not None:
         channel = streams.of_camera_decided(fixed)
-        slot_name, hls_name, others = of_decided(fixed), of_camera(fixed), 0
+        slot_name, hls_name, other_viewers = of_decided(fixed), of_camera(fixed), 0
     elif preferred is not None:
         channel = streams.of_person_preferring(person, preferred, scoped=scoped)
-        slot_name, hls_name, others = f"object {person} preferring {preferred}", None, 0
-    return await _send(request, channel, slot_name, hls_name, container, others)
+        slot_name, hls_name, other_viewers = f"object {person} preferring {preferred}", None, 0
+    return await _send(request, channel, slot_name, hls_name, container, other_viewers)
 
 
 async def _live(request: web.Request, container: Container) -> web.StreamResponse:
@@ -96,17 +96,18 @@ async def _send(
     slot_name: str,
     hls_name: str | None,
     container: Container,
-    others: int = 0,
+    other_viewers: int = 0,
 ) -> web.StreamResponse:
-    """Send a channel, whose viewers hold slots by one name, and HLS players of the same by another.
+    """Send a channel if a viewer slot is free.
 
-    ``others`` is how many watch the same over another channel.
+    ``slot_name`` and ``hls_name`` are the slot names of the stream's viewers and HLS players;
+    ``other_viewers`` is the number of viewers of the same person over other channels.
     """
     head = container.head(request.app[SERVICE])
     if head is None:
         return unavailable("no camera has delivered a picture yet")
     players = 0 if hls_name is None else request.app[HLS_SESSIONS].of(hls_name)
-    viewers = channel.viewers + others + players
+    viewers = channel.viewers + other_viewers + players
     refused = refuse_viewer(request, viewers, (slot_name, hls_name or slot_name))
     if refused is not None:
         return refused

@@ -1,7 +1,7 @@
-"""Fair share: where no slot is left, a client with fewer gets one of the client with the most.
+"""Fair share of viewer slots: when none is free, a client with fewer takes one of the client with the most.
 
-A client is a token, however many sessions, addresses and players it has; where there are no tokens, an
-address. As long as slots are free no share is limited: behind a proxy all clients have one address.
+A client is a token, with all its sessions, addresses and players, or an address where there are no tokens.
+While slots are free no client is limited: behind a proxy all clients have the same address.
 """
 
 from __future__ import annotations
@@ -15,35 +15,35 @@ from server.http.access.permissions import ClientIdentity
 
 @dataclass(slots=True, eq=False)
 class Slot:
-    """What a client holds."""
+    """A slot that a client holds."""
 
     client: ClientIdentity
     stream: str
     end: Callable[[], None]
-    """Ends what the slot is used for; it is released once that is done."""
+    """Ends the slot's stream; the slot is released when that has ended."""
     weight: int = 1
-    """How many slots it counts as."""
+    """The number of slots that it counts as."""
 
 
 class FairShare:
-    """Which client holds which slots."""
+    """The slots that clients hold."""
 
     def __init__(self) -> None:
         self._held: dict[Slot, None] = {}
-        """The newest last."""
+        """In order of time, the newest last."""
         self._ending: dict[Slot, None] = {}
 
     @property
     def all(self) -> int:
-        """How many slots are held."""
-        return sum(it.weight for it in self._held)
+        """The number of slots held."""
+        return sum(slot.weight for slot in self._held)
 
     def ending(self, streams: Collection[str] | None = None) -> int:
-        """Return how many slots were evicted but not released yet; of some streams, or of all."""
-        return sum(it.weight for it in self._ending if streams is None or it.stream in streams)
+        """Return the number of slots evicted but not released yet, of some streams or of all."""
+        return sum(slot.weight for slot in self._ending if streams is None or slot.stream in streams)
 
     def take(self, slot: Slot) -> Slot:
-        """Register a slot; call :meth:`release` in the end."""
+        """Register a slot; the caller calls :meth:`release` at the end."""
         self._held[slot] = None
         return slot
 
@@ -53,25 +53,26 @@ class FairShare:
         self._ending.pop(slot, None)
 
     def evict_for(self, client: ClientIdentity, streams: Collection[str] | None = None) -> bool:
-        """Evict a slot in favor of a client, of some streams or any; tell whether there was one to evict.
+        """Evict a slot in favor of a client, of some streams or of any; return whether one was evicted.
 
-        It is the newest slot of the client that holds the most, if those are at least two more than this
-        client's: so no two clients evict each other in turn. Operators are evicted only for other operators;
-        and they evict others however many slots they hold.
+        It is the newest slot of the client that holds the most, if that holds at least two more than this
+        client, so that two clients do not evict each other in turn. Operators are evicted only for other
+        operators, and evict other clients however many slots they hold.
         """
-        held = [it for it in self._held if streams is None or it.stream in streams]
-        counts, operators = Counter[str](), {it.client.key for it in held if it.client.is_operator}
-        for it in held:
-            counts[it.client.key] += it.weight
-        own = counts.pop(client.key, 0)
+        held = [slot for slot in self._held if streams is None or slot.stream in streams]
+        counts = Counter[str]()
+        operators = {slot.client.key for slot in held if slot.client.is_operator}
+        for slot in held:
+            counts[slot.client.key] += slot.weight
+        own_count = counts.pop(client.key, 0)
         candidates = {key: count for key, count in counts.items() if key not in operators}
         if not (client.is_operator and candidates):
-            among = counts if client.is_operator else candidates
-            candidates = {key: count for key, count in among.items() if count > own + 1}
+            evictable = counts if client.is_operator else candidates
+            candidates = {key: count for key, count in evictable.items() if count > own_count + 1}
         if not candidates:
             return False
         most = max(candidates, key=candidates.__getitem__)
-        newest = next(it for it in reversed(held) if it.client.key == most)
+        newest = next(slot for slot in reversed(held) if slot.client.key == most)
         del self._held[newest]
         self._ending[newest] = None
         newest.end()

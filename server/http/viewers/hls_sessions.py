@@ -1,4 +1,4 @@
-"""HLS sessions: players that fetch hold no connection, so who has fetched lately counts as a viewer."""
+"""HLS sessions: HLS players hold no connection, so those that have fetched recently count as viewers."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from aiohttp import web
 from server.http.access.permissions import ClientIdentity
 from server.http.viewers.fair_share import FairShare, Slot
 
-_TARGETS = 3
-"""Target durations: a player fetches once in each; who has not for so many has left."""
+_TIMEOUT_TARGETS = 3
+"""Target durations without a request after which a player has left; it should fetch once in each."""
 
 
 def of_person(number: int) -> str:
@@ -29,7 +29,7 @@ def of_camera(name: str) -> str:
 
 
 def of_live(camera: str) -> str:
-    """Return the slot name of a camera's live stream over a connection of its own."""
+    """Return the slot name of a camera's live stream outside HLS."""
     return f"live {camera}"
 
 
@@ -39,13 +39,13 @@ def of_decided(camera: str) -> str:
 
 
 class HlsClient(NamedTuple):
-    """A player that fetches a stream, as far as players can be told apart."""
+    """The identity of a player that fetches a stream."""
 
     stream: str
     client: ClientIdentity
     address: str
     agent: str
-    """Its User-Agent header: there may be several players behind one address."""
+    """The User-Agent header: there may be several players behind one address."""
 
 
 @dataclass(slots=True)
@@ -53,47 +53,47 @@ class _Session:
     until: float
     slot: Slot
     evicted: bool = False
-    """Its slot was taken away: it needs another one."""
+    """Whether its slot was evicted: it needs another one."""
     waiting: Counter[str] = field(default_factory=Counter)
-    """Requests that block until there is something new and are not answered yet, by kind."""
+    """Blocking requests that are not answered yet, by kind."""
 
     @property
     def weight(self) -> int:
-        """How many players it must be: each blocks on one request of a kind at a time."""
+        """The number of players that it must be: each blocks on one request of a kind at a time."""
         return max(1, max(self.waiting.values(), default=0))
 
 
 class HlsSessions:
-    """Counts players, which hold slots; ``clock`` is in seconds and never steps."""
+    """Counts HLS players and holds their slots; ``clock`` is monotonic, in seconds."""
 
     def __init__(
         self, target_s: float, slots: FairShare, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        self._kept_s, self._slots, self._clock = _TARGETS * target_s, slots, clock
+        self._timeout_s, self._slots, self._clock = _TIMEOUT_TARGETS * target_s, slots, clock
         self._sessions: dict[HlsClient, _Session] = {}
-        """The one that has fetched last is the last."""
+        """In order of their last request, the newest last."""
         self._by_stream: Counter[str] = Counter()
 
     @property
     def all(self) -> int:
-        """How many players there are, all streams together."""
+        """The number of players of all streams."""
         self._expire()
         return self._by_stream.total()
 
     def of(self, stream: str) -> int:
-        """Return how many players fetch a stream."""
+        """Return the number of players of a stream."""
         self._expire()
         return self._by_stream[stream]
 
     def is_new_viewer(self, client: HlsClient, awaits: str | None) -> bool:
-        """Return whether a request adds a viewer; ``awaits`` is the kind of data it may block on."""
+        """Return whether a request adds a viewer; ``awaits`` is the kind of data that it may wait for."""
         self._expire()
         known = self._sessions.get(client)
         return known is None or (awaits is not None and known.waiting[awaits] >= known.weight)
 
     @contextmanager
     def request(self, client: HlsClient, awaits: str | None) -> Iterator[None]:
-        """Count a player while a request is answered, and for a while after."""
+        """Count a player while a request is answered, and until its timeout afterwards."""
         session = self._change(client, self._sessions.get(client), awaits, 1)
         try:
             yield
@@ -107,7 +107,7 @@ class HlsSessions:
         session = previous or known or self._new(client)
         if awaits is not None:
             session.waiting[awaits] += by
-        session.until = self._clock() + self._kept_s
+        session.until = self._clock() + self._timeout_s
         session.slot.weight = session.weight
         self._slots.take(session.slot)
         self._sessions[client] = session
@@ -119,7 +119,7 @@ class HlsSessions:
         return session
 
     def _evict(self, client: HlsClient, session: _Session) -> None:
-        """Count a player no more, though it may still wait for an answer."""
+        """Stop counting a player, even if it still waits for an answer."""
         session.evicted = True
         if self._sessions.get(client) is session:
             self._drop(client)
@@ -132,7 +132,7 @@ class HlsSessions:
             del self._by_stream[client.stream]
 
     def _expire(self) -> None:
-        """Drop players that have not fetched for long; one that waits for an answer stays."""
+        """Drop players that have timed out; one that waits for an answer stays."""
         now = self._clock()
         while self._sessions:
             client, oldest = next(iter(self._sessions.items()))
@@ -142,7 +142,7 @@ class HlsSessions:
                 self._drop(client)
                 continue
             del self._sessions[client]
-            oldest.until = now + self._kept_s
+            oldest.until = now + self._timeout_s
             self._sessions[client] = oldest
 
 

@@ -1,4 +1,4 @@
-"""Traffic: bytes sent, and how far behind viewers are."""
+"""Traffic: bytes sent, GOPs lost by viewers, and the longest queue."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from server.service.facade.streams import Subscriber
 
 
 class Traffic:
-    """Counts bytes of streams and of other answers, and what viewers lose.
+    """Counts bytes sent and GOPs lost.
 
     Attributes:
-        streams: bytes of endless answers.
-        answers: bytes of all others.
+        streams: bytes of streams.
+        answers: bytes of all other responses.
     """
 
     def __init__(self) -> None:
@@ -22,26 +22,26 @@ class Traffic:
         """GOPs lost by viewers who have left."""
 
     def join(self, viewer: Subscriber) -> None:
-        """Count a viewer's losses from now on; call :meth:`leave` in the end."""
+        """Add a viewer; the caller calls :meth:`leave` at the end."""
         self._viewers.add(viewer)
 
     def leave(self, viewer: Subscriber) -> None:
-        """Keep what a viewer has lost, who leaves."""
+        """Remove a viewer, and keep the count of its lost GOPs."""
         self._viewers.discard(viewer)
         self._lost += viewer.lost_gops
 
     @property
     def lost(self) -> int:
-        """How many GOPs viewers have lost because they fell behind."""
+        """The number of GOPs that viewers have lost because they fell behind."""
         return self._lost + sum(viewer.lost_gops for viewer in self._viewers)
 
     @property
     def longest_queue(self) -> int:
-        """How many pieces wait for the viewer who is furthest behind."""
+        """The number of chunks queued for the viewer that is furthest behind."""
         return max((viewer.queued for viewer in self._viewers), default=0)
 
     async def count(self, request: web.Request, response: web.StreamResponse) -> None:
-        """Count an answer that has a body of its own; streams count themselves."""
+        """Count the body of a response; streams are counted as they are sent."""
         if isinstance(response, web.Response) and request.method != "HEAD":
             self.answers += response.content_length or 0
 

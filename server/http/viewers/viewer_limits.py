@@ -1,4 +1,4 @@
-"""Viewer limits: how many may watch one stream, all streams together, and be sent events."""
+"""Viewer limits: of one stream, of all streams together, and of event streams."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from server.http.viewers.fair_share import FairShare, Slot
 from server.http.viewers.hls_sessions import HLS_SESSIONS
 
 VIEWER_SLOTS = web.AppKey("viewer slots", FairShare)
-"""Who watches which stream."""
+"""Slots of viewers, by stream."""
 EVENT_SLOTS = web.AppKey("event slots", FairShare)
-"""Who is sent events, or recorded decisions."""
+"""Slots of clients that receive events or recorded decisions."""
 
 
 def refuse_viewer(
     request: web.Request, viewers: int = 0, streams: tuple[str, ...] = ()
 ) -> web.Response | None:
-    """Return 503 where no more may watch a stream of so many viewers; None: there is a slot, or is one now.
+    """Return 503 if no slot is free for another viewer of a stream; None: one is free, or has been evicted.
 
-    ``streams`` are the names by which its viewers hold slots. A drawing process counts as a viewer of the
-    stream that it draws, and so does each HLS session.
+    ``viewers`` is the number of its viewers; HLS sessions and render workers count as viewers.
+    ``streams`` are the names by which its viewers hold slots.
     """
     service, slots = request.app[SERVICE], request.app[VIEWER_SLOTS]
     limits = service.config.http
@@ -34,7 +34,7 @@ def refuse_viewer(
     total += service.rendering.viewers + request.app[HLS_SESSIONS].all
     if viewers - slots.ending(streams) >= limits.viewers_per_object:
         if _evict(request, slots, streams):
-            return None  # one less of all, too
+            return None  # that also freed one of the total
         return unavailable("the stream has as many viewers as allowed (http.viewers_per_object)")
     if total - slots.ending() >= limits.viewers_max and not _evict(request, slots):
         return unavailable("the server has as many viewers as allowed (http.viewers_max)")
@@ -43,13 +43,13 @@ def refuse_viewer(
 
 @contextmanager
 def viewer_slot(request: web.Request, stream: str) -> Iterator[Slot]:
-    """Hold a viewer's slot inside."""
+    """Hold a viewer slot inside."""
     with _slot(request, request.app[VIEWER_SLOTS], stream) as slot:
         yield slot
 
 
 def refuse_event_listener(request: web.Request) -> web.Response | None:
-    """Return 503 where no more may be sent events; None: there is a slot, or there is one now."""
+    """Return 503 if no event slot is free; None: one is free, or has been evicted."""
     slots, most = request.app[EVENT_SLOTS], request.app[SERVICE].config.http.viewers_max
     if slots.all < most or _evict(request, slots):
         return None
@@ -58,13 +58,13 @@ def refuse_event_listener(request: web.Request) -> web.Response | None:
 
 @contextmanager
 def event_slot(request: web.Request) -> Iterator[None]:
-    """Hold a slot for events inside."""
+    """Hold an event slot inside."""
     with _slot(request, request.app[EVENT_SLOTS], ""):
         yield
 
 
 def _evict(request: web.Request, slots: FairShare, streams: tuple[str, ...] | None = None) -> bool:
-    """Evict a client that holds more than its fair share; HEAD takes no slot and evicts no one."""
+    """Evict a slot of a client with more than its fair share; HEAD requests need no slot."""
     return request.method != "HEAD" and slots.evict_for(request.app[ACCESS].client_of(request), streams)
 
 

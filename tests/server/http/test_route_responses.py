@@ -27,7 +27,7 @@ from server.service.streaming.subscriber_queue import Subscriber
         ("/objects/99/best.jpg", "there is no object 99"),
         ("/cameras/c9/live.mjpeg", "there is no camera 'c9'; there are c0, c1"),
         ("/cameras/c9/live.jpg?overlay=1", "there is no camera 'c9'; there are c0, c1"),
-        ("/objects/99/thumb.jpg", "there is no picture of object 99"),
+        ("/objects/99/thumb.jpg", "there is no thumbnail of object 99"),
         ("/cameras/c9/live.mp4", "there is no camera 'c9'; there are c0, c1"),
         ("/api/nothing", "there is nothing at /api/nothing"),
         ("/objects/one/best.mp4", "there is nothing at /objects/one/best.mp4"),

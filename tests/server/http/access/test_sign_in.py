@@ -19,8 +19,8 @@ from server.config.tokens_file import token_digest
 from server.http.access.authentication import COOKIE_PREFIX, Authenticator, Credential
 from server.http.access.csrf import CSRF_HEADER
 from server.http.access.local_requests import is_local_request
-from server.http.access.login_rate_limit import LoginRateLimit
 from server.http.access.sessions import Sessions
+from server.http.access.wrong_token_rate_limit import WrongTokenRateLimit
 
 SESSION = "/api/session"
 CAMERAS = "/api/operator/cameras"
@@ -303,7 +303,7 @@ async def test_a_cookie_that_has_run_out_is_no_wrong_token(site: Hall) -> None:
 
 def test_failures_are_forgotten_one_by_one_and_each_address_has_its_own() -> None:
     now = [0.0]
-    failures = LoginRateLimit(lambda: now[0])
+    failures = WrongTokenRateLimit(lambda: now[0])
     for _ in range(6):
         failures.add("10.0.0.7")
     assert failures.wait("10.0.0.7") == pytest.approx(24.0)

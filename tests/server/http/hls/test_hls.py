@@ -127,7 +127,7 @@ async def test_before_the_first_segment_players_are_told_to_come_again(busy: Hal
         ("/objects/99/hls/init.mp4", "there is no object 99"),
         ("/objects/99/hls/0.m4s", "there is no object 99"),
         ("/cameras/c9/hls/index.m3u8", "there is no camera 'c9'; there are c0, c1"),
-        ("/cameras/c0/hls/999.m4s", "no segment 999: expired, or not there yet"),
+        ("/cameras/c0/hls/999.m4s", "no segment 999: expired, or not available yet"),
         ("/cameras/c0/hls/-1.m4s", "there is nothing at /cameras/c0/hls/-1.m4s"),
         ("/cameras/c0/hls/1.ts", "there is nothing at /cameras/c0/hls/1.ts"),
     ],

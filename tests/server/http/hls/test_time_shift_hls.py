@@ -175,9 +175,9 @@ async def test_what_was_somebodys_can_be_fetched_when_they_are_forgotten(hall: H
         ("/cameras/c9/hls/index.m3u8?from=-60", 404, "there is no camera 'c9'; there are c0, c1"),
         ("/cameras/c0/hls/index.m3u8?from=p999", 416, NOTHING),
         ("/objects/1/hls/index.m3u8?from=p9&to=p9", 400, "to: p9 is not after from, which is p9"),
-        ("/objects/1/hls/index.m3u8?from=p100", 503, "the first segment is not whole yet"),
-        ("/objects/1/hls/10.m4s", 404, "no segment 10: expired, or not there yet"),
-        ("/objects/1/hls/999999999999.m4s", 404, "no segment 999999999999: expired, or not there yet"),
+        ("/objects/1/hls/index.m3u8?from=p100", 503, "the first segment is not complete yet"),
+        ("/objects/1/hls/10.m4s", 404, "no segment 10: expired, or not available yet"),
+        ("/objects/1/hls/999999999999.m4s", 404, "no segment 999999999999: expired, or not available yet"),
     ],
 )  # fmt: skip
 async def test_what_cannot_be_had_is_told_in_one_line(hall: Hall, path: str, status: int, error: str) -> None:

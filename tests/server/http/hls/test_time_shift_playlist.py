@@ -1,4 +1,4 @@
-"""A list of a day would take the service a second, and be fetched every second: lists have bounds."""
+"""Time-shift playlists are limited: one of a day would take a second to write."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from pathlib import Path
 
 import pytest
 
-import server.http.hls.long_playlist as long_module
 from fakes.http.hls_recording import GOPS, HTTP, LENGTH, forget, numbers, shows, text, until_written
 from fakes.service.fed_site import Hall, opened
 from fakes.service.scripted_cameras import CAMERAS, FPS
 from fakes.service.scripted_recordings import PULSE0
 from server.http.hls import time_shift_playlist
-from server.http.hls.long_playlist import MOST_GROWING, long_playlist, trimmed
+from server.http.hls.time_shift_playlist import (
+    MAX_GROWING_SEGMENTS,
+    trim_growing_playlist,
+    write_time_shift_playlist,
+)
 from server.service.streaming.hls_segmenter import segment_layout
 from server.service.time_shift.hls_time_shift import SegmentList
 
@@ -24,11 +27,10 @@ PLAN = segment_layout(FPS, LENGTH, LENGTH / FPS, 1.0)
 
 @pytest.fixture
 async def hall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Hall]:
-    """A site whose lists are short: eight segments that grow, twelve that do not, a time of day in four."""
-    for module in (long_module, time_shift_playlist):
-        monkeypatch.setattr(module, "MOST_GROWING", 8)
-        monkeypatch.setattr(module, "MOST", 12)
-    monkeypatch.setattr(long_module, "_DATED_EVERY", 4)
+    """Serve a site with short playlists: 8 segments growing, 12 complete, every fourth with a time."""
+    monkeypatch.setattr(time_shift_playlist, "MAX_GROWING_SEGMENTS", 8)
+    monkeypatch.setattr(time_shift_playlist, "_MAX_SEGMENTS", 12)
+    monkeypatch.setattr(time_shift_playlist, "_DATE_INTERVAL", 4)
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 1.0}, http=HTTP):
         hall.service.recorder.open()
         hall.service.come(*CAMERAS)
@@ -36,18 +38,18 @@ async def hall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator
 
 
 def dated(playlist: str) -> dict[int, datetime]:
-    """Return the segments before which the time of day stands."""
+    """Return the wall-clock times by segment."""
     found = re.findall(r"^#EXT-X-PROGRAM-DATE-TIME:(.*)\n#EXTINF.*\n(\d+)\.m4s$", playlist, re.MULTILINE)
     return {int(number): datetime.fromisoformat(when) for when, number in found}
 
 
 def entries(playlist: str) -> dict[int, str]:
-    """Return what is told of each segment."""
+    """Return the lines of each segment."""
     found = re.findall(r"((?:#EXT-X-P.*\n)?#EXTINF.*\n)(\d+)\.m4s$", playlist, re.MULTILINE)
-    return {int(number): told for told, number in found}
+    return {int(number): lines for lines, number in found}
 
 
-async def test_a_list_that_goes_on_and_on_loses_its_oldest(hall: Hall) -> None:
+async def test_a_growing_playlist_drops_its_oldest_segments(hall: Hall) -> None:
     path = "/objects/1/hls/index.m3u8?from=p10&to=live"
     before: dict[int, str] = {}
     shows(hall, range(7))
@@ -57,13 +59,13 @@ async def test_a_list_that_goes_on_and_on_loses_its_oldest(hall: Hall) -> None:
         first = numbers(listed)[0]
         assert len(numbers(listed)) <= 8
         assert f"#EXT-X-MEDIA-SEQUENCE:{first}\n" in listed
-        kept = {number: told for number, told in before.items() if number >= first}
-        assert kept.items() <= entries(listed).items(), "what stays has not changed"
+        kept = {number: lines for number, lines in before.items() if number >= first}
+        assert kept.items() <= entries(listed).items(), "listed segments do not change"
         before = entries(listed)
     assert list(before) == list(range(12, 20))
 
 
-async def test_no_playlist_promises_that_nothing_is_taken_from_it(hall: Hall) -> None:
+async def test_a_playlist_has_no_type_since_deleted_segments_leave_it(hall: Hall) -> None:
     shows(hall, range(16))
     await until_written(hall, 16)
     forget(hall)
@@ -92,7 +94,7 @@ async def test_no_playlist_promises_that_nothing_is_taken_from_it(hall: Hall) ->
         ("from=-2&to=live", "from=p150&to=live"),
     ],
 )
-async def test_a_wish_without_an_end_is_given_a_list_that_there_can_be(
+async def test_a_request_without_an_end_is_answered_with_a_playlist_of_allowed_length(
     hall: Hall, query: str, names: str
 ) -> None:
     shows(hall, range(GOPS))
@@ -106,19 +108,19 @@ async def test_a_wish_without_an_end_is_given_a_list_that_there_can_be(
 @pytest.mark.parametrize(
     ("query", "error"),
     [
-        ("from=p5&to=p121", "to: a list has 12 segments at most, here 5 s; say to=p120"),
-        ("from=-9&to=-1", "to: a list has 12 segments at most, here 5 s; say to=p120"),
+        ("from=p5&to=p121", "to: a playlist has 12 segments at most, here 5 s; use to=p120"),
+        ("from=-9&to=-1", "to: a playlist has 12 segments at most, here 5 s; use to=p120"),
         (
             "from=p170&to=p260",
-            "to: a list that grows has 8 segments at most, here 3 s; say to=live, or to=p250",
+            "to: a growing playlist has 8 segments at most, here 3 s; use to=live or to=p250",
         ),
         (
             "from=p170&to=p9999999999999",
-            "to: a list that grows has 8 segments at most, here 3 s; say to=live, or to=p250",
+            "to: a growing playlist has 8 segments at most, here 3 s; use to=live or to=p250",
         ),
     ],
 )
-async def test_a_list_that_would_be_too_long_is_refused_with_what_would_do(
+async def test_a_playlist_that_would_be_too_long_is_refused_with_an_alternative(
     hall: Hall, query: str, error: str
 ) -> None:
     shows(hall, range(GOPS))
@@ -126,27 +128,29 @@ async def test_a_list_that_would_be_too_long_is_refused_with_what_would_do(
     assert await hall.get(f"/objects/1/hls/index.m3u8?{query}") == (400, {"error": error})
 
 
-async def test_live_is_an_end_of_hls_alone(hall: Hall) -> None:
+async def test_only_hls_accepts_live_as_an_end(hall: Hall) -> None:
     shows(hall, range(GOPS))
-    status, told = await hall.get("/objects/1/best.mp4?from=p5&to=live")
-    assert (status, told["error"][:22]) == (400, "to: 'live' is not a ti")
+    status, answer = await hall.get("/objects/1/best.mp4?from=p5&to=live")
+    assert (status, answer["error"][:22]) == (400, "to: 'live' is not a ti")
 
 
-def test_the_time_of_day_is_told_of_the_first_and_of_some_others() -> None:
+def test_the_first_segment_and_every_64th_have_a_wall_clock_time() -> None:
     listing = SegmentList(range(100, 400), PLAN.segment_frames, 1003, 3996)
-    listed = long_playlist(listing, PLAN, PULSE0, ended=True)
+    listed = write_time_shift_playlist(listing, PLAN, PULSE0, ended=True)
     assert numbers(listed) == list(range(100, 400))
-    told = {number: when.timestamp() for number, when in dated(listed).items()}
+    times = {number: when.timestamp() for number, when in dated(listed).items()}
     pulses = {100: 1003} | {number: number * PLAN.segment_frames for number in (128, 192, 256, 320, 384)}
-    assert told == pytest.approx({number: PULSE0 + pulse / FPS for number, pulse in pulses.items()})
-    lengths = [float(it) for it in re.findall(r"#EXTINF:([\d.]+),", listed)]
+    assert times == pytest.approx({number: PULSE0 + pulse / FPS for number, pulse in pulses.items()})
+    lengths = [float(seconds) for seconds in re.findall(r"#EXTINF:([\d.]+),", listed)]
     assert lengths == [7 / FPS, *[10 / FPS] * 298, 6 / FPS]
 
 
-@pytest.mark.parametrize("stop", range(MOST_GROWING + 100, MOST_GROWING + 300, 7))
-def test_what_is_first_after_others_have_gone_was_dated_before(stop: int) -> None:
+@pytest.mark.parametrize("stop", range(MAX_GROWING_SEGMENTS + 100, MAX_GROWING_SEGMENTS + 300, 7))
+def test_the_first_segment_after_trimming_had_a_wall_clock_time_before(stop: int) -> None:
     whole = SegmentList(range(100, stop), PLAN.segment_frames, 1000, stop * PLAN.segment_frames)
-    left = trimmed(whole)
-    assert MOST_GROWING - 64 < len(left.numbers) <= MOST_GROWING
-    before, after = (entries(long_playlist(it, PLAN, PULSE0, ended=False)) for it in (whole, left))
+    trimmed = trim_growing_playlist(whole)
+    assert MAX_GROWING_SEGMENTS - 64 < len(trimmed.numbers) <= MAX_GROWING_SEGMENTS
+    before, after = (
+        entries(write_time_shift_playlist(listing, PLAN, PULSE0, ended=False)) for listing in (whole, trimmed)
+    )
     assert after.items() <= before.items()

@@ -1,0 +1,87 @@
+"""Validation of stream requests: supported query parameters, and a container that fits the site's codec.
+
+Unsupported query parameters are refused instead of ignored.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Awaitable, Callable
+
+from aiohttp import web
+
+from server.http.app_keys import SERVICE
+from server.http.json_responses import error_response
+
+OVERLAY = {
+    "/objects/{object}/best.mp4",
+    "/objects/{object}/best.mjpeg",
+    "/objects/{object}/best.jpg",
+    "/cameras/{camera}/live.mjpeg",
+    "/cameras/{camera}/live.jpg",
+}
+"""Routes that support overlay=, which burns boxes in."""
+TIME_SHIFT = {
+    "/objects/{object}/best.mp4",
+    "/objects/{object}/best.ts",
+    "/cameras/{camera}/live.mp4",
+    "/cameras/{camera}/live.ts",
+    "/objects/{object}/hls/index.m3u8",
+    "/cameras/{camera}/hls/index.m3u8",
+    "/api/past",
+}
+"""Routes that support from= and to= (time shift)."""
+CAMERA_QUERY = {"/objects/{object}/best.mp4", "/objects/{object}/best.webm", "/objects/{object}/best.ts"}
+"""Routes that support camera= and prefer=, a fixed or a preferred camera."""
+_STREAM_PREFIXES = ("/objects/", "/cameras/")
+_CONTAINER_PATH = re.compile(
+    r"/(?:objects|cameras)/[^/]+/(?:(?:best|live)\.[a-z0-9]+|hls/.*)|/api/(?:objects|cameras)/[^/]+/past"
+)
+"""Paths whose answers depend on the container."""
+
+
+@web.middleware
+async def validate_query(
+    request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+) -> web.StreamResponse:
+    """Answer 400 where a stream does not support a query parameter."""
+    resource = request.match_info.route.resource
+    if resource is not None and request.query and request.path.startswith(_STREAM_PREFIXES):
+        error = _invalid_query(request, resource.canonical)
+        if error is not None:
+            return error_response(400, error)
+    return await handler(request)
+
+
+@web.middleware
+async def check_container(
+    request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+) -> web.StreamResponse:
+    """Answer 404 where a stream is requested in a container of another codec: nothing is transcoded."""
+    if _CONTAINER_PATH.fullmatch(request.path):
+        container, is_webm = request.app[SERVICE].streams.container, request.path.endswith(".webm")
+        if container == "webm" and not request.path.endswith((".webm", ".mjpeg", ".jpg")):
+            return error_response(
+                404, "these streams are VP8 (encode.codec): there is best.webm, live.webm and JPEG"
+            )
+        if container == "mp4" and is_webm:
+            return error_response(
+                404, "these streams are H.264 (encode.codec): there is best.mp4 and live.mp4"
+            )
+    return await handler(request)
+
+
+def _invalid_query(request: web.Request, path: str) -> str | None:
+    overlay = request.query.get("overlay", "0")
+    if overlay not in {"0", "1"}:
+        return f"overlay={overlay}: must be 0 or 1"
+    if overlay == "1" and path not in OVERLAY:
+        return "overlay: boxes are burnt into a person's best.mp4, and into .mjpeg and .jpg; not into this"
+    for name, effect in (("camera", "be fixed to one"), ("prefer", "prefer a camera")):
+        excluded = {"overlay", "from", "to", "camera", "prefer"} - {name}
+        if name in request.query and (path not in CAMERA_QUERY or request.query.keys() & excluded):
+            return f"{name}: a person's live best.mp4, best.ts or best.webm can {effect}, and nothing else"
+    for name in ("from", "to"):
+        if name in request.query and path not in TIME_SHIFT:
+            return f"{name}: only .mp4, .ts and HLS can begin in the past"
+    return None
