@@ -120,7 +120,7 @@ class _Camera:
         track = config.track
         self.tracker = OnlineTracker(track.window, track.costs, create_solver(track.solver))
         self.builder = TrackMessageBuilder(camera, 0, frames.size, track.window.stride)
-        self.scorer = CrossViewScorer(config, camera, frames.size, 0) if config.witnesses(camera) else None
+        self.scorer = CrossViewScorer(config, camera, frames.size, 0) if config.peers_of(camera) else None
         self._frames = frames
 
     def shared(self, pulse: int) -> Detections | None:

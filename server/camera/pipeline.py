@@ -111,9 +111,7 @@ class CameraPipeline:
         self._reporter = TrackMessageBuilder(camera_id, boot, self.source.size, track.window.stride)
         self._sharpness = SharpnessMemory() if config.view.quality.sharpness > 0 else None
         self.cross_view = (
-            CrossViewScorer(config, camera_id, self.source.size, boot)
-            if config.witnesses(camera_id)
-            else None
+            CrossViewScorer(config, camera_id, self.source.size, boot) if config.peers_of(camera_id) else None
         )
         self.first_pulse = camera.offset if self.source.recorded else 0
         """The pulse of the first picture."""

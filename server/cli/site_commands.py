@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from server.config.running_config import ActiveConfig
 
 ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")]
-_UP_LETS_GO_S = 1.9
+_UP_RELEASE_S = 1.9
 """Longer than its child processes take to end."""
 LogFolder = Annotated[
     Path | None, typer.Option("--out", help="Write tracks and camera choices into this new folder.")
@@ -102,7 +102,7 @@ def up(
     check_exposure(running.now)
     check_ports(running.now)
     check_recordings(running.now)
-    run_process(lambda: run_up(running, environment, out), let_go_s=_UP_LETS_GO_S)
+    run_process(lambda: run_up(running, environment, out), release_s=_UP_RELEASE_S)
 
 
 def demo(
@@ -115,5 +115,5 @@ def demo(
 
     log_to_stderr("demo")
     run_process(
-        lambda: run_demo(port, seconds, open_browser=not no_browser), let_go_s=_UP_LETS_GO_S, hang_up=True
+        lambda: run_demo(port, seconds, open_browser=not no_browser), release_s=_UP_RELEASE_S, hang_up=True
     )

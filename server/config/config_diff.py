@@ -11,14 +11,13 @@ from pydantic import BaseModel
 from server.config.site_config import Config
 
 _RESOLVED = "ground"
-"""The file of all homographies: what is in it has become each camera's own."""
+"""The file of all homographies; the loader has copied them to the cameras."""
 
 
 def changed_keys(one: Config, other: Config) -> tuple[str, ...]:
-    """List the settings in which two configurations differ, in the order of the reference.
+    """Return the keys of settings that differ, such as ``view.switch_cost_s``, in the order of the reference.
 
-    They are named as ``view.switch_cost_s`` and ``cameras.c0.source``; ``cameras`` alone says that there are
-    other cameras, or the same in another order.
+    ``cameras`` alone means other cameras, or another order of cameras.
     """
     return tuple(key for name in Config.model_fields for key in _section(name, one, other))
 

@@ -1,6 +1,6 @@
-"""Refusal of duplicate keys in YAML and JSON: parsers would silently keep the last one.
+"""Detection of duplicate keys in YAML and JSON, of which parsers silently keep the last one.
 
-Two sections ``access:``, pasted from two documents, would lose the tokens and open the site.
+A second ``access:`` section, pasted from a document, would drop the tokens and open the site.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from server.system.address_redaction import redact_address
 _NO_VALUES = frozenset({"tag:yaml.org,2002:merge", "tag:yaml.org,2002:value"})
 """Tags of the keys ``<<`` and ``=``, which have no value."""
 _JSON_TOKEN = re.compile(r'("(?:[^"\\]|\\.)*")(\s*:)?|[{}]', re.DOTALL)
-"""In valid JSON quotes are of strings alone: each string is found as a whole. Group 2: it is a key."""
+"""Matches whole strings and braces of valid JSON; group 2 is set for keys."""
 
 
 class DuplicateKeyError(ValueError):
-    """A mapping has a key twice; the text says which, and in which lines."""
+    """A mapping has a key twice; the text names the key and both lines."""
 
     def __init__(self, key: str, first: int, second: int) -> None:
         lines = f"lines {first} and {second}" if first != second else f"line {first}"
@@ -35,11 +35,11 @@ class DuplicateKeyError(ValueError):
 def check_yaml_keys(root: yaml.Node, value_of: Callable[[yaml.Node], Any]) -> None:
     """Check that no mapping has a key twice; keys from merges (``<<``) may be overridden.
 
-    Keys are equal if their text or their value is: ``1``, ``"1"`` and ``0x1``. ``value_of`` returns the
-    value of a scalar.
+    Keys are equal if their texts or values are: ``1``, ``"1"`` and ``0x1``. ``value_of`` returns the value of
+    a scalar.
 
     Raises:
-        DuplicateKeyError: a mapping has.
+        DuplicateKeyError: a mapping has a key twice.
     """
     left, seen = [root], set[int]()
     while left:
@@ -51,7 +51,7 @@ def check_yaml_keys(root: yaml.Node, value_of: Callable[[yaml.Node], Any]) -> No
             left += reversed(node.value)
         elif isinstance(node, yaml.MappingNode):
             _check_yaml_mapping(node, value_of)
-            left += [it for pair in reversed(node.value) for it in reversed(pair)]
+            left += [child for pair in reversed(node.value) for child in reversed(pair)]
 
 
 def _check_yaml_mapping(node: yaml.MappingNode, value_of: Callable[[yaml.Node], Any]) -> None:
@@ -71,8 +71,8 @@ def parse_json(text: str) -> Any:
     """Parse JSON in which no object has a key twice.
 
     Raises:
-        DuplicateKeyError: one has.
-        ValueError, RecursionError: it is not valid JSON, as of :func:`json.loads`.
+        DuplicateKeyError: an object has a key twice.
+        ValueError, RecursionError: it is not valid JSON; from :func:`json.loads`.
     """
     content = json.loads(text)
     open_objects: list[dict[str, int]] = []

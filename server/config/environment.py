@@ -1,6 +1,6 @@
-"""Check environment variables ``MYVIEW_SECTION__KEY`` before pydantic-settings reads them.
+"""Checks of environment variables ``MYVIEW_SECTION__KEY`` before pydantic-settings reads them.
 
-pydantic-settings ignores case, keeps one of two equal names, and drops unknown ones.
+pydantic-settings ignores case, silently keeps one of two equal names, and drops unknown ones.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def check_environment(where: str) -> None:
     """Check that all environment variables name known settings, and no two name the same one.
 
     Raises:
-        UserError: one is unknown, as ``MYVIEW_HTP__PORT``, or two are equal; the text begins with ``where``.
+        UserError: a variable is unknown (``MYVIEW_HTP__PORT``), or two set the same; begins with ``where``.
     """
     variables: dict[tuple[str, ...], str] = {}
     for name in sorted(os.environ):
@@ -30,7 +30,7 @@ def check_environment(where: str) -> None:
         if place[0] not in Config.model_fields or (place[0] == "ground" and len(place) > 1):
             raise UserError(f"{where}: environment: {name}: there is no section {place[0]!r}")
         if place in variables:
-            raise UserError(f"{where}: environment: {_both(variables[place], name, place)}")
+            raise UserError(f"{where}: environment: {_both_set(variables[place], name, place)}")
         variables[place] = name
     for place, name in variables.items():
         try:
@@ -39,24 +39,24 @@ def check_environment(where: str) -> None:
             raise UserError(f"{where}: environment: {name}: {error}") from error
         for length in range(1, len(place)):
             outer = variables.get(place[:length])
-            if outer is not None and _says(_parsed(os.environ[outer]), place[length:]):
-                raise UserError(f"{where}: environment: {_both(outer, name, place)}")
+            if outer is not None and _sets(_parsed(os.environ[outer]), place[length:]):
+                raise UserError(f"{where}: environment: {_both_set(outer, name, place)}")
 
 
 def _place(name: str) -> tuple[str, ...] | None:
-    """Return the path of a variable's setting; None: it has none, as MYVIEW_LOG."""
+    """Return the path of a variable's setting; None: it is for something else, like MYVIEW_LOG."""
     if not name.upper().startswith(PREFIX):
         return None
     place = tuple(name[len(PREFIX) :].lower().split(_DELIMITER))
     return place if len(place) > 1 or place[0] in Config.model_fields else None
 
 
-def _both(one: str, other: str, place: Sequence[str]) -> str:
+def _both_set(one: str, other: str, place: Sequence[str]) -> str:
     return f"{one} and {other} both set {'.'.join(place)}: remove one"
 
 
 def _parsed(text: str) -> Any:
-    """Parse a variable's value if it is JSON; else return it unchanged.
+    """Parse a variable's value if it is JSON; otherwise return it unchanged.
 
     Raises:
         DuplicateKeyError: an object in it has a key twice.
@@ -69,8 +69,8 @@ def _parsed(text: str) -> Any:
         return text
 
 
-def _says(content: Any, place: Sequence[str]) -> bool:
-    """Return whether a section's content sets what is at a path, or is no mapping."""
+def _sets(content: Any, place: Sequence[str]) -> bool:
+    """Return whether a section's content sets the key at a path, or is not a mapping."""
     for key in place:
         if not isinstance(content, dict):
             return True

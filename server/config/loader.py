@@ -1,4 +1,4 @@
-"""From a YAML file to a :class:`Config`, or to one line that says what is wrong with it."""
+"""Configuration loader: from a YAML file to a :class:`Config`, or to a one-line error."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def read_content(path: Path) -> dict[str, Any]:
     """Read a configuration file's sections, unchecked.
 
     Raises:
-        UserError: it cannot be read, or is no mapping of sections.
+        UserError: it cannot be read, or is not a mapping of sections.
     """
     content = read_yaml(path, "the configuration")
     if not isinstance(content, dict) or not all(isinstance(section, str) for section in content):
@@ -66,7 +66,7 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     try:
         config = Config(**content)
     except ValidationError as error:
-        raise UserError(_one_line(where, error)) from None  # its own text repeats keys unredacted
+        raise UserError(_one_line(where, error)) from None  # its text repeats keys unredacted
     except SettingsError as error:
         raise UserError(f"{where}: environment: {error}; a list, or a whole section, must be JSON") from error
     check_numbers(config.model_dump(), where)
@@ -82,7 +82,7 @@ def resolve_paths(config: Config, *, where: str, folder: Path) -> Config:
     homographies, unit = _homographies(folder / config.ground, where) if config.ground else ({}, None)
     try:
         cameras = [_resolved(camera, homographies, unit, folder) for camera in config.cameras]
-        _one_side(cameras)
+        _check_handedness(cameras)
     except ValueError as error:
         raise UserError(f"{where}: {error}") from error
     onnx = replace(config.detect.onnx, model=config.detect.model_in(folder))
@@ -94,11 +94,11 @@ def resolve_paths(config: Config, *, where: str, folder: Path) -> Config:
     if record.folder is not None:
         record = record.model_copy(update={"folder": folder / record.folder})
     update = {"cameras": cameras, "detect": detect, "sound": sound, "record": record}
-    return config.model_copy(update={**update, **_who_may(config, folder)})
+    return config.model_copy(update={**update, **_resolved_access(config, folder)})
 
 
-def _who_may(config: Config, folder: Path) -> dict[str, Any]:
-    """Resolve the paths of the files of tokens, passwords and certificates."""
+def _resolved_access(config: Config, folder: Path) -> dict[str, Any]:
+    """Return the sections with files of tokens, passwords and certificates, with absolute paths."""
     access, tls = config.access, config.http.tls
     if access.tokens is not None:
         access = access.model_copy(update={"tokens": folder / access.tokens})
@@ -114,7 +114,7 @@ def _who_may(config: Config, folder: Path) -> dict[str, Any]:
 
 
 def _process_files(section: ProcessSection, folder: Path) -> ProcessSection:
-    """Resolve the paths of a section that has ``users`` and ``tls``."""
+    """Resolve the paths of ``users`` and ``tls`` in a section."""
 
     def resolved(path: Path | None) -> Path | None:
         return None if path is None else (folder / path).absolute()
@@ -126,7 +126,7 @@ def _process_files(section: ProcessSection, folder: Path) -> ProcessSection:
 
 
 def change_view_settings(view: ViewSettings, changes: Mapping[str, Any], where: str) -> ViewSettings:
-    """Return the settings of the choice with some of them changed, checked as those of a file are.
+    """Return view-selection settings with some changed, checked like those of a file.
 
     Raises:
         UserError: something is wrong; the text begins with ``where``.
@@ -139,7 +139,7 @@ def change_view_settings(view: ViewSettings, changes: Mapping[str, Any], where: 
 
 
 def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content with changes to it, section by section."""
+    """Merge changes into nested content."""
     merged = dict(content)
     for key, value in changes.items():
         inner = merged.get(key)
@@ -150,7 +150,7 @@ def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str,
 def _resolved(
     camera: CameraSettings, homographies: Mapping[str, Any], unit: str | None, folder: Path
 ) -> CameraSettings:
-    """Make paths absolute and fill in the ground homography from the file for all cameras, and its unit."""
+    """Make a camera's paths absolute and fill in its homography and unit from the file for all cameras."""
     ground, ground_unit = camera.ground, camera.ground_unit
     if ground is None:
         ground, ground_unit = homographies.get(camera.id), ground_unit or unit
@@ -165,31 +165,33 @@ def _resolved(
     return camera.model_copy(update=update)
 
 
-def _one_side(cameras: Sequence[CameraSettings]) -> None:
-    """Refuse homographies of which one sees the floor as from above and another as from below.
+def _check_handedness(cameras: Sequence[CameraSettings]) -> None:
+    """Check that no homography mirrors the ground plane against the others.
 
     Raises:
-        ValueError: there are such.
+        ValueError: one does.
     """
-    sides = {
-        it.id: ground_handedness(np.array(it.ground, dtype=np.float64))
-        for it in cameras
-        if it.ground is not None
+    handedness = {
+        camera.id: ground_handedness(np.array(camera.ground, dtype=np.float64))
+        for camera in cameras
+        if camera.ground is not None
     }
-    ways = [[camera for camera, side in sides.items() if side == way] for way in (1, -1)]
-    fewer, others = sorted(ways, key=len)
-    if fewer:
+    groups = [[camera for camera, side in handedness.items() if side == sign] for sign in (1, -1)]
+    minority, majority = sorted(groups, key=len)
+    if minority:
         raise ValueError(
-            f"ground: camera {fewer[0]} has the floor mirrored against camera {others[0]}: one of them has "
-            "its horizon below the floor, as if tilted past straight down, or its axes exchanged"
+            f"ground: camera {minority[0]} has the floor mirrored against camera {majority[0]}: one of them "
+            "has its horizon below the floor, as if tilted past straight down, or its axes exchanged"
         )
 
 
 def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]], str | None]:
-    """Read ``{"unit": "m", "homography": {"c0": [[…], […], […]]}}``; the unit may be left out.
+    """Read homographies by camera, and the unit, which is optional.
+
+    The file is ``{"unit": "m", "homography": {"c0": [[…], […], […]]}}``.
 
     Raises:
-        UserError: it cannot be read, a matrix in it is not an invertible 3x3, or the unit is not understood.
+        UserError: it cannot be read, a matrix is not an invertible 3x3, or the unit is invalid.
     """
     try:
         content = parse_json(path.read_text(encoding="utf-8"))
@@ -234,7 +236,7 @@ def _plain(detail: ErrorDetails, within: tuple[str, ...]) -> str:
 
 
 def _known_keys(section: tuple[int | str, ...]) -> list[str]:
-    """List the keys of a section, given the way to it."""
+    """Return the keys of a section, given its path."""
     model: Any = Config
     for part in section:
         if isinstance(part, int):

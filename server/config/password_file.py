@@ -8,10 +8,10 @@ from server.system.errors import UserError
 
 
 def read_users(path: Path, setting: str) -> dict[str, str]:
-    """Read the users' passwords by name; ``setting`` is what names the file.
+    """Read the users' passwords by name; ``setting`` is the key that names the file.
 
     Raises:
-        UserError: it cannot be read, or a line is no name and password.
+        UserError: it cannot be read, or a line is not name:password.
     """
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
@@ -36,7 +36,7 @@ def password_of(path: Path, name: str, setting: str) -> str:
     """Return a user's password.
 
     Raises:
-        UserError: it cannot be read, or there is none.
+        UserError: the file cannot be read, or has no line for this user.
     """
     password = read_users(path, setting).get(name)
     if password is None:

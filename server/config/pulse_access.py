@@ -1,4 +1,4 @@
-"""Access to the pulse server: who its clients are, their passwords, and TLS."""
+"""Access to the pulse server: client names, passwords and TLS."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SETTING = "sync.users"
 
 
 def bestview_client_name(index: int) -> str:
-    """Return the name of a best-view service at the pulse server, which waits for it before pulse 0."""
+    """Return the client name of a best-view service; the pulse server waits for it before pulse 0."""
     return "bestview" if index == 0 else f"bestview-{index}"
 
 
@@ -59,7 +59,7 @@ def pulse_server_tls(config: Config) -> ssl.SSLContext | None:
     """Load the certificate of the pulse server; None where it has none.
 
     Raises:
-        UserError: the certificate or its key cannot be read, or they are no pair.
+        UserError: the certificate or its key cannot be read, or they do not match.
     """
     tls = config.sync.tls
     if tls.certificate is None or tls.key is None:

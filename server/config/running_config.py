@@ -1,4 +1,4 @@
-"""The active configuration of a process, and its file, which may have changed since."""
+"""The active configuration of a process, compared with its file, which may have changed since."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from server.system.errors import UserError
 from server.system.file_state import FileState, file_state
 
 ACTIVE_CONFIG_VARIABLE = "MYVIEW_IN_FORCE"
-"""In the environment of what `myview up` starts: where it keeps the configuration that the site runs by.
+"""Environment variable with the path of the active configuration, set by `myview up` for its processes.
 
-A restarted process must not use a changed file that was not reloaded yet.
+A restarted process must not use a changed configuration file that was not reloaded yet.
 """
 
 
@@ -27,9 +27,9 @@ class ConfigFileState:
     """The difference between the configuration file and the active configuration."""
 
     error: str
-    """Why it cannot be in force; empty: it can."""
+    """Why the file is invalid; empty: it is valid."""
     pending_restart: tuple[str, ...]
-    """The settings in which it differs."""
+    """Keys of the settings that differ."""
 
     @property
     def differs(self) -> bool:
@@ -38,10 +38,10 @@ class ConfigFileState:
 
 
 class ActiveConfig:
-    """The configuration that a process runs by, ``now``; set again after a reload.
+    """The active configuration, ``now``; the process replaces it after a reload.
 
     Raises:
-        UserError: the file cannot be read, or something in it is wrong.
+        UserError: the file cannot be read or is invalid.
     """
 
     def __init__(self, path: Path) -> None:
@@ -51,10 +51,10 @@ class ActiveConfig:
         self._file: Config | UserError = self.now
 
     def wanted(self) -> Config:
-        """Read what is to be in force: what a supervisor says is, or the file.
+        """Read the configuration to activate: the supervisor's active one if there is one, else the file.
 
         Raises:
-            UserError: it cannot be read, or something in it is wrong.
+            UserError: it cannot be read or is invalid.
         """
         active_file = os.environ.get(ACTIVE_CONFIG_VARIABLE)
         if active_file is None or not is_owned_by_this_user(Path(active_file)):
@@ -64,7 +64,7 @@ class ActiveConfig:
     def on_disk(self) -> ConfigFileState:
         """Compare the file with the active configuration; it is read again only when it has changed.
 
-        One that is wrong is read each time: what it refers to, and may be wrong itself, is not known.
+        An invalid file is read each time, since the error may be in a file that it names.
         """
         folder = self.path.parent
         ground = self._file.ground if isinstance(self._file, Config) else None
@@ -90,10 +90,7 @@ def is_owned_by_this_user(path: Path) -> bool:
 
 
 def serialize_config(config: Config, folder: Path) -> str:
-    """Write a configuration as a file that says the same from anywhere: all paths in it are absolute.
-
-    ``folder`` is where its own file lies.
-    """
-    content = config.model_dump(mode="json", exclude={"ground"})  # each camera has its own
+    """Return a configuration as YAML with absolute paths; ``folder`` is that of its file."""
+    content = config.model_dump(mode="json", exclude={"ground"})  # each camera has its homography
     absolute = build_config(content, where="the configuration in force", folder=folder.absolute())
     return yaml.safe_dump(absolute.model_dump(mode="json", exclude={"ground"}), sort_keys=False)

@@ -34,7 +34,7 @@ from tracking.registry import TEMPORAL_TRACKER
 
 PREFIX = "MYVIEW_"
 _SERVICE = re.compile(r"bestview(-\d+)?")
-"""What best-view services are called beside the cameras, where pulses and passwords are given out."""
+"""Names of best-view services as clients of the pulse server; no camera may have one."""
 
 
 class Config(BaseSettings):
@@ -54,7 +54,7 @@ class Config(BaseSettings):
     encode: EncodeSettings = EncodeSettings()
     cameras: Annotated[list[CameraSettings], Field(min_length=1)]
     ground: Path | None = None
-    """A JSON file with one homography per camera; a camera's own `ground` goes before it."""
+    """A JSON file with one homography per camera; a camera's `ground` takes precedence."""
     sound: SoundSettings = SoundSettings()
     detect: Annotated[DetectSettings, no_unknown_keys(DetectSettings)] = DetectSettings()
     """Finding people in a picture; by default by background subtraction and box filters (paper, IV.A.2)."""
@@ -95,7 +95,7 @@ class Config(BaseSettings):
 
     @property
     def least_lookahead(self) -> int:
-        """The frames that a view must be looked ahead for at least: its tracks no longer change then."""
+        """The fewest look-ahead frames, after which tracks no longer change."""
         return self.encode.gop + self.track.lag(self.site.fps)
 
     def check_lookahead(self, view: ViewSettings) -> None:
@@ -137,28 +137,28 @@ class Config(BaseSettings):
         return self
 
     @property
-    def sounding(self) -> str | None:
-        """The camera whose process sends the sound: the one whose sound it is, or the first; None: nobody."""
+    def audio_camera(self) -> str | None:
+        """The camera whose process sends the sound: its source, or the first for a file; None: no sound."""
         source = self.sound.source
         return source if source is None or source in self.camera_ids else self.camera_ids[0]
 
-    def witnesses(self, camera_id: str) -> Sequence[str]:
-        """Return the cameras that may look at the same ground as this one, if it goes by what others find."""
-        looks = {it.id for it in self.cameras if it.ground is not None} - self.overhead
-        if not self.track.cross_view.enabled or camera_id not in looks:
+    def peers_of(self, camera_id: str) -> Sequence[str]:
+        """Return the cameras whose detections a camera uses: calibrated, not overhead; none if disabled."""
+        calibrated = {camera.id for camera in self.cameras if camera.ground is not None} - self.overhead
+        if not self.track.cross_view.enabled or camera_id not in calibrated:
             return ()
-        return tuple(it for it in self.camera_ids if it in looks and it != camera_id)
+        return tuple(peer for peer in self.camera_ids if peer in calibrated and peer != camera_id)
 
     @property
     def overhead(self) -> frozenset[str]:
         """The cameras that look straight down."""
-        return frozenset(it.id for it in self.cameras if it.kind == "overhead")
+        return frozenset(camera.id for camera in self.cameras if camera.kind == "overhead")
 
     def camera(self, camera_id: str) -> CameraSettings:
         """Return one camera.
 
         Raises:
-            KeyError: there is none of this id.
+            KeyError: there is no camera with this id.
         """
         for camera in self.cameras:
             if camera.id == camera_id:

@@ -1,4 +1,4 @@
-"""A camera's ``source``: its notation and its kind."""
+"""Camera sources: the kind of a ``source`` value, and its resolution."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from pathlib import Path
 from server.system.address_redaction import has_protocol, is_login
 
 _MEMORY = Path("/dev/shm")  # noqa: S108 — nothing is written there
-"""Below /dev, and yet of files: a folder in memory."""
+"""Below /dev, but a file system in memory."""
 
 
 class SourceKind(Enum):
-    """Where pictures come from."""
+    """The kind of a camera's source."""
 
     SCENE = "scene"
     """The synthetic scene: ``scene:room?camera=0``."""
     FOLDER = "folder"
     """A folder of images, in the order of their names."""
     FILE = "file"
-    """A recording: its moment (n - offset) / fps at pulse n, however busy the machine is."""
+    """A recording: at pulse n its picture at (n - offset) / fps, however busy the machine is."""
     STREAM = "stream"
     """A camera: its newest picture at every pulse."""
 
@@ -33,18 +33,18 @@ def source_kind(source: str) -> SourceKind:
     try:
         return SourceKind.FOLDER if Path(source).is_dir() else SourceKind.FILE
     except OSError:
-        return SourceKind.FILE  # not for this user, or no name that a file can have: opening it says so
+        return SourceKind.FILE  # no access, or an invalid file name: opening it reports that
 
 
 def is_device(source: str) -> bool:
-    """Return whether this is a device of this machine, such as ``/dev/video0``, be it there or unplugged."""
+    """Return whether this is a device of this machine, such as ``/dev/video0``, plugged in or not."""
     path = Path(source)
     if Path("/dev") not in path.parents:
         return False
     try:
         return path.is_char_device() or (not path.exists() and _MEMORY not in path.parents)
     except OSError:
-        return True  # it is there, and not for this user
+        return True  # it exists, but this user has no access
 
 
 def path_is_missing(path: str) -> bool:
@@ -59,9 +59,9 @@ def path_is_missing(path: str) -> bool:
 
 
 def resolve_source(source: str, folder: Path) -> str:
-    """Make a relative path relative to ``folder`` (the configuration's); leave addresses and scenes alone.
+    """Resolve a relative path against ``folder`` (the configuration's); leave addresses and scenes unchanged.
 
-    What looks like an address, or like one without its protocol, and is no file, is none: ``rtsp:host``.
+    A source that looks like an address (``rtsp:host``) is a path only if that exists.
     """
     if source.startswith("scene:") or "://" in source:
         return source

@@ -1,7 +1,7 @@
-"""The token file: access rights of viewers and operators.
+"""The token file: access rights of viewers and operators, with the SHA-256 of each token.
 
-It holds the SHA-256 of each token. A token is 256 random bits, so it needs no slow hash; and every request is
-checked, so a slow one would let strangers keep the server busy.
+A token is 256 random bits, so it needs no slow hash; every request is checked, so a slow one would let
+clients overload the server.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Token(Section):
     """One token and its access rights."""
 
     name: Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f]*$")]
-    """The owner's name; not secret."""
+    """The owner's name, which is not secret."""
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
     role: Role
     object: Annotated[int, Field(ge=1, le=999_999_999)] | None = None
@@ -33,7 +33,7 @@ class Token(Section):
     camera: Identifier | None = None
     """Limits the token to this camera."""
     made: AwareDatetime | None = None
-    """When it was made. If person numbers have restarted since, its object is void."""
+    """When it was made. If person numbers have restarted since, a token for an object is void."""
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:
@@ -55,24 +55,24 @@ def token_digest(token: str) -> str:
 
 
 def read_tokens(path: Path) -> tuple[Token, ...]:
-    """Read the file of tokens.
+    """Read a token file.
 
     Raises:
-        UserError: it cannot be read, or something in it is wrong.
+        UserError: it cannot be read or is invalid.
     """
     content = read_yaml(path, "the tokens")
     check_values(content, str(path))
     listed = content.get("tokens") if isinstance(content, dict) and len(content) == 1 else None
     if not isinstance(listed, list):
         raise UserError(f"{path}: is not a list of tokens: it begins with 'tokens:', one token per line")
-    tokens = tuple(_token(path, number, one) for number, one in enumerate(listed))
-    for what in ("name", "sha256"):
-        given = Counter(getattr(it, what) for it in tokens)
-        twice = next((it for it, count in given.items() if count > 1), None)
-        if twice is not None:
-            numbers = [number for number, it in enumerate(tokens) if getattr(it, what) == twice]
+    tokens = tuple(_token(path, number, entry) for number, entry in enumerate(listed))
+    for field in ("name", "sha256"):
+        counts = Counter(getattr(token, field) for token in tokens)
+        duplicate = next((value for value, count in counts.items() if count > 1), None)
+        if duplicate is not None:
+            numbers = [number for number, token in enumerate(tokens) if getattr(token, field) == duplicate]
             places = " and ".join(f"tokens.{number}" for number in numbers[:2])
-            raise UserError(f"{path}: {places}: have the same {what}, {twice}; each needs its own")
+            raise UserError(f"{path}: {places}: have the same {field}, {duplicate}; each needs its own")
     return tokens
 
 
@@ -81,7 +81,7 @@ def _token(path: Path, number: int, content: Any) -> Token:
         return Token.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(["tokens", str(number), *(abbreviate(str(it)) for it in first["loc"])])
+        place = ".".join(["tokens", str(number), *(abbreviate(str(part)) for part in first["loc"])])
         reason = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
         line = f"{path}: {place}: {reason.removeprefix('Value error, ')}"
         raise UserError(" ".join(line.split())) from None

@@ -1,4 +1,4 @@
-"""Refusal of unknown configuration keys, with a suggestion of the key that was meant."""
+"""Detection of unknown configuration keys, with a suggestion of a similar key."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from server.config.values import abbreviate
 
 
 def no_unknown_keys(settings: type) -> BeforeValidator:
-    """Return a validator that refuses keys which a dataclass does not have: pydantic would ignore them."""
+    """Return a validator that refuses keys that a dataclass does not have: pydantic ignores them."""
 
     def check(value: Any) -> Any:
         _check(settings, value, "")
@@ -25,7 +25,7 @@ def no_unknown_keys(settings: type) -> BeforeValidator:
 
 
 def did_you_mean(key: str, known: Sequence[str]) -> str:
-    """Return the question whether a similar key was meant; empty where none is similar."""
+    """Return a "did you mean" question with a similar key; empty if none is similar."""
     close = difflib.get_close_matches(key, known, n=1)
     return f"did you mean {close[0]!r}?" if close else ""
 

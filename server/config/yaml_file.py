@@ -19,10 +19,10 @@ except ImportError:  # PyYAML was built without it
 
 _SHOWN = 300
 """Characters of a library's message that an error repeats."""
-_MOST_MERGED = 100_000
-"""Keys that merges (``<<``) may add to mappings: nested merges multiply them."""
-_DEEPEST = 200
-"""Nesting depth: libyaml's loader recurses, and would overflow the stack."""
+_MAX_MERGED_KEYS = 100_000
+"""Most keys that merges (``<<``) may add to mappings: nested merges multiply them."""
+_MAX_DEPTH = 200
+"""Nesting depth beyond which libyaml's recursive loader could overflow the stack."""
 
 _QUOTED = re.compile(r" '[^'<>]{2,}'")
 """A quoted name from the file in a library's message; not ``'<block end>'`` and ``']'``."""
@@ -39,15 +39,15 @@ class _Loader(SafeLoader):
         self._merged = 0
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
-        """Merge, and count."""
+        """Merge, and count the keys."""
         super().flatten_mapping(node)
         self._merged += len(node.value)
-        if self._merged > _MOST_MERGED:
+        if self._merged > _MAX_MERGED_KEYS:
             raise yaml.YAMLError("merges (<<) that expand to too many keys")
 
 
 def read_yaml(path: Path, what: str) -> Any:
-    """Read a file's content; ``what`` names it for people.
+    """Read a file's content; ``what`` names it in errors.
 
     Raises:
         UserError: it cannot be read, or is not valid YAML.
@@ -63,7 +63,7 @@ def read_yaml(path: Path, what: str) -> Any:
     except DuplicateKeyError as error:
         raise UserError(f"{path}: {error}") from error
     except yaml.YAMLError as error:
-        raise UserError(f"{path}: is not valid YAML: {_words(error)[:_SHOWN]}") from None
+        raise UserError(f"{path}: is not valid YAML: {_describe(error)[:_SHOWN]}") from None
     except (ValueError, LookupError, TypeError, AttributeError):  # raised by PyYAML for `!!int x`
         raise UserError(f"{path}: is not valid YAML: an invalid date, number or tag") from None
 
@@ -87,8 +87,8 @@ def _loaded(text: str) -> Any:
         loader.dispose()
 
 
-def _words(error: yaml.YAMLError) -> str:
-    """Describe a YAML error with its position, without content of the file, which may be a password."""
+def _describe(error: yaml.YAMLError) -> str:
+    """Describe a YAML error and its position, without the file's content, which may be a password."""
     if not isinstance(error, yaml.MarkedYAMLError):
         return " ".join(str(error).replace(' in "<unicode string>"', "").split())
     parts = []
@@ -120,5 +120,5 @@ def _check_depth(text: str) -> None:
     depth = 0
     for event in yaml.parse(text, Loader=SafeLoader):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > _DEEPEST:
+        if depth > _MAX_DEPTH:
             raise yaml.YAMLError("brackets nested too deeply")

@@ -85,7 +85,7 @@ class BestViewPipeline:
             self.aligner,
             self.splicer.publish_frame,
             self.audio_buffer,
-            audio_camera=config.sounding,
+            audio_camera=config.audio_camera,
             current_pulse=lambda: self.pulse,
             max_ahead=max_ahead,
         )

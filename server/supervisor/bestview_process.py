@@ -24,15 +24,15 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     """Run the best-view service with its page, streams and API.
 
     Raises:
-        UserError: a port or the output folder is unavailable, or the site is open by accident.
-        UnavailableError: the pulses are lost for good.
+        UserError: a port or the output folder is unavailable, or the site is exposed by accident.
+        UnavailableError: the connection to the pulse server is lost.
     """
     config = running.now
     check_viewers(config)
     if config.view.share.index == 0:
         check_bus(config)  # the other shards are not the router
     pipeline = BestViewPipeline(add_scene_ground(config), out)
-    following = asyncio.create_task(_follow(running, pipeline), name="reload")
+    reload_task = asyncio.create_task(_follow(running, pipeline), name="reload")
     try:
         pipeline.open()
         async with serving(make_app(BestViewService(pipeline), running.on_disk), config.http) as port:
@@ -43,19 +43,19 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     except SyncError as error:
         raise UnavailableError(f"bestview: {error}") from error
     finally:
-        following.cancel()
+        reload_task.cancel()
         pipeline.close()
 
 
 async def _follow(running: ActiveConfig, pipeline: BestViewPipeline) -> None:
-    """Apply reloaded configurations, as far as a running service can."""
+    """Apply the settings of reloaded configurations that a running service can change."""
     async for reload in reloads(running):
         try:
             pipeline.apply_config(reload.now)
         except UserError as error:
             log.warning("%s: %s; the previous configuration stays in force", running.path, error)
         except Exception:
-            log.exception("%s: applying it failed; the next reload tries again", running.path)
+            log.exception("%s: applying the configuration failed; the next reload tries again", running.path)
         else:
             running.now = reload.now
             log.info("%s", reload.line)

@@ -32,47 +32,47 @@ async def camera_process(running: ActiveConfig, camera_id: str) -> None:
 
     Raises:
         UserError: its source cannot be opened.
-        UnavailableError: the pulses are lost for good, or the restart failed.
+        UnavailableError: the connection to the pulse server is lost, or the restart failed.
     """
     if source_kind(running.now.camera(camera_id).source) is SourceKind.STREAM:
-        signal_started()  # opening it mostly waits for a network or a device, without load
+        signal_started()  # opening it mostly waits for a network or device, so others may start meanwhile
     restart = asyncio.Event()
-    following = asyncio.create_task(_follow(running, camera_id, restart), name="reload")
+    reload_task = asyncio.create_task(_follow(running, camera_id, restart), name="reload")
     try:
-        camera = await _create(running, camera_id, restart, begun=False)
+        camera = await _create(running, camera_id, restart, started=False)
         signal_started()
         while not await _run(camera, restart):
-            camera = await _create(running, camera_id, restart, begun=True)
+            camera = await _create(running, camera_id, restart, started=True)
     except SyncError as error:
         raise UnavailableError(f"camera {camera_id}: {error}") from error
     finally:
-        following.cancel()
-        await asyncio.gather(following, return_exceptions=True)
+        reload_task.cancel()
+        await asyncio.gather(reload_task, return_exceptions=True)
 
 
 async def _create(
-    running: ActiveConfig, camera_id: str, restart: asyncio.Event, *, begun: bool
+    running: ActiveConfig, camera_id: str, restart: asyncio.Event, *, started: bool
 ) -> CameraProcess:
-    """Create the camera as soon as its source opens, by the settings in force; ``restart``: they changed.
+    """Create the camera when its source can be opened, with the active settings.
 
-    Ending the process instead would load all libraries again each time. ``begun``: the site has started, so
-    errors of this camera end it alone.
+    The process keeps running meanwhile: a new one would load all libraries again. ``restart`` is set when the
+    settings change. ``started``: the site has started, so an error of this camera must not end it.
     """
-    away, backoff = LogThrottle(quiet_s=0.0), Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
+    unavailable, backoff = LogThrottle(quiet_s=0.0), Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
     while True:
         restart.clear()
         try:
             camera = await asyncio.to_thread(_open, running.now, camera_id)
         except UnavailableError as error:
-            if (more := away.record(str(error))) is not None:
+            if (more := unavailable.record(str(error))) is not None:
                 log.warning("%s%s; retrying", error, more)
-            begun = True
+            started = True
         except UserError as error:
-            if not begun:
+            if not started:
                 raise
             raise UnavailableError(str(error)) from error  # the supervisor restarts this process
         else:
-            if ended := away.end():
+            if ended := unavailable.end():
                 log.info("camera %s answers, after %.0f s", camera_id, ended.seconds)
             return camera
         with contextlib.suppress(TimeoutError):
@@ -84,7 +84,7 @@ def _open(config: Config, camera_id: str) -> CameraProcess:
 
 
 async def _run(camera: CameraProcess, restart: asyncio.Event) -> bool:
-    """Run until the recording is over (True) or the camera has to restart (False)."""
+    """Run until the recording is over (return True) or the camera has to restart (return False)."""
     run, waiting = asyncio.create_task(camera.run()), asyncio.create_task(restart.wait())
     try:
         await asyncio.wait({run, waiting}, return_when=asyncio.FIRST_COMPLETED)

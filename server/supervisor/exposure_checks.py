@@ -1,4 +1,4 @@
-"""Checks that refuse a site which other machines can reach without authentication."""
+"""Exposure checks: refuse a site that other machines can reach without authentication."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def check_pulses(config: Config) -> None:
 
 
 def check_bus(config: Config) -> None:
-    """Refuse to be other machines' router, unless the bus has users and TLS, or the network is trusted.
+    """Refuse to be a bus router for other machines, unless it has users and TLS or trusts the network.
 
     Raises:
         UserError: `zenoh.listen` is not a loopback address.
@@ -57,7 +57,7 @@ def check_bus(config: Config) -> None:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether only this machine can reach a host."""
+    """Return whether a host is only reachable from this machine."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

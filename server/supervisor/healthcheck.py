@@ -2,8 +2,8 @@
 
     python -m server.supervisor.healthcheck sync | bestview | camera ID
 
-Exit code 0: healthy; 1: not, and one line says why, which the engine keeps. It runs every few seconds beside
-each process, so it loads little: no configuration, only the environment that the compose files set.
+Exit code 0: healthy; 1: unhealthy, with a one-line reason for the container engine. It runs every few seconds
+beside each process, so it loads little: no configuration, only environment variables of the compose files.
 ``MYVIEW_HEALTH_URL`` is the best view's address, ``MYVIEW_HEALTH_CERTIFICATE`` the file of its certificate,
 and ``MYVIEW_HEALTH_TOKEN`` (a file) or ``MYVIEW_TOKEN`` the token.
 """
@@ -61,10 +61,10 @@ def check_camera(camera: str) -> None:
     """Check whether a camera's frames arrive at the best view.
 
     Raises:
-        UnhealthyError: it does not.
-        OSError: the best view is away.
+        UnhealthyError: they do not.
+        OSError: the best view is unreachable.
     """
-    known = {it["camera"]: it for it in json.loads(_get("/api/cameras"))["cameras"]}
+    known = {camera["camera"]: camera for camera in json.loads(_get("/api/cameras"))["cameras"]}
     if camera not in known:
         raise UnhealthyError(f"the best view knows no camera {camera}, or the token is for another one")
     if known[camera]["state"] != "live" or not known[camera]["fps"] > 0:
@@ -75,11 +75,11 @@ def check_camera(camera: str) -> None:
 
 def _get(path: str) -> bytes:
     url = os.environ.get("MYVIEW_HEALTH_URL") or _URL
-    request = urllib.request.Request(url.rstrip("/") + path)  # noqa: S310 — the compose files say where
+    request = urllib.request.Request(url.rstrip("/") + path)  # noqa: S310 — the address is from the compose files
     token = _token()
     if token:
         request.add_header("Authorization", f"Bearer {token}")
-    # No proxy, even if the engine sets one for all containers: it does not know a site's own names.
+    # No proxy, even if the engine sets one for all containers: it cannot resolve the site's host names.
     opener = urllib.request.build_opener(
         urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=_trust())
     )
@@ -126,7 +126,7 @@ def main(words: Sequence[str]) -> int:
     try:
         check(words)
     except (UnhealthyError, OSError, ValueError, KeyError, TypeError, http.client.HTTPException) as error:
-        print(f"{' '.join(words)}: {' '.join(str(error).split())}")  # noqa: T201 — the engine keeps it
+        print(f"{' '.join(words)}: {' '.join(str(error).split())}")  # noqa: T201 — for the container engine
         return 1
     return 0
 

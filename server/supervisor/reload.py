@@ -11,16 +11,16 @@ from server.config.site_config import Config
 
 _LIVE = tuple(f"view.{name}" for name in LIVE_VIEW_SETTINGS)
 """Settings that the best view applies at the next GOP."""
-_OF_A_CAMERA = ("source", "password", "offset", "at_end", "h264", "options", "ignore", "detections")
+_CAMERA_KEYS = ("source", "password", "offset", "at_end", "h264", "options", "ignore", "detections")
 """Settings that only the camera's own process uses."""
 _TRACK = tuple(name for name in TrackSettings.model_fields if name != "backlog_s")
-_OF_CAMERAS = ("detect", *(f"track.{name}" for name in _TRACK))
-"""Settings that all camera processes use, and no other."""
+_SHARED_KEYS = ("detect", *(f"track.{name}" for name in _TRACK))
+"""Settings that only camera processes use."""
 _EPOCHS = ("track.window.window", "track.window.stride")
-"""Of these, settings by which the best view aligns windows: they wait for a restart."""
+"""Of these, settings by which the best view aligns tracking windows: they need a restart of the site."""
 _BY_LAG = ("tracker", "temporal")
-"""Of these, settings that may change when frames are final: then they wait, too."""
-_OF_THE_BEST_VIEW = ("view", "http", "access", "record")
+"""Of these, settings that may change the lag of final frames, and then need a restart of the site."""
+_BEST_VIEW_SECTIONS = ("view", "http", "access", "record")
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +28,8 @@ class ReloadPlan:
     """The effects of a changed configuration.
 
     Attributes:
-        now: the configuration to run by: the old one with all settings that can change while running.
-        live: settings that the best view applies without a break.
+        now: the configuration to activate: the old one with all settings that can change while running.
+        live: settings that the best view applies without interrupting streams.
         cameras: cameras whose processes have to restart.
         best_view: settings that wait for a restart of the best view, which ends streams.
         site: settings that wait for a restart of all processes.
@@ -66,28 +66,28 @@ def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
         live = tuple(key for key in live if key != "view.lookahead")
     unchanged = _deferred_track_settings(running, wanted, keys)
     shared = tuple(
-        key for key in _of(keys, _OF_CAMERAS) if not _of((key,), [f"track.{it}" for it in unchanged])
+        key for key in _of(keys, _SHARED_KEYS) if not _of((key,), [f"track.{name}" for name in unchanged])
     )
-    # Pass-through depends on the site's codec: if that changes, h264 waits, too.
-    names_of_own = tuple(it for it in _OF_A_CAMERA if not (it == "h264" and "encode.codec" in keys))
-    own_changes = {
-        it: _of(keys, [f"cameras.{it}.{name}" for name in names_of_own]) for it in running.camera_ids
+    # Pass-through depends on the site's codec: if that changes, h264 needs a restart, too.
+    camera_keys = tuple(key for key in _CAMERA_KEYS if not (key == "h264" and "encode.codec" in keys))
+    camera_changes = {
+        camera: _of(keys, [f"cameras.{camera}.{name}" for name in camera_keys])
+        for camera in running.camera_ids
     }
-    sharpness_toggled = (running.view.quality.sharpness > 0) != (
-        view.quality.sharpness > 0
-    )  # cameras measure it, or do not
+    # Cameras measure sharpness only if it has a weight.
+    sharpness_toggled = (running.view.quality.sharpness > 0) != (view.quality.sharpness > 0)
     restarted = tuple(
-        camera for camera in running.camera_ids if shared or sharpness_toggled or own_changes[camera]
+        camera for camera in running.camera_ids if shared or sharpness_toggled or camera_changes[camera]
     )
-    applied = {*live, *shared, *(key for names in own_changes.values() for key in names)}
+    applied = {*live, *shared, *(key for names in camera_changes.values() for key in names)}
     waiting = tuple(key for key in keys if key not in applied)
-    best_view = _of(waiting, _OF_THE_BEST_VIEW)
+    best_view = _of(waiting, _BEST_VIEW_SECTIONS)
     now = running.model_copy(
         update={
             "view": view,
             "detect": wanted.detect,
             "track": _track(running, wanted, unchanged),
-            "cameras": [_camera(running, wanted, it, names_of_own) for it in running.camera_ids],
+            "cameras": [_camera(running, wanted, camera, camera_keys) for camera in running.camera_ids],
         }
     )
     return ReloadPlan(now, live, restarted, best_view, tuple(key for key in waiting if key not in best_view))
@@ -99,15 +99,15 @@ def _of(keys: Sequence[str], sections: Sequence[str]) -> tuple[str, ...]:
 
 
 def _deferred_track_settings(running: Config, wanted: Config, keys: Sequence[str]) -> tuple[str, ...]:
-    """Return settings of `track` that must wait, since they change when windows end or frames are final."""
+    """Return settings of `track` that need a restart: they change when windows end or frames are final."""
     fps = running.site.fps
-    apart = running.track.model_copy(update={name: getattr(wanted.track, name) for name in _BY_LAG})
-    late = _BY_LAG if apart.lag(fps) != running.track.lag(fps) else ()
+    changed = running.track.model_copy(update={name: getattr(wanted.track, name) for name in _BY_LAG})
+    late = _BY_LAG if changed.lag(fps) != running.track.lag(fps) else ()
     return (*late, "window") if any(key in _EPOCHS for key in keys) else late
 
 
 def _track(running: Config, wanted: Config, unchanged: Sequence[str]) -> TrackSettings:
-    """Return the new `track` section, without the settings that must wait."""
+    """Return the new `track` section, with old values of the settings that need a restart."""
     names = [name for name in _TRACK if name not in unchanged]
     return running.track.model_copy(update={name: getattr(wanted.track, name) for name in names})
 

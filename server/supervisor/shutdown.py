@@ -20,8 +20,8 @@ SUPERVISED_VARIABLE = "MYVIEW_SUPERVISED"
 """Set in the environment of a supervised process."""
 EXIT_FINISHED = 4
 """Exit code of a supervised process that has nothing left to do; 0: it was terminated."""
-_LET_GO_S = 1.2
-"""How long a process may take to release everything; a silent camera would block it for longer."""
+_RELEASE_S = 1.2
+"""Time limit for releasing everything after a signal; a silent camera would block for longer."""
 
 
 async def run_until_signal(
@@ -30,12 +30,12 @@ async def run_until_signal(
     *,
     hang_up: bool = True,
 ) -> bool:
-    """Run a coroutine until it is done, or until a signal cancels it after calling ``on_signal``.
+    """Run a coroutine until it ends, or until a signal cancels it; then ``on_signal`` is called first.
 
     ``hang_up``: SIGHUP cancels it, too.
 
     Returns:
-        Whether it was done by itself.
+        Whether it ended by itself.
     """
     task = asyncio.create_task(main())
     loop = asyncio.get_running_loop()
@@ -55,17 +55,17 @@ async def run_until_signal(
 
 
 def run_process(
-    main: Callable[[], Coroutine[Any, Any, None]], let_go_s: float = _LET_GO_S, *, hang_up: bool = False
+    main: Callable[[], Coroutine[Any, Any, None]], release_s: float = _RELEASE_S, *, hang_up: bool = False
 ) -> None:
-    """Run a process's coroutine until it is over, or SIGTERM or SIGINT comes.
+    """Run a process's coroutine until it ends, or until SIGTERM or SIGINT.
 
-    ``hang_up``: SIGHUP ends it, too; else the coroutine handles it.
+    ``hang_up``: SIGHUP ends it, too; otherwise the coroutine handles SIGHUP.
 
-    After a signal the process has so many seconds to release everything, then exits: a thread may be blocked
-    by a silent camera.
+    After a signal the process has ``release_s`` seconds to release everything and then exits, since a silent
+    camera may block a thread.
     """
-    over = asyncio.run(run_until_signal(main, lambda: _end_after(let_go_s), hang_up=hang_up))
-    if over and os.environ.get(SUPERVISED_VARIABLE):
+    finished = asyncio.run(run_until_signal(main, lambda: _end_after(release_s), hang_up=hang_up))
+    if finished and os.environ.get(SUPERVISED_VARIABLE):
         sys.exit(EXIT_FINISHED)
 
 

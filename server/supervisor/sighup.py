@@ -1,4 +1,4 @@
-"""SIGHUP: reload the configuration, or end if the terminal was closed."""
+"""SIGHUP: reload the configuration, or exit if the terminal was closed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _early: list[int] = []
 
 
 def record_early_sighups() -> None:
-    """Record each SIGHUP from now on, for :func:`sighups`; only in the main thread.
+    """Record each SIGHUP until :func:`sighups` runs; only in the main thread.
 
     Called before the configuration is read, so that changes while the process starts are reloaded.
     """
@@ -33,19 +33,19 @@ def record_early_sighups() -> None:
 
 
 async def sighups() -> AsyncGenerator[None, None]:
-    """Yield once per SIGHUP; several in between count as one.
+    """Yield once per SIGHUP; signals that arrive meanwhile count as one.
 
-    If it came because the terminal was closed, the process gets SIGTERM instead.
+    If the terminal was closed, send this process SIGTERM instead.
     """
-    came = asyncio.Event()
+    received = asyncio.Event()
     at_terminal = _has_terminal()
-    asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, came.set)
+    asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, received.set)
     if _early:  # only now: later signals set the event themselves
         _early.clear()
-        came.set()
+        received.set()
     while True:
-        await came.wait()
-        came.clear()
+        await received.wait()
+        received.clear()
         if at_terminal and not _has_terminal():
             os.kill(os.getpid(), signal.SIGTERM)
         else:
@@ -53,10 +53,10 @@ async def sighups() -> AsyncGenerator[None, None]:
 
 
 async def reloads(running: ActiveConfig, check: Check = lambda *_: None) -> AsyncIterator[ReloadPlan]:
-    """Reload the configuration at each SIGHUP; yield what it changes.
+    """Reload the configuration at each SIGHUP; yield the reload plan.
 
-    An invalid one is logged in one line and ignored. The caller sets ``running.now`` once a change is in
-    force.
+    An invalid configuration is logged in one line and ignored. The caller sets ``running.now`` once it has
+    applied the changes.
     """
     async for _ in sighups():
         try:

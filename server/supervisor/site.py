@@ -26,8 +26,8 @@ from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
-_APART_S = 4.0
-"""Seconds between two camera restarts, so that the other cameras show the first one's people."""
+_RESTART_INTERVAL_S = 4.0
+"""Seconds between two camera restarts, during which other cameras show the people of the restarting one."""
 
 
 async def run_up(running: ActiveConfig, environment: Mapping[str, str], out: Path | None) -> None:
@@ -38,7 +38,7 @@ async def run_up(running: ActiveConfig, environment: Mapping[str, str], out: Pat
     """
     with _folder() as folder:
         active_file, write_failures = Path(folder) / "site.yaml", LogThrottle()
-        # Rewritten each time: old temporary files may be deleted, and sites run for months.
+        # Rewritten before each start: old temporary files may be deleted while a site runs for months.
         supervisor = Supervisor(
             running.path,
             running.now,
@@ -46,19 +46,19 @@ async def run_up(running: ActiveConfig, environment: Mapping[str, str], out: Pat
             out,
             before_start=lambda: _write_active_config(running, active_file, write_failures),
         )
-        following = asyncio.create_task(
+        reload_task = asyncio.create_task(
             _follow(running, supervisor, lambda: _write_active_config(running, active_file, write_failures)),
             name="reload",
         )
         try:
             await supervisor.run()
         finally:
-            following.cancel()
-            await asyncio.gather(following, return_exceptions=True)
+            reload_task.cancel()
+            await asyncio.gather(reload_task, return_exceptions=True)
 
 
 def check_exposure(config: Config) -> None:
-    """Refuse a site that other machines can reach by accident.
+    """Refuse a site that other machines can reach without authentication.
 
     Raises:
         UserError: they can.
@@ -76,7 +76,7 @@ async def _follow(running: ActiveConfig, supervisor: Supervisor, write_config: C
         supervisor.reload("bestview")
         for number, camera in enumerate(reload.cameras):
             if number:
-                await asyncio.sleep(_APART_S)
+                await asyncio.sleep(_RESTART_INTERVAL_S)
             supervisor.reload(camera)
 
 
@@ -104,7 +104,7 @@ def _write_active_config(running: ActiveConfig, path: Path, failures: LogThrottl
     new = path.with_suffix(".new")
     try:
         path.parent.mkdir(mode=0o700, exist_ok=True)
-        if not is_owned_by_this_user(path.parent):  # it was deleted, and another user took the name
+        if not is_owned_by_this_user(path.parent):  # it was deleted, and another user has created it
             raise PermissionError(errno.EACCES, "its folder belongs to another user")
         new.write_text(serialize_config(running.now, running.path.parent), encoding="utf-8")
         new.replace(path)

@@ -1,4 +1,4 @@
-"""Checks before any process starts: ports are free, recordings can be opened."""
+"""Startup checks: ports are free and recordings can be opened, before any process starts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from server.system.errors import UserError
 
 
 def check_port_free(host: str, port: int, what: str) -> None:
-    """Make sure that a port can be listened on, before anything is started.
+    """Check that a port can be listened on.
 
     Raises:
         UserError: it cannot.
@@ -26,10 +26,10 @@ def check_port_free(host: str, port: int, what: str) -> None:
 
 
 def check_ports(config: Config) -> None:
-    """Refuse at once when a port is taken, rather than in one of five processes.
+    """Check that all ports of a site are free.
 
     Raises:
-        UserError: one is.
+        UserError: a port is in use.
     """
     check_port_free(config.http.host, config.http.port, "http.port")
     check_port_free(config.sync.bind, config.sync.port, "sync.port")
@@ -40,22 +40,22 @@ def check_ports(config: Config) -> None:
 
 
 def check_recordings(config: Config) -> None:
-    """Refuse at once what no camera process could open; live cameras may come and go.
+    """Check that recordings, scenes, detections and the sound can be opened; live cameras are not checked.
 
     Raises:
         UserError: a recording, a scene, a file of detections or the sound cannot be opened.
     """
-    if config.sounding is not None:
-        open_audio(config, config.sounding)
+    if config.audio_camera is not None:
+        open_audio(config, config.audio_camera)
     for camera in config.camera_ids:
         check_recording(config, camera)
 
 
 def check_recording(config: Config, camera: str) -> None:
-    """Refuse a recorded view that its process could not open.
+    """Check that a camera's recording or scene, and its detections, can be opened.
 
     Raises:
-        UserError: it cannot be opened, or its file of detections.
+        UserError: one of them cannot be opened.
     """
     if source_kind(config.camera(camera).source) is not SourceKind.STREAM:
         CameraPipeline(config, camera, ready=False).close()

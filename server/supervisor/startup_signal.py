@@ -1,7 +1,7 @@
-"""The signal by which a started process reports that it has loaded, so that the next one can start.
+"""Startup signal: a started process reports that it has loaded, so that the next one can start.
 
-A process loads for a second of a processor's time or two. Forty that do so together keep each other, and
-those that have to answer meanwhile.
+Loading takes one to two seconds of processor time. Forty processes that load at once would slow each other
+down, and those that serve meanwhile.
 """
 
 from __future__ import annotations
@@ -14,46 +14,46 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 STARTED_FD_VARIABLE = "MYVIEW_STARTED_FD"
-"""In the environment of a process that a supervisor starts: the descriptor that it closes once loaded."""
+"""Environment variable with the file descriptor that a supervised process closes once it has loaded."""
 
 
 def signal_started() -> None:
-    """Notify the supervisor, if there is one, that this process has started; idempotent."""
+    """Notify the supervisor, if there is one, that this process has loaded; idempotent."""
     with contextlib.suppress(ValueError, OSError):
         os.close(int(os.environ.pop(STARTED_FD_VARIABLE, "")))
 
 
 @dataclass(frozen=True, slots=True)
 class StartupPipe:
-    """Its end tells that a process has started, or has died.
+    """A pipe that reaches its end when a process has loaded or died.
 
     Attributes:
-        own: the supervisor's end.
-        given: the other one, which the process inherits and closes.
+        read_end: the supervisor's end.
+        write_end: the end that the process inherits and closes.
     """
 
-    own: int
-    given: int
+    read_end: int
+    write_end: int
 
     async def ended(self, within_s: float) -> None:
-        """Wait until all other ends are closed, at most so many seconds."""
+        """Wait until all write ends are closed, at most ``within_s`` seconds."""
         ended = asyncio.Event()
         loop = asyncio.get_running_loop()
-        loop.add_reader(self.own, ended.set)
+        loop.add_reader(self.read_end, ended.set)
         try:
-            # Not wait_for: up to Python 3.11 who is cancelled just when it is over is not cancelled by it.
+            # Not wait_for: up to Python 3.11 it swallows a cancellation that comes as it completes.
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(within_s):
                     await ended.wait()
         finally:
-            loop.remove_reader(self.own)
+            loop.remove_reader(self.read_end)
 
 
 @contextmanager
 def open_startup_pipe() -> Iterator[StartupPipe]:
-    """Open a pipe; its supervisor's end is closed with the block, the other one by its caller."""
-    own, given = os.pipe()
+    """Open a pipe; the context closes the read end, the caller the write end."""
+    read_end, write_end = os.pipe()
     try:
-        yield StartupPipe(own, given)
+        yield StartupPipe(read_end, write_end)
     finally:
-        os.close(own)
+        os.close(read_end)

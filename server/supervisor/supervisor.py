@@ -23,12 +23,12 @@ from server.system.processors import available_processors
 log = logging.getLogger(__name__)
 
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.2, 10.0
-_SETTLED_S = 10.0
-"""After running so long a process restarts quickly again."""
-_STARTS_WITHIN_S = 10.0
-"""How long a loading process delays the start of others: it may hang."""
-_END_S = 1.6
-"""How long processes have to end before they are killed; they give up a little sooner themselves."""
+_STABLE_S = 10.0
+"""Running time after which a process is restarted without backoff again."""
+_STARTUP_TIMEOUT_S = 10.0
+"""How long a loading process delays the start of others; it may hang."""
+_KILL_AFTER_S = 1.6
+"""Time from SIGTERM to SIGKILL; processes exit by themselves a little sooner."""
 
 
 @dataclass(slots=True)
@@ -39,19 +39,19 @@ class Child:
     arguments: Sequence[str]
     awaits: Sequence[Child] = ()
     """Processes that must have started first."""
-    nicer: int = 0
-    """Its niceness above the supervisor's."""
+    niceness: int = 0
+    """Niceness added to the supervisor's."""
     process: asyncio.subprocess.Process | None = None
     restarts: int = 0
-    dies: LogThrottle = field(default_factory=LogThrottle)
+    deaths: LogThrottle = field(default_factory=LogThrottle)
     started: asyncio.Event = field(default_factory=asyncio.Event)
-    """It has loaded once, or timed out."""
+    """Set when it has loaded once, or has timed out."""
     done: asyncio.Event = field(default_factory=asyncio.Event)
-    """It has ended with nothing left to do."""
+    """Set when it has exited with nothing left to do."""
 
 
 class Supervisor:
-    """Starts one process each for the pulses, every camera and the best view; restarts what dies.
+    """Starts one process each for the pulses, every camera and the best view, and restarts those that die.
 
     A camera whose recording is over exits with `EXIT_FINISHED` and is not restarted; when the best-view
     service does, the whole site ends. ``before_start`` is called whenever a process is about to be started.
@@ -75,7 +75,10 @@ class Supervisor:
         self._load_slots = asyncio.Semaphore(max(1, int(available_processors())))
         """Slots for cameras that are loading."""
         first = [Child("bestview", ["bestview", path]), Child("sync", ["sync", path])]
-        cameras = [Child(it, ["camera", path, it], first, config.site.niceness) for it in config.camera_ids]
+        cameras = [
+            Child(camera, ["camera", path, camera], first, config.site.niceness)
+            for camera in config.camera_ids
+        ]
         self.children = [*first, *cameras]
 
     async def run(self) -> None:
@@ -86,13 +89,13 @@ class Supervisor:
         """
         watchers = [asyncio.create_task(self._watch(child), name=child.name) for child in self.children]
         try:
-            over = asyncio.create_task(self.children[0].done.wait())
-            finished, _ = await asyncio.wait([over, *watchers], return_when=asyncio.FIRST_COMPLETED)
-            while over not in finished:
+            site_done = asyncio.create_task(self.children[0].done.wait())
+            finished, _ = await asyncio.wait([site_done, *watchers], return_when=asyncio.FIRST_COMPLETED)
+            while site_done not in finished:
                 for watcher in finished:
                     watcher.result()  # raises UserError if a process refused its input
                 pending = [watcher for watcher in watchers if not watcher.done()]
-                finished, _ = await asyncio.wait([over, *pending], return_when=asyncio.FIRST_COMPLETED)
+                finished, _ = await asyncio.wait([site_done, *pending], return_when=asyncio.FIRST_COMPLETED)
         finally:
             await self._end(watchers)
 
@@ -105,8 +108,8 @@ class Supervisor:
     async def _watch(self, child: Child) -> None:
         backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
         loop = asyncio.get_running_loop()
-        for other in child.awaits:
-            await other.started.wait()
+        for prerequisite in child.awaits:
+            await prerequisite.started.wait()
         while True:
             async with self._load_slots if child.awaits else contextlib.nullcontext():
                 started = loop.time()
@@ -118,33 +121,33 @@ class Supervisor:
                 return
             if code == UserError.code and child.restarts == 0:
                 raise UserError(f"{child.name} could not start")
-            if loop.time() - started > _SETTLED_S:
+            if loop.time() - started > _STABLE_S:
                 backoff.reset()
             cause, pause = _cause(code), backoff.next()
-            if (more := child.dies.record(cause)) is not None:
+            if (more := child.deaths.record(cause)) is not None:
                 log.warning("%s %s%s; starting it again in %.1f s", child.name, cause, more, pause)
             await asyncio.sleep(pause)
             child.restarts += 1
 
     async def _start(self, child: Child) -> asyncio.subprocess.Process:
-        """Start a process; return it once it has loaded, has died, or takes too long."""
+        """Start a process; return it once it has loaded, has died, or has timed out."""
         with open_startup_pipe() as pipe:
             try:
                 self._before_start()
                 process = child.process = await start_command(
                     self._arguments(child),
-                    {**self._environment, STARTED_FD_VARIABLE: str(pipe.given)},
-                    inherited=(pipe.given,),
-                    niceness=child.nicer,
+                    {**self._environment, STARTED_FD_VARIABLE: str(pipe.write_end)},
+                    inherited=(pipe.write_end,),
+                    niceness=child.niceness,
                 )
             finally:
-                os.close(pipe.given)
-            await pipe.ended(_STARTS_WITHIN_S)
+                os.close(pipe.write_end)
+            await pipe.ended(_STARTUP_TIMEOUT_S)
         child.started.set()
         return process
 
     def _arguments(self, child: Child) -> Sequence[str]:
-        """Return a process's arguments; a restarted best view writes to files of its own."""
+        """Return a process's arguments; a restarted best view writes into a new folder."""
         if self._out is None or child is not self.children[0]:
             return child.arguments
         out = self._out / f"restart-{child.restarts}" if child.restarts else self._out
@@ -159,7 +162,9 @@ class Supervisor:
         for process in running:
             process.terminate()
         _, late = (
-            await asyncio.wait([asyncio.create_task(process.wait()) for process in running], timeout=_END_S)
+            await asyncio.wait(
+                [asyncio.create_task(process.wait()) for process in running], timeout=_KILL_AFTER_S
+            )
             if running
             else ((), ())
         )

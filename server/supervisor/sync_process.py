@@ -1,4 +1,4 @@
-"""The process that sends the pulses."""
+"""The pulse server's process."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ log = logging.getLogger(__name__)
 async def sync_process(running: ActiveConfig) -> None:
     """Send pulses; pulse 0 waits for all cameras and best-view services.
 
-    Nothing that it goes by can change while it runs: of a configuration that is read again it says so.
+    A reloaded configuration is only logged: none of its settings can change while it runs.
 
     Raises:
-        UserError: the port cannot be listened on, strangers could listen, or passwords cannot be read.
+        UserError: the port cannot be listened on or is exposed, or passwords cannot be read.
     """
     config = running.now
     check_pulses(config)
@@ -39,8 +39,8 @@ async def sync_process(running: ActiveConfig) -> None:
     try:
         await server.start()
     except OSError as error:
-        taken = error.errno == errno.EADDRINUSE
-        reason = "the port is in use" if taken else (error.strerror or error)
+        in_use = error.errno == errno.EADDRINUSE
+        reason = "the port is in use" if in_use else (error.strerror or error)
         raise UserError(f"sync.port: cannot listen on {sync.bind}:{sync.port}: {reason}") from error
     log.info("pulses at %g a second on %s:%d", config.site.fps, sync.bind, server.port)
     signal_started()

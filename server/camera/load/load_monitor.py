@@ -19,7 +19,7 @@ class LoadMonitor:
     def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
         track = config.track
         self._camera, self._stride, self._gop = camera_id, track.window.stride, config.encode.gop
-        waits = track.cross_view_wait_s if config.witnesses(camera_id) else 0.0
+        waits = track.cross_view_wait_s if config.peers_of(camera_id) else 0.0
         waits += 1.0 / config.site.fps
         bounds = LevelBounds(waits + _BEHIND * track.backlog_s, waits + _KEEPS_UP * track.backlog_s)
         levels = shed_levels(self._stride, live=live) if track.shed_load else (ShedLevel(),)

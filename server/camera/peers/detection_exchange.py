@@ -36,7 +36,7 @@ class PeerDetectionExchange:
     def __init__(self, config: Config, camera_id: str, cross_view: CrossViewScorer | None, most: int) -> None:
         self._config, self._camera = config, camera_id
         self._keys = ZenohKeys(config.site.name)
-        self._others = config.witnesses(camera_id) if cross_view else ()
+        self._others = config.peers_of(camera_id) if cross_view else ()
         self._patience = config.track.cross_view_wait_s
         sees_same_ground = cross_view.sees_same_ground if cross_view else lambda _: False
         self._buffer = PeerDetectionBuffer(self._others, most, sees_same_ground)

@@ -54,10 +54,10 @@ def _while_busy() -> str:
 
 def sound_findings(config: Config) -> list[Finding]:
     """Check that the site's sound can be opened, if it has one."""
-    if config.sounding is None:
+    if config.audio_camera is None:
         return []
     try:
-        open_audio(config, config.sounding)
+        open_audio(config, config.audio_camera)
     except UserError as error:
         return [
             bad("sound", str(error).removeprefix("sound: "), "use another file, or a camera that has sound")

@@ -63,7 +63,7 @@ class CameraWorkers:
     def start(self) -> None:
         """Start all workers; a signal waits until each is known, so that :meth:`close` ends every one."""
         piping = PeerPipeFactory(
-            {camera: self._config.witnesses(camera) for camera in self._config.camera_ids}
+            {camera: self._config.peers_of(camera) for camera in self._config.camera_ids}
         )
         with defer_termination():
             for camera in self._config.camera_ids:

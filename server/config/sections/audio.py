@@ -11,7 +11,7 @@ from server.media.audio.audio_format import OPUS_RATE, AudioFormat, Coding
 
 
 class SoundSettings(Section):
-    """One sound for the whole site, under every picture."""
+    """One sound for the whole site, in every stream."""
 
     source: str | None = None
     """A camera's id: that camera's sound. Or a file; None: the site has no sound."""
@@ -31,10 +31,10 @@ class SoundSettings(Section):
     @model_validator(mode="after")
     def _opus_has_its_rate(self) -> Self:
         if self.codec == "opus" and self.rate != OPUS_RATE:
-            raise ValueError(f"codec: opus has {OPUS_RATE} samples a second; rate says {self.rate}")
+            raise ValueError(f"codec: opus has {OPUS_RATE} samples a second; rate is {self.rate}")
         return self
 
     @property
     def format(self) -> AudioFormat | None:
-        """What all streams of the site sound like; None: they have no sound."""
+        """The audio format of all streams; None: the site has no sound."""
         return None if self.source is None else AudioFormat(self.rate, self.channels, self.codec)

@@ -40,6 +40,6 @@ Port = Annotated[int, Field(ge=1, le=_PORT_MOST)]
 
 
 class Section(BaseModel):
-    """A part of the configuration: a key that it does not know is an error, never ignored."""
+    """A section of the configuration; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)

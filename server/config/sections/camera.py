@@ -1,4 +1,4 @@
-"""One camera, and what is done with its pictures and its people."""
+"""The sections `cameras` and `track`: a camera's source, and tracking."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class TrackSettings(Section):
     @classmethod
     def _tracker_is_known(cls, tracker: str) -> str:
         if tracker not in tracker_names():
-            raise ValueError(f"no tracker is called {tracker!r}; there are {', '.join(tracker_names())}")
+            raise ValueError(f"there is no tracker {tracker!r}; there are {', '.join(tracker_names())}")
         return tracker
 
     @field_validator("solver")

@@ -1,4 +1,4 @@
-"""Which detector looks for people, and its settings: the section `detect`."""
+"""The section `detect`: the detector and its settings."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ DetectorKind = Literal["background", "boxes", "hog", "onnx"]
 
 @dataclass(frozen=True, slots=True)
 class DetectSettings(BackgroundSettings):
-    """The background detector's settings, and those of the detectors that may take its place."""
+    """Settings of the background detector and of the detectors that can replace it."""
 
-    kind: DetectorKind = "background"  # boxes: background without what is not in the paper
+    kind: DetectorKind = "background"  # boxes: the background detector of the paper, without extensions
     hog: HogSettings = field(default_factory=HogSettings)
     onnx: OnnxSettings = field(default_factory=OnnxSettings)
 
@@ -25,5 +25,5 @@ class DetectSettings(BackgroundSettings):
             raise ValueError("onnx.model: kind onnx needs the path of an ONNX file")
 
     def model_in(self, folder: Path) -> Path | None:
-        """Return the path of the network's file, which is relative to the configuration's folder."""
+        """Return the path of the ONNX file, which is relative to the configuration's folder."""
         return None if self.onnx.model is None else folder / self.onnx.model

@@ -10,7 +10,7 @@ from server.config.sections.base import Section
 
 
 class EncodeSettings(Section):
-    """Identical in all cameras that encode: that is what makes cutting without re-encoding possible."""
+    """Encoder settings, equal in all cameras, so that views can be cut without re-encoding."""
 
     codec: Literal["h264", "vp8"] = "h264"
     """H.264 by x264 in MP4, or VP8 by libvpx in WebM: free of patents' and of the GPL's terms."""

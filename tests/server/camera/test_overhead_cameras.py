@@ -110,8 +110,8 @@ def test_people_are_the_same_in_two_cameras_that_look_straight_down(
 
 
 def test_who_stands_upright_and_who_is_seen_from_above_do_not_vouch_for_each_other() -> None:
-    assert _config("upright").witnesses("c0") == ("c1",)
-    assert not _config("overhead").witnesses("c0")
+    assert _config("upright").peers_of("c0") == ("c1",)
+    assert not _config("overhead").peers_of("c0")
     assert _config("overhead").overhead == {"c0", "c1"}
 
 

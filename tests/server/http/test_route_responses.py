@@ -114,7 +114,7 @@ async def test_a_mistake_of_the_servers_own_is_500_without_a_traceback(
     monkeypatch.setattr(hall.service, "frame_buffers", {})
     assert await hall.get("/api/cameras") == (
         500,
-        {"error": "internal server error; the server's log says more"},
+        {"error": "internal server error; see the server's log"},
     )
 
 

@@ -90,7 +90,7 @@ def test_a_process_that_is_held_up_ends_all_the_same(tmp_path: Path) -> None:
         "from server.supervisor.shutdown import run_process\n"
         "def held_up(): pathlib.Path(sys.argv[1]).touch(); time.sleep(60)\n"
         "async def main(): await asyncio.to_thread(held_up)\n"
-        "run_process(main, let_go_s=0.3)\n"
+        "run_process(main, release_s=0.3)\n"
     )
     process = subprocess.Popen([sys.executable, "-c", script, str(started)])
     until_true(started.exists)

@@ -162,7 +162,7 @@ async def test_a_best_view_that_died_waits_for_no_camera_that_loads(machine: Mac
 async def test_what_never_says_that_it_has_loaded_keeps_nobody_for_ever(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(supervisor, "_STARTS_WITHIN_S", 0.01)
+    monkeypatch.setattr(supervisor, "_STARTUP_TIMEOUT_S", 0.01)
     machine.loads_at_once = False
     machine.run()
     assert len(await machine.processes(4)) == 4

@@ -138,7 +138,7 @@ def test_another_rate_is_refused_in_one_line(tmp_path: Path) -> None:
         "cameras": [{"id": "c0", "source": "scene:room"}],
         "sound": {"source": "c0", "codec": "opus", "rate": 44_100},
     }
-    with pytest.raises(UserError, match=r"codec: opus has 48000 samples a second; rate says 44100"):
+    with pytest.raises(UserError, match=r"codec: opus has 48000 samples a second; rate is 44100"):
         build_config(content, where="hall", folder=tmp_path)
 
 

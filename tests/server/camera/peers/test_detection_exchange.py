@@ -328,10 +328,10 @@ def test_a_site_with_one_homography_or_none_has_nobody_to_ask(recording: Path) -
     plain = [camera.model_copy(update={"ground": None}) for camera in config.cameras]
     for cameras in (plain, [config.cameras[0], *plain[1:]]):
         lone = config.model_copy(update={"cameras": cameras})
-        assert not any(lone.witnesses(camera) for camera in lone.camera_ids)
+        assert not any(lone.peers_of(camera) for camera in lone.camera_ids)
         pipeline = CameraPipeline(lone, "c0")
         assert pipeline.detect(0, pipeline.take(0)).message is None
         assert pipeline.end_message(1) is None
         pipeline.close()
-    assert config.witnesses("c1") == ("c0", "c2")
-    assert not config_of(recording, use=False).witnesses("c1")
+    assert config.peers_of("c1") == ("c0", "c2")
+    assert not config_of(recording, use=False).peers_of("c1")

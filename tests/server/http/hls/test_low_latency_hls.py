@@ -189,7 +189,7 @@ async def test_the_end_is_an_answer_to_all_who_wait(hall: Hall) -> None:
 @pytest.mark.parametrize(
     ("query", "error"),
     [
-        ("_HLS_part=1", "_HLS_part: needs _HLS_msn, the segment that it is a part of"),
+        ("_HLS_part=1", "_HLS_part: needs _HLS_msn, the number of its segment"),
         ("_HLS_msn=x", "_HLS_msn=x: must be a whole number"),
         ("_HLS_msn=1&_HLS_part=-1", "_HLS_part=-1: must be a whole number"),
         ("_HLS_msn=99", "_HLS_msn=99: is too far ahead; the newest segment is 1"),
@@ -205,7 +205,7 @@ async def test_what_never_comes_is_not_waited_for_for_ever(
     hall: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shows(hall, range(PARTS + 1))
-    monkeypatch.setattr("server.http.hls.live_playlist._BLOCK_MOST", 0.05)
+    monkeypatch.setattr("server.http.hls.live_playlist._MAX_BLOCK", 0.05)
     async with hall.session.get(f"{STREAM}index.m3u8?_HLS_msn=2") as answer:
         assert (answer.status, bool(answer.headers["Retry-After"])) == (503, True)
 
