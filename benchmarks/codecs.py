@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from server.camera.encoding.encoder import Encoder
+from server.camera.encoder import Encoder
 from server.camera.pipeline import CameraPipeline
 from server.config.loader import build_config
 from server.config.sections import EncodeSettings, SiteSettings

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
-from server.camera.encoding.encoder import Encoder
+from server.camera.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import FragmentSample, fragment
 from server.media.h264.annexb import join_sample, nal_units

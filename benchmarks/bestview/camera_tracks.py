@@ -67,7 +67,7 @@ def in_pictures(config: Config, camera: str) -> CameraDetections:
         except SourceEndedError:
             break
         frames.detections.append(search_result.detections)
-        frames.searched.append(search_result.is_searched)
+        frames.searched.append(search_result.has_detection)
     pipeline.close()
     return frames
 

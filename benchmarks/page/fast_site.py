@@ -14,7 +14,7 @@ import numpy as np
 from aiohttp import web
 
 from benchmarks.common.environment import ROOT
-from server.camera.encoding.encoder import Encoder
+from server.camera.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment, shift_fragment, ticks
 from server.media.stream_format import StreamFormat

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.scaling.simulated_hall import HEIGHT, STRIDE, WIDTH, WINDOW, SimulatedHall, SimulatedTracker
 from camsync import PulseClient
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.loader import load_config
 from server.config.site_config import Config
 from server.messaging.bus import Bus

@@ -31,7 +31,7 @@ from benchmarks.streaming.stalled_viewers import StallComparison, compare_stalle
 from benchmarks.streaming.stream_site import running, viewers
 from benchmarks.streaming.tables import StreamMeasurements, describe, plot
 from benchmarks.streaming.viewing_cost import first_pictures, step_up, watch_objects
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 
 PARTS = ("splice", "objects", "viewers", "first", "frames", "drift", "hls", "stalled")
 _OBJECTS = 50

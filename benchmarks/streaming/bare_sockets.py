@@ -16,7 +16,7 @@ from benchmarks.streaming.simulated_cameras import ENCODE, SITE
 from benchmarks.streaming.stream_site import viewers
 from benchmarks.streaming.viewer_crowd import CrowdReading
 from benchmarks.streaming.viewing_cost import send_delays
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.media.containers.fmp4 import FragmentSample, fragment
 
 _BACKLOG = 1000

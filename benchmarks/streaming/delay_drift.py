@@ -10,7 +10,7 @@ import msgspec
 
 from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, SimulatedHall, SimulatedTracker
 from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.containers.fmp4 import ticks

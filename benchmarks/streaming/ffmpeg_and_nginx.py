@@ -15,7 +15,7 @@ from pathlib import Path
 
 from benchmarks.streaming.simulated_cameras import ENCODE, SITE
 from benchmarks.streaming.stream_site import StreamSite, terminate
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.cli.generated_config import free_port
 
 _CUT_S = 2.0

@@ -12,7 +12,7 @@ import av
 import numpy as np
 
 from benchmarks.streaming.splice_cost import SplicerFixture
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import CameraSettings, EncodeSettings, SiteSettings
 from server.config.site_config import Config
 from server.service.streaming.media_chunk import MediaChunk

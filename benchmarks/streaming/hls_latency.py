@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.scaling.simulated_hall import SimulatedHall
 from benchmarks.streaming.delay_drift import PacedCameras
 from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.config.sections import CameraSettings, HttpSettings
 from server.config.site_config import Config
 from server.http.app import make_app, serving

@@ -17,7 +17,7 @@ import msgspec
 
 from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, SimulatedHall, SimulatedTracker
 from camsync import PulseClient
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.loader import load_config
 from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config

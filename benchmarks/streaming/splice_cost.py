@@ -13,7 +13,7 @@ import numpy as np
 from av.codec.context import Flags
 
 from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.codec import stream_format_for
@@ -34,7 +34,7 @@ class SplicerFixture:
     def __init__(self, films: Sequence[Sequence[AccessUnit]], config: Config) -> None:
         self._films, self.gop = films, config.encode.gop
         self.stream_format = stream_format = stream_format_for(
-            config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
+            config.encode.codec, config.site.size, per_camera_parameters=config.encode.parameters == "own"
         )
         self._buffers = {
             name: FrameBuffer(config.site.fps, 4 * self.gop, stream_format) for name in config.camera_ids

@@ -22,7 +22,7 @@ from benchmarks.scaling.simulated_hall import SimulatedHall
 from benchmarks.streaming import timed_service
 from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE, save
 from benchmarks.streaming.viewer_crowd import CrowdReading
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.cli.generated_config import free_port
 
 PER_CAMERA = 20

@@ -19,7 +19,7 @@ from benchmarks.streaming.splice_cost import transcode
 from benchmarks.streaming.stream_site import StreamSite, ViewerProcess
 from benchmarks.streaming.timed_service import SendTimes
 from benchmarks.streaming.viewer_crowd import CrowdReading
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.media.rendering_messages import TIMESCALE
 
 _SETTLE_S = 2.0

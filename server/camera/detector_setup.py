@@ -1,4 +1,4 @@
-"""A camera's detector, chosen and set up from the configuration."""
+"""Creates a camera's detector as configured; for a recording, the background is learned in advance."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from bestview import camera_height, horizon_row
+from server.camera.sources import FrameSource, Recording
 from server.config.ground_unit import UNITS_PER_METER
 from server.config.sections import CameraSettings
 from server.config.sections.detect import DetectSettings
@@ -30,7 +31,7 @@ from tracking.detectors import (
     paper_settings,
 )
 
-_NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
+_NO_IMAGE = np.empty((0, 0, 3), dtype=np.uint8)
 
 
 class CameraDetector(Detector, Protocol):
@@ -43,12 +44,12 @@ class CameraDetector(Detector, Protocol):
 
     @property
     def warming_up(self) -> bool:
-        """Whether detection did not run on the last frame, so that its empty result proves nothing."""
+        """Whether detection did not run on the last frame: an empty result does not mean an empty room."""
         ...
 
 
-def make_detector(config: Config, camera: CameraSettings, fit: Letterbox) -> CameraDetector:
-    """Return the detector of a camera; its boxes are in the site's picture.
+def make_detector(config: Config, camera: CameraSettings, letterbox: Letterbox) -> CameraDetector:
+    """Return the detector of a camera; boxes are in pixels of the site's image.
 
     Raises:
         UserError: the detection file or the network cannot be read, or the network cannot be run.
@@ -56,52 +57,73 @@ def make_detector(config: Config, camera: CameraSettings, fit: Letterbox) -> Cam
     if camera.detections is not None:
         with _as_user_error(f"camera {camera.id}: detections"):
             file = MotFileDetector(camera.detections, MotFileSettings(first_frame=camera.offset))
-            return LetterboxedDetections(file, fit, config.detect)
-    polygons = [fit.to_site(np.asarray(polygon, dtype=np.float64)) for polygon in camera.ignore]
+            return LetterboxedDetections(file, letterbox, config.detect)
+    polygons = [letterbox.to_site(np.asarray(polygon, dtype=np.float64)) for polygon in camera.ignore]
     ignore = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in polygons)
     with _as_user_error(f"camera {camera.id}: detect"):
         settings = replace(config.detect, ignore=(*config.detect.ignore, *ignore))
         if camera.kind == "overhead":
-            return _of_kind(overhead_settings(settings), None)
-        return _of_kind(settings, _floor(config, camera, fit))
+            return _create_detector(overhead_settings(settings), None)
+        return _create_detector(settings, _floor(config, camera, letterbox))
+
+
+def warm_up_detector(
+    config: Config, camera: CameraSettings, source: FrameSource, letterbox: Letterbox
+) -> CameraDetector:
+    """Return a camera's detector; for a recording it has learned the background before the first frame.
+
+    The detector of a live camera learns the background while it runs.
+
+    Raises:
+        UserError: the detector's files or the recording cannot be read.
+    """
+    detector, settings = make_detector(config, camera, letterbox), config.detect
+    if isinstance(detector, LetterboxedDetections) and isinstance(source, Recording):
+        detector.number_frames_by(source.counted_pulse)
+    if isinstance(detector, BackgroundDetector):
+        indices = range(0, settings.prescan_frames, settings.prescan_every)
+        detector.prepare((letterbox.image(image) for image in source.ahead(indices)), settings.prescan_every)
+    return detector
 
 
 _PERSON_M = 1.7
 _MIN_SLOPE, _MAX_SLOPE = 0.03, 1.5
-"""A person's height over the camera's: cameras at 1.1 to 57 meters. Beyond, the unit is probably wrong."""
+"""Limits of a person's height over the camera's: cameras at 1.1 to 57 meters. Beyond, the unit is probably
+wrong."""
 
 
-def _floor(config: Config, camera: CameraSettings, fit: Letterbox) -> FloorGeometry | None:
-    """Return what the homography implies for people's heights in the site's picture; None: nothing."""
+def _floor(config: Config, camera: CameraSettings, letterbox: Letterbox) -> FloorGeometry | None:
+    """Return the horizon and height of people that follow from the homography; None: unknown."""
     per_meter = UNITS_PER_METER.get(camera.ground_unit or "")
     if camera.ground is None:
         return None
     homography = np.array(camera.ground, dtype=np.float64)
     width, height = config.site.width, config.site.height
-    middle = float(fit.to_own(np.array([width / 2.0, 0.0]))[0])
+    middle = float(letterbox.to_camera(np.array([width / 2.0, 0.0]))[0])
     row = horizon_row(homography, middle)
     if row is None:
         return None
-    horizon = float(fit.to_site(np.array([middle, row]))[1])
-    # A horizon below the middle of the picture says little about people's heights.
+    horizon = float(letterbox.to_site(np.array([middle, row]))[1])
+    # With a horizon below the middle of the image, the homography hardly constrains people's heights.
     if horizon > height / 2.0:
         return None
     if per_meter is None:
-        # A horizon far above the picture is uncertain, and no camera height is known to check it.
+        # A horizon far above the image is uncertain, and the camera height, which could confirm it, is
+        # unknown.
         return FloorGeometry(horizon, None) if horizon >= -height else None
     above = camera_height(homography, middle)
     slope = _PERSON_M * per_meter / above if above else 0.0
     return FloorGeometry(horizon, slope) if _MIN_SLOPE <= slope <= _MAX_SLOPE else None
 
 
-def _of_kind(settings: DetectSettings, floor: FloorGeometry | None) -> CameraDetector:
+def _create_detector(settings: DetectSettings, floor: FloorGeometry | None) -> CameraDetector:
     """Return the detector that the settings name."""
-    looks = AppearanceExtractor(settings.appearance, settings.gray_bins)
+    appearance = AppearanceExtractor(settings.appearance, settings.gray_bins)
     match settings.kind:
         case "hog":
-            return HogDetector(settings.hog, looks, settings.ignore)
+            return HogDetector(settings.hog, appearance, settings.ignore)
         case "onnx":
-            return OnnxDetector(settings.onnx, looks, settings.ignore)
+            return OnnxDetector(settings.onnx, appearance, settings.ignore)
         case "boxes":
             return BackgroundDetector(paper_settings(settings))
         case "background":
@@ -124,26 +146,26 @@ def _as_user_error(where: str) -> Iterator[None]:
 
 
 class LetterboxedDetections:
-    """Detections from a file, moved from the camera's own pixels into the site's picture."""
+    """Detections from a file, mapped from the camera's image to the site's."""
 
     warming_up = False
 
-    def __init__(self, file: MotFileDetector, fit: Letterbox, settings: DetectSettings) -> None:
-        self._file, self._fit = file, fit
-        self._looks = AppearanceExtractor(settings.appearance, settings.gray_bins)
+    def __init__(self, file: MotFileDetector, letterbox: Letterbox, settings: DetectSettings) -> None:
+        self._file, self._letterbox = file, letterbox
+        self._appearance = AppearanceExtractor(settings.appearance, settings.gray_bins)
         self._frame_number: Callable[[int], int] = int
 
     def number_frames_by(self, frame_number: Callable[[int], int]) -> None:
-        """Map pulses to the file's frame numbers, which count a recording's pictures one by one."""
+        """Set the mapping from pulses to the file's frame numbers, which count the recording's frames."""
         self._frame_number = frame_number
 
     @property
     def bins(self) -> int:
         """Bins of a detection's appearance histogram."""
-        return self._looks.bins
+        return self._appearance.bins
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:
-        """Return the detections of a frame, with appearance histograms from the site's picture."""
-        own = self._file.detect(_NO_PICTURE, None if frame is None else self._frame_number(frame))
-        boxes = self._fit.boxes_to_site(own.boxes)
-        return Detections(boxes, own.scores, self._looks.histograms(image, boxes))
+        """Return the detections of a frame, with appearance histograms from the site's image."""
+        own = self._file.detect(_NO_IMAGE, None if frame is None else self._frame_number(frame))
+        boxes = self._letterbox.boxes_to_site(own.boxes)
+        return Detections(boxes, own.scores, self._appearance.histograms(image, boxes))

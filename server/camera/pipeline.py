@@ -1,4 +1,7 @@
-"""The processing of one camera's frames, live and offline: the same frames give the same tracks."""
+"""Processes one camera's frames, live and offline: capture, encoding, detection, tracking.
+
+The same frames give the same tracks.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +9,26 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from bestview import shows_ground
 from server.camera.audio import LiveAudioSource
-from server.camera.background_warmup import warm_up_detector
-from server.camera.corrected_windows import corrected_messages
-from server.camera.detector_setup import make_detector
-from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.camera.floor_check import check_floor
+from server.camera.detector_setup import make_detector, warm_up_detector
+from server.camera.encoder import AccessUnit, Encoder
 from server.camera.load.frame_skipper import FrameSkipper
+from server.camera.operator_corrections import merge_correction
 from server.camera.passthrough import PassthroughEncoder, open_passthrough
 from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
 from server.camera.sharpness import SharpnessMemory
-from server.camera.sources import Image, PictureSource, open_source
+from server.camera.sources import FrameSource, Image, open_source
 from server.camera.track_messages import TrackMessageBuilder
 from server.camera.tracker_setup import set_up_tracker
+from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks, FrameDetections
 from server.messaging.operator_messages import CORRECTIONS_MAX
+from server.system.errors import UserError
 from tracking import Detections, create_solver
 from tracking.interactive import PositionCorrection
 
@@ -37,17 +43,17 @@ class DetectedFrame:
 
     Attributes:
         pulse: its pulse.
-        image: the picture; None: there was none.
-        detections: the detections.
-        is_searched: whether detection ran; otherwise the empty result proves nothing.
+        image: None: there was none.
+        detections: empty where detection did not run.
+        has_detection: whether detection ran.
         message: the detections as sent to the peer cameras; None without peers.
-        skipped: load shedding left the frame out.
+        skipped: whether load shedding left the frame out.
     """
 
     pulse: int
     image: Image | None
     detections: Detections
-    is_searched: bool
+    has_detection: bool
     message: FrameDetections | None
     skipped: bool = False
 
@@ -58,7 +64,7 @@ class DetectedFrame:
 
 
 _AWAY_AFTER_S = 2.0
-"""Seconds without pictures after which a passthrough camera counts as away."""
+"""Seconds without frames after which a passthrough camera counts as away."""
 
 
 class CameraPipeline:
@@ -70,7 +76,7 @@ class CameraPipeline:
     ``ready``: warm up for the first frame, which takes seconds; otherwise only check that everything opens.
 
     Raises:
-        UserError: the source or the detections cannot be opened, or the homography does not fit the picture.
+        UserError: the source or the detections cannot be opened, or the homography does not match the image.
     """
 
     def __init__(
@@ -83,19 +89,21 @@ class CameraPipeline:
         ready: bool = True,
     ) -> None:
         camera, site = config.camera(camera_id), config.site
-        own = open_passthrough(config, camera, listener)
-        self.is_passthrough = own.source is not None
-        """Whether the source's own H.264 is passed on."""
-        self.why_encoded = own.why
-        """Why not, where the configuration allows it; empty: it was not requested."""
-        self.source: PictureSource = own.source or open_source(camera, site, listener, ready=ready)
-        self._fit = Letterbox(self.source.size, (site.width, site.height))
-        check_floor(camera, self.source.size)
-        self._encoder = PassthroughEncoder(own.source) if own.source else Encoder(site, config.encode)
+        passthrough = open_passthrough(config, camera, listener)
+        self.is_passthrough = passthrough.source is not None
+        """Whether the source's own H.264 is passed through."""
+        self.why_encoded = passthrough.reason
+        """Why it cannot be passed through; empty: that was not requested."""
+        self.source: FrameSource = passthrough.source or open_source(camera, site, listener, ready=ready)
+        self._letterbox = Letterbox(self.source.size, (site.width, site.height))
+        _check_homography(camera, self.source.size)
+        self._encoder = (
+            PassthroughEncoder(passthrough.source) if passthrough.source else Encoder(site, config.encode)
+        )
         self._detector = (
-            warm_up_detector(config, camera, self.source, self._fit)
+            warm_up_detector(config, camera, self.source, self._letterbox)
             if ready
-            else make_detector(config, camera, self._fit)
+            else make_detector(config, camera, self._letterbox)
         )
         track = config.track
         tracker = set_up_tracker(
@@ -104,43 +112,43 @@ class CameraPipeline:
             camera,
             self.source,
             lambda: create_solver(track.solver),
-            self._fit,
+            self._letterbox,
             ready=ready,
         )
         self._tracker = FrameSkipper(tracker, self._detector.bins, track.window.stride)
-        self._reporter = TrackMessageBuilder(camera_id, boot, self.source.size, track.window.stride)
+        self._messages = TrackMessageBuilder(camera_id, boot, self.source.size, track.window.stride)
         self._sharpness = SharpnessMemory() if config.view.quality.sharpness > 0 else None
         self.cross_view = (
             CrossViewScorer(config, camera_id, self.source.size, boot) if config.peers_of(camera_id) else None
         )
         self.first_pulse = camera.offset if self.source.recorded else 0
-        """The pulse of the first picture."""
+        """The pulse of the first frame."""
         self._last: int | None = None
         self._corrections: deque[PositionCorrection] = deque(maxlen=CORRECTIONS_MAX)
         self._missing = 0
-        """Pulses since the last picture."""
-        self._patience = round(_AWAY_AFTER_S * site.fps) + config.encode.gop
+        """Pulses since the last frame."""
+        self._away_after = round(_AWAY_AFTER_S * site.fps) + config.encode.gop
 
     def take(self, pulse: int) -> Image | None:
-        """Return the site-sized picture of a pulse, None where the source has none yet.
+        """Return the site-sized image of a pulse; None where the source has none (yet).
 
         Raises:
             SourceEndedError: the recording is over.
         """
-        own = self.source.take(pulse)
-        if own is None:
+        image = self.source.take(pulse)
+        if image is None:
             self._missing += 1
             return None
         self._missing = 0
-        return self._fit.image(own)
+        return self._letterbox.image(image)
 
     @property
     def away(self) -> bool:
-        """Whether a live camera gives no pictures; a passthrough camera may be waiting for a GOP to begin."""
-        return not self.source.recorded and self._missing > (self._patience if self.is_passthrough else 0)
+        """Whether a live camera delivers no frames; passthrough may have to wait for a GOP to begin."""
+        return not self.source.recorded and self._missing > (self._away_after if self.is_passthrough else 0)
 
     def encode(self, pulse: int, image: Image) -> AccessUnit:
-        """Encode the picture of a pulse, which was the last one taken."""
+        """Encode the image of a pulse, which was the last one taken."""
         return self._encoder.encode(pulse, image)
 
     def track(self, pulse: int, image: Image | None) -> CameraTracks | None:
@@ -148,22 +156,22 @@ class CameraPipeline:
         return self.track_detections(self.detect(pulse, image))
 
     def detect(self, pulse: int, image: Image | None, *, skipped: bool = False) -> DetectedFrame:
-        """Detect people in a frame; ``image`` is None where it was not taken or is skipped.
+        """Detect people in a frame; ``image`` is None if it was not captured or is skipped.
 
         ``skipped``: left out by load shedding; detections are interpolated from the frames around it. Pulses
         must ascend.
         """
         if image is None:
-            detections, is_searched = Detections.empty(self._detector.bins), False
+            detections, has_detection = Detections.empty(self._detector.bins), False
         else:
             detections = self._detector.detect(image, pulse)
-            is_searched = not self._detector.warming_up
-        word = (
-            self.cross_view.build_message(pulse, detections if is_searched else None)
+            has_detection = not self._detector.warming_up
+        message = (
+            self.cross_view.build_message(pulse, detections if has_detection else None)
             if self.cross_view
             else None
         )
-        return DetectedFrame(pulse, image, detections, is_searched, word, skipped=skipped)
+        return DetectedFrame(pulse, image, detections, has_detection, message, skipped=skipped)
 
     def track_detections(
         self,
@@ -181,17 +189,17 @@ class CameraPipeline:
         pulse, detections = frame.pulse, frame.detections
         if self._last is not None:
             missed = range(max(self._last + 1, pulse - _REPORTED_GAP_MAX), pulse)
-            self._reporter.shed(missed)
-            self._reporter.unsearched(missed)
+            self._messages.shed(missed)
+            self._messages.without_detection(missed)
         self._last = pulse
-        if not frame.is_searched:
-            self._reporter.unsearched([pulse])
+        if not frame.has_detection:
+            self._messages.without_detection([pulse])
         if frame.image is None and pulse >= self.first_pulse:
-            self._reporter.shed([pulse])
+            self._messages.shed([pulse])
         if self.cross_view is not None and frame.needs_peers:
             detections = self.cross_view.rescore(detections, peers.messages)
             if peers.is_incomplete:
-                self._reporter.without_peers(pulse)
+                self._messages.without_peers(pulse)
         result = (
             self._tracker.skip(pulse) if frame.skipped else self._tracker.push(pulse, detections, frame.image)
         )
@@ -201,8 +209,8 @@ class CameraPipeline:
         if self._corrections:
             revised = self._tracker.apply_corrections(list(self._corrections))
             self._corrections.clear()
-            result = result if revised is None else corrected_messages(result, revised)
-        return self._with_sharpness(self._reporter.regular(result), frame.image)
+            result = result if revised is None else merge_correction(result, revised)
+        return self._add_sharpness(self._messages.regular(result), frame.image)
 
     def end_message(self, end: int) -> FrameDetections | None:
         """Return the message that ends this camera's detections; the recording has no frame ``end``."""
@@ -211,15 +219,28 @@ class CameraPipeline:
     def finish(self, end: int) -> CameraTracks:
         """End tracking at the recording's end, which has no frame ``end``: provisional frames become final.
 
-        A camera restarted after its recording had ended reports the end as well.
+        A camera that was restarted after its recording had ended reports the end again.
         """
         last = end - 1 if self._last is None else self._last
-        return self._with_sharpness(self._reporter.closing(self._tracker.flush(), last), None)
+        return self._add_sharpness(self._messages.closing(self._tracker.flush(), last), None)
 
-    def _with_sharpness(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
+    def _add_sharpness(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
         """Add each track's sharpness, where view quality uses it."""
-        return tracks if self._sharpness is None else self._sharpness.measured(tracks, image)
+        return tracks if self._sharpness is None else self._sharpness.measure(tracks, image)
 
     def close(self) -> None:
         """Close the source."""
         self.source.close()
+
+
+def _check_homography(camera: CameraSettings, size: tuple[int, int]) -> None:
+    """Check that the homography maps some of the camera's image, ``size`` = (width, height), to the floor.
+
+    Raises:
+        UserError: the whole image lies above the horizon.
+    """
+    if camera.ground is not None and not shows_ground(np.array(camera.ground, dtype=np.float64), size):
+        raise UserError(
+            f"camera {camera.id}: ground: its whole image, {size[0]}x{size[1]}, lies above the horizon: "
+            "the homography belongs to a camera tilted past straight down, or to another image; leave it out"
+        )

@@ -1,4 +1,4 @@
-"""One camera's process: on every pulse it takes a frame, encodes and publishes it, and updates the tracks."""
+"""One camera's process: on every pulse it captures a frame, encodes, publishes and tracks it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from server.camera.pipeline import CameraPipeline
 from server.camera.retained_state import RetainedState
 from server.camera.sources import Image, SourceEndedError
 from server.camera.status_meter import StatusMeter
-from server.camera.thumbnails import thumbnails
+from server.camera.thumbnails import encode_thumbnails
 from server.config.pulse_access import pulse_client_tls, pulse_credentials
 from server.config.site_config import Config
 from server.messaging.bus import Bus
@@ -53,24 +53,24 @@ class _QueuedFrame:
 
     Attributes:
         pulse: its pulse.
-        image: the picture; None: there was none, or it was shed.
-        taken: when it was taken, by the loop's clock.
+        image: None: there was none, or it was shed.
+        captured: when it was captured, by the loop's clock.
         due: when its pulse was due, likewise.
-        skipped: load shedding left it out.
+        skipped: whether load shedding left it out.
     """
 
     pulse: int
     image: Image | None
-    taken: float
+    captured: float
     due: float
     skipped: bool = False
 
 
 class CameraProcess:
-    """Runs a pipeline on the pulses. Two threads of its own: video must never wait for tracking.
+    """Runs a camera's pipeline on the pulses, in two threads: video must never wait for tracking.
 
     Raises:
-        UserError: the source cannot be opened, or the password for the pulses not be read.
+        UserError: the source cannot be opened, or the password for the pulses cannot be read.
     """
 
     def __init__(self, config: Config, camera_id: str) -> None:
@@ -78,23 +78,23 @@ class CameraProcess:
         self._pulse_credentials = pulse_credentials(config, camera_id)
         self._pulse_tls = pulse_client_tls(config)
         self._boot = time.time_ns() // 1_000_000
-        self._clock = steady_unix_clock()  # of pulses and all that is measured from them
+        self._clock = steady_unix_clock()  # of pulses and of all times relative to them
         self._keys = ZenohKeys(config.site.name)
-        self._sound = open_audio(config, camera_id)
-        listener = self._sound if isinstance(self._sound, LiveAudioSource) else None
+        self._audio = open_audio(config, camera_id)
+        listener = self._audio if isinstance(self._audio, LiveAudioSource) else None
         self._pipeline = CameraPipeline(config, camera_id, self._boot, listener)
         if self._pipeline.is_passthrough:
-            log.info("camera %s: its own H.264 passes through", camera_id)
+            log.info("camera %s: its own H.264 is passed through", camera_id)
         elif self._pipeline.why_encoded:
             log.warning("camera %s is re-encoded: its own H.264: %s", camera_id, self._pipeline.why_encoded)
         self._video = ThreadPoolExecutor(1, "video")
         self._tracking = ThreadPoolExecutor(1, "tracking")
         fps = config.site.fps
-        self._backlog_pictures = max(1, round(config.track.backlog_s * fps))
+        self._images_max = max(1, round(config.track.backlog_s * fps))
         self._backlog: asyncio.Queue[_QueuedFrame | None] = asyncio.Queue(
-            maxsize=_FRAMES_PER_IMAGE * self._backlog_pictures
+            maxsize=_FRAMES_PER_IMAGE * self._images_max
         )
-        # Passthrough frames depend on each other, and a recording is shown whole: neither drops frames.
+        # Passthrough frames depend on each other, and recordings are shown completely: neither drops frames.
         live = not (self._pipeline.source.recorded or self._pipeline.is_passthrough)
         self._load = LoadMonitor(config, camera_id, live=live)
         self._exchange = PeerDetectionExchange(
@@ -104,7 +104,7 @@ class CameraProcess:
         self._meter = StatusMeter(fps)
         self._state: CameraState = "starting"
         self._end = 0
-        """The first pulse that the recording has no frame for, once it is over."""
+        """The first pulse after the recording, once that has ended."""
         self._bus: Bus | None = None
 
     async def run(self) -> None:
@@ -115,7 +115,7 @@ class CameraProcess:
                 bus.subscribe(self._keys.camera(self._id, "position_corrections"), self._corrections.put)
             retained = RetainedState(partial(self._publish, "retained_identities"))
             bus.subscribe(self._keys.camera(self._id, "identities"), retained.put)
-            bus.watch_alive(self._keys.bestview("**"), lambda _, there: retained.service(there))
+            bus.watch_alive(self._keys.bestview("**"), lambda _, is_present: retained.on_service(is_present))
             await self._wait_for_bestview(bus)
             bus.declare_alive(self._keys.camera(self._id, "alive"))
             await self._exchange.join()
@@ -143,19 +143,19 @@ class CameraProcess:
     async def _wait_until_done(
         video: asyncio.Task[None], tracking: asyncio.Task[None], status: asyncio.Task[None]
     ) -> None:
-        """Wait for video and tracking to end; an error in any task ends the process."""
-        left = {video, tracking, status}
-        while left - {status}:
-            over, left = await asyncio.wait(left, return_when=asyncio.FIRST_COMPLETED)
-            for task in over:
+        """Wait for video and tracking to end; raise the error of any task."""
+        pending = {video, tracking, status}
+        while pending - {status}:
+            done, pending = await asyncio.wait(pending, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
                 task.result()
 
     async def _wait_for_bestview(self, bus: Bus) -> None:
         """Wait for the best-view service: frames published before it connects are lost, frame 0 included."""
-        there = asyncio.Event()
-        bus.watch_alive(self._keys.bestview("alive"), lambda _, alive: there.set() if alive else None)
+        present = asyncio.Event()
+        bus.watch_alive(self._keys.bestview("alive"), lambda _, alive: present.set() if alive else None)
         try:
-            await asyncio.wait_for(there.wait(), self._config.sync.start_timeout_s)
+            await asyncio.wait_for(present.wait(), self._config.sync.start_timeout_s)
         except TimeoutError:
             log.warning(
                 "camera %s: no best-view service at %s yet",
@@ -168,7 +168,7 @@ class CameraProcess:
         # After a stall a recording catches up; a live camera continues with its newest picture.
         settings = ClientSettings(queue=2, free_run_after=sync.start_timeout_s)
         if self._pipeline.source.recorded:
-            settings = replace(settings, queue=self._backlog_pictures, catch_up=self._config.track.backlog_s)
+            settings = replace(settings, queue=self._images_max, catch_up=self._config.track.backlog_s)
         client = PulseClient(
             sync.host,
             sync.port,
@@ -180,7 +180,7 @@ class CameraProcess:
             tls=self._pulse_tls,
         )
         async with client as pulses:
-            self._meter.watch(pulses)
+            self._meter.set_client(pulses)
             async for pulse in pulses:
                 try:
                     await self._on_pulse(pulse, pulses.now() - pulse.due)
@@ -193,11 +193,11 @@ class CameraProcess:
     async def _on_pulse(self, pulse: Pulse, late: float) -> None:
         due = asyncio.get_running_loop().time() - late
         await self._send_audio(pulse.number)
-        if not self._load.takes(pulse.number):
+        if not self._load.captures(pulse.number):
             self._meter.missed(pulse.number, 1 + pulse.missed)
             self._queue_for_tracking(pulse.number, None, due, skipped=True)
             return
-        image = await self._in(self._video, lambda: self._pipeline.take(pulse.number))
+        image = await self._run_in(self._video, lambda: self._pipeline.take(pulse.number))
         if image is None:
             if self._pipeline.away:
                 self._state = "away"
@@ -206,7 +206,7 @@ class CameraProcess:
             return
         self._state = "live"
         taken = self._clock()
-        unit = await self._in(self._video, lambda: self._pipeline.encode(pulse.number, image))
+        unit = await self._run_in(self._video, lambda: self._pipeline.encode(pulse.number, image))
         head = FrameHeader(
             pulse=pulse.number,
             key=unit.key,
@@ -222,10 +222,10 @@ class CameraProcess:
 
     async def _send_audio(self, pulse: int) -> None:
         """Publish the audio of this pulse, if this process has the site's audio source."""
-        sound = self._sound
-        if sound is None:
+        audio = self._audio
+        if audio is None:
             return
-        for run in consecutive_runs(await self._in(self._video, lambda: sound.at(pulse))):
+        for run in consecutive_runs(await self._run_in(self._video, lambda: audio.at(pulse))):
             head = AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])
             if self._bus is not None:
                 data = b"".join(frame.data for frame in run)
@@ -235,7 +235,7 @@ class CameraProcess:
         self, pulse: int, image: Image | None, due: float, *, skipped: bool = False
     ) -> None:
         """Queue a frame for the tracker, without its image where tracking is far behind."""
-        shed = image is not None and self._backlog.qsize() >= self._backlog_pictures
+        shed = image is not None and self._backlog.qsize() >= self._images_max
         if shed:
             self._meter.shed()
         if not self._backlog.full():
@@ -244,42 +244,47 @@ class CameraProcess:
 
     async def _track(self) -> None:
         """Detect and track, frame by frame, behind the video."""
-        thumbs_every = max(1, round(self._config.site.fps))
-        detect_times: list[float] = []
+        thumbnail_interval = max(1, round(self._config.site.fps))
+        detection_times: list[float] = []
         while (item := await self._backlog.get()) is not None:
             pulse, image, skipped = item.pulse, item.image, item.skipped
-            if image is not None and not self._load.searches(pulse):
+            if image is not None and not self._load.detects(pulse):
                 image, skipped = None, True
                 self._meter.shed()
             began = time.perf_counter()
             detect = partial(self._pipeline.detect, pulse, image, skipped=skipped)
-            frame = await self._in(self._tracking, detect)
+            frame = await self._run_in(self._tracking, detect)
             if image is not None:
-                detect_times.append(time.perf_counter() - began)
+                detection_times.append(time.perf_counter() - began)
             now = asyncio.get_running_loop().time()
             self._load.measure_lag(now - item.due, now)
-            peers = await self._exchange.exchange(pulse, frame.message, item.taken, needed=frame.needs_peers)
+            peers = await self._exchange.exchange(
+                pulse, frame.message, item.captured, needed=frame.needs_peers
+            )
             began = time.perf_counter()
             track = partial(self._pipeline.track_detections, frame, peers, self._corrections.take())
-            tracks = await self._in(self._tracking, track)
+            tracks = await self._run_in(self._tracking, track)
             if tracks is None:
                 continue
-            search_s, solve_s = fmean(detect_times) if detect_times else None, time.perf_counter() - began
-            detect_times.clear()
-            self._send_tracks(msgspec.structs.replace(tracks, search_s=search_s, solve_s=solve_s))
-            if image is not None and tracks.epoch * self._config.track.window.stride % thumbs_every < (
+            detection_s, solve_s = (
+                fmean(detection_times) if detection_times else None,
+                time.perf_counter() - began,
+            )
+            detection_times.clear()
+            self._send_tracks(msgspec.structs.replace(tracks, detection_s=detection_s, solve_s=solve_s))
+            if image is not None and tracks.epoch * self._config.track.window.stride % thumbnail_interval < (
                 self._config.track.window.stride
             ):
                 await self._send_thumbnails(image, tracks)
         await self._exchange.publish_end(self._pipeline.end_message(self._end))
-        self._send_tracks(await self._in(self._tracking, lambda: self._pipeline.finish(self._end)))
+        self._send_tracks(await self._run_in(self._tracking, lambda: self._pipeline.finish(self._end)))
 
     def _send_tracks(self, tracks: CameraTracks) -> None:
         self._publish("tracks", msgspec.json.encode(msgspec.structs.replace(tracks, solved_at=self._clock())))
 
     async def _send_thumbnails(self, image: Image, tracks: CameraTracks) -> None:
-        pictures = await self._in(self._tracking, lambda: thumbnails(image, tracks))
-        for track, jpeg in pictures.items():
+        thumbnails = await self._run_in(self._tracking, lambda: encode_thumbnails(image, tracks))
+        for track, jpeg in thumbnails.items():
             head = ThumbnailHeader(track=track, boot=self._boot, pulse=tracks.last)
             self._publish(f"thumbs/{track}", jpeg, msgspec.json.encode(head))
 
@@ -294,7 +299,7 @@ class CameraProcess:
         )
         bad = self._exchange.bad_messages + self._corrections.bad_messages
         status = msgspec.structs.replace(
-            status, position_corrections=self._corrections.taken, bad_messages=bad
+            status, position_corrections=self._corrections.count, bad_messages=bad
         )
         self._publish("status", msgspec.json.encode(status))
 
@@ -303,5 +308,5 @@ class CameraProcess:
             self._bus.publish(self._keys.camera(self._id, what), payload, attachment)
 
     @staticmethod
-    async def _in(pool: ThreadPoolExecutor, work: Callable[[], T]) -> T:
+    async def _run_in(pool: ThreadPoolExecutor, work: Callable[[], T]) -> T:
         return await asyncio.get_running_loop().run_in_executor(pool, work)

@@ -9,10 +9,7 @@ from server.messaging.inbox import Message
 
 
 class RetainedState:
-    """Holds the newest state of the service, undecoded, and sends it to every service that starts.
-
-    ``send`` publishes it.
-    """
+    """Holds the service's newest state, undecoded; sends it to every service that starts."""
 
     def __init__(self, send: Callable[[bytes], None]) -> None:
         self._send = send
@@ -23,7 +20,7 @@ class RetainedState:
         if len(message.payload) <= SNAPSHOT_BYTES_MAX:
             self._state = message.payload
 
-    def service(self, is_present: bool) -> None:
-        """Send the state to a service that appeared, even if empty, so that it does not wait."""
+    def on_service(self, is_present: bool) -> None:
+        """Send the state, even an empty one, to a service that appeared, so that it need not wait for it."""
         if is_present:
             self._send(self._state)

@@ -1,4 +1,4 @@
-"""Sharpness of each person's picture, measured once a window on its last frame."""
+"""Sharpness of each person's image, measured once per window, in its last frame."""
 
 from __future__ import annotations
 
@@ -24,21 +24,23 @@ _MIN_SIDE = 4
 
 
 class SharpnessMemory:
-    """Remembers the last sharpness of each track, for windows in whose last frame it is hidden."""
+    """Keeps the last sharpness of each track, for windows in whose last frame the person is hidden."""
 
     def __init__(self) -> None:
-        self._known: dict[int, float] = {}
+        self._values: dict[int, float] = {}
 
-    def measured(self, message: CameraTracks, image: Image | None) -> CameraTracks:
+    def measure(self, message: CameraTracks, image: Image | None) -> CameraTracks:
         """Return the message with its tracks' sharpness; ``image`` is the window's last frame, if any."""
         for track in message.tracks:
             box = track.boxes[-1] if track.boxes else None
             value = None if image is None or box is None else sharpness(image, box)
             if value is not None:
-                self._known[track.id] = value
-        self._known = {it.id: self._known[it.id] for it in message.tracks if it.id in self._known}
+                self._values[track.id] = value
+        self._values = {
+            track.id: self._values[track.id] for track in message.tracks if track.id in self._values
+        }
         tracks = [
-            msgspec.structs.replace(track, sharpness=self._known.get(track.id)) for track in message.tracks
+            msgspec.structs.replace(track, sharpness=self._values.get(track.id)) for track in message.tracks
         ]
         return msgspec.structs.replace(message, tracks=tracks)
 
@@ -51,12 +53,12 @@ def sharpness(image: Image, box: Box) -> float | None:
     """
     height, width = image.shape[:2]
     left, top, right, bottom = (round(side) for side in box)
-    part = image[max(top, 0) : min(bottom, height), max(left, 0) : min(right, width)]
-    if min(part.shape[:2]) < _MIN_SIDE:
+    crop = image[max(top, 0) : min(bottom, height), max(left, 0) : min(right, width)]
+    if min(crop.shape[:2]) < _MIN_SIDE:
         return None
-    shrinking = part.shape[0] > _HEIGHT
+    shrinking = crop.shape[0] > _HEIGHT
     small = cv2.resize(
-        cv2.cvtColor(part, cv2.COLOR_BGR2GRAY),
+        cv2.cvtColor(crop, cv2.COLOR_BGR2GRAY),
         (_WIDTH, _HEIGHT),
         interpolation=cv2.INTER_AREA if shrinking else cv2.INTER_LINEAR,
     ).astype(np.float64)

@@ -1,4 +1,4 @@
-"""Counters behind a camera's status message."""
+"""Counters for a camera's status message."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class StatusMeter:
         self._shed = 0
         self._client: PulseClient | None = None
 
-    def watch(self, client: PulseClient) -> None:
-        """Take clock offset and round trip from this client."""
+    def set_client(self, client: PulseClient) -> None:
+        """Use this client's clock offset and round trip."""
         self._client = client
 
     def frame(self, pulse: int, missed: int) -> None:

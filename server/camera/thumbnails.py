@@ -9,34 +9,34 @@ from server.camera.sources import Image
 from server.messaging.messages import Box, CameraTracks
 
 _HEIGHT = 160
-"""Pixels; sharp enough for a thumbnail on a dense screen."""
+"""Height in pixels: sharp enough on a high-resolution screen."""
 _MARGIN = 0.15
-"""Of the box's size, around the person."""
+"""Margin around the box, as a share of its size."""
 _QUALITY = 82
 
 
-def thumbnails(image: Image, tracks: CameraTracks) -> dict[int, bytes]:
-    """Return a JPEG by track of each person visible in the window's last frame, ``image``."""
-    pictures = {}
+def encode_thumbnails(image: Image, tracks: CameraTracks) -> dict[int, bytes]:
+    """Return by track the JPEG thumbnail of each person visible in the window's last frame, ``image``."""
+    thumbnails = {}
     for track in tracks.tracks:
         box = track.boxes[-1] if track.boxes else None
-        part = None if box is None else _cut_out(image, box)
-        if part is None:
+        crop = None if box is None else _crop(image, box)
+        if crop is None:
             continue
-        scale = _HEIGHT / part.shape[0]
-        size = (max(1, round(part.shape[1] * scale)), _HEIGHT)
-        done, jpeg = cv2.imencode(
-            ".jpg", cv2.resize(part, size, interpolation=cv2.INTER_AREA), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
+        scale = _HEIGHT / crop.shape[0]
+        size = (max(1, round(crop.shape[1] * scale)), _HEIGHT)
+        is_encoded, jpeg = cv2.imencode(
+            ".jpg", cv2.resize(crop, size, interpolation=cv2.INTER_AREA), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
         )
-        if done:
-            pictures[track.id] = np.asarray(jpeg).tobytes()
-    return pictures
+        if is_encoded:
+            thumbnails[track.id] = np.asarray(jpeg).tobytes()
+    return thumbnails
 
 
-def _cut_out(image: Image, box: Box) -> Image | None:
+def _crop(image: Image, box: Box) -> Image | None:
     left, top, right, bottom = box
     x, y = _MARGIN * (right - left), _MARGIN * (bottom - top)
-    part = image[
+    crop = image[
         max(0, int(top - y)) : max(0, int(bottom + y)), max(0, int(left - x)) : max(0, int(right + x))
     ]
-    return part if part.size else None
+    return crop if crop.size else None

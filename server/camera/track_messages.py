@@ -15,28 +15,28 @@ from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
 from tracking import SolveReport, WindowResult, WindowTrack, types
 
 _SHARE_DIGITS = 5
-"""Decimals of a histogram's share."""
+"""Decimals of histogram values."""
 
 
 class TrackMessageBuilder:
-    """Builds a camera's track messages, and counts the frames without detection."""
+    """Builds a camera's track messages, and collects the frames without detection for them."""
 
     def __init__(self, camera: str, boot: int, size: tuple[int, int], stride: int) -> None:
         self._camera, self._boot, self._size, self._stride = camera, boot, size, stride
         self._shed: list[int] = []
-        self._unsearched: list[int] = []
+        self._without_detection: list[int] = []
         self._without_peers: list[int] = []
 
     def shed(self, pulses: Iterable[int]) -> None:
-        """Note frames that were missed or shed, for the next message."""
+        """Add frames that were missed or shed to the next message."""
         self._shed.extend(pulses)
 
-    def unsearched(self, pulses: Iterable[int]) -> None:
-        """Note frames without detection, for the next message."""
-        self._unsearched.extend(pulses)
+    def without_detection(self, pulses: Iterable[int]) -> None:
+        """Add frames without detection to the next message."""
+        self._without_detection.extend(pulses)
 
     def without_peers(self, pulse: int) -> None:
-        """Note a frame without the detections of some peer, for the next message."""
+        """Add a frame without the detections of some peer to the next message."""
         self._without_peers.append(pulse)
 
     def regular(self, result: WindowResult) -> CameraTracks:
@@ -57,9 +57,9 @@ class TrackMessageBuilder:
             last=last,
             final_to=last,
             ended=True,
-            shed=_taken(self._shed),
-            without_detection=_taken(self._unsearched),
-            without_peers=_taken(self._without_peers),
+            shed=_pop_all(self._shed),
+            without_detection=_pop_all(self._without_detection),
+            without_peers=_pop_all(self._without_peers),
             tracks=[],
             solve=None,
         )
@@ -74,25 +74,25 @@ class TrackMessageBuilder:
             last=result.last,
             final_to=result.final_to,
             ended=ended,
-            shed=_taken(self._shed),
-            without_detection=_taken(self._unsearched),
-            without_peers=_taken(self._without_peers),
+            shed=_pop_all(self._shed),
+            without_detection=_pop_all(self._without_detection),
+            without_peers=_pop_all(self._without_peers),
             tracks=[_track(track) for track in result.tracks],
-            solve=_solve(result.report),
-            risk_events=[_risk_event(it) for it in result.risk_events[:RISK_EVENTS_MAX]],
+            solve=_solver_report(result.report),
+            risk_events=[_risk_event(event) for event in result.risk_events[:RISK_EVENTS_MAX]],
             revised_from=result.revised_from,
         )
 
 
-def _taken(noted: list[int]) -> list[int]:
-    """Take out the frames noted since the last message."""
-    taken = noted.copy()
-    noted.clear()
-    return taken
+def _pop_all(frames: list[int]) -> list[int]:
+    """Return the frames since the last message, and empty the list."""
+    popped = frames.copy()
+    frames.clear()
+    return popped
 
 
 def _track(track: WindowTrack) -> TrackMessage:
-    # Interpolated: a short occlusion is no reason to cut to another camera.
+    # Interpolated boxes: a short occlusion should not cause a cut to another camera.
     return TrackMessage(
         id=track.id,
         boxes=[_box(row) for row in track.interpolated],
@@ -121,7 +121,7 @@ def _box(row: NDArray[np.float64]) -> Box | None:
     return None if np.isnan(left) else (left, top, right, bottom)
 
 
-def _solve(report: SolveReport | None) -> SolverReport | None:
+def _solver_report(report: SolveReport | None) -> SolverReport | None:
     if report is None:
         return None
     return SolverReport(

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bestview import to_ground
-from server.camera.sources import PictureSource
+from server.camera.sources import FrameSource
 from server.config.ground_unit import UNITS_PER_METER
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
@@ -22,35 +22,37 @@ def set_up_tracker(
     config: Config,
     name: str,
     camera: CameraSettings,
-    source: PictureSource | None,
+    source: FrameSource | None,
     solver: Callable[[], Solver],
-    fit: Letterbox | None = None,
+    letterbox: Letterbox | None = None,
     *,
     ready: bool = True,
 ) -> Tracker:
-    """Return the tracker of a name; one that learns the room has scanned a recording's pictures.
+    """Create the tracker of a name; with ``ready``, one that needs a prescan has scanned the recording.
 
-    Pictures are scanned through the letterbox ``fit`` if given; without ``ready`` none are scanned.
+    Images are scaled by ``letterbox``, if given.
     """
     track = config.track
-    letterbox = fit or (None if source is None else Letterbox(source.size, source.size))
+    letterbox = letterbox or (None if source is None else Letterbox(source.size, source.size))
     settings = track.temporal if letterbox is None else _with_room_width(track.temporal, camera, letterbox)
     tracker = create_tracker(
         name, track.window, track.costs, solver, settings, config.site.fps, assist=track.assist
     )
     if ready and source is not None and letterbox is not None and isinstance(tracker, PrescanTracker):
-        places = range(0, config.detect.prescan_frames, config.detect.prescan_every)
-        tracker.prepare(letterbox.image(image) for image in source.ahead(places))
+        indices = range(0, config.detect.prescan_frames, config.detect.prescan_every)
+        tracker.prepare(letterbox.image(image) for image in source.ahead(indices))
     return tracker
 
 
-def _with_room_width(settings: TemporalSettings, camera: CameraSettings, fit: Letterbox) -> TemporalSettings:
-    """Set the width of the room from the homography, where its unit is known; black columns count."""
+def _with_room_width(
+    settings: TemporalSettings, camera: CameraSettings, letterbox: Letterbox
+) -> TemporalSettings:
+    """Set the room width from the homography, if its unit is known; letterbox bars are included."""
     per_meter = UNITS_PER_METER.get(camera.ground_unit or "")
     if camera.ground is None or per_meter is None:
         return settings
-    width, height = fit.size
-    ends = fit.to_own(np.array([[0.0, height / 2.0], [width, height / 2.0]]))
+    width, height = letterbox.size
+    ends = letterbox.to_camera(np.array([[0.0, height / 2.0], [width, height / 2.0]]))
     left, right = to_ground(np.array(camera.ground, dtype=np.float64), ends)
     width_m = float(np.hypot(*(right - left))) / per_meter
     return replace(settings, room_m=width_m) if np.isfinite(width_m) else settings

@@ -10,12 +10,14 @@ from server.media.vp8.stream_format import Vp8StreamFormat
 Codec = Literal["h264", "vp8"]
 
 
-def stream_format_for(codec: Codec, size: tuple[int, int], *, own_parameters: bool = False) -> StreamFormat:
+def stream_format_for(
+    codec: Codec, size: tuple[int, int], *, per_camera_parameters: bool = False
+) -> StreamFormat:
     """Return the stream format of a site.
 
-    ``size`` is (width, height) in pixels. ``own_parameters``: each camera may have H.264 parameter sets of
-    its own.
+    ``size`` is (width, height) in pixels. ``per_camera_parameters``: H.264 parameter sets may differ among
+    cameras.
     """
     if codec == "vp8":
         return Vp8StreamFormat(*size)
-    return PerCameraStreamFormat() if own_parameters else StreamFormat()
+    return PerCameraStreamFormat() if per_camera_parameters else StreamFormat()

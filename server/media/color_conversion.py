@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 
 class _Reformatters(threading.local):
-    """FFmpeg's converters of one thread: setting one up takes as long as converting many pictures."""
+    """FFmpeg's converters, one set per thread: creating one takes as long as converting many pictures."""
 
     def __init__(self) -> None:
         self.to_bgr, self.to_yuv = VideoReformatter(), VideoReformatter()
@@ -20,14 +20,14 @@ class _Reformatters(threading.local):
 
 _reformatters = _Reformatters()
 _THREADS = 1
-"""FFmpeg would start a thread per core, for a fraction of a millisecond's work."""
+"""Otherwise FFmpeg would start a thread per core, for a fraction of a millisecond of work."""
 
 
 def to_bgr(picture: VideoFrame) -> NDArray[np.uint8]:
     """Return a decoded picture as ``(height, width, 3)`` BGR.
 
     A picture with a color space that FFmpeg cannot convert (half of the codes of ITU-T H.273, 8.3) is
-    converted by BT.601: such a code is mostly a mistake.
+    converted by BT.601: such a code is mostly an error.
     """
     try:
         converted = _reformatters.to_bgr.reformat(picture, format="bgr24", threads=_THREADS)
@@ -39,6 +39,6 @@ def to_bgr(picture: VideoFrame) -> NDArray[np.uint8]:
 
 
 def to_yuv(image: NDArray[np.uint8]) -> VideoFrame:
-    """Return a picture, ``(height, width, 3)`` BGR, as YUV 4:2:0 for an encoder."""
+    """Return an image, ``(height, width, 3)`` BGR, as YUV 4:2:0 for an encoder."""
     picture = VideoFrame.from_ndarray(image, format="bgr24")
     return _reformatters.to_yuv.reformat(picture, format="yuv420p", threads=_THREADS)

@@ -1,4 +1,4 @@
-"""Fills a gap in a stream with pictures that repeat the one before it."""
+"""Fills a gap in a stream by repeating the picture before it."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Span = tuple[int, int]
 """The pulse of a picture, and the number of pulses it is shown for."""
 
 NO_BOOT = -1
-"""The boot of a picture that no camera has encoded."""
+"""The boot of a picture that the service has written itself."""
 _MAX_COUNTED_LOSS = 15
 """Missing pictures that frame_num, which has at least four bits, counts without wrapping around."""
 
 
 class GapFiller(Protocol):
-    """Makes pictures that repeat the last one; how depends on the codec."""
+    """Writes pictures that repeat the last one, in the stream's codec."""
 
     def can_follow(self, picture: EncodedPicture) -> bool:
         """Return whether the other methods can read this picture."""
@@ -30,7 +30,7 @@ class GapFiller(Protocol):
         """Return repetitions of the newest picture; only a keyframe can be decoded after them."""
 
     def before(self, picture: EncodedPicture, span: Span) -> list[EncodedPicture]:
-        """Return a repetition of the last picture, after which the given picture can still be decoded."""
+        """Return a repetition of the last picture; the given picture can still be decoded after it."""
 
     def is_lost_between(self, newest: EncodedPicture, picture: EncodedPicture, missing: int) -> bool:
         """Return whether a reference of the picture is among the ``missing`` pulses after the newest one.
@@ -46,7 +46,7 @@ class H264GapFiller:
     header_format: SliceHeaderFormat
     fps: float
     parameters: ParameterSets | None = None
-    """As of :class:`EncodedPicture`."""
+    """As in :class:`EncodedPicture`."""
 
     def can_follow(self, picture: EncodedPicture) -> bool:
         """Return whether the picture has a frame_num."""

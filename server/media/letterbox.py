@@ -1,4 +1,4 @@
-"""Letterboxing: scales a camera's picture to the site's size, and maps coordinates both ways."""
+"""Letterboxing: scales a camera's image to the site's size, and maps coordinates both ways."""
 
 from __future__ import annotations
 
@@ -11,33 +11,35 @@ Image = NDArray[np.uint8]
 
 
 class Letterbox:
-    """Scales a picture to the site's size with its aspect ratio; the rest stays black.
+    """Scales an image to the site's size, keeping its aspect ratio, with black bars.
 
     Sizes are (width, height) in pixels.
     """
 
-    def __init__(self, own: tuple[int, int], site: tuple[int, int]) -> None:
-        self.own, self._site = own, site
-        self._exact = own == site
-        self.scale = min(site[0] / own[0], site[1] / own[1])
+    def __init__(self, camera: tuple[int, int], site: tuple[int, int]) -> None:
+        self.camera_size, self._site = camera, site
+        self._is_identity = camera == site
+        self.scale = min(site[0] / camera[0], site[1] / camera[1])
         self._inner = (
-            min(site[0], max(1, round(own[0] * self.scale))),
-            min(site[1], max(1, round(own[1] * self.scale))),
+            min(site[0], max(1, round(camera[0] * self.scale))),
+            min(site[1], max(1, round(camera[1] * self.scale))),
         )
         self._left = (site[0] - self._inner[0]) // 2
         self._top = (site[1] - self._inner[1]) // 2
 
     @property
     def size(self) -> tuple[int, int]:
-        """The site's picture size."""
+        """The site's image size."""
         return self._site
 
-    def image(self, own: Image) -> Image:
-        """Return the site-sized picture of a camera's own picture."""
-        if self._exact and own.shape[1::-1] == self._site:
-            return own
+    def image(self, image: Image) -> Image:
+        """Return a camera's image at the site's size."""
+        if self._is_identity and image.shape[1::-1] == self._site:
+            return image
         shrinking = self.scale < 1
-        scaled = cv2.resize(own, self._inner, interpolation=cv2.INTER_AREA if shrinking else cv2.INTER_LINEAR)
+        scaled = cv2.resize(
+            image, self._inner, interpolation=cv2.INTER_AREA if shrinking else cv2.INTER_LINEAR
+        )
         if self._inner == self._site:
             return np.asarray(scaled, dtype=np.uint8)
         canvas = np.zeros((self._site[1], self._site[0], 3), dtype=np.uint8)
@@ -45,17 +47,17 @@ class Letterbox:
         return canvas
 
     def to_site(self, points: Floats) -> Floats:
-        """Map points ``(…, 2)`` from the camera's own picture into the site's."""
+        """Map points ``(…, 2)`` from the camera's image to the site's."""
         return points * self.scale + (self._left, self._top)
 
-    def to_own(self, points: Floats) -> Floats:
-        """Map points ``(…, 2)`` from the site's picture into the camera's own."""
+    def to_camera(self, points: Floats) -> Floats:
+        """Map points ``(…, 2)`` from the site's image to the camera's."""
         return (points - (self._left, self._top)) / self.scale
 
-    def boxes_to_own(self, boxes: Floats) -> Floats:
-        """Map boxes ``(N, 4)`` from the site's picture into the camera's own."""
+    def boxes_to_camera(self, boxes: Floats) -> Floats:
+        """Map boxes ``(N, 4)`` from the site's image to the camera's."""
         return (boxes - (self._left, self._top, self._left, self._top)) / self.scale
 
     def boxes_to_site(self, boxes: Floats) -> Floats:
-        """Map boxes ``(N, 4)`` from the camera's own picture into the site's."""
+        """Map boxes ``(N, 4)`` from the camera's image to the site's."""
         return boxes * self.scale + (self._left, self._top, self._left, self._top)

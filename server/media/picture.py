@@ -10,24 +10,24 @@ from server.media.h264.annexb import ParameterSets
 
 @dataclass(frozen=True, slots=True)
 class EncodedPicture:
-    """One encoded picture, packed for its container."""
+    """One encoded picture, packed for the stream's container."""
 
     pulse: int
     key: bool
     fragment: bytes
     """An MP4 fragment, or a WebM cluster."""
     boot: int
-    """The run of the camera's process; a picture never refers to one of another run."""
+    """The run of the camera's process; a picture never references one of another run."""
     duration: int = 1
     """The number of pulses it is shown for."""
     after: int | None = None
-    """The pulse of its reference picture; None: not known, or it has none."""
+    """The pulse of its reference picture; None: unknown, or it has none."""
     parameters: ParameterSets | None = None
-    """Its parameter sets; None where all streams of the site share theirs."""
+    """Its parameter sets; None where all cameras of the site share theirs."""
 
     @property
     def until(self) -> int:
-        """The pulse after its last."""
+        """The first pulse after it."""
         return self.pulse + self.duration
 
     @property

@@ -1,8 +1,8 @@
 """Messages between the service and a render worker, over the worker's pipes.
 
-Each request has one answer; both are length-prefixed msgpack messages. The first message is
-:class:`RenderSettings`; its answer is :data:`READY`. This module does not import the configuration: a worker
-must start fast.
+Each request has one response; both are length-prefixed msgpack messages. The first message is
+:class:`RenderSettings`; the response is :data:`READY`. This module does not import the configuration: a
+worker must start fast.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ StillKind = Literal["plain", "boxed"]
 LENGTH_BYTES = 4
 """Bytes of the length before every message, big-endian."""
 READY = bytes(LENGTH_BYTES)
-"""Written by a worker that has loaded its libraries: an empty message."""
+"""An empty message, sent by a worker that has loaded its libraries."""
 TIMESCALE = 90_000
 """Ticks per second in MP4 fragments: divisible by 24, 25, 30 and 50 frames per second."""
 
 
 class RenderSettings(msgspec.Struct, frozen=True, kw_only=True):
-    """Size, rate and encoder settings of a site's pictures; the worker encodes H.264 as the cameras do."""
+    """Size, rate and encoder settings of a site's video; the worker encodes H.264 as the cameras do."""
 
     codec: Literal["h264", "vp8"] = "h264"
     """The codec of the frames to decode; the worker always encodes H.264."""
@@ -41,7 +41,7 @@ class RenderSettings(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RenderRequest(msgspec.Struct, frozen=True, kw_only=True):
-    """Frames to decode, and the outputs to make of them."""
+    """Frames to decode, and the outputs to render from them."""
 
     fragments: bytes = b""
     """MP4 fragments or WebM clusters of consecutive frames; the first request begins with a keyframe."""
@@ -53,11 +53,11 @@ class RenderRequest(msgspec.Struct, frozen=True, kw_only=True):
     video: bool = False
     """Whether to encode the frames with boxes."""
     plain: list[float] = []
-    """Rates, in pictures per second, at which to make JPEG pictures (:func:`is_at_rate`)."""
+    """Rates, in pictures per second, at which to encode JPEG pictures (:func:`is_at_rate`)."""
     boxed: list[float] = []
     """Rates for JPEG pictures with boxes."""
     still: StillKind | None = None
-    """The kind of JPEG picture to make of the last decoded frame, of this request or an earlier one."""
+    """The kind of JPEG picture to encode of the last decoded frame, of this request or an earlier one."""
 
 
 class EncodedFrame(msgspec.Struct, frozen=True):
@@ -78,7 +78,7 @@ class JpegPicture(msgspec.Struct, frozen=True):
 
 
 class RenderResult(msgspec.Struct, frozen=True, kw_only=True):
-    """The answer to :class:`RenderRequest`."""
+    """The response to :class:`RenderRequest`."""
 
     newest: int
     """The pulse of the last decoded frame, of this request or an earlier one; -1: none."""
@@ -89,7 +89,7 @@ class RenderResult(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def is_at_rate(pulse: int, rate: float, fps: float) -> bool:
-    """Return whether a frame is among the ``rate`` pictures per second taken out of ``fps``.
+    """Return whether a frame is one of the ``rate`` per second that are selected out of ``fps``.
 
     It depends on the pulse alone, so that streams of one rate share pictures, and the pictures of a rate are
     among those of its multiples.
@@ -98,6 +98,6 @@ def is_at_rate(pulse: int, rate: float, fps: float) -> bool:
 
 
 def encode_message(message: msgspec.Struct) -> bytes:
-    """Return a message encoded for the pipe, behind its length."""
+    """Return a message encoded for the pipe, preceded by its length."""
     body = msgspec.msgpack.encode(message)
     return len(body).to_bytes(LENGTH_BYTES, "big") + body

@@ -24,7 +24,7 @@ Container = Literal["mp4", "webm"]
 
 
 class ParameterMismatchError(Exception):
-    """The camera's parameter sets are not the site's: its frames would decode into wrong pixels."""
+    """The camera's parameter sets differ from the site's: its frames would be decoded wrongly."""
 
 
 class StreamFormat:
@@ -47,7 +47,7 @@ class StreamFormat:
             ParameterMismatchError: they are missing, or not the site's.
         """
         if parameters is None:
-            raise ParameterMismatchError("a keyframe without parameter sets")
+            raise ParameterMismatchError("it sends a keyframe without parameter sets")
         if self.parameters is None:
             self.parameters = parameters
         elif parameters != self.parameters:
@@ -70,7 +70,7 @@ class StreamFormat:
         self,
         size: tuple[int, int],
         fps: float,
-        sound: AudioFormat | None = None,
+        audio: AudioFormat | None = None,
         *,
         pulses: int | None = None,
     ) -> bytes | None:
@@ -81,7 +81,7 @@ class StreamFormat:
         del fps, pulses  # players add up the fragments
         if self.parameters is None:
             return None
-        return init_segment(self.parameters, *size, sound)
+        return init_segment(self.parameters, *size, audio)
 
     def rebase(self, origin: int, fragment: bytes, fps: float) -> bytes:
         """Return a fragment shifted into a stream whose time 0 is the pulse ``origin``."""
@@ -100,42 +100,42 @@ class StreamFormat:
     def blank(
         self, newest: EncodedPicture | None, first: int, frames: int, fps: float
     ) -> list[EncodedPicture]:
-        """Return a GOP of gray pictures that can follow a picture; empty if its format is not supported.
+        """Return a GOP of gray pictures to follow ``newest``; empty if its format is not supported.
 
-        Where a picture cannot be repeated, one gray picture is shown for the whole GOP.
+        If a picture cannot be repeated in this format, one gray picture lasts for the whole GOP.
         """
         del newest
         return self._blank(self.parameters, None, first, frames, fps)
 
     def _blank(
         self,
-        written: ParameterSets | None,
-        stated: ParameterSets | None,
+        parameters: ParameterSets | None,
+        attached: ParameterSets | None,
         first: int,
         frames: int,
         fps: float,
     ) -> list[EncodedPicture]:
-        """Return the gray GOP written by parameter sets; ``stated`` are those named in its pictures."""
-        if written is None:
+        """Return a gray GOP in the format of ``parameters``; ``attached`` are set in its pictures."""
+        if parameters is None:
             return []
         try:
-            gray = gray_picture(written, first // frames % 2)
+            gray = gray_picture(parameters, first // frames % 2)
         except UnsupportedParametersError:
             return []
-        gap_filler = gap_filler_for(written, fps)
+        gap_filler = gap_filler_for(parameters, fps)
         duration = frames if gap_filler is None else 1
         packed = fragment([FragmentSample(gray, key=True, duration=duration)], first, fps)
         key = EncodedPicture(
-            first, key=True, fragment=packed, boot=NO_BOOT, duration=duration, parameters=stated
+            first, key=True, fragment=packed, boot=NO_BOOT, duration=duration, parameters=attached
         )
         if gap_filler is None:
             return [key]
-        gap_filler = replace(gap_filler, parameters=stated)
+        gap_filler = replace(gap_filler, parameters=attached)
         return [key, *gap_filler.after(key, [(pulse, 1) for pulse in range(first + 1, first + frames)])]
 
 
 class PerCameraStreamFormat(StreamFormat):
-    """H.264 in MP4 where each camera has parameter sets of its own, carried by its keyframes."""
+    """H.264 in MP4 where parameter sets differ among cameras; keyframes carry them."""
 
     def accept(self, key: bytes) -> ParameterSets:
         """Return the parameter sets of a camera's keyframe.
@@ -145,7 +145,7 @@ class PerCameraStreamFormat(StreamFormat):
         """
         parameters = parameter_sets(nal_units(key))
         if parameters is None:
-            raise ParameterMismatchError("a keyframe without parameter sets")
+            raise ParameterMismatchError("it sends a keyframe without parameter sets")
         if self.parameters is None:
             self.parameters = replace(parameters, may_change=True)
         return parameters
@@ -155,7 +155,7 @@ class PerCameraStreamFormat(StreamFormat):
         return parameter_sets(split_sample(sample_of(key)))
 
     def gap_filler(self, newest: EncodedPicture, fps: float) -> GapFiller | None:
-        """Return the gap filler after a picture, by that picture's parameter sets."""
+        """Return the gap filler after a picture, for its parameter sets."""
         if newest.parameters is None:
             return None
         gap_filler = gap_filler_for(newest.parameters, fps)

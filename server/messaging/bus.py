@@ -1,4 +1,4 @@
-"""zenoh for asyncio: publish, subscribe and liveliness, bounded everywhere."""
+"""zenoh for asyncio: publish, subscribe and liveliness, with bounded queues."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MAX_PUBLISHERS = 64
 
 
 class Bus:
-    """One zenoh session. Close it, or the process never ends: zenoh's threads are not daemons."""
+    """One zenoh session. It must be closed, or the process never exits: zenoh's threads are not daemons."""
 
     def __init__(self, session: zenoh.Session) -> None:
         self._session = session
@@ -37,7 +37,7 @@ class Bus:
 
     @classmethod
     def router(cls, settings: ZenohSettings, access: Mapping[str, Any] | None = None) -> Self:
-        """Open the session that all others connect to: the best-view service's.
+        """Open the session of the best-view service, to which all others connect.
 
         ``access`` is zenoh's access control for the users in ``settings.users``.
 
@@ -63,7 +63,7 @@ class Bus:
 
     @classmethod
     def client(cls, settings: ZenohSettings, user: str | None = None) -> Self:
-        """Open a session to the site's router, which may connect later, and disconnect and reconnect.
+        """Open a session to the site's router; it connects and reconnects in the background.
 
         It exchanges messages with the router's process, the best-view service, not with other clients.
         ``user`` is its user name, where the router requires one.
@@ -75,7 +75,7 @@ class Bus:
         return cls._connected(settings, "peer", user)
 
     @classmethod
-    def second(cls, settings: ZenohSettings, user: str | None = None) -> Self:
+    def further_service(cls, settings: ZenohSettings, user: str | None = None) -> Self:
         """Open a session for a further best-view service, which receives the messages of all clients.
 
         Raises:
@@ -85,10 +85,10 @@ class Bus:
         return cls._connected(settings, "router", user)
 
     @classmethod
-    def hearing(cls, settings: ZenohSettings, user: str | None = None) -> Self:
-        """Open a session that receives the messages of the router's other clients, too.
+    def listener(cls, settings: ZenohSettings, user: str | None = None) -> Self:
+        """Open a session that also receives the messages of the router's other clients.
 
-        The router must be running; later it may disconnect and reconnect. Blocks for some seconds at most.
+        The router must be running; later the session reconnects. Blocks for some seconds at most.
 
         Raises:
             UserError: the router cannot be reached.
@@ -99,9 +99,9 @@ class Bus:
             config.insert_json5("connect/endpoints", json.dumps([settings.connect]))
             return cls(zenoh.open(config))
         except zenoh.ZError as error:
-            refused = "" if settings.users is None else ", or it refuses this user"
+            refusal = "" if settings.users is None else ", or it refuses this user"
             raise UserError(
-                f"zenoh.connect: no router answers at {redact_endpoint(settings.connect)}{refused}"
+                f"zenoh.connect: no router responds at {redact_endpoint(settings.connect)}{refusal}"
             ) from error
 
     @classmethod

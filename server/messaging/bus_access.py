@@ -60,36 +60,36 @@ def build_access_control(
             "may not command cameras",
             "ingress",
             ["put", "delete"],
-            [keys.camera("*", it) for it in _COMMANDS],
+            [keys.camera("*", command) for command in _COMMANDS],
         )
         | {"permission": "deny"},
     ]
     further = [bestview_client_name(index) for index in range(1, _MAX_SERVICES)]
-    listeners = [it for it in users if it not in {*cameras, *further, bestview_client_name(0)}]
+    listeners = [user for user in users if user not in {*cameras, *further, bestview_client_name(0)}]
     subjects = [{"id": "services", "usernames": further}]
     policies = [{"rules": ["services"], "subjects": ["services"]}]
     if listeners:
         subjects.append({"id": "listeners", "usernames": listeners})
         policies.append({"rules": ["may subscribe to all", "receives all"], "subjects": ["listeners"]})
     for camera in cameras:
-        own = [keys.camera(camera, "**"), *([keys.sound] if camera == audio_camera else [])]
-        rules.append(_rule(f"camera {camera}", "ingress", _SEND, own))
-        commands = [keys.camera(camera, it) for it in _COMMANDS]
+        publish_keys = [keys.camera(camera, "**"), *([keys.sound] if camera == audio_camera else [])]
+        rules.append(_rule(f"camera {camera}", "ingress", _SEND, publish_keys))
+        commands = [keys.camera(camera, command) for command in _COMMANDS]
         rules.append(
             _rule(f"camera {camera} may subscribe to commands", "ingress", ["declare_subscriber"], commands)
         )
         rules.append(_rule(f"camera {camera} receives commands", "egress", ["put"], commands))
         subjects.append({"id": f"camera {camera}", "usernames": [camera]})
-        own_rules = [
-            f"camera {camera}{what}" for what in ("", " may subscribe to commands", " receives commands")
+        camera_rules = [
+            f"camera {camera}{suffix}" for suffix in ("", " may subscribe to commands", " receives commands")
         ]
-        own_rules += [
+        camera_rules += [
             "may not command cameras",
             "may subscribe to peers",
             "receives peers",
             "learns subscriptions",
         ]
-        policies.append({"rules": own_rules, "subjects": [f"camera {camera}"]})
+        policies.append({"rules": camera_rules, "subjects": [f"camera {camera}"]})
     return {
         "enabled": True,
         "default_permission": "deny",

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 
 def epoch_of_window(last: int, stride: int) -> int:
-    """Return the epoch of a window that ends with pulse ``last``, a regular end."""
+    """Return the epoch of a regular window that ends with pulse ``last``."""
     return last // stride
 
 
 def closing_epoch(last: int, stride: int) -> int:
     """Return the closing epoch of a recording with the last pulse ``last``.
 
-    If ``last`` is a regular end, its own epoch is used already, and the closing one is the next.
+    If a regular window ends with ``last``, that epoch is used already, and the closing one is the next.
     """
     return (last + 1) // stride
 

@@ -1,8 +1,8 @@
-"""Snapshot of people's identities, which cameras retain for a best-view service that restarts.
+"""Snapshot of people's identities, which cameras keep for a restart of the best-view service.
 
 The cameras' processes continue tracking while the service restarts, so a track before and after is the same
-person. The service therefore sends each camera the person numbers of its tracks; the camera retains the
-newest snapshot, unread, and sends it to every service that starts.
+person. The service therefore sends each camera the person numbers of its tracks; the camera keeps the
+newest snapshot, undecoded, and sends it to every service that starts.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import msgspec
 from server.messaging.number_types import Number, Pulse
 
 PERSON_NUMBER_MAX = 999_999_999
-"""Addresses have at most nine digits for it."""
+"""URLs have at most nine digits for it."""
 SNAPSHOT_BYTES_MAX = 1 << 20
-"""Bytes that a camera retains, at most."""
+"""Size limit of a snapshot in bytes."""
 ALIASES_MAX = 64
 """Former numbers of one person, at most; the newest."""
 NAME_LENGTH_MAX = 40
@@ -28,7 +28,7 @@ PersonNumber = Annotated[int, msgspec.Meta(ge=1, le=PERSON_NUMBER_MAX)]
 
 
 class PersonSnapshot(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One person whom the camera tracks."""
+    """One person tracked by the camera."""
 
     number: PersonNumber
     tracks: list[Number]
@@ -41,7 +41,7 @@ class PersonSnapshot(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tr
 
 
 class IdentitySnapshot(msgspec.Struct, frozen=True, kw_only=True):
-    """The people whom one camera tracks, as of a pulse."""
+    """The people that one camera tracks at a pulse."""
 
     pulse: Pulse
     boot: Number

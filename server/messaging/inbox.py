@@ -16,13 +16,13 @@ from logthrottle import LogThrottle
 log = logging.getLogger(__name__)
 
 PENDING_MAX = 4096
-"""Waiting messages of one sender, at most: several seconds of the busiest camera."""
+"""Limit of one sender's queue, in messages: several seconds of the busiest camera."""
 _BYTES_MAX = 1 << 26
-"""Waiting bytes of one sender, at most."""
+"""Limit of one sender's queue, in bytes."""
 _SENDERS_MAX = 1024
-"""Senders with a queue of their own; further ones share one."""
+"""Limit of queues, one per sender; further senders share one."""
 DRAIN_SLICE_S = 0.02
-"""How long items are handled in one turn of the event loop."""
+"""Seconds for which items are handled in one turn of the event loop."""
 
 Item = TypeVar("Item")
 
@@ -60,7 +60,7 @@ class Inbox(Generic[Item]):
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
         self._pending: OrderedDict[str, deque[Item]] = OrderedDict()
-        """By sender, the next one first. No queue is empty."""
+        """Non-empty queues by sender, in the order of their turns."""
         self._bytes: Counter[str] = Counter()
         self._is_scheduled = False
         self.lost = 0
@@ -68,7 +68,7 @@ class Inbox(Generic[Item]):
 
     @property
     def waiting(self) -> int:
-        """The number of items that wait."""
+        """The number of queued items."""
         with self._lock:
             return sum(map(len, self._pending.values()))
 
@@ -94,7 +94,7 @@ class Inbox(Generic[Item]):
             self.lost += 1
 
     def _take(self) -> Item | None:
-        """Take the next sender's oldest item; None: none waits."""
+        """Remove and return the next sender's oldest item; None: the queues are empty."""
         with self._lock:
             if not self._pending:
                 self._is_scheduled = False

@@ -14,7 +14,7 @@ key                                           payload                           
 ``myview/SITE/camera/ID/detections``          :class:`FrameDetections`
 ``myview/SITE/camera/ID/position_corrections``     ``PositionCorrections``, to the camera
 ``myview/SITE/camera/ID/identities``          ``IdentitySnapshot``, to the camera
-``myview/SITE/camera/ID/retained_identities``  the same, to a service that starts; empty: unknown
+``myview/SITE/camera/ID/retained_identities``  the same, to a service that starts; empty: none
 ``myview/SITE/camera/ID/peer_listener``       liveliness token: receives the other cameras' detections
 ``myview/SITE/camera/ID/alive``               liveliness token
 ``myview/SITE/sound``                         consecutive frames of audio          :class:`AudioHeader`
@@ -39,10 +39,10 @@ DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 """The exceptions of a decoder: invalid JSON, invalid UTF-8, nested too deeply."""
 
 Box = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
-"""Left, top, right, bottom in pixels of the site's picture."""
+"""Left, top, right, bottom in pixels of the site's image."""
 
 NumberedBox = tuple[int, float, float, float, float]
-"""A person's number, and their box: left, top, right, bottom in pixels of the site's picture."""
+"""A person's number, and their box: left, top, right, bottom in pixels of the site's image."""
 
 
 class FrameHeader(msgspec.Struct, frozen=True, kw_only=True):
@@ -58,7 +58,7 @@ class FrameHeader(msgspec.Struct, frozen=True, kw_only=True):
     due: Time
     """When the pulse was due."""
     taken: Time
-    """When the picture was taken."""
+    """When the frame was captured."""
     encoded: Time
 
 
@@ -67,7 +67,7 @@ HISTOGRAM_BINS_MAX = 1024
 
 
 class AppearanceHistogram(msgspec.Struct, frozen=True, kw_only=True):
-    """Appearance of a person: mean color histogram of consecutive frames without others in the box."""
+    """Appearance of a person: mean color histogram of consecutive frames with no one else in the box."""
 
     first: Pulse
     last: Pulse
@@ -103,7 +103,7 @@ class TrackMessage(msgspec.Struct, frozen=True, kw_only=True):
     appearance: list[AppearanceHistogram] = []
     """In frames up to ``final_to`` without other people in the box, in order."""
     sharpness: Annotated[float, msgspec.Meta(ge=0, le=1)] | None = None
-    """Sharpness of the person's picture; null: not measured."""
+    """Sharpness of the person's image; null: not measured."""
 
 
 class SolverReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -117,7 +117,7 @@ class SolverReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 TRACKS_MAX = 1000
-"""Tracks of one window, at most: more than any picture has room for."""
+"""Tracks of one window, at most: more than people fit into any image."""
 
 
 class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
@@ -126,9 +126,9 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     camera: str
     boot: Number
     size: tuple[Pixels, Pixels]
-    """Width and height of the camera's own picture; boxes are in pixels of the site's."""
+    """Width and height of the camera's image; boxes are in pixels of the site's."""
     epoch: Pulse
-    """Which of the site's windows: it ends with pulse (epoch + 1) · stride - 1, or with the recording."""
+    """Number of the window: it ends with pulse (epoch + 1) · stride - 1, or with the recording."""
     first: Pulse
     """First frame (pulse number) of the window."""
     last: Annotated[int, msgspec.Meta(ge=-1, le=PULSE_MAX)]
@@ -136,7 +136,7 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     final_to: Annotated[int, msgspec.Meta(ge=-PULSE_MAX, le=PULSE_MAX)]
     """Frames up to this one are final, unless a later message revises them (``revised_from``)."""
     ended: bool
-    """Whether the recording has ended: nothing follows."""
+    """Whether the recording has ended: this is its last message."""
     shed: list[Pulse]
     """Frames of this epoch that were missed, or skipped by detection because the machine was too busy."""
     without_detection: list[Pulse] = []
@@ -148,10 +148,10 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     solve: SolverReport | None
     solved_at: Time = 0.0
     """When the window was solved, unix seconds by the camera's clock; 0 offline."""
-    search_s: Duration | None = None
-    """Seconds of detection in a frame, the mean of this epoch; null offline."""
+    detection_s: Duration | None = None
+    """Mean seconds of detection per frame in this epoch; null offline."""
     solve_s: Duration | None = None
-    """Seconds of tracking to the end of the window; null offline."""
+    """Seconds of tracking at the end of the window; null offline."""
     risk_events: Annotated[list[RiskEvent], msgspec.Meta(max_length=RISK_EVENTS_MAX)] = []
     """Predicted tracking failures, where `track.assist` is on."""
     revised_from: Pulse | None = None
@@ -159,7 +159,7 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
 
 
 ScoredBox = tuple[Coordinate, Coordinate, Coordinate, Coordinate, Annotated[float, msgspec.Meta(ge=0, le=1)]]
-"""Left, top, right, bottom in pixels of the camera's own picture, and the detection score."""
+"""Left, top, right, bottom in pixels of the camera's image, and the detection score."""
 
 FRAME_DETECTIONS_MAX = 100
 """Detections of one frame, at most; those with the highest scores."""
@@ -171,16 +171,16 @@ class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):
     camera: str
     boot: Number
     size: tuple[Pixels, Pixels]
-    """Width and height of the camera's own picture."""
+    """Width and height of the camera's image."""
     pulse: Pulse
     boxes: Annotated[list[ScoredBox], msgspec.Meta(max_length=FRAME_DETECTIONS_MAX)] | None
     """Null: detection did not run."""
     ended: bool = False
-    """Whether the recording has ended before this pulse: nothing follows."""
+    """Whether the recording has ended before this pulse: this is its last message."""
 
 
 CameraState = Literal["starting", "live", "away", "ended"]
-"""State of a camera; away: its source delivers no pictures now."""
+"""State of a camera; away: its source delivers no frames now."""
 
 
 class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
@@ -191,17 +191,17 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     state: CameraState
     pulse: Annotated[int, msgspec.Meta(ge=-1, le=PULSE_MAX)]
     fps: Duration
-    """Frames taken in the last second or so."""
+    """Frames captured in about the last second."""
     missed: Number
     """Pulses without a frame since the start."""
     shed: Number
     """Frames without detection since the start."""
     waiting: Number = 0
-    """Frames that wait for detection."""
+    """Frames that are queued for detection."""
     load_level: Annotated[int, msgspec.Meta(ge=0, le=100)] = 0
     """Load-shedding level; 0: none."""
     load: Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[ -~]*\Z")] = ""
-    """What is left out, for people to read: printable ASCII."""
+    """The shed work as text for people: printable ASCII."""
     position_corrections: Number = 0
     """Position corrections that the tracker received since the start."""
     bad_messages: Number = 0
@@ -231,14 +231,14 @@ class ViewCut(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PersonMerge(msgspec.Struct, frozen=True, kw_only=True):
-    """Two numbers turned out to be one person: ``lost`` is never used again."""
+    """Two numbers are one person: ``lost`` is never used again."""
 
     kept: int
     lost: int
 
 
 class PersonSplit(msgspec.Struct, frozen=True, kw_only=True):
-    """A camera's track of ``kept`` turned out to be another person, ``new_object``."""
+    """A camera's track of ``kept`` is another person, ``new_object``."""
 
     kept: int
     new_object: int

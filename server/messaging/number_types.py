@@ -20,7 +20,7 @@ Time = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
 """Unix seconds, or a difference of them; bounded so that sums stay finite."""
 
 Cost = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
-"""The cost of a solution, bounded likewise."""
+"""The cost of a solution, bounded for the same reason."""
 
 Duration = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 """Seconds."""

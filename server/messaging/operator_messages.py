@@ -32,7 +32,7 @@ CORRECTIONS_MAX = 256
 
 
 TOLERANCE_MIN = 1.0
-"""Smallest tolerance in pixels: nobody clicks more precisely."""
+"""Smallest tolerance in pixels: clicks are not more precise."""
 
 
 class CorrectedPosition(msgspec.Struct, frozen=True, kw_only=True):
@@ -41,14 +41,14 @@ class CorrectedPosition(msgspec.Struct, frozen=True, kw_only=True):
     pulse: Pulse
     track: Number
     x: Coordinate
-    """Pixels of the site's picture, as are ``y`` and ``tolerance``."""
+    """Pixels of the site's image, as are ``y`` and ``tolerance``."""
     y: Coordinate
     tolerance: Annotated[float, msgspec.Meta(ge=TOLERANCE_MIN, le=1e4)]
     """Largest expected error of the position."""
 
 
 class PositionCorrections(msgspec.Struct, frozen=True, kw_only=True):
-    """Positions of tracked people that an operator marked in one camera's picture."""
+    """Positions of tracked people that an operator marked in one camera's image."""
 
     boot: Number
     """The boot of the camera that the tracks belong to."""

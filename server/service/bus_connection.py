@@ -44,7 +44,7 @@ class BusConnection:
             UserError: the address is in use, or a password file cannot be read.
         """
         if self._index:
-            bus = Bus.second(self._config.zenoh, bestview_client_name(self._index))
+            bus = Bus.further_service(self._config.zenoh, bestview_client_name(self._index))
         else:
             bus = Bus.router(self._config.zenoh, access_control_of(self._config))
         self._bus = bus

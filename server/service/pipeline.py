@@ -62,7 +62,7 @@ class BestViewPipeline:
         self.max_lookahead = (frames - backlog) // 2 - grace - stride
         """The longest look-ahead, in frames, that can be set at run time: half of what the buffers allow."""
         self.stream_format = stream_format_for(
-            config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
+            config.encode.codec, config.site.size, per_camera_parameters=config.encode.parameters == "own"
         )
         self.frame_buffers = {
             camera: FrameBuffer(config.site.fps, frames, self.stream_format) for camera in cameras

@@ -37,7 +37,7 @@ from benchmarks.streaming.viewing_cost import (
     send_delays,
     watch_objects,
 )
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.media.containers.fmp4 import FragmentSample, fragment, ticks
 from server.media.containers.mpegts import ContinuityCounters
 from server.media.picture import EncodedPicture

@@ -67,7 +67,7 @@ async def test_a_best_view_that_is_killed_shows_the_same_people_under_the_same_a
     async with running(config) as site:
         await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
         words: list[CameraTracks] = []
-        bus = await asyncio.to_thread(Bus.hearing, ZenohSettings(connect=site.config["zenoh"]["connect"]))
+        bus = await asyncio.to_thread(Bus.listener, ZenohSettings(connect=site.config["zenoh"]["connect"]))
         try:
             bus.subscribe(ZenohKeys("e2e").camera("*", "tracks"), lambda message: words.append(read(message)))
             for _ in range(2):

@@ -126,7 +126,7 @@ class PeerMessages(ScriptTarget):
         for pulse, (_, payload, _) in enumerate(_script.decode(data)):
             self.messages += 1
             # The bus delivers only the subscribed key.
-            heard = self._exchange._read(Message(KEYS.camera("c1", "detections"), payload, b""))
+            heard = self._exchange._decode(Message(KEYS.camera("c1", "detections"), payload, b""))
             if heard is not None and heard.camera == "c1":
                 buffer.put(heard, 0.0)
             buffer.expect(pulse, 1.0)

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.loader import build_config
 from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config

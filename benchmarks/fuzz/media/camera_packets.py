@@ -17,12 +17,12 @@ from benchmarks.fuzz.media.damaged_media import damage_media
 from server.camera.passthrough.access_units import parse_packing
 from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
 from server.camera.passthrough.recording_source import PassthroughRecording
-from server.camera.sources.base import PictureSource, SourceEndedError
+from server.camera.sources.base import FrameSource, SourceEndedError
 from server.camera.sources.recording import Recording
 from server.system.errors import UserError
 
 
-def _take(source: PictureSource) -> None:
+def _take(source: FrameSource) -> None:
     """Read the first frames of a recording, and close it."""
     try:
         for pulse in range(12):

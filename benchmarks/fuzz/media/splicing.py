@@ -22,7 +22,7 @@ from benchmarks.fuzz.engine.fed_site import (
 )
 from benchmarks.fuzz.engine.target import ScriptTarget
 from benchmarks.fuzz.media.damaged_media import damage_media
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.config.site_config import Config
 from server.messaging.epochs import end_of_epoch
 from server.service.streaming.broadcaster import Broadcaster

@@ -30,7 +30,7 @@ def open_audio(config: Config, camera_id: str) -> RecordedAudioSource | LiveAudi
             return LiveAudioSource(settings, fps, config.encode.gop / fps)
         if source_kind(path) is not SourceKind.FILE:
             raise UserError(
-                f"sound: camera {camera_id} has none: {redact_address(path)}; name another, or a file"
+                f"sound: camera {camera_id} has no audio: {redact_address(path)}; name another, or a file"
             )
     try:
         return RecordedAudioSource(path, settings, fps, offset, at_end)

@@ -22,7 +22,7 @@ _MAX_SILENCE_S = 10
 _DECODER_DELAY = {"aac": 0, "opus": 312}
 """Samples that a decoder is behind the encoder, beyond whole frames (libopus: 6.5 ms at 48 kHz)."""
 _MAX_DRIFT_S = 0.02
-"""Audio further than this from its place, in seconds, is moved there."""
+"""Audio further than this from its due position, in seconds, is moved there."""
 
 
 class AudioEncoder:
@@ -45,7 +45,7 @@ class AudioEncoder:
         self._samples: NDArray[np.float32] = np.zeros((audio_format.channels, 0), dtype=np.float32)
         """``(channels, samples)`` that do not fill a frame yet."""
         self._first: int | None = None
-        """The number of the first of them."""
+        """The sample number of the first one."""
         self._overlap = 0
         """Samples to drop from the next input, which overlaps."""
 
@@ -55,9 +55,9 @@ class AudioEncoder:
             return []
         shift = at - packet.pts * packet.time_base
         try:
-            decoded = [it for it in packet.decode() if isinstance(it, AudioFrame)]
+            decoded = [frame for frame in packet.decode() if isinstance(frame, AudioFrame)]
         except av.error.FFmpegError as error:
-            log.debug("sound that cannot be decoded: %s", error)
+            log.debug("audio that cannot be decoded: %s", error)
             return []
         try:
             for frame in decoded:
@@ -67,17 +67,17 @@ class AudioEncoder:
                     )
                 self._append(frame)
         except av.error.FFmpegError as error:
-            if not self._has_warned:  # the same holds for all that follow
+            if not self._has_warned:  # later packets have the same format
                 log.warning(
-                    "sound of %s at %d Hz cannot be converted: %s",
+                    "audio of %s at %d Hz cannot be converted: %s",
                     *(self._input_format or ())[1:],
                     error.strerror,
                 )
             self._has_warned = True
-        return self._encoded()
+        return self._encode_full_frames()
 
     def _seek(self, at: int) -> None:
-        """Make sample number ``at`` the next one, unless it nearly is."""
+        """Continue at sample number ``at``, unless the position is nearly that already."""
         if self._first is None or at > self._first + _MAX_SILENCE_S * self._rate:
             self._first, self._samples = (
                 max(0, at) // self._frame_samples * self._frame_samples,
@@ -92,14 +92,14 @@ class AudioEncoder:
 
     def _append(self, frame: AudioFrame) -> None:
         input_format = frame.format.name, frame.layout.name, frame.sample_rate
-        if input_format != self._input_format:  # an encoder's settings may change while it sends
+        if input_format != self._input_format:  # the source's settings may change during a connection
             self._input_format, self._resampler = input_format, self._new_resampler()
         for out in self._resampler.resample(frame):
             samples = out.to_ndarray()[:, self._overlap :]
             self._overlap -= out.samples - samples.shape[1]
             self._samples = np.concatenate((self._samples, samples), axis=1)
 
-    def _encoded(self) -> list[EncodedAudioFrame]:
+    def _encode_full_frames(self) -> list[EncodedAudioFrame]:
         frames: list[EncodedAudioFrame] = []
         while self._first is not None and self._samples.shape[1] >= self._frame_samples:
             samples = np.ascontiguousarray(self._samples[:, : self._frame_samples])
@@ -127,7 +127,7 @@ class AudioEncoder:
 
     def _new_encoder(self, audio_format: AudioFormat, kbps: int) -> AudioCodecContext:
         encoder = av.CodecContext.create({"aac": "aac", "opus": "libopus"}[audio_format.coding], "w")
-        assert isinstance(encoder, AudioCodecContext)  # noqa: S101 — tells mypy what they are
+        assert isinstance(encoder, AudioCodecContext)  # noqa: S101 — for mypy
         encoder.sample_rate, encoder.layout, encoder.format = audio_format.rate, self._layout, self._format
         encoder.time_base = Fraction(1, audio_format.rate)
         encoder.bit_rate = kbps * 1000

@@ -25,7 +25,7 @@ class AudioFramer(Protocol):
     """Turns the packets of a source into numbered audio frames."""
 
     def take(self, packet: Packet, at: Fraction) -> list[EncodedAudioFrame]:
-        """Return the frames that a packet completes, which sounds ``at`` seconds after pulse 0."""
+        """Return the frames that a packet completes; the packet plays ``at`` seconds after pulse 0."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""Live audio of a network camera, beside its pictures."""
+"""Live audio of a network camera, in step with its video."""
 
 from __future__ import annotations
 
@@ -11,41 +11,41 @@ from av.audio.stream import AudioStream
 
 from logthrottle import LogThrottle
 from server.camera.audio.frames import AudioFramer, EncodedAudioFrame, Packet
-from server.camera.audio.selection import select_framer
+from server.camera.audio.passthrough import select_framer
 from server.config.sections import SoundSettings
 
 log = logging.getLogger(__name__)
 
 _MEAN_S = 4.0
-"""Seconds over which the pictures' delay is averaged: each waits for its pulse, more or less."""
+"""Seconds over which the frames' delay is averaged: it varies, since each waits for its pulse."""
 _RESET_S = 0.5
 """A change of delay by more than this, in seconds, restarts the average."""
 _BUFFER_S = 2.0
 """Seconds of audio to buffer."""
 _MAX_OFFSET_S = 2.0
-"""Audio further than this from the shown picture, in seconds, is dropped: a clock has stepped."""
+"""Audio further than this from the current frame, in seconds, is dropped: a clock has stepped."""
 
 
 class LiveAudioSource:
-    """Audio of a network camera, aligned with its pictures by the camera's own clock.
+    """Audio of a network camera, aligned with its video by the camera's own clock.
 
-    The source's thread passes pictures and packets; ``at`` is called in another thread. Pictures, and audio
+    The source's thread passes frame times and packets; ``at`` is called in another thread. Frames, and audio
     with them, wait up to ``waiting_s`` seconds until they are shown.
     """
 
     def __init__(self, settings: SoundSettings, fps: float, waiting_s: float = 0.0) -> None:
         audio_format = settings.format
         if audio_format is None:
-            raise ValueError("a site without sound")
+            raise ValueError("the site has no audio")
         self._format, self._kbps, self._fps = audio_format, settings.kbps, fps
         self._max_offset_s = _MAX_OFFSET_S + waiting_s
         self._lock = threading.Lock()
         self._shown_at = 0.0
         """The newest pulse's time, seconds after pulse 0."""
         self._newest: Fraction | None = None
-        """When the newest picture was taken, by the camera's clock."""
+        """When the newest frame was captured, by the camera's clock."""
         self._shifts: deque[float] = deque(maxlen=max(1, round(_MEAN_S * fps)))
-        """Of the last pictures: pulse time minus camera time."""
+        """Of the last frames: pulse time minus camera time."""
         self._shift: Fraction | None = None
         self._frames: deque[EncodedAudioFrame] = deque(
             maxlen=round(_BUFFER_S * audio_format.rate / audio_format.samples)
@@ -66,28 +66,28 @@ class LiveAudioSource:
             self._framer = select_framer(stream, self._format, self._kbps)
 
     def picture(self, time: Fraction) -> None:
-        """Note when the newest picture was taken, by the camera's clock."""
+        """Set when the newest frame was captured, by the camera's clock."""
         with self._lock:
             self._newest = time
 
     def packet(self, packet: Packet) -> None:
-        """Take an audio packet."""
+        """Add an audio packet."""
         with self._lock:
             shift, shown_at = self._shift, self._shown_at
         if shift is None or self._framer is None or packet.pts is None or packet.time_base is None:
             return
         at = packet.pts * packet.time_base + shift
         if abs(at - shown_at) > self._max_offset_s:
-            return  # taking it would make all earlier audio late
+            return  # accepting it would make all earlier audio late
         for frame in self._framer.take(packet, at):
             if frame.number <= self._last:
-                continue  # already past: after a reconnect, or since the mean delay has moved
+                continue  # sent already: after a reconnect, or since the mean delay has changed
             self._last = frame.number
             with self._lock:
                 self._frames.append(frame)
 
     def at(self, pulse: int) -> list[EncodedAudioFrame]:
-        """Return the frames since the previous pulse; the newest picture is shown at this one."""
+        """Return the audio frames since the previous pulse; the newest video frame is shown at this one."""
         with self._lock:
             self._shown_at = pulse / self._fps
             if self._newest is not None:

@@ -1,4 +1,4 @@
-"""Passthrough of audio that already has the site's format, byte for byte."""
+"""Passes audio of the site's format through byte for byte, and selects the encoder for other audio."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ from fractions import Fraction
 
 from av.audio.stream import AudioStream
 
-from server.camera.audio.frames import EncodedAudioFrame, Packet
+from server.camera.audio.encoder import AudioEncoder
+from server.camera.audio.frames import AudioFramer, EncodedAudioFrame, Packet
 from server.media.audio.audio_format import OPUS_RATE, AudioFormat
 from server.media.audio.opus import packet_samples
 
 _MAX_DRIFT = Fraction(3, 4)
-"""Frames that one may be off its place before it is moved: times in files are rounded."""
+"""Largest difference between a packet's time and the next frame number, in frames: times in files are
+rounded."""
 _EXTENSION = b"\x56\xe5"
 """Marks an extension beyond AAC low complexity (ISO/IEC 14496-3, 1.6.6.1)."""
 _PRESENT = 0x80
@@ -37,15 +39,41 @@ class AudioPassthrough:
         self._next: int | None = None
 
     def take(self, packet: Packet, at: Fraction) -> list[EncodedAudioFrame]:
-        """Return the packet as a frame; nothing where its number is taken or its length is not a frame's."""
+        """Return the packet as a frame; nothing if its number is used already or it is not one frame long."""
         data = bytes(packet)
         if self._format.coding == "opus" and packet_samples(data) != self._format.samples:
             return []
-        place = at * self._format.rate / self._format.samples
-        number = round(place)
-        if self._next is not None and abs(place - self._next) < _MAX_DRIFT:
+        position = at * self._format.rate / self._format.samples
+        number = round(position)
+        if self._next is not None and abs(position - self._next) < _MAX_DRIFT:
             number = self._next
         if number < (self._next or 0):
             return []
         self._next = number + 1
         return [EncodedAudioFrame(number, data)]
+
+
+def select_framer(stream: AudioStream, audio_format: AudioFormat, kbps: int) -> AudioFramer:
+    """Return a passthrough for audio of the site's format, an encoder for other audio."""
+    if not is_compatible(stream, audio_format):
+        return AudioEncoder(audio_format, kbps)
+    return AudioPassthrough(audio_format) if audio_format.coding == "aac" else _OpusFramer(audio_format, kbps)
+
+
+class _OpusFramer:
+    """Passes through or encodes, by the first packet: Opus streams do not declare their frame length."""
+
+    def __init__(self, audio_format: AudioFormat, kbps: int) -> None:
+        self._format, self._kbps = audio_format, kbps
+        self._framer: AudioFramer | None = None
+
+    def take(self, packet: Packet, at: Fraction) -> list[EncodedAudioFrame]:
+        """Return the frames that a packet completes."""
+        if self._framer is None:
+            is_compatible_length = packet_samples(bytes(packet)) == self._format.samples
+            self._framer = (
+                AudioPassthrough(self._format)
+                if is_compatible_length
+                else AudioEncoder(self._format, self._kbps)
+            )
+        return self._framer.take(packet, at)

@@ -14,7 +14,7 @@ from av.stream import Disposition
 from av.video.stream import VideoStream
 
 from server.camera.audio.frames import AudioFramer, EncodedAudioFrame, Packet
-from server.camera.audio.selection import select_framer
+from server.camera.audio.passthrough import select_framer
 from server.camera.sources.frame_timing import frame_count, frame_rate
 from server.config.sections import SoundSettings
 from server.config.source_address import path_is_missing
@@ -24,13 +24,13 @@ from server.system.errors import UserError
 log = logging.getLogger(__name__)
 
 _WARM_UP_S = 1
-"""Seconds to decode before the first requested moment."""
+"""Seconds to decode before the first requested time."""
 _LEAD_S = Fraction(1, 5)
 _MAX_JUMP_S = 5
 
 
 class RecordedAudioSource:
-    """Audio of a recording: at pulse ``offset + n``, what sounds ``n / fps`` seconds after its first picture.
+    """Audio of a recording: pulse ``offset + n`` plays the audio ``n / fps`` seconds after its first frame.
 
     Audio of the site's format is passed through, other audio encoded.
 
@@ -43,15 +43,15 @@ class RecordedAudioSource:
     ) -> None:
         audio_format = settings.format
         if audio_format is None:
-            raise ValueError("a site without sound")
+            raise ValueError("the site has no audio")
         self._path = path
         self._fps = Fraction(fps).limit_denominator(100_000)
         self._begin = offset / self._fps
         container, stream = _open(path)
         try:
-            self._start = _first_picture_time(container)
+            self._start = _first_frame_time(container)
             self._framer: AudioFramer = select_framer(stream, audio_format, settings.kbps)
-            self._duration = self._length(container, stream) if at_end == "loop" else None
+            self._duration = self._loop_duration(container, stream) if at_end == "loop" else None
         finally:
             container.close()
         self._packets: Iterator[tuple[Fraction, Packet]] | None = None
@@ -60,7 +60,7 @@ class RecordedAudioSource:
         """Whether a read error was logged."""
 
     def at(self, pulse: int) -> list[EncodedAudioFrame]:
-        """Return the frames to send at a pulse: a moment early, so that they arrive before its pictures."""
+        """Return the frames to send at a pulse: a fifth of a second early, to arrive before its video."""
         return self.until(pulse + max(1, round(_LEAD_S * self._fps)))
 
     def until(self, pulse: int) -> list[EncodedAudioFrame]:
@@ -70,7 +70,7 @@ class RecordedAudioSource:
         """
         end = pulse / self._fps
         if self._packets is None:
-            self._packets = self._from(max(Fraction(0), end - _WARM_UP_S))
+            self._packets = self._packets_from(max(Fraction(0), end - _WARM_UP_S))
         frames: list[EncodedAudioFrame] = []
         while (timed := self._waiting or next(self._packets, None)) is not None:
             self._waiting = timed if timed[0] >= end else None
@@ -79,25 +79,25 @@ class RecordedAudioSource:
             frames += self._framer.take(timed[1], timed[0])
         return frames
 
-    def _from(self, moment: Fraction) -> Iterator[tuple[Fraction, Packet]]:
-        """Yield the packets from a moment on, each with its time in seconds after pulse 0."""
+    def _packets_from(self, start: Fraction) -> Iterator[tuple[Fraction, Packet]]:
+        """Yield the packets from a time on, each with its time in seconds after pulse 0."""
         begin, duration = self._begin, self._duration
         if duration is not None:
-            begin += max(0, (moment - begin) // duration) * duration
+            begin += max(0, (start - begin) // duration) * duration
         while True:
-            any_packet = False
-            for time, packet in self._once():
+            has_packets = False
+            for time, packet in self._one_pass():
                 if duration is not None and time >= duration:
                     break
-                any_packet = True
-                if begin + time >= moment:
+                has_packets = True
+                if begin + time >= start:
                     yield begin + time, packet
-            if duration is None or not any_packet:  # a file without audio in its duration would loop for ever
+            if duration is None or not has_packets:  # an empty pass would loop forever
                 return
             begin += duration
 
-    def _once(self) -> Iterator[tuple[Fraction, Packet]]:
-        """Yield the packets of one pass, each with its time after the first picture."""
+    def _one_pass(self) -> Iterator[tuple[Fraction, Packet]]:
+        """Yield the packets of one pass, each with its time in seconds after the first video frame."""
         container, stream = _open(self._path)
         try:
             for time, packet in _in_order(container.demux(stream)):
@@ -111,20 +111,20 @@ class RecordedAudioSource:
         finally:
             container.close()
 
-    def _length(self, container: InputContainer, sound: AudioStream) -> Fraction:
-        """Return the duration of a loop in seconds: that of the video, or of the audio without any."""
+    def _loop_duration(self, container: InputContainer, audio: AudioStream) -> Fraction:
+        """Return the duration of a loop in seconds: that of the video, else of the audio."""
         if (video := _video_stream(container)) is not None:
             return _video_duration(container, video, self._fps)
         ends = [
-            (it.pts + (it.duration or 0)) * it.time_base
-            for it in container.demux(sound)
-            if it.pts is not None and it.time_base is not None
+            (packet.pts + (packet.duration or 0)) * packet.time_base
+            for packet in container.demux(audio)
+            if packet.pts is not None and packet.time_base is not None
         ]
         return Fraction(max(ends, default=Fraction(1)))
 
 
-def _first_picture_time(container: InputContainer) -> Fraction:
-    """Return the first picture's time, in seconds of the file."""
+def _first_frame_time(container: InputContainer) -> Fraction:
+    """Return the time stamp of the first video frame, in seconds."""
     video = _video_stream(container)
     if video is None or video.start_time is None:
         return Fraction(0)
@@ -145,14 +145,14 @@ def _video_duration(container: InputContainer, video: VideoStream, fps: Fraction
 
 
 def _in_order(packets: Iterable[Packet]) -> Iterator[tuple[Fraction, Packet]]:
-    """Yield packets with their times in seconds, without single damaged ones far ahead of the next."""
+    """Yield packets with their times in seconds; a single damaged one far ahead of the next is dropped."""
     reached: Fraction | None = None
     ahead: tuple[Fraction, Packet] | None = None
     for packet in packets:
         if packet.pts is None or packet.time_base is None or not packet.size:
             continue
         time = packet.pts * packet.time_base
-        if ahead is not None and time >= ahead[0]:  # it was a gap
+        if ahead is not None and time >= ahead[0]:  # it was a gap, not damage
             yield ahead
             reached = ahead[0]
         ahead = None
@@ -164,9 +164,9 @@ def _in_order(packets: Iterable[Packet]) -> Iterator[tuple[Fraction, Packet]]:
 
 
 def _video_stream(container: InputContainer) -> VideoStream | None:
-    """Return the video stream, if any; a cover picture does not count."""
+    """Return the video stream, if any; a cover image does not count."""
     streams = container.streams.video
-    return next((it for it in streams if not it.disposition & Disposition.attached_pic), None)
+    return next((video for video in streams if not video.disposition & Disposition.attached_pic), None)
 
 
 def _open(path: str) -> tuple[InputContainer, AudioStream]:
@@ -179,5 +179,5 @@ def _open(path: str) -> tuple[InputContainer, AudioStream]:
         raise UserError(f"{name}: cannot open this file: {ffmpeg_reason(error)}") from None
     if not container.streams.audio:
         container.close()
-        raise UserError(f"{name}: there is no sound in this file")
+        raise UserError(f"{name}: there is no audio in this file")
     return container, container.streams.audio[0]

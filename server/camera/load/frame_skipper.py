@@ -13,7 +13,7 @@ from tracking.registry import Tracker
 class FrameSkipper:
     """Passes frames to the tracker in order, with interpolated detections for skipped ones.
 
-    A skipped frame waits for the next one with detection, at the latest until the end of its window.
+    A skipped frame waits for the next one with detection, at most until the end of its window.
     """
 
     def __init__(self, tracker: Tracker, bins: int, stride: int) -> None:
@@ -32,10 +32,10 @@ class FrameSkipper:
         """Push a frame's detections."""
         results = [self._release((pulse, detections)), self._tracker.push(pulse, detections, image)]
         self._before = pulse, detections
-        return merge_results([it for it in results if it is not None])
+        return merge_results([result for result in results if result is not None])
 
     def apply_corrections(self, corrections: Sequence[PositionCorrection]) -> WindowResult | None:
-        """Pass corrections on; None: they change nothing, or the tracker accepts none."""
+        """Apply operator corrections; None: they change nothing, or the tracker does not support them."""
         return (
             self._tracker.apply_corrections(corrections)
             if isinstance(self._tracker, InteractiveTracker)
@@ -43,15 +43,15 @@ class FrameSkipper:
         )
 
     def flush(self) -> WindowResult | None:
-        """Push what waits, and flush the tracker."""
+        """Push the skipped frames, and flush the tracker."""
         results = [self._release(None), self._tracker.flush()]
-        return merge_results([it for it in results if it is not None])
+        return merge_results([result for result in results if result is not None])
 
     def _release(self, after: tuple[int, Detections] | None) -> WindowResult | None:
         """Push the skipped frames; ``after`` is the next frame with detection."""
         skipped, self._skipped = self._skipped, []
-        results = [self._tracker.push(it, self._interpolated(it, after)) for it in skipped]
-        return merge_results([it for it in results if it is not None])
+        results = [self._tracker.push(pulse, self._interpolated(pulse, after)) for pulse in skipped]
+        return merge_results([result for result in results if result is not None])
 
     def _interpolated(self, pulse: int, after: tuple[int, Detections] | None) -> Detections:
         before = self._before

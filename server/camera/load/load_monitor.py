@@ -14,14 +14,14 @@ _BEHIND, _KEEPS_UP = 0.25, 0.1
 
 
 class LoadMonitor:
-    """Asks the load shedder for its level and logs changes; without `track.shed_load` the level stays 0."""
+    """Sets the shedding level by the load, and logs its changes; without `track.shed_load` it stays 0."""
 
     def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
         track = config.track
         self._camera, self._stride, self._gop = camera_id, track.window.stride, config.encode.gop
-        waits = track.cross_view_wait_s if config.peers_of(camera_id) else 0.0
-        waits += 1.0 / config.site.fps
-        bounds = LevelBounds(waits + _BEHIND * track.backlog_s, waits + _KEEPS_UP * track.backlog_s)
+        latency_s = track.cross_view_wait_s if config.peers_of(camera_id) else 0.0
+        latency_s += 1.0 / config.site.fps
+        bounds = LevelBounds(latency_s + _BEHIND * track.backlog_s, latency_s + _KEEPS_UP * track.backlog_s)
         levels = shed_levels(self._stride, live=live) if track.shed_load else (ShedLevel(),)
         self._shedder = LoadShedder(levels, bounds)
 
@@ -32,16 +32,16 @@ class LoadMonitor:
 
     @property
     def description(self) -> str:
-        """What is shed, in words; empty: nothing."""
+        """The shed work as text; empty: none."""
         return self._shedder.current.description
 
-    def searches(self, pulse: int) -> bool:
+    def detects(self, pulse: int) -> bool:
         """Return whether detection runs on a frame."""
-        return self._shedder.current.searches(pulse, self._stride)
+        return self._shedder.current.detects(pulse, self._stride)
 
-    def takes(self, pulse: int) -> bool:
-        """Return whether a frame is taken."""
-        return self._shedder.current.takes(pulse, self._stride, self._gop)
+    def captures(self, pulse: int) -> bool:
+        """Return whether a frame is captured."""
+        return self._shedder.current.captures(pulse, self._stride, self._gop)
 
     def measure_lag(self, lag: float, now: float) -> None:
         """Update with the seconds from a frame's pulse to its detection, at ``now`` by a steady clock."""
@@ -51,5 +51,7 @@ class LoadMonitor:
             log.warning("camera %s is %.1f s behind: %s", self._camera, lag, self.description)
         elif self.level < before:
             log.info(
-                "camera %s keeps up: %s", self._camera, self.description or "every frame is searched again"
+                "camera %s keeps up: %s",
+                self._camera,
+                self.description or "detection runs on every frame again",
             )

@@ -1,21 +1,22 @@
 """Load shedding: how much work a camera leaves out on an overloaded machine. Has no clock.
 
-Detection costs most, so it is skipped first. A live camera then takes fewer frames, and the stream fills the
-gaps.
+Detection costs most, so it is skipped first. A live camera then captures fewer frames, and the
+stream fills the gaps.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-_SEARCHED = (1, 2, 3)
+_DETECTION_INTERVALS = (1, 2, 3)
 _UP_AFTER_S = 0.5
 """Seconds that tracking must lag, without catching up, before the next level."""
-_DOWN_AFTER_S, _DOWN_MOST_S = 5.0, 60.0
-"""Seconds that it must keep up before the level below is tried, and the most after failed tries."""
-_TOO_SOON = 4.0
+_DOWN_AFTER_S, _DOWN_MAX_S = 5.0, 60.0
+"""Seconds that it must keep up before the level below is tried, and their maximum after failed tries."""
+_RETRY_FACTOR = 4.0
+"""Factor of that time after a level was lowered too early."""
 _CATCHES_UP = 0.95
-"""A lag below this share of the earlier one is catching up."""
+"""Below this share of the earlier lag, tracking is catching up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,29 +24,29 @@ class ShedLevel:
     """How much work one level leaves out.
 
     Attributes:
-        searched: detection runs on one in so many frames, counted back from the end of each window.
-        taken: one in so many frames is taken.
+        detection_interval: detection runs on one in so many frames, counted back from the end of each window.
+        capture_interval: one in so many frames is captured.
     """
 
-    searched: int = 1
-    taken: int = 1
+    detection_interval: int = 1
+    capture_interval: int = 1
 
-    def searches(self, pulse: int, stride: int) -> bool:
+    def detects(self, pulse: int, stride: int) -> bool:
         """Return whether detection runs on a frame; it always does on the last frame of a window."""
-        return -(pulse + 1) % stride % self.searched == 0
+        return -(pulse + 1) % stride % self.detection_interval == 0
 
-    def takes(self, pulse: int, stride: int, gop: int) -> bool:
-        """Return whether a frame is taken: always the first of a GOP and the last of a window."""
-        return pulse % gop % self.taken == 0 or (pulse + 1) % stride == 0
+    def captures(self, pulse: int, stride: int, gop: int) -> bool:
+        """Return whether a frame is captured; the first of a GOP and the last of a window always are."""
+        return pulse % gop % self.capture_interval == 0 or (pulse + 1) % stride == 0
 
     @property
     def description(self) -> str:
-        """What is shed, in words; empty: nothing."""
-        if self.searched == 1:
+        """The shed work as text; empty: none."""
+        if self.detection_interval == 1:
             return ""
-        which = _ORDINALS.get(self.searched, f"{self.searched}th")
-        shown = "" if self.taken == 1 else "showing every 2nd and "
-        return f"{shown}searching every {which} frame: the machine is too busy"
+        ordinal = _ORDINALS.get(self.detection_interval, f"{self.detection_interval}th")
+        capture = "" if self.capture_interval == 1 else "showing every 2nd and "
+        return f"{capture}detecting in every {ordinal} frame: the machine is too busy"
 
 
 _ORDINALS = {2: "2nd", 3: "3rd"}
@@ -54,11 +55,11 @@ _ORDINALS = {2: "2nd", 3: "3rd"}
 def shed_levels(stride: int, *, live: bool) -> tuple[ShedLevel, ...]:
     """Return the levels from 0 up, for windows that end every ``stride`` frames.
 
-    Frames of a recording are always taken.
+    Frames of a recording are always captured.
     """
-    searched = sorted({it for it in _SEARCHED if it <= stride} | {stride})
-    found = [ShedLevel(it) for it in searched]
-    return (*found, ShedLevel(searched[-1], 2)) if live else tuple(found)
+    intervals = sorted({interval for interval in _DETECTION_INTERVALS if interval <= stride} | {stride})
+    levels = [ShedLevel(interval) for interval in intervals]
+    return (*levels, ShedLevel(intervals[-1], 2)) if live else tuple(levels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +84,8 @@ class LoadShedder:
         self._behind_since: float | None = None
         self._behind_by = 0.0
         self._keeps_up_since: float | None = None
-        self._patience = _DOWN_AFTER_S
-        self._went_down = -_DOWN_MOST_S
+        self._down_after_s = _DOWN_AFTER_S
+        self._lowered_at = -_DOWN_MAX_S
 
     @property
     def current(self) -> ShedLevel:
@@ -102,10 +103,10 @@ class LoadShedder:
             self._keeps_up_since = None
         elif self._keeps_up_since is None:
             self._keeps_up_since = now
-        elif now - self._keeps_up_since >= self._patience and self.level:
+        elif now - self._keeps_up_since >= self._down_after_s and self.level:
             self.level -= 1
-            self._patience = max(self._patience / 2.0, _DOWN_AFTER_S)
-            self._went_down, self._keeps_up_since = now, now
+            self._down_after_s = max(self._down_after_s / 2.0, _DOWN_AFTER_S)
+            self._lowered_at, self._keeps_up_since = now, now
 
     def _behind(self, lag: float, now: float) -> None:
         if self._behind_since is None:
@@ -119,5 +120,5 @@ class LoadShedder:
         if self.level == len(self._levels) - 1:
             return
         self.level += 1
-        if now - self._went_down < _DOWN_MOST_S:
-            self._patience = min(_TOO_SOON * self._patience, _DOWN_MOST_S)
+        if now - self._lowered_at < _DOWN_MAX_S:
+            self._down_after_s = min(_RETRY_FACTOR * self._down_after_s, _DOWN_MAX_S)

@@ -16,9 +16,9 @@ _MAX_GOPS = 4
 class AccessUnitQueue:
     """A queue that hands out the first access unit of a GOP only at a pulse where a GOP begins.
 
-    A camera begins its GOPs at any time, so units wait for up to a GOP and the cushion, and its pictures are
-    later than other cameras' by that. As its clock drifts, now and then a GOP is skipped, or a pulse has no
-    unit and the rest of its GOP is unusable.
+    A camera begins its GOPs at any time, so units wait for up to a GOP and the cushion, and the camera is
+    behind the others by that. As its clock drifts, occasionally a GOP is skipped, or a pulse has no unit and
+    the remainder of its GOP is unusable.
     """
 
     def __init__(self, gop: int) -> None:

@@ -23,14 +23,14 @@ class AccessUnitPacking:
     """The parameter sets, which may be missing from the units."""
 
     def annex_b(self, packet: bytes) -> bytes:
-        """Return the NAL units with start codes, a keyframe's with the parameter sets before them.
+        """Return the NAL units with start codes; a keyframe begins with the parameter sets.
 
         Raises:
             ValueError: the lengths do not fit.
         """
         data = packet
         if self.length_bytes:
-            data = b"".join(_START_CODE + unit for unit in _behind_lengths(packet, self.length_bytes))
+            data = b"".join(_START_CODE + unit for unit in _split_length_prefixed(packet, self.length_bytes))
         types = [nal_type(unit) for unit in nal_units(data)]
         if NAL_IDR in types and NAL_SPS not in types:
             return b"".join(_START_CODE + unit for unit in self.sets) + data
@@ -62,11 +62,11 @@ def parse_packing(extradata: bytes | None) -> AccessUnitPacking:
 
 
 def is_keyframe(annex_b: bytes) -> bool:
-    """Return whether an access unit can be decoded without any before it."""
+    """Return whether an access unit can be decoded without earlier ones."""
     return any(nal_type(unit) == NAL_IDR for unit in nal_units(annex_b))
 
 
-def _behind_lengths(packet: bytes, length_bytes: int) -> Iterator[bytes]:
+def _split_length_prefixed(packet: bytes, length_bytes: int) -> Iterator[bytes]:
     at = 0
     while at < len(packet):
         size = int.from_bytes(packet[at : at + length_bytes], "big")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from server.camera.encoding.encoder import Encoder
+from server.camera.encoder import Encoder
 from server.camera.passthrough.access_units import is_keyframe
 from server.camera.sources.frame_timing import frame_index
 from server.camera.sources.opening import OpenedVideo
@@ -30,7 +30,7 @@ class RequiredFormat:
     fps: float
     gop: int
     parameters: ParameterSets | None
-    """Those of the encoding cameras; None: none encodes, and the cameras' own must agree."""
+    """Those of the re-encoded cameras; None: there are none, and the cameras' own must agree."""
 
 
 def required_format(config: Config) -> RequiredFormat:
@@ -39,8 +39,8 @@ def required_format(config: Config) -> RequiredFormat:
     parameters = None
     encoding = any(camera.h264 != "pass" for camera in config.cameras)
     if encoding and config.encode.parameters == "equal":
-        blank = np.zeros((site.height, site.width, 3), dtype=np.uint8)
-        first = Encoder(site, config.encode).encode(0, blank)
+        black = np.zeros((site.height, site.width, 3), dtype=np.uint8)
+        first = Encoder(site, config.encode).encode(0, black)
         parameters = parameter_sets(nal_units(first.data))
     return RequiredFormat((site.width, site.height), site.fps, config.encode.gop, parameters)
 
@@ -63,24 +63,24 @@ class CompatibilityCheck:
         if codec != "h264":
             raise IncompatibleStreamError(f"it is {codec}, not H.264")
         if opened.size != required.size:
-            own, site = ("x".join(map(str, size)) for size in (opened.size, required.size))
+            camera_size, site_size = ("x".join(map(str, size)) for size in (opened.size, required.size))
             raise IncompatibleStreamError(
-                f"its pictures are {own}, the site's {site} (site.width, site.height)"
+                f"its frames are {camera_size}, the site's {site_size} (site.width, site.height)"
             )
         rate = opened.stream.average_rate
         if rate and abs(float(rate) / required.fps - 1) > _SAME_RATE:
             raise IncompatibleStreamError(
-                f"it has {float(rate):g} pictures a second, the site {required.fps:g} (site.fps)"
+                f"it has {float(rate):g} frames a second, the site {required.fps:g} (site.fps)"
             )
 
     def check_orientation(self, orientation: Orientation) -> None:
-        """Check the orientation of its pictures.
+        """Check the orientation.
 
         Raises:
-            IncompatibleStreamError: they must be turned or stretched, which the streams cannot express.
+            IncompatibleStreamError: images must be rotated or stretched, which the streams cannot express.
         """
-        if orientation.words:
-            raise IncompatibleStreamError(f"its pictures are shown {orientation.words}")
+        if orientation.description:
+            raise IncompatibleStreamError(f"it is shown {orientation.description}")
 
     def check_frame_time(self, frame: int, seconds: float) -> None:
         """Check the time of a recording's frame, in seconds after its first one.
@@ -91,7 +91,7 @@ class CompatibilityCheck:
         if (place := frame_index(seconds, self._required.fps)) != frame:
             raise IncompatibleStreamError(
                 f"frame {frame} is shown at {seconds:.2f} s, which is frame {place} at the site's "
-                f"{self._required.fps:g} pictures a second (site.fps)"
+                f"{self._required.fps:g} frames a second (site.fps)"
             )
 
     def check_access_unit(
@@ -103,23 +103,33 @@ class CompatibilityCheck:
             IncompatibleStreamError: it does not fit.
         """
         gop = self._required.gop
-        later = shown is not None and self._shown is not None and shown <= self._shown
-        if later or (shown is not None and decoded is not None and shown != decoded):
+        goes_back = shown is not None and self._shown is not None and shown <= self._shown
+        if goes_back or (shown is not None and decoded is not None and shown != decoded):
             raise IncompatibleStreamError(
-                f"frame {frame} is decoded and shown in another order: it has B pictures"
+                f"frame {frame} is decoded and shown in another order: it has B frames"
             )
         self._shown = shown
         if is_keyframe(data) != (pulse % gop == 0):
-            does = "begins a GOP, where none of the site does" if pulse % gop else "does not begin a GOP"
-            raise IncompatibleStreamError(f"frame {frame} {does}: they begin every {gop} frames (encode.gop)")
+            problem = (
+                "begins a GOP, but none of the site's GOPs begins there"
+                if pulse % gop
+                else "does not begin a GOP"
+            )
+            raise IncompatibleStreamError(
+                f"frame {frame} {problem}: they begin every {gop} frames (encode.gop)"
+            )
         if pulse % gop == 0:
-            self._key(frame, parameter_sets(nal_units(data)))
+            self._check_parameters(frame, parameter_sets(nal_units(data)))
 
-    def _key(self, frame: int, found: ParameterSets | None) -> None:
+    def _check_parameters(self, frame: int, found: ParameterSets | None) -> None:
         if found is None:
             raise IncompatibleStreamError(f"frame {frame} begins a GOP without parameter sets")
         if self._parameters is None:
             self._parameters = found
         elif found != self._parameters:
-            whose = "this site encodes with" if self._required.parameters else "it began with"
-            raise IncompatibleStreamError(f"frame {frame} has other parameter sets (SPS, PPS) than {whose}")
+            expected = (
+                "those that this site encodes with" if self._required.parameters else "at its beginning"
+            )
+            raise IncompatibleStreamError(
+                f"frame {frame} has other parameter sets (SPS, PPS) than {expected}"
+            )

@@ -1,4 +1,4 @@
-"""An encoder's stand-in that passes the source's access units through."""
+"""Takes the place of an encoder where the source's access units are passed through."""
 
 from __future__ import annotations
 
@@ -6,38 +6,38 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
-from server.camera.encoding.encoder import AccessUnit
-from server.camera.sources import PictureSource
+from server.camera.encoder import AccessUnit
+from server.camera.sources import FrameSource
 from server.camera.sources.base import Image
 
 
 @dataclass(frozen=True, slots=True)
 class PassthroughUnit:
-    """An access unit as it came, in Annex B, and its decoded picture."""
+    """An unchanged access unit of the source, in Annex B, and its decoded image."""
 
     key: bool
     data: bytes
     image: Image
     time: Fraction | None = None
-    """When it was taken, seconds by the camera's clock; None: not known."""
+    """When it was captured, seconds by the camera's clock; None: unknown."""
 
 
-class PassthroughSource(PictureSource, Protocol):
-    """A source that keeps the access units of its pictures."""
+class PassthroughSource(FrameSource, Protocol):
+    """A source that also has the access units of its images."""
 
-    taken: PassthroughUnit | None
-    """The unit of the picture taken last."""
+    current: PassthroughUnit | None
+    """The access unit of the image that ``take`` returned last."""
 
 
 class PassthroughEncoder:
-    """Stands in for an encoder: returns the access unit of the picture that was taken."""
+    """Returns the source's access unit instead of encoding the image."""
 
     def __init__(self, source: PassthroughSource) -> None:
         self._source = source
 
     def encode(self, pulse: int, image: Image) -> AccessUnit:
-        """Return the access unit of a pulse, whose picture was the last one taken."""
-        unit = self._source.taken
+        """Return the access unit of a pulse, whose image was the last one taken."""
+        unit = self._source.current
         if unit is None or unit.image is not image:
-            raise RuntimeError("a picture was taken meanwhile")
+            raise RuntimeError("another image has been taken since")
         return AccessUnit(pulse, unit.key, unit.data)

@@ -20,9 +20,9 @@ class PassthroughOpening:
     """The result of opening a camera for passthrough."""
 
     source: PassthroughSource | None
-    """None: the camera's pictures must be encoded."""
-    why: str
-    """Why; empty: passthrough was not requested."""
+    """None: the camera's video must be encoded."""
+    reason: str
+    """Why it must be encoded; empty: passthrough was not requested."""
 
 
 def open_passthrough(
@@ -37,22 +37,22 @@ def open_passthrough(
     if camera.h264 == "encode":
         return PassthroughOpening(None, "")
     try:
-        return PassthroughOpening(_opened(config, camera, listener), "")
-    except IncompatibleStreamError as misfit:
+        return PassthroughOpening(_open(config, camera, listener), "")
+    except IncompatibleStreamError as error:
         if camera.h264 == "pass":
-            hint = "set the camera so, or let it be encoded (h264: auto)"
-            raise UserError(f"camera {camera.id}: h264: pass: {misfit}; {hint}") from misfit
-        return PassthroughOpening(None, str(misfit))
+            hint = "change the camera's settings, or let it be encoded (h264: auto)"
+            raise UserError(f"camera {camera.id}: h264: pass: {error}; {hint}") from error
+        return PassthroughOpening(None, str(error))
     except UserError as error:
-        away = source_kind(camera.source) is SourceKind.STREAM
-        raise (UnavailableError if away else UserError)(f"camera {camera.id}: {error}") from error
+        is_stream = source_kind(camera.source) is SourceKind.STREAM
+        raise (UnavailableError if is_stream else UserError)(f"camera {camera.id}: {error}") from error
 
 
-def _opened(config: Config, camera: CameraSettings, listener: LiveAudioSource | None) -> PassthroughSource:
+def _open(config: Config, camera: CameraSettings, listener: LiveAudioSource | None) -> PassthroughSource:
     match source_kind(camera.source):
         case SourceKind.STREAM:
             return PassthroughStream(camera.source, camera.options, listener, required_format(config))
         case SourceKind.FILE:
             return PassthroughRecording(camera.source, camera.offset, camera.at_end, required_format(config))
         case _:
-            raise IncompatibleStreamError("there is no H.264 in single images")
+            raise IncompatibleStreamError("image files contain no H.264")

@@ -31,7 +31,7 @@ class PassthroughRecording:
 
     Raises:
         UserError: there is no such file, or no video in it.
-        IncompatibleStreamError: some of it does not fit the site's streams; all of it is read to check.
+        IncompatibleStreamError: it does not fit the site's streams; the whole file is read to check this.
     """
 
     recorded = True
@@ -43,13 +43,13 @@ class PassthroughRecording:
             raise UserError(f"{redact_address(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
         self._fps = required.fps
-        self._length = _checked(path, offset, required)
+        self._length = _check_file(path, offset, required)
         if self._loop and self._length % required.gop:
             raise IncompatibleStreamError(
-                f"its {self._length} frames are not whole GOPs: it cannot begin again (at_end)"
+                f"its {self._length} frames are not whole GOPs: it cannot loop (at_end)"
             )
         self.size = required.size
-        self.taken: PassthroughUnit | None = None
+        self.current: PassthroughUnit | None = None
         self._begin()
 
     def take(self, pulse: int) -> Image | None:
@@ -66,11 +66,11 @@ class PassthroughRecording:
             self._begin()
         while self._next <= index:
             self._read()
-        return None if self.taken is None else self.taken.image
+        return None if self.current is None else self.current.image
 
-    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
-        """Decode the frames at some places, from the file opened once more."""
-        return decode_frames(self._path, places, self._fps)
+    def ahead(self, indices: Sequence[int]) -> Iterator[Image]:
+        """Decode the frames with these indices, from a second reader of the file."""
+        return decode_frames(self._path, indices, self._fps)
 
     def close(self) -> None:
         """Close the file."""
@@ -83,20 +83,20 @@ class PassthroughRecording:
 
     def _read(self) -> None:
         packet = next(self._packets, None)
-        if packet is None:  # shorter than when it was checked
+        if packet is None:  # the file is shorter than when it was checked
             raise SourceEndedError(self._path)
         data = self._packing.annex_b(bytes(packet))
         image = decode_unit(packet)
-        if image is None and self.taken is not None:
-            image = self.taken.image  # damaged, for a viewer, too
-        self.taken = None if image is None else PassthroughUnit(is_keyframe(data), data, image)
+        if image is None and self.current is not None:
+            image = self.current.image  # damaged: viewers see the previous image, too
+        self.current = None if image is None else PassthroughUnit(is_keyframe(data), data, image)
         self._next += 1
 
 
 def decode_unit(packet: av.Packet[VideoStream]) -> Image | None:
-    """Return the picture of an access unit; None where it cannot be decoded (yet), or must be turned."""
+    """Return the image of an access unit; None where it cannot be decoded (yet), or must be rotated."""
     pictures = decode_pictures(packet)
-    return to_bgr(pictures[-1]) if pictures and not parse_orientation(pictures[-1]).turned else None
+    return to_bgr(pictures[-1]) if pictures and not parse_orientation(pictures[-1]).is_rotated else None
 
 
 def decode_pictures(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
@@ -108,7 +108,7 @@ def decode_pictures(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
 
 
 def decode_without_delay(opened: OpenedVideo) -> None:
-    """Make the decoder return each picture with its own access unit."""
+    """Make the decoder return each picture at once, with its own access unit."""
     opened.stream.codec_context.flags |= av.codec.context.Flags.low_delay
 
 
@@ -126,7 +126,7 @@ def _orientation(path: str) -> Orientation:
     return recording.orientation
 
 
-def _checked(path: str, offset: int, required: RequiredFormat) -> int:
+def _check_file(path: str, offset: int, required: RequiredFormat) -> int:
     """Check the whole file; return the number of its frames."""
     opened, check, frame = open_video(path), CompatibilityCheck(required), -1
     unit, first = float(opened.stream.time_base or 1), None
@@ -146,5 +146,5 @@ def _checked(path: str, offset: int, required: RequiredFormat) -> int:
     finally:
         opened.container.close()
     if frame < 0:
-        raise UserError(f"{redact_address(path)}: there is not one picture in this video; is the file whole?")
+        raise UserError(f"{redact_address(path)}: this video has no frames; is the file complete?")
     return frame + 1

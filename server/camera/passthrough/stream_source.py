@@ -51,35 +51,35 @@ class PassthroughStream(LiveStream):
         self._waiting = AccessUnitQueue(required.gop)
         self._waiting_lock = threading.Lock()
         self._frame_s = 1 / Fraction(required.fps).limit_denominator(1001)
-        self._unbroken = False
+        self._is_decodable = False
         """Whether no unit was lost since the last keyframe."""
-        self.taken: PassthroughUnit | None = None
+        self.current: PassthroughUnit | None = None
         super().__init__(url, options, listener)
 
     def take(self, pulse: int) -> Image | None:
-        """Return the picture of a pulse's access unit; None: there is none."""
+        """Return the image of a pulse's access unit; None: there is none."""
         with self._waiting_lock:
-            self.taken = taken = self._waiting.take(pulse)
-        if taken is None:
+            self.current = unit = self._waiting.take(pulse)
+        if unit is None:
             return None
-        if self._listener is not None and taken.time is not None:
-            # The picture has waited; audio is requested at the next pulse, before its picture is taken.
-            self._listener.picture(taken.time + self._frame_s)
-        return taken.image
+        if self._listener is not None and unit.time is not None:
+            # The unit has waited; audio is requested at the next pulse, before that pulse's unit.
+            self._listener.picture(unit.time + self._frame_s)
+        return unit.image
 
     def _read(self, opened: OpenedVideo) -> bool:
         try:
             CompatibilityCheck(self._required).check_video(opened)
-        except IncompatibleStreamError as misfit:
+        except IncompatibleStreamError as error:
             opened.container.close()
-            self._lost(f"{redact_address(self._url)}: its stream does not fit any more: {misfit}")
+            self._log_away(f"{redact_address(self._url)}: its stream does not fit any more: {error}")
             return False
         decode_without_delay(opened)
-        self._unbroken = False
+        self._is_decodable = False
         return super()._read(opened)
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
-        """Queue an access unit with its picture; return whether it has one."""
+        """Queue an access unit with its image; return whether it could be decoded."""
         if not packet.size:
             return False
         try:
@@ -90,8 +90,8 @@ class PassthroughStream(LiveStream):
         self._sized.set()  # the orientation was checked before, and may not change
         if image is not None and image.shape[1::-1] != self._required.size:
             image = None  # the size may not change within a connection
-        self._unbroken = image is not None and bool(data) and (self._unbroken or key)
-        if image is not None and self._unbroken:
+        self._is_decodable = image is not None and bool(data) and (self._is_decodable or key)
+        if image is not None and self._is_decodable:
             time = None
             if packet.pts is not None and packet.time_base is not None:
                 time = packet.pts * packet.time_base
@@ -111,26 +111,26 @@ def _check(url: str, options: Mapping[str, str], required: RequiredFormat) -> No
     try:
         check.check_video(opened)
         aspect = pixel_aspect(opened.stream)
-        packing, begun = parse_packing(opened.stream.codec_context.extradata), -1
+        packing, start = parse_packing(opened.stream.codec_context.extradata), -1
         for frame, packet in enumerate(access_unit_packets(opened)):
             data = packing.annex_b(bytes(packet))
             for picture in decode_pictures(packet):
                 check.check_orientation(parse_orientation(picture, aspect))
-            if begun < 0 and is_keyframe(data):
-                begun = frame
-            if begun >= 0:
-                check.check_access_unit(frame - begun, frame - begun, data, packet.pts, packet.dts)
-            if frame - max(begun, 0) >= _CHECKED_GOPS * required.gop:
+            if start < 0 and is_keyframe(data):
+                start = frame
+            if start >= 0:
+                check.check_access_unit(frame - start, frame - start, data, packet.pts, packet.dts)
+            if frame - max(start, 0) >= _CHECKED_GOPS * required.gop:
                 break
-        if begun < 0:
+        if start < 0:
             raise IncompatibleStreamError(
                 f"no GOP begins within {_CHECKED_GOPS * required.gop} frames (encode.gop)"
             )
     except (av.error.InvalidDataError, ValueError) as error:
         why = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
         raise IncompatibleStreamError(f"it cannot be read: {why}") from None
-    except av.error.FFmpegError as error:  # the connection broke, which says nothing about the stream
+    except av.error.FFmpegError as error:  # the connection broke: the stream may be compatible
         why = timeout_message(error, READ_S) or ffmpeg_reason(error)
-        raise UserError(f"{redact_address(url)}: it stopped while it was checked: {why}") from None
+        raise UserError(f"{redact_address(url)}: it stopped during the check: {why}") from None
     finally:
         opened.container.close()

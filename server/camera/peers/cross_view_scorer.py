@@ -22,7 +22,7 @@ _PIXEL_DIGITS, _SCORE_DIGITS = 1, 3
 
 @dataclass(frozen=True, slots=True)
 class PeerDetections:
-    """Detections of the peer cameras in a frame; ``is_incomplete``: some that were expected did not come."""
+    """Detections of the peer cameras in a frame; ``is_incomplete``: some expected ones are missing."""
 
     messages: tuple[FrameDetections, ...] = ()
     is_incomplete: bool = False
@@ -34,10 +34,10 @@ class CrossViewScorer:
     def __init__(self, config: Config, camera_id: str, size: tuple[int, int], boot: int) -> None:
         self._config, self._camera, self._size, self._boot = config, camera_id, size, boot
         site = config.site
-        self._fit = Letterbox(size, (site.width, site.height))
-        self._own = _geometry(config, camera_id, size)
-        self._others: dict[str, tuple[tuple[int, int], CameraGeometry | None]] = {}
-        """By peer: the size of its pictures, and its geometry; None: it sees none of this camera's ground."""
+        self._letterbox = Letterbox(size, (site.width, site.height))
+        self._geometry = _geometry(config, camera_id, size)
+        self._peers: dict[str, tuple[tuple[int, int], CameraGeometry | None]] = {}
+        """By peer: its image size, and its geometry; None: it sees none of this camera's ground."""
 
     def build_message(
         self, pulse: int, detections: Detections | None, *, ended: bool = False
@@ -46,10 +46,10 @@ class CrossViewScorer:
         boxes = None
         if detections is not None:
             # The most confident ones, in the detector's order.
-            most = np.sort(np.argsort(-detections.scores, kind="stable")[:FRAME_DETECTIONS_MAX])
-            places = self._fit.boxes_to_own(detections.boxes[most]).round(_PIXEL_DIGITS)
-            scores = detections.scores[most].round(_SCORE_DIGITS)
-            rows = np.clip(np.column_stack([places, scores]), -COORDINATE_MAX, COORDINATE_MAX)
+            top = np.sort(np.argsort(-detections.scores, kind="stable")[:FRAME_DETECTIONS_MAX])
+            boxes_px = self._letterbox.boxes_to_camera(detections.boxes[top]).round(_PIXEL_DIGITS)
+            scores = detections.scores[top].round(_SCORE_DIGITS)
+            rows = np.clip(np.column_stack([boxes_px, scores]), -COORDINATE_MAX, COORDINATE_MAX)
             boxes = [(row[0], row[1], row[2], row[3], row[4]) for row in rows.tolist()]
         return FrameDetections(
             camera=self._camera, boot=self._boot, size=self._size, pulse=pulse, boxes=boxes, ended=ended
@@ -61,33 +61,35 @@ class CrossViewScorer:
 
     def rescore(self, detections: Detections, messages: Sequence[FrameDetections]) -> Detections:
         """Return the detections with scores corrected by the peers' detections of the same frame."""
-        others = [
+        peers = [
             (geometry, _camera_detections(message.boxes))
             for message in messages
             if message.boxes is not None and (geometry := self._geometry_of(message)) is not None
         ]
-        found = CameraDetections(self._fit.boxes_to_own(detections.boxes), detections.scores)
+        found = CameraDetections(self._letterbox.boxes_to_camera(detections.boxes), detections.scores)
         return replace(
-            detections, scores=rescore_detections(self._own, found, others, self._config.track.cross_view)
+            detections, scores=rescore_detections(self._geometry, found, peers, self._config.track.cross_view)
         )
 
     def _geometry_of(self, message: FrameDetections) -> CameraGeometry | None:
-        known = self._others.get(message.camera)
-        if known is None or known[0] != message.size:
+        cached = self._peers.get(message.camera)
+        if cached is None or cached[0] != message.size:
             geometry = _geometry(self._config, message.camera, message.size)
-            known = self._others[message.camera] = (
+            cached = self._peers[message.camera] = (
                 message.size,
-                geometry if views_overlap(self._own, geometry) else None,
+                geometry if views_overlap(self._geometry, geometry) else None,
             )
-        return known[1]
+        return cached[1]
 
 
 def _geometry(config: Config, camera_id: str, size: tuple[int, int]) -> CameraGeometry:
     camera, site = config.camera(camera_id), config.site
-    fit = Letterbox(size, (site.width, site.height))
-    own = [np.array(polygon, dtype=np.float64) for polygon in camera.ignore]
-    shared = [fit.to_own(np.array(polygon, dtype=np.float64)) for polygon in config.detect.ignore]
-    return CameraGeometry(np.array(camera.ground, dtype=np.float64), size, (*own, *shared))
+    letterbox = Letterbox(size, (site.width, site.height))
+    camera_ignore = [np.array(polygon, dtype=np.float64) for polygon in camera.ignore]
+    site_ignore = [
+        letterbox.to_camera(np.array(polygon, dtype=np.float64)) for polygon in config.detect.ignore
+    ]
+    return CameraGeometry(np.array(camera.ground, dtype=np.float64), size, (*camera_ignore, *site_ignore))
 
 
 def _camera_detections(rows: Sequence[tuple[float, ...]]) -> CameraDetections:

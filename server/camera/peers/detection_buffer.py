@@ -1,4 +1,4 @@
-"""The peers' detections by pulse, and which peers to wait for. Has no clock: the caller passes the time."""
+"""Buffers the peers' detections by pulse, and decides which peers to wait for. The caller passes the time."""
 
 from __future__ import annotations
 
@@ -22,36 +22,36 @@ class _Peer:
     """The pulse of its newest message."""
     ended: bool = False
     trusted: bool = True
-    """False after a late message: it is not waited for until a message arrives in time."""
+    """False after a late message, until one arrives in time: it is not waited for."""
     overlaps: bool | None = None
-    """Whether it sees the same ground as this camera; None: not known yet."""
+    """Whether it sees the same ground as this camera; None: unknown yet."""
     messages: dict[int, FrameDetections] = field(default_factory=dict)
 
 
 class PeerDetectionBuffer:
-    """Collects the detections of peer cameras. A camera that is late is not waited for until it is in time.
+    """Collects the detections of peer cameras. It does not wait for one that was late last time.
 
-    A camera's messages come in pulse order: after a later one, an earlier one cannot follow. A camera that
-    never connected, has left or is too slow costs one wait.
+    A camera's messages arrive in pulse order. A camera that never connected, has left or is too slow costs
+    one wait.
 
     Args:
-        others: the peer cameras.
-        most: messages to keep of one camera; more would be of frames far ahead.
-        sees_same_ground: returns for a camera's first message whether it sees the same ground.
+        peers: the peer cameras.
+        messages_max: messages to keep per camera; more would be about frames far ahead.
+        sees_same_ground: returns whether the sender of a message sees the same ground.
     """
 
     def __init__(
-        self, others: Sequence[str], most: int, sees_same_ground: Callable[[FrameDetections], bool]
+        self, peers: Sequence[str], messages_max: int, sees_same_ground: Callable[[FrameDetections], bool]
     ) -> None:
-        self._peers = {camera: _Peer() for camera in others}
-        self._most, self._sees_same_ground = most, sees_same_ground
+        self._peers = {camera: _Peer() for camera in peers}
+        self._messages_max, self._sees_same_ground = messages_max, sees_same_ground
         self._deadlines: deque[tuple[int, float]] = deque(maxlen=_DEADLINES_MAX)
 
     def put(self, message: FrameDetections, now: float) -> bool:
-        """Add a message; return whether its camera sees the same ground and is worth listening to."""
+        """Add a message; return whether its camera sees the same ground, so that its messages are useful."""
         peer = self._peers[message.camera]
         if peer.boot != message.boot:
-            # `overlaps` stays: where a camera stands is in the configuration.
+            # `overlaps` stays: it follows from the configuration.
             peer.boot, peer.newest, peer.ended, peer.trusted = message.boot, -1, False, True
             peer.messages.clear()
         if peer.overlaps is None:
@@ -65,23 +65,23 @@ class PeerDetectionBuffer:
             peer.overlaps
             and not message.ended
             and message.pulse >= current
-            and len(peer.messages) < self._most
+            and len(peer.messages) < self._messages_max
         ):
             peer.messages[message.pulse] = message
         return peer.overlaps
 
     def expect(self, pulse: int, until: float) -> None:
-        """Set the deadline for messages about a frame, and forget those about earlier ones.
+        """Set the deadline for messages about a frame, and drop the messages about earlier ones.
 
         Pulses must ascend.
         """
         self._deadlines.append((pulse, until))
         for peer in self._peers.values():
-            for old in [it for it in peer.messages if it < pulse]:
+            for old in [buffered for buffered in peer.messages if buffered < pulse]:
                 del peer.messages[old]
 
     def is_missing(self, pulse: int) -> bool:
-        """Return whether a message about this frame is still worth waiting for."""
+        """Return whether a message about this frame may still arrive in time."""
         return any(_missed(peer, pulse) for peer in self._peers.values())
 
     def give_up(self, pulse: int) -> list[str]:

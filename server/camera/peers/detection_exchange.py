@@ -1,4 +1,4 @@
-"""Exchange of detections with the peer cameras over the bus, with a short wait for theirs."""
+"""Exchanges detections with the peer cameras over the bus, and waits a short time for theirs."""
 
 from __future__ import annotations
 
@@ -33,22 +33,24 @@ class PeerDetectionExchange:
     It opens a second bus session: the camera's first one receives nothing from other cameras.
     """
 
-    def __init__(self, config: Config, camera_id: str, cross_view: CrossViewScorer | None, most: int) -> None:
+    def __init__(
+        self, config: Config, camera_id: str, cross_view: CrossViewScorer | None, messages_max: int
+    ) -> None:
         self._config, self._camera = config, camera_id
         self._keys = ZenohKeys(config.site.name)
-        self._others = config.peers_of(camera_id) if cross_view else ()
-        self._patience = config.track.cross_view_wait_s
+        self._peers = config.peers_of(camera_id) if cross_view else ()
+        self._wait_s = config.track.cross_view_wait_s
         sees_same_ground = cross_view.sees_same_ground if cross_view else lambda _: False
-        self._buffer = PeerDetectionBuffer(self._others, most, sees_same_ground)
+        self._buffer = PeerDetectionBuffer(self._peers, messages_max, sees_same_ground)
         self._listening: set[str] = set()
         self._changed = asyncio.Event()
         self._join_task: asyncio.Task[None] | None = None
         self._open_task: asyncio.Task[Bus] | None = None
         self._bus: Bus | None = None
         self._has_published = False
-        self._waits = LogThrottle(quiet_s=0.0)
-        self._late: dict[str, LogThrottle] = defaultdict(LogThrottle)
-        self._bad: dict[str, LogThrottle] = defaultdict(LogThrottle)
+        self._join_log = LogThrottle(quiet_s=0.0)
+        self._late_log: dict[str, LogThrottle] = defaultdict(LogThrottle)
+        self._bad_log: dict[str, LogThrottle] = defaultdict(LogThrottle)
         self.bad_messages = 0
         """Messages of peers that could not be parsed."""
 
@@ -57,7 +59,7 @@ class PeerDetectionExchange:
 
         An error in the background is raised by the next :meth:`exchange`.
         """
-        if not self._others:
+        if not self._peers:
             return
         self._join_task = asyncio.create_task(self._join(), name="join")
         await asyncio.wait({self._join_task}, timeout=_JOIN_TIMEOUT_S)
@@ -76,33 +78,33 @@ class PeerDetectionExchange:
     async def _join(self) -> None:
         while True:
             self._open_task = asyncio.create_task(
-                asyncio.to_thread(Bus.hearing, self._config.zenoh, self._camera)
+                asyncio.to_thread(Bus.listener, self._config.zenoh, self._camera)
             )
             try:
                 # Shielded: a session opened after cancellation could not be closed, and the process hangs.
                 bus = await asyncio.shield(self._open_task)
                 break
-            except UserError as problem:
-                if (more := self._waits.record(str(problem))) is not None:
+            except UserError as error:
+                if (more := self._join_log.record(str(error))) is not None:
                     log.info(
-                        "camera %s: cannot receive from its peers yet: %s%s", self._camera, problem, more
+                        "camera %s: cannot receive the peers' detections yet: %s%s", self._camera, error, more
                     )
                 await asyncio.sleep(_RETRY_S)
-        if self._waits.end():
-            log.info("camera %s: receives from its peers", self._camera)
-        for other in self._others:
-            self._listen(bus, other)
-        bus.watch_alive(self._keys.camera("*", "peer_listener"), self._alive)
+        if self._join_log.end():
+            log.info("camera %s: receives the peers' detections", self._camera)
+        for peer in self._peers:
+            self._listen(bus, peer)
+        bus.watch_alive(self._keys.camera("*", "peer_listener"), self._on_listener)
         # After the subscriptions: a peer that sees this token can rely on them.
         bus.declare_alive(self._keys.camera(self._camera, "peer_listener"))
         self._bus = bus
 
     async def exchange(
-        self, pulse: int, message: FrameDetections | None, taken: float, *, needed: bool
+        self, pulse: int, message: FrameDetections | None, captured: float, *, needed: bool
     ) -> PeerDetections:
         """Publish a frame's detections; return the peers' of the same frame, waiting where needed.
 
-        ``taken`` is when the frame was taken, by the loop's clock. The deadline counts from there, not from
+        ``captured`` is the time of capture, by the loop's clock. The deadline counts from it, not from
         detection, so that a slow peer does not delay this camera further.
         """
         if message is None:
@@ -110,28 +112,28 @@ class PeerDetectionExchange:
         if self._join_task is not None and self._join_task.done():
             self._join_task.result()
         await self._publish(message)
-        until = taken + self._patience
+        until = captured + self._wait_s
         self._buffer.expect(pulse, until)
         if not needed:
             return PeerDetections()
         if self._bus is not None:
-            await self._until(lambda: not self._buffer.is_missing(pulse), until)
+            await self._wait_until(lambda: not self._buffer.is_missing(pulse), until)
         for camera in self._buffer.give_up(pulse):
             self._log_late(camera, pulse)
         peers = self._buffer.detections_at(pulse)
-        for it in peers.messages:
-            self._log_in_time(it.camera)
+        for received in peers.messages:
+            self._log_in_time(received.camera)
         return peers
 
     def _log_late(self, camera: str, pulse: int) -> None:
-        more = self._late[camera].record()
+        more = self._late_log[camera].record()
         if more is not None:
             text = "camera %s: detections of camera %s in frame %d came too late%s"
             log.info(text, self._camera, camera, pulse, more)
 
     def _log_in_time(self, camera: str) -> None:
-        if self._late[camera].end():
-            log.info("camera %s: detections of camera %s come in time again", self._camera, camera)
+        if self._late_log[camera].end():
+            log.info("camera %s: detections of camera %s arrive in time again", self._camera, camera)
 
     async def publish_end(self, message: FrameDetections | None) -> None:
         """Publish that no more frames follow."""
@@ -144,10 +146,10 @@ class PeerDetectionExchange:
         if not self._has_published:
             self._has_published = True
             until = asyncio.get_running_loop().time() + _LISTENERS_S
-            await self._until(lambda: self._listening.issuperset(self._others), until)
+            await self._wait_until(lambda: self._listening.issuperset(self._peers), until)
         self._bus.publish(self._keys.camera(self._camera, "detections"), msgspec.json.encode(message))
 
-    async def _until(self, done: Callable[[], bool], until: float) -> None:
+    async def _wait_until(self, done: Callable[[], bool], until: float) -> None:
         """Wait until a condition holds, checked on every event, or the deadline passes."""
         try:
             async with asyncio.timeout_at(until):
@@ -157,32 +159,32 @@ class PeerDetectionExchange:
         except TimeoutError:
             return
 
-    def _listen(self, bus: Bus, other: str) -> None:
-        def take(received: Message) -> None:
-            message = self._read(received)
+    def _listen(self, bus: Bus, peer: str) -> None:
+        def receive(received: Message) -> None:
+            message = self._decode(received)
             if message is not None and not self._buffer.put(message, asyncio.get_running_loop().time()):
-                end()  # unsubscribe: of many cameras few see the same ground
+                unsubscribe()  # only a few of many cameras see the same ground
             self._changed.set()
 
-        end = bus.listen(self._keys.camera(other, "detections"), take)
+        unsubscribe = bus.listen(self._keys.camera(peer, "detections"), receive)
 
-    def _read(self, received: Message) -> FrameDetections | None:
-        other = camera_of_key(received.key)
+    def _decode(self, received: Message) -> FrameDetections | None:
+        peer = camera_of_key(received.key)
         try:
             message = _DECODER.decode(received.payload)
-            if message.camera != other:
+            if message.camera != peer:
                 raise msgspec.ValidationError("it names another camera")
-        except DECODE_ERRORS as problem:
+        except DECODE_ERRORS as error:
             self.bad_messages += 1
-            if (more := self._bad[other].record(str(problem))) is not None:
+            if (more := self._bad_log[peer].record(str(error))) is not None:
                 text = "camera %s: cannot parse a message on %s: %s%s"
-                log.warning(text, self._camera, received.key, problem, more)
+                log.warning(text, self._camera, received.key, error, more)
             return None
-        if ended := self._bad[other].end():
+        if ended := self._bad_log[peer].end():
             text = "camera %s: messages of camera %s can be parsed again; %d could not"
-            log.info(text, self._camera, other, ended.count)
+            log.info(text, self._camera, peer, ended.count)
         return message
 
-    def _alive(self, key: str, there: bool) -> None:
-        (self._listening.add if there else self._listening.discard)(camera_of_key(key))
+    def _on_listener(self, key: str, is_present: bool) -> None:
+        (self._listening.add if is_present else self._listening.discard)(camera_of_key(key))
         self._changed.set()

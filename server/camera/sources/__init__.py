@@ -1,9 +1,9 @@
-"""Picture sources: network cameras, recordings, image folders, synthetic scenes."""
+"""Frame sources: network cameras, recordings, image folders, synthetic scenes."""
 
 from __future__ import annotations
 
 from server.camera.audio import LiveAudioSource
-from server.camera.sources.base import Image, PictureSource, SourceEndedError
+from server.camera.sources.base import FrameSource, Image, SourceEndedError
 from server.camera.sources.image_folder import ImageFolder
 from server.camera.sources.live_stream import LiveStream
 from server.camera.sources.recording import Recording
@@ -12,12 +12,12 @@ from server.config.sections import CameraSettings, SiteSettings
 from server.config.source_address import SourceKind, source_kind
 from server.system.errors import UnavailableError, UserError
 
-__all__ = ["Image", "ImageFolder", "PictureSource", "Recording", "SourceEndedError", "open_source"]
+__all__ = ["FrameSource", "Image", "ImageFolder", "Recording", "SourceEndedError", "open_source"]
 
 
 def open_source(
     camera: CameraSettings, site: SiteSettings, listener: LiveAudioSource | None = None, *, ready: bool = True
-) -> PictureSource:
+) -> FrameSource:
     """Open a camera's source; a network camera's audio is passed to ``listener``, if given.
 
     ``ready``: warm up for the first pulse; otherwise only check that it opens.
@@ -38,6 +38,6 @@ def open_source(
             case SourceKind.FILE:
                 return Recording(camera.source, camera.offset, camera.at_end, site.fps)
     except UserError as error:
-        # A network camera may be switched off for now; a missing file stays missing.
-        away = source_kind(camera.source) is SourceKind.STREAM
-        raise (UnavailableError if away else UserError)(f"camera {camera.id}: {error}") from error
+        # A network camera may be off temporarily; a missing file is permanent.
+        is_stream = source_kind(camera.source) is SourceKind.STREAM
+        raise (UnavailableError if is_stream else UserError)(f"camera {camera.id}: {error}") from error

@@ -1,4 +1,4 @@
-"""The interface of picture sources."""
+"""The interface of frame sources."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ Image = NDArray[np.uint8]
 
 
 class SourceEndedError(Exception):
-    """The recording has no picture for this pulse or any later one."""
+    """The recording has no frame for this pulse or any later one."""
 
 
-class PictureSource(Protocol):
-    """Returns the picture of a pulse. Used from one thread at a time; ``take`` may block."""
+class FrameSource(Protocol):
+    """Returns the image of a pulse. Used from one thread at a time; ``take`` may block."""
 
     size: tuple[int, int]
-    """Width and height of its pictures in pixels."""
+    """Width and height of its images in pixels."""
     recorded: bool
-    """Whether it is a recording: a pulse's picture is the same whenever it is taken."""
+    """Whether it is a recording: the image of a pulse is always the same."""
 
     def take(self, pulse: int) -> Image | None:
-        """Return the picture of a pulse; None: there is none (yet). Pulses must ascend.
+        """Return the image of a pulse; None: there is none (yet). Pulses must ascend.
 
         Raises:
             SourceEndedError: the recording is over.
         """
         ...
 
-    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
-        """Return a recording's pictures at ascending positions, without moving the playback position.
+    def ahead(self, indices: Sequence[int]) -> Iterator[Image]:
+        """Return a recording's frames with these ascending indices; the playback position stays.
 
         Fewer where the recording is shorter; none for a live source.
         """

@@ -1,4 +1,4 @@
-"""Reads a recording's pictures one by one, each with its own time, even from a damaged file."""
+"""Reads a recording's frames with their times, even from a damaged file."""
 
 from __future__ import annotations
 
@@ -19,64 +19,65 @@ from server.system.address_redaction import redact_address
 log = logging.getLogger(__name__)
 
 _COUNTED_WHEN_REORDERED = frozenset({"avi"})
-"""Containers whose time stamps count packets in decoding order: with reordering they are no display times."""
+"""Containers whose time stamps count packets in decoding order: with reordering they are not presentation
+times."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TimedPicture:
-    """A picture of a recording.
+class TimedFrame:
+    """A frame of a recording.
 
     Attributes:
-        seconds: when it is shown, after the first one of the recording.
-        picture: None: it could not be decoded, and the one before it stands for it.
+        seconds: its presentation time, after the recording's first frame.
+        picture: the decoded picture; None: it could not be decoded, and the previous one is repeated.
     """
 
     seconds: float
     picture: VideoFrame | None
 
 
-def read_pictures(opened: OpenedVideo, *, again: bool = False) -> Iterator[TimedPicture]:
-    """Yield the pictures in display order, those that cannot be decoded included.
+def read_frames(opened: OpenedVideo, *, again: bool = False) -> Iterator[TimedFrame]:
+    """Yield the frames in presentation order, including those that cannot be decoded.
 
-    Reading ends at a read error, which is logged; not so when the file is read ``again``.
+    Reading ends at a read error. Warnings are logged unless the file is read ``again``.
     """
-    line: _Line | None = None
+    timeline: _Timeline | None = None
     for packet in _packets(opened, again=again):
-        if line is None:
-            line = _counted_or_timed(opened, packet, again=again)
-        yield from line.after(packet)
-    if line is not None:
-        yield from line.rest()
+        if timeline is None:
+            timeline = _select_timeline(opened, packet, again=again)
+        yield from timeline.decode(packet)
+    if timeline is not None:
+        yield from timeline.flush()
 
 
-class _Line(Protocol):
-    def after(self, packet: av.Packet[VideoStream]) -> Iterator[TimedPicture]:
-        """Decode a packet; yield the pictures that are now known to come next."""
+class _Timeline(Protocol):
+    def decode(self, packet: av.Packet[VideoStream]) -> Iterator[TimedFrame]:
+        """Decode a packet; yield the frames whose order is now known."""
         ...
 
-    def rest(self) -> Iterator[TimedPicture]:
-        """Yield the lost pictures at the end."""
+    def flush(self) -> Iterator[TimedFrame]:
+        """Yield the frames lost at the end."""
         ...
 
 
-def _counted_or_timed(opened: OpenedVideo, first: av.Packet[VideoStream], *, again: bool) -> _Line:
+def _select_timeline(opened: OpenedVideo, first: av.Packet[VideoStream], *, again: bool) -> _Timeline:
     reordered = opened.stream.codec_context.reorder_depth > 0
     if first.pts is None or (opened.container.format.name in _COUNTED_WHEN_REORDERED and reordered):
         if first.pts is None and not again:
             log.warning(
-                "%s: there are no times in this file: its pictures are counted, %g a second",
+                "%s: no time stamps in this file: frames are counted at %g a second",
                 opened.container.name,
                 opened.fps,
             )
-        return _CountedLine(opened)
-    return _TimedLine(opened)
+        return _CountedTimeline(opened)
+    return _StampedTimeline(opened)
 
 
-class _TimedLine:
-    """Finds lost pictures by the packets' time stamps.
+class _StampedTimeline:
+    """Finds lost frames by the packets' time stamps.
 
     After a damaged keyframe a decoder returns nothing until the next one, without an error. ``_spacing``
-    separates lost pictures from packets without one (VP8's invisible frames are stamped close to others).
+    separates lost frames from packets without one (VP8's invisible frames have time stamps close to others).
     """
 
     def __init__(self, opened: OpenedVideo) -> None:
@@ -87,7 +88,7 @@ class _TimedLine:
         self._origin: int | None = None
         self._last: int | None = None
 
-    def after(self, packet: av.Packet[VideoStream]) -> Iterator[TimedPicture]:
+    def decode(self, packet: av.Packet[VideoStream]) -> Iterator[TimedFrame]:
         if packet.pts is not None and not packet.is_discard:
             if self._last is not None and packet.pts < self._last:
                 yield self._at(packet.pts, None)  # the decoder had skipped ahead
@@ -102,11 +103,11 @@ class _TimedLine:
                 self._last = time
                 yield self._at(time, picture)
 
-    def rest(self) -> Iterator[TimedPicture]:
+    def flush(self) -> Iterator[TimedFrame]:
         if self._awaited:
             yield from self._lost_before(max(self._awaited) + self._spacing)
 
-    def _lost_before(self, time: int) -> Iterator[TimedPicture]:
+    def _lost_before(self, time: int) -> Iterator[TimedFrame]:
         earlier = sorted(awaited for awaited in self._awaited if awaited < time)
         self._awaited = [awaited for awaited in self._awaited if awaited > time]
         for lost in earlier:
@@ -115,23 +116,23 @@ class _TimedLine:
                 self._last = lost
                 yield self._at(lost, None)
 
-    def _at(self, time: int, picture: VideoFrame | None) -> TimedPicture:
+    def _at(self, time: int, picture: VideoFrame | None) -> TimedFrame:
         if self._origin is None:
             self._origin = time
-        return TimedPicture((time - self._origin) * self._unit, picture)
+        return TimedFrame((time - self._origin) * self._unit, picture)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PacketNumber:
-    """A packet's number. An object, since PyAV compares such tags by identity."""
+    """A packet's number, as an object: PyAV compares such tags by identity."""
 
     number: int
 
 
-class _CountedLine:
-    """Finds lost pictures in a file without display times, by counting at its assumed rate.
+class _CountedTimeline:
+    """Finds lost frames in a file without time stamps, by counting packets at its assumed rate.
 
-    Each picture carries its packet's number. A packet is lost when its picture is overdue by more than
+    Each decoded picture carries its packet's number. A frame is lost when it is overdue by more than
     reordering allows.
     """
 
@@ -139,9 +140,9 @@ class _CountedLine:
         self._context, self._fps = opened.stream.codec_context, opened.fps
         self._context.copy_opaque = True
         self._awaited: list[int] = []
-        self._packets = self._pictures = 0
+        self._packets = self._frames = 0
 
-    def after(self, packet: av.Packet[VideoStream]) -> Iterator[TimedPicture]:
+    def decode(self, packet: av.Packet[VideoStream]) -> Iterator[TimedFrame]:
         if packet.size:
             packet.opaque = _PacketNumber(self._packets)
             self._awaited.append(self._packets)
@@ -150,19 +151,23 @@ class _CountedLine:
             if isinstance(picture.opaque, _PacketNumber):
                 number = picture.opaque.number
                 if number not in self._awaited:
-                    continue  # already counted as lost
-                overdue = [it for it in self._awaited if it < number - self._context.reorder_depth]
-                self._awaited = [it for it in self._awaited if it not in overdue and it != number]
-                if not picture.interlaced_frame:  # of which two packets may make one
+                    continue  # counted as lost already
+                overdue = [
+                    awaited for awaited in self._awaited if awaited < number - self._context.reorder_depth
+                ]
+                self._awaited = [
+                    awaited for awaited in self._awaited if awaited not in overdue and awaited != number
+                ]
+                if not picture.interlaced_frame:  # two packets may be one interlaced frame
                     yield from (self._next(None) for _ in overdue)
             yield self._next(picture)
 
-    def rest(self) -> Iterator[TimedPicture]:
+    def flush(self) -> Iterator[TimedFrame]:
         return (self._next(None) for _ in self._awaited)
 
-    def _next(self, picture: VideoFrame | None) -> TimedPicture:
-        self._pictures += 1
-        return TimedPicture((self._pictures - 1) / self._fps, picture)
+    def _next(self, picture: VideoFrame | None) -> TimedFrame:
+        self._frames += 1
+        return TimedFrame((self._frames - 1) / self._fps, picture)
 
 
 def _decoded(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
@@ -182,7 +187,7 @@ def _packets(opened: OpenedVideo, *, again: bool) -> Iterator[av.Packet[VideoStr
                     "%s: its time stamps jump: playback continues across the jump",
                     redact_address(opened.container.name),
                 )
-                again = True  # once is enough
+                again = True  # warn only once
             yield packet
     except av.error.FFmpegError as error:
         if error.errno == errno.EINTR:

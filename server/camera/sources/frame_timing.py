@@ -1,4 +1,4 @@
-"""A recording's frame rate, and its pictures' times on the pulse clock."""
+"""Frame rate of a recording, and the mapping of frame times to pulses."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import math
 from av.video.stream import VideoStream
 
 DEFAULT_FPS = 25.0
-"""Pictures a second where the file does not declare a rate."""
+"""Frames per second where the file does not declare a rate."""
 _NEARLY = 0.05
-"""Relative deviation of the mean rate from a usual one, where pictures are missing."""
+"""Relative deviation of the mean rate from a usual one, due to missing frames."""
 _USUAL_DENOMINATORS = (1, 2, 1001)
 """Denominators of usual rates: 25, 12.5, 30000/1001."""
 _LATE = 0.45
-"""Share of a frame by which a picture may come after its pulse: times in files are rounded."""
+"""Share of a frame interval by which a frame may be later than its pulse: times in files are rounded."""
 
 
 def frame_rate(stream: VideoStream) -> float:
-    """Return pictures a second: the usual rate that fits their spacing, else their mean rate."""
+    """Return frames per second: the usual rate that fits their spacing, else the mean rate."""
     mean, spaced = stream.average_rate, stream.guessed_rate
     if not mean:
         return float(spaced) if spaced else DEFAULT_FPS
@@ -27,10 +27,10 @@ def frame_rate(stream: VideoStream) -> float:
 
 
 def frame_index(seconds: float, fps: float) -> int:
-    """Return the first frame, at ``fps``, that shows a picture ``seconds`` after the first one."""
+    """Return the index, at ``fps``, of a frame that is ``seconds`` after the first one."""
     return math.ceil(seconds * fps - _LATE)
 
 
 def frame_count(seconds: float, rate: float, fps: float) -> int:
-    """Return a recording's length in frames at ``fps``; its last picture is at ``seconds``."""
+    """Return a recording's length in frames at ``fps``; its last frame is at ``seconds``."""
     return max(1, frame_index(seconds + 1 / rate, fps))

@@ -21,9 +21,9 @@ _ENDINGS = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp"}
 
 
 class ImageFolder:
-    """Shows its image ``pulse - offset`` in the order of the file names, upright as EXIF says.
+    """Returns image number ``pulse - offset`` in the order of the file names, upright according to EXIF.
 
-    All are letterboxed to the first one's size. One that cannot be read shows as the one before it, and is
+    All are letterboxed to the size of the first one. An unreadable one is replaced by the previous one, and
     logged.
 
     Raises:
@@ -50,7 +50,7 @@ class ImageFolder:
         """Whether an image of another size was logged."""
 
     def take(self, pulse: int) -> Image | None:
-        """Return the image of a pulse; one that cannot be read shows as the one before it."""
+        """Return the image of a pulse; an unreadable one is replaced by the previous one."""
         index = pulse - self._offset
         if index < 0:
             return None
@@ -66,9 +66,9 @@ class ImageFolder:
             self._newest = self._fitted(image, self._files[index])
         return self._newest
 
-    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
+    def ahead(self, indices: Sequence[int]) -> Iterator[Image]:
         """Read some of the images; one that cannot be read is left out."""
-        files = [self._files[place] for place in places if place < len(self._files)]
+        files = [self._files[index] for index in indices if index < len(self._files)]
         images = ((_read(file), file) for file in files)
         return (self._fitted(image, file) for image, file in images if image is not None)
 
@@ -83,7 +83,7 @@ class ImageFolder:
         if not self._resized:
             self._resized = True
             log.warning(
-                "%s: is %dx%d, and the first image %dx%d: all are fitted into that",
+                "%s is %dx%d, the first image %dx%d: all images are letterboxed to that size",
                 *(file, *size, *self.size),
             )
         return Letterbox(size, self.size).image(image)
@@ -97,6 +97,6 @@ def _read(file: Path) -> Image | None:
         data = np.fromfile(file, dtype=np.uint8)
     except OSError:
         return None
-    # From memory: given a file name, OpenCV ignores the orientation of a TIFF.
+    # From memory: with a file name, OpenCV ignores the orientation of a TIFF.
     image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
     return None if image is None else np.asarray(image, dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""A live camera, by RTSP, HTTP, V4L2 or anything else that FFmpeg opens: its newest picture at each pulse."""
+"""A live camera over RTSP, HTTP, V4L2 or another input of FFmpeg: its newest image at each pulse."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ OPEN_S, READ_S = 10.0, 5.0
 """Timeouts of connecting and of reading, in seconds."""
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
 _JOIN_S = 0.5
-_FIRST_PICTURE_S = 2.0
-"""Seconds to wait for the first picture, which carries the orientation."""
+_FIRST_FRAME_S = 2.0
+"""Seconds to wait for the first frame, which carries the orientation."""
 _STALE_S = 1.5
-"""Age in seconds from which a picture is not shown again: the camera counts as away, and the view can change
-within the two seconds that are promised."""
+"""Age in seconds from which a frame is not shown again: the camera counts as away. Less than the two seconds
+within which the view must change."""
 _HELD_BACK = 2
-"""Pictures that FFmpeg holds back until the next one begins: one in the demuxer, one in the parser."""
+"""Frames that FFmpeg holds back until the next one begins: one in the demuxer, one in the parser."""
 
 
 class LiveStream:
@@ -50,47 +50,47 @@ class LiveStream:
         self._orientation = Orientation(pixel_aspect=pixel_aspect(opened.stream))
         self.size = self._orientation.size(self._stored)
         self._sized = threading.Event()
-        """Set by the first picture, from which on the size is fixed."""
+        """Set by the first frame; the size is fixed from then on."""
         self._resized: tuple[int, int] | None = None
-        """The new size of its pictures, where it has changed."""
+        """The new size of its images, if it has changed."""
         self._lock = threading.Lock()
         self._newest: VideoFrame | None = None
         self._newest_at = 0.0
         self._silence = _Silence()
         self._closing = threading.Event()
-        self._away = LogThrottle(quiet_s=0.0)
+        self._away_log = LogThrottle(quiet_s=0.0)
         self._thread = threading.Thread(target=self._run, args=(opened,), name="source", daemon=True)
         self._thread.start()
-        self._sized.wait(_FIRST_PICTURE_S)
+        self._sized.wait(_FIRST_FRAME_S)
         self._sized.set()
 
     def take(self, pulse: int) -> Image | None:
-        """Return the newest picture; None while the camera is away.
+        """Return the newest image; None while the camera is away.
 
         Raises:
-            UnavailableError: the size of its pictures has changed; the caller has to open it again, because
+            UnavailableError: the size of its images has changed; the caller has to open it again, because
                 homography, boxes and appearance models belong to the old size.
         """
         del pulse
         if self._resized is not None:
-            raise UnavailableError(f"{redact_address(self._url)}: {self._other_size(self._resized)}")
+            raise UnavailableError(f"{redact_address(self._url)}: {self._size_message(self._resized)}")
         with self._lock:
             picture = self._newest if time.monotonic() - self._newest_at < _STALE_S else None
         return None if picture is None else self._oriented(picture).image(picture)
 
-    def ahead(self, places: Sequence[int]) -> Iterator[Image]:  # noqa: ARG002 — Source
-        """Return nothing: a live camera has no pictures ahead."""
+    def ahead(self, indices: Sequence[int]) -> Iterator[Image]:  # noqa: ARG002 — FrameSource
+        """Return nothing: a live camera has no future frames."""
         return iter(())
 
     def close(self) -> None:
         """Stop reading."""
         self._closing.set()
-        self._thread.join(_JOIN_S)  # a silent camera blocks the thread for longer; it ends by itself
+        self._thread.join(_JOIN_S)  # a silent camera may block the thread for longer; it ends by itself
 
     def _run(self, opened: OpenedVideo | None) -> None:
         backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
         while not self._closing.is_set():
-            if opened is not None and self._read_alive(opened):
+            if opened is not None and self._read_safely(opened):
                 backoff.reset()
             if self._closing.wait(backoff.next()):
                 return
@@ -98,17 +98,17 @@ class LiveStream:
                 opened = open_video(self._url, self._options, (OPEN_S, READ_S))
             except UserError as error:
                 opened = None
-                self._lost(str(error))
+                self._log_away(str(error))
 
     def _read(self, opened: OpenedVideo) -> bool:
-        """Read until the connection ends; return whether any picture came."""
+        """Read until the connection ends; return whether any frame was decoded."""
         aspect = pixel_aspect(opened.stream)
         size = replace(self._orientation, pixel_aspect=aspect).size(opened.size)
         if size != self.size:
             self._resized = size
             opened.container.close()
             return False
-        any_picture, why = False, "the connection has ended"
+        has_frames, why = False, "the connection has ended"
         self._silence = _Silence()
         try:
             for packet in opened.container.demux(opened.stream, *self._audio_streams(opened)):
@@ -116,38 +116,38 @@ class LiveStream:
                     break
                 if packet.stream is opened.stream:
                     if self._decode(cast("av.Packet[VideoStream]", packet)):
-                        any_picture = True
+                        has_frames = True
                         self._log_recovered()
                 elif self._listener is not None:
                     self._listener.packet(cast("av.Packet[AudioStream]", packet))
         except _SizeChangedError as error:
-            why = str(error)  # damage, or a real change: the next connection shows which
+            why = str(error)  # damage, or a real change: the next connection tells them apart
         except (av.error.FFmpegError, OSError) as error:
             why = f"reading stopped: {timeout_message(error, READ_S) or ffmpeg_reason(error)}"
         finally:
             opened.container.close()
         if not self._closing.is_set():
-            self._lost(f"{redact_address(self._url)}: {why}")
-        return any_picture
+            self._log_away(f"{redact_address(self._url)}: {why}")
+        return has_frames
 
-    def _other_size(self, size: tuple[int, int]) -> str:
-        return "its pictures are {}x{} now, they were {}x{}".format(*size, *self.size)
+    def _size_message(self, size: tuple[int, int]) -> str:
+        return "its images are {}x{} now, they were {}x{}".format(*size, *self.size)
 
-    def _lost(self, why: str, *, unexpected: bool = False) -> None:
-        """Log that the camera is away, throttled for one that comes and goes."""
-        if (more := self._away.record(why)) is not None:
+    def _log_away(self, why: str, *, unexpected: bool = False) -> None:
+        """Log that the camera is away; throttled, as it may come and go."""
+        if (more := self._away_log.record(why)) is not None:
             log.warning("%s%s; retrying", why, more, exc_info=unexpected)
 
     def _log_recovered(self) -> None:
-        if ended := self._away.end():
-            log.info("%s: pictures come again, after %.0f s", redact_address(self._url), ended.seconds)
+        if ended := self._away_log.end():
+            log.info("%s: frames arrive again, after %.0f s", redact_address(self._url), ended.seconds)
 
-    def _read_alive(self, opened: OpenedVideo) -> bool:
-        """Read, and survive unexpected errors: the thread is not restarted."""
+    def _read_safely(self, opened: OpenedVideo) -> bool:
+        """Read, and log unexpected errors: the thread must survive them."""
         try:
             return self._read(opened)
         except Exception as error:  # noqa: BLE001 — logged with its traceback
-            self._lost(f"{redact_address(self._url)}: unexpected {type(error).__name__}", unexpected=True)
+            self._log_away(f"{redact_address(self._url)}: unexpected {type(error).__name__}", unexpected=True)
             opened.container.close()
             return False
 
@@ -160,17 +160,17 @@ class LiveStream:
         return streams
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
-        old = self._silence.was_before(packet, time.monotonic())
+        is_stale = self._silence.was_before(packet, time.monotonic())
         try:
             pictures = [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
-        except av.error.FFmpegError:  # damaged; read errors show up elsewhere
+        except av.error.FFmpegError:  # damaged; read errors are raised by the demuxer
             return False
         if pictures and not self._sized.is_set():
             self._set_orientation(pictures[0])
         for size in map(self._size_of, pictures):
             if size != self.size:
-                raise _SizeChangedError(self._other_size(size))
-        if pictures and not old:
+                raise _SizeChangedError(self._size_message(size))
+        if pictures and not is_stale:
             with self._lock:
                 self._newest, self._newest_at = pictures[-1], time.monotonic()
             newest = pictures[-1]
@@ -179,7 +179,7 @@ class LiveStream:
         return bool(pictures)
 
     def _set_orientation(self, first: VideoFrame) -> None:
-        """Set orientation and size by the first picture."""
+        """Set orientation and size from the first picture."""
         if (first.width, first.height) == self._stored:
             self._orientation = self._oriented(first)
             self.size = self._size_of(first)
@@ -195,14 +195,14 @@ class LiveStream:
 
 
 class _SizeChangedError(Exception):
-    """A picture's size differs from the first one's."""
+    """The size of a picture differs from the first one's."""
 
 
 class _Silence:
-    """Detects pictures from before a silence that arrive after it.
+    """Detects frames from before a silence of the camera that arrive after it.
 
-    In some formats, such as MPEG-TS, a picture ends where the next one begins: the last ones before a silence
-    arrive after it, as if they were new.
+    In some formats, such as MPEG-TS, a frame ends where the next one begins: the last ones before a silence
+    arrive after it, and look new.
     """
 
     def __init__(self) -> None:
@@ -217,7 +217,7 @@ class _Silence:
         at, last = self._at, self._time
         self._at, self._time = now, float(packet.pts * packet.time_base)
         if at is not None and now - at > _STALE_S:
-            # If time stamps jumped as well, a few new pictures count as old; that does no harm.
+            # If time stamps jumped as well, a few new frames count as old, which is harmless.
             self._until, self._left = last + (now - at) / 2, _HELD_BACK
         if not self._left or self._time >= self._until:
             self._left = 0

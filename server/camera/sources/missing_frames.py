@@ -11,15 +11,15 @@ from server.system.address_redaction import redact_address
 log = logging.getLogger(__name__)
 
 _MAX_SPANS = 5
-"""Places to list in a log line."""
+"""Spans to list in a log line."""
 _MAX_FRAMES = 100_000
 """Frames to remember of each kind."""
 _UNEVEN = 0.1
-"""Share of missing frames above which the camera's rate counts as uneven instead."""
+"""Share of missing frames from which the frame rate is reported as uneven instead."""
 
 
 class MissingFrames:
-    """Collects the frames that repeat an earlier picture; numbered from 0, in log lines from 1."""
+    """Collects the frames that repeat an earlier one; numbered from 0, in log lines from 1."""
 
     def __init__(self, path: str) -> None:
         self._path = path
@@ -46,38 +46,38 @@ class MissingFrames:
         self._is_logged = True
         if self._damaged:
             log.warning(
-                "%s: %d damaged frames show as the picture before them: %s",
+                "%s: %d damaged frames are replaced by the previous one: %s",
                 redact_address(self._path),
                 len(self._damaged),
-                _listed(self._damaged),
+                _format_spans(self._damaged),
             )
         missing = self._missing - self._damaged
         if len(missing) > _UNEVEN * length:
             log.warning(
-                "%s: its pictures come at uneven times (%.4g a second): each is shown when it was taken",
+                "%s: its frame rate is uneven (%.4g a second): each frame is shown at its own time",
                 redact_address(self._path),
                 rate,
             )
         elif missing:
             log.warning(
-                "%s: %d frames are missing from it and show as the picture before them: %s",
+                "%s: %d frames are missing and replaced by the previous one: %s",
                 redact_address(self._path),
                 len(missing),
-                _listed(missing),
+                _format_spans(missing),
             )
 
 
-def _listed(frames: set[int]) -> str:
-    """List frames as spans: `frame 4, 31 to 60`."""
+def _format_spans(frames: set[int]) -> str:
+    """Return frames as text, in spans: `frames 4, 31 to 60`."""
     spans = list(_spans(sorted(frames)))
-    words = [f"{first + 1}" if first == last else f"{first + 1} to {last + 1}" for first, last in spans]
-    more = f" and {len(words) - _MAX_SPANS} other places" if len(words) > _MAX_SPANS else ""
-    return f"frame{'s' if len(frames) > 1 else ''} {', '.join(words[:_MAX_SPANS])}{more}"
+    spans_text = [f"{first + 1}" if first == last else f"{first + 1} to {last + 1}" for first, last in spans]
+    more = f" and {len(spans_text) - _MAX_SPANS} other places" if len(spans_text) > _MAX_SPANS else ""
+    return f"frame{'s' if len(frames) > 1 else ''} {', '.join(spans_text[:_MAX_SPANS])}{more}"
 
 
 def _spans(frames: list[int]) -> Iterator[tuple[int, int]]:
     first = frames[0]
-    for one, other in pairwise([*frames, frames[-1] + 2]):
-        if other != one + 1:
-            yield first, one
-            first = other
+    for frame, following in pairwise([*frames, frames[-1] + 2]):
+        if following != frame + 1:
+            yield first, frame
+            first = following

@@ -1,4 +1,4 @@
-"""Opens video by FFmpeg, with error texts that a user can act on."""
+"""Opens video with FFmpeg; error texts tell the user what to do."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class OpenedVideo:
 
     Attributes:
         container: the file or connection.
-        stream: its first video.
-        size: width and height as stored; the first picture carries the orientation.
-        fps: its declared pictures a second.
-        frames: its declared number of pictures; 0: not declared.
-        videos: number of videos in it, without cover pictures.
+        stream: its first video stream.
+        size: width and height as stored; the first frame carries the orientation.
+        fps: its declared frame rate.
+        frames: its declared number of frames; 0: not declared.
+        video_streams: number of video streams, without cover images.
     """
 
     container: InputContainer
@@ -41,7 +41,7 @@ class OpenedVideo:
     size: tuple[int, int]
     fps: float
     frames: int
-    videos: int = 1
+    video_streams: int = 1
 
 
 def open_video(
@@ -66,27 +66,27 @@ def open_video(
     if container.format.name == _TEXT:
         container.close()
         raise UserError(
-            f"{name}: this is text, and no video; detections are named with --det, or with `detections` "
-            "beside a camera's source"
+            f"{name}: this is text, not video; for detections use --det, or `detections` "
+            "next to a camera's source"
         )
-    videos = [it for it in container.streams.video if not it.disposition & Disposition.attached_pic]
+    videos = [
+        stream for stream in container.streams.video if not stream.disposition & Disposition.attached_pic
+    ]
     if not videos:
         container.close()
         raise UserError(f"{name}: there is no video in this file")
     stream = videos[0]
-    context: VideoCodecContext | None = (
-        stream.codec_context
-    )  # PyAV's types do not know that it may be missing
+    context: VideoCodecContext | None = stream.codec_context  # it may be missing, contrary to PyAV's types
     if context is None or not context.width or not context.height:
         container.close()
-        raise UserError(f"{name}: cannot decode this video: no picture size in it; is the file whole?")
+        raise UserError(f"{name}: cannot decode this video: it has no frame size; is the file complete?")
     context.thread_count = 1  # one process per camera already uses the cores
     size = (context.width, context.height)
     return OpenedVideo(container, stream, size, frame_rate(stream), stream.frames, len(videos))
 
 
 def timeout_message(error: Exception, seconds: float) -> str | None:
-    """Return the error text of a source that sent nothing for so long."""
+    """Return the error text for a timeout of ``seconds``; None for other errors."""
     return f"no answer within {seconds:g} s" if isinstance(error, av.error.ExitError) else None
 
 
@@ -95,8 +95,8 @@ def _reason(source: str, error: Exception) -> str:
     if isinstance(error, OSError) and error.errno == errno.EIO and "://" in source:
         try:
             socket.getaddrinfo(urlsplit(source).hostname, None)
-        except socket.gaierror as unknown:
-            return str(unknown.strerror)
+        except socket.gaierror as resolution_error:
+            return str(resolution_error.strerror)
         except ValueError:
             pass  # not a valid address
     return ffmpeg_reason(error)

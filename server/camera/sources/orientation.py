@@ -1,4 +1,4 @@
-"""Orientation and pixel aspect: how a stored picture is turned, mirrored and stretched for display."""
+"""Orientation and pixel aspect: how a stored picture is rotated, mirrored and stretched for display."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MATRIX_NAME = "DISPLAYMATRIX"
 _MATRIX = struct.Struct("=9i")
 _MAX_ASPECT = 4.0
 """A pixel aspect beyond this counts as damage."""
-INTERLACED = "it is interlaced, so two moments are in one picture: deinterlaced, people are found better"
+INTERLACED = "it is interlaced: each frame mixes two moments; deinterlace it for better detection"
 """The warning about interlaced video, which is used as it is."""
 _SQUARE = 0.01
 """Deviation from square pixels that is ignored: encoders round."""
@@ -29,10 +29,10 @@ class Orientation:
     """The transformation of a stored picture for display.
 
     Attributes:
-        transposed: rows become columns, before anything is mirrored.
-        mirrored_x: left and right change places.
-        mirrored_y: top and bottom do.
-        pixel_aspect: how wide a stored pixel is, in heights of it.
+        transposed: rows become columns, before mirroring.
+        mirrored_x: left and right are exchanged.
+        mirrored_y: top and bottom are exchanged.
+        pixel_aspect: width of a stored pixel over its height.
     """
 
     transposed: bool = False
@@ -41,17 +41,17 @@ class Orientation:
     pixel_aspect: float = 1.0
 
     @property
-    def words(self) -> str:
-        """The transformation in words; empty: none."""
-        if self.turned:
-            return "turned or mirrored (display matrix)"
+    def description(self) -> str:
+        """The transformation as text; empty: none."""
+        if self.is_rotated:
+            return "rotated or mirrored (display matrix)"
         if self.pixel_aspect != 1.0:
             return f"stretched (its pixels are {self.pixel_aspect:.3g} times as wide as high)"
         return ""
 
     @property
-    def turned(self) -> bool:
-        """Whether the picture is shown turned or mirrored."""
+    def is_rotated(self) -> bool:
+        """Whether the picture is shown rotated or mirrored."""
         return self.transposed or self.mirrored_x or self.mirrored_y
 
     def size(self, stored: tuple[int, int]) -> tuple[int, int]:
@@ -64,9 +64,9 @@ class Orientation:
         image = to_bgr(picture)
         if self.pixel_aspect != 1.0:
             upright = replace(self, transposed=False).size((image.shape[1], image.shape[0]))
-            how = cv2.INTER_AREA if self.pixel_aspect < 1.0 else cv2.INTER_LINEAR
-            image = np.asarray(cv2.resize(image, upright, interpolation=how), dtype=np.uint8)
-        if not self.turned:
+            interpolation = cv2.INTER_AREA if self.pixel_aspect < 1.0 else cv2.INTER_LINEAR
+            image = np.asarray(cv2.resize(image, upright, interpolation=interpolation), dtype=np.uint8)
+        if not self.is_rotated:
             return image
         if self.transposed:
             image = image.transpose(1, 0, 2)
@@ -83,7 +83,7 @@ _QUARTERS = (
     Orientation(mirrored_x=True, mirrored_y=True),
     Orientation(transposed=True, mirrored_x=True),
 )
-"""By quarter turns to the left."""
+"""By quarter turns, counterclockwise."""
 
 
 def parse_orientation(picture: VideoFrame, pixel_aspect: float = 1.0) -> Orientation:
@@ -92,10 +92,10 @@ def parse_orientation(picture: VideoFrame, pixel_aspect: float = 1.0) -> Orienta
     Rotations are rounded to quarter turns. Of a photo's EXIF only the rotation is available.
     """
     try:
-        found = picture.side_data.get(_MATRIX_NAME)
+        matrix = picture.side_data.get(_MATRIX_NAME)
     except ValueError:  # PyAV does not know some other side data, such as a photo's EXIF
         return replace(_QUARTERS[round(picture.rotation / 90) % 4], pixel_aspect=pixel_aspect)
-    data = bytes(found) if isinstance(found, SideData) else b""
+    data = bytes(matrix) if isinstance(matrix, SideData) else b""
     if len(data) != _MATRIX.size:
         return Orientation(pixel_aspect=pixel_aspect)
     # The matrix maps (x, y) to (a x + c y, b x + d y).

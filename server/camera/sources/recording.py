@@ -1,4 +1,4 @@
-"""A recorded video, replayed on the pulses by its pictures' times."""
+"""A recorded video, replayed on the pulses according to its frames' times."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal
 from av.video.frame import VideoFrame
 
 from server.camera.sources.base import Image, SourceEndedError
-from server.camera.sources.frame_reader import TimedPicture, read_pictures
+from server.camera.sources.frame_reader import TimedFrame, read_frames
 from server.camera.sources.frame_timing import frame_count, frame_index
 from server.camera.sources.missing_frames import MissingFrames
 from server.camera.sources.opening import open_video
@@ -24,27 +24,27 @@ log = logging.getLogger(__name__)
 SAME_RATE = 0.001
 """Relative difference below which two rates count as equal: 29.97 is 30 in round numbers."""
 _MAX_NUMBERS = 10_000
-"""Pulses whose picture numbers are remembered; more than tracking can lag."""
+"""Pulses whose frame numbers are kept; more than tracking can lag."""
 
 
 class Recording:
-    """Shows at pulse ``offset + n`` the picture due ``n / fps`` seconds after the first one.
+    """Returns at pulse ``offset + n`` the frame that is shown ``n / fps`` seconds after the first one.
 
-    That is the newest picture due by then, within half a frame; at equal rates it is picture ``n``. So
+    That is the newest frame due by then, within half a frame interval; at equal rates it is frame ``n``. So
     recorded views stay aligned at any rate and load.
 
-    A damaged or missing picture shows as the one before it, so that later ones keep their time; this is
-    logged at the end. Pictures are upright, with square pixels, and letterboxed to the first one's size.
+    A damaged or missing frame is replaced by the previous one, so that later ones keep their time; this is
+    logged at the end. Images are upright, with square pixels, and letterboxed to the size of the first one.
 
     Args:
         path: the file.
-        offset: the pulse of its first picture.
+        offset: the pulse of its first frame.
         at_end: whether it stops or loops.
         fps: pulses a second; None: the recording's own rate.
         quiet: log no warnings about the file.
 
     Raises:
-        UserError: there is no such file, no video in it, or not one picture that can be decoded.
+        UserError: there is no such file, no video in it, or no frame that can be decoded.
     """
 
     recorded = True
@@ -65,57 +65,57 @@ class Recording:
         self._opened = open_video(path)
         self._aspect = pixel_aspect(self._opened.stream)
         self.fps = self._opened.fps
-        """The declared pictures a second."""
+        """The declared frame rate."""
         self.frames = self._opened.frames
-        """The declared number of pictures; 0: not declared."""
+        """The declared number of frames; 0: not declared."""
         self._site_fps = fps or self.fps
         self._same_rate = abs(self.fps / self._site_fps - 1) <= SAME_RATE
-        self._gaps: MissingFrames | None = None if quiet else MissingFrames(path)
+        self._missing_frames: MissingFrames | None = None if quiet else MissingFrames(path)
         self._length: int | None = None
-        """Its length in pulses; None: not known before its end."""
+        """Its length in pulses; None: unknown until its end."""
         self._number_offsets: dict[int, int] = {}
-        """By pulse: the shown picture's number minus the pulse's position, where they differ."""
+        """By pulse: the number of the shown frame minus its position, where they differ."""
         self._begin()
         try:
             first = self._forward(0)  # a broken file is rejected now, not at the first pulse
         except SourceEndedError:
-            self._gaps = None  # all of it is damaged
+            self._missing_frames = None  # all of it is damaged
             self.close()
             raise UserError(
-                f"{redact_address(path)}: there is not one picture in this video; is the file whole?"
+                f"{redact_address(path)}: this video has no frames; is the file complete?"
             ) from None
         self.orientation = parse_orientation(first, self._aspect)
-        """The first picture's orientation."""
+        """The orientation of the first frame."""
         self.size = self.orientation.size((first.width, first.height))
         self._resized = quiet
         """Whether a change of size was logged."""
         if not quiet:
-            self._log_peculiarities(first)
+            self._log_warnings(first)
 
     def take(self, pulse: int) -> Image | None:
-        """Return the picture of a pulse; None before the recording begins."""
+        """Return the image of a pulse; None before the recording begins."""
         index = pulse - self._offset
         if index < 0:
             return None
         try:
-            place = self._place(index)
-            picture = self._forward(place)
+            position = self._position(index)
+            picture = self._forward(position)
         except SourceEndedError:
             self._log_missing_frames()
             if not self._loop or not self._length:
                 raise
-            place = self._place(index)
-            picture = self._forward(place)
-        self._note_number(pulse, place)
+            position = self._position(index)
+            picture = self._forward(position)
+        self._record_number(pulse, position)
         return self._shown(picture)
 
     def counted_pulse(self, pulse: int) -> int:
-        """Return the pulse that this pulse's picture would have if pictures were counted one per pulse."""
+        """Return the pulse that this pulse's frame would have if frames were counted one per pulse."""
         return pulse + self._number_offsets.get(pulse, 0)
 
-    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
-        """Decode the frames at some places, from the file opened once more."""
-        return decode_frames(self._path, places, self._site_fps)
+    def ahead(self, indices: Sequence[int]) -> Iterator[Image]:
+        """Decode the frames with these indices, from a second reader of the file."""
+        return decode_frames(self._path, indices, self._site_fps)
 
     def close(self) -> None:
         """Close the file."""
@@ -124,15 +124,15 @@ class Recording:
 
     def _begin(self) -> None:
         again = self._quiet or self._length is not None
-        self._pictures = read_pictures(self._opened, again=again)
-        self._coming: TimedPicture | None = None
+        self._pictures = read_frames(self._opened, again=again)
+        self._upcoming: TimedFrame | None = None
         self._newest: VideoFrame | None = None
         self._at = self._number = self._requested = -1
-        """The newest picture's position and number, and the last requested position."""
+        """The newest frame's position and number, and the last requested position."""
         self._seconds = 0.0
 
-    def _place(self, index: int) -> int:
-        """Return the position for an index, modulo the length of a loop; rewind where needed."""
+    def _position(self, index: int) -> int:
+        """Return the position of an index, modulo the length of a loop; rewind if needed."""
         if self._length is None:
             return index
         if index >= self._length and not self._loop:
@@ -144,43 +144,43 @@ class Recording:
             self._begin()
         return index
 
-    def _forward(self, place: int) -> VideoFrame:
-        """Decode up to the picture shown at a position."""
-        self._requested = place
-        while (coming := self._coming or next(self._pictures, None)) is not None:
-            at = frame_index(coming.seconds, self._site_fps)
-            # If the beginning is damaged, the first good picture stands for it.
-            if at > place and self._newest is not None:
-                self._coming = coming
+    def _forward(self, position: int) -> VideoFrame:
+        """Decode up to the frame shown at a position, and return it."""
+        self._requested = position
+        while (upcoming := self._upcoming or next(self._pictures, None)) is not None:
+            at = frame_index(upcoming.seconds, self._site_fps)
+            # A damaged beginning is replaced by the first intact frame.
+            if at > position and self._newest is not None:
+                self._upcoming = upcoming
                 break
-            self._coming = None
-            self._take_in(at, coming)
+            self._upcoming = None
+            self._advance(at, upcoming)
         else:
             self._end()
-        if self._newest is None or (self._length is not None and place >= self._length):
+        if self._newest is None or (self._length is not None and position >= self._length):
             raise SourceEndedError(self._path)
         return self._newest
 
-    def _take_in(self, at: int, coming: TimedPicture) -> None:
-        """Advance to the file's next picture, which has a position."""
+    def _advance(self, at: int, upcoming: TimedFrame) -> None:
+        """Make the file's next frame, at a position, the newest one."""
         self._number += 1
-        self._seconds = max(self._seconds, coming.seconds)
-        noted = self._gaps if self._length is None else None
-        if noted is not None and coming.picture is None:
-            noted.add_damaged(at)
-        if noted is not None and self._same_rate:
-            noted.add_missing(range(self._at + 1, at))
+        self._seconds = max(self._seconds, upcoming.seconds)
+        missing = self._missing_frames if self._length is None else None
+        if missing is not None and upcoming.picture is None:
+            missing.add_damaged(at)
+        if missing is not None and self._same_rate:
+            missing.add_missing(range(self._at + 1, at))
         self._at = max(self._at, at)
-        self._newest = coming.picture or self._newest
+        self._newest = upcoming.picture or self._newest
 
     def _end(self) -> None:
         if self._length is None and self._newest is not None:
             self._length = frame_count(self._seconds, self.fps, self._site_fps)
 
-    def _note_number(self, pulse: int, place: int) -> None:
-        moved = self._number - place if self._at <= place else 0
-        if moved:
-            self._number_offsets[pulse] = moved
+    def _record_number(self, pulse: int, position: int) -> None:
+        offset = self._number - position if self._at <= position else 0
+        if offset:
+            self._number_offsets[pulse] = offset
             if len(self._number_offsets) > _MAX_NUMBERS:
                 del self._number_offsets[next(iter(self._number_offsets))]
 
@@ -192,43 +192,45 @@ class Recording:
         if not self._resized:
             self._resized = True
             log.warning(
-                "%s: its pictures are %dx%d from frame %d on, they were %dx%d: they are fitted into that",
+                "%s: its images are %dx%d from frame %d on, they were %dx%d: letterboxed to that size",
                 *(redact_address(self._path), *size, self._requested + 1, *self.size),
             )
         return Letterbox(size, self.size).image(image)
 
-    def _log_peculiarities(self, first: VideoFrame) -> None:
-        if self._opened.videos > 1:
+    def _log_warnings(self, first: VideoFrame) -> None:
+        if self._opened.video_streams > 1:
             log.warning(
-                "%s: there are %d videos in it: the first is taken",
+                "%s contains %d video streams: the first is used",
                 redact_address(self._path),
-                self._opened.videos,
+                self._opened.video_streams,
             )
         if first.interlaced_frame:
             log.warning("%s: %s", redact_address(self._path), INTERLACED)
         if not self._same_rate:
-            some = "left out" if self.fps > self._site_fps else "shown twice"
+            effect = "dropped" if self.fps > self._site_fps else "repeated"
             log.warning(
-                "%s: it has %.4g pictures a second, %.4g are taken: each is shown at its time, some are %s",
-                *(redact_address(self._path), self.fps, self._site_fps, some),
+                "%s has %.4g frames a second, the site %.4g: frames keep their times, some are %s",
+                *(redact_address(self._path), self.fps, self._site_fps, effect),
             )
 
     def _log_missing_frames(self) -> None:
-        if self._gaps is not None:
+        if self._missing_frames is not None:
             length = self._at + 1
-            self._gaps.log_summary(length, self._number / self._seconds if self._seconds else self.fps)
+            self._missing_frames.log_summary(
+                length, self._number / self._seconds if self._seconds else self.fps
+            )
 
 
-def decode_frames(path: str, places: Sequence[int], fps: float | None = None) -> Iterator[Image]:
-    """Decode frames of a file at ascending positions; fewer where the file is shorter.
+def decode_frames(path: str, indices: Sequence[int], fps: float | None = None) -> Iterator[Image]:
+    """Decode the frames of a file with ascending indices; fewer where the file is shorter.
 
     Raises:
         UserError: it cannot be opened.
     """
     recording = Recording(path, fps=fps, quiet=True)
     try:
-        for place in places:
-            image = recording.take(place)
+        for index in indices:
+            image = recording.take(index)
             if image is not None:
                 yield image
     except SourceEndedError:

@@ -1,4 +1,4 @@
-"""A synthetic scene as a picture source: ``scene:room?camera=0&cameras=3&objects=4&seed=1``."""
+"""A synthetic scene as a frame source: ``scene:room?camera=0&cameras=3&objects=4&seed=1``."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from server.config.sections import SiteSettings
 from server.system.errors import UserError
 from synthetic import Scene
 
-_WHOLE = re.compile(r"[0-9]{1,18}")
+_WHOLE_NUMBER = re.compile(r"[0-9]{1,18}")
 _DEFAULTS = {"camera": 0, "cameras": None, "objects": None, "seed": 1}  # None: the scene's default
 
 
 class SyntheticSource:
-    """Draws the picture of a pulse; endless.
+    """Draws the image of a pulse; endless.
 
     Raises:
         UserError: the scene is unknown, or its parameters are wrong.
@@ -29,9 +29,9 @@ class SyntheticSource:
         name, _, query = source.removeprefix("scene:").partition("?")
         values: dict[str, int | None] = dict(_DEFAULTS)
         for key, value in parse_qsl(query, keep_blank_values=True):
-            if key not in values or not _WHOLE.fullmatch(value):
+            if key not in values or not _WHOLE_NUMBER.fullmatch(value):
                 raise UserError(
-                    f"{source}: {key}={value} is not a whole number for one of {', '.join(values)}"
+                    f"{source}: {key}={value} must be a whole number, for one of {', '.join(values)}"
                 )
             values[key] = int(value)
         camera, seed = values["camera"] or 0, values["seed"] or 0
@@ -41,26 +41,28 @@ class SyntheticSource:
         except ValueError as error:
             raise UserError(f"{source}: {error}") from error
         if camera >= self._scene.cameras:
-            raise UserError(f"{source}: camera {camera} of {self._scene.cameras}: they count from 0")
+            raise UserError(
+                f"{source}: there is no camera {camera}: the scene has {self._scene.cameras}, numbered from 0"
+            )
         self._camera = camera
         self.size = size
 
     def warm_up(self) -> Self:
-        """Draw one picture: painting the room takes a second, which must not delay the first pulse."""
+        """Draw one image: painting the room takes a second, which must not delay the first pulse."""
         self._scene.image(self._camera, 0)
         return self
 
     def take(self, pulse: int) -> Image | None:
-        """Draw the picture of a pulse."""
+        """Draw the image of a pulse."""
         return self._scene.image(self._camera, pulse)
 
-    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
-        """Draw the pictures of some pulses."""
-        return (self._scene.image(self._camera, place) for place in places)
+    def ahead(self, pulses: Sequence[int]) -> Iterator[Image]:
+        """Draw the images of some pulses."""
+        return (self._scene.image(self._camera, pulse) for pulse in pulses)
 
     @property
     def ground(self) -> list[list[float]] | None:
-        """The homography from the picture to the floor in metres, as in a configuration; None: no floor."""
+        """The homography from the image to the floor in meters, as in a configuration; None: no floor."""
         homography = self._scene.homography(self._camera)
         return None if homography is None else [[float(entry) for entry in row] for row in homography]
 

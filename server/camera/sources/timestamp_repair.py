@@ -9,7 +9,7 @@ from server.camera.sources.opening import OpenedVideo
 
 _BACK_S = 1.0
 _FAR_S, _FAR_FRAMES = 60.0, 10
-"""A step forward beyond this, in seconds or frames, whichever is more, is a jump."""
+"""A step forward beyond the larger of the two, in seconds and frames, is a jump."""
 
 
 class TimestampRepair:

@@ -10,7 +10,7 @@ from multiprocessing.process import BaseProcess
 from multiprocessing.queues import Queue
 from typing import TypeAlias
 
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.camera.peers.cross_view_scorer import PeerDetections
 from server.camera.pipeline import CameraPipeline, DetectedFrame
 from server.camera.sources import SourceEndedError

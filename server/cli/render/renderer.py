@@ -33,7 +33,7 @@ class Renderer:
         # What is to be decided, and what the camera that was run first has done since.
         frames = 4 * (config.view.lookahead + config.encode.gop + config.track.window.stride)
         stream_format = stream_format_for(
-            config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
+            config.encode.codec, config.site.size, per_camera_parameters=config.encode.parameters == "own"
         )
         self._frame_buffers = {
             camera: FrameBuffer(config.site.fps, frames, stream_format) for camera in cameras

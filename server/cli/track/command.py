@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from server.camera.background_warmup import warm_up_detector
-from server.camera.sources import Image, PictureSource, SourceEndedError, open_source
+from server.camera.detector_setup import warm_up_detector
+from server.camera.sources import FrameSource, Image, SourceEndedError, open_source
 from server.camera.tracker_setup import set_up_tracker
 from server.cli.generated_config import config_for_videos
 from server.config.loader import build_config, read_content
@@ -117,16 +117,18 @@ def detect_frames(config: Config) -> Iterator[DetectedFrame]:
     """Yield every frame of the video with its detections, in the video's own pixels."""
     camera = config.cameras[0]
     source = open_source(camera, config.site)
-    fit = Letterbox(source.size, (config.site.width, config.site.height))
-    detector = warm_up_detector(config, camera, source, fit)
+    letterbox = Letterbox(source.size, (config.site.width, config.site.height))
+    detector = warm_up_detector(config, camera, source, letterbox)
     for number, image in read_frames(source):
         if image is not None:
-            detections = detector.detect(fit.image(image), number)
-            yield DetectedFrame(number, replace(detections, boxes=fit.boxes_to_own(detections.boxes)), image)
+            detections = detector.detect(letterbox.image(image), number)
+            yield DetectedFrame(
+                number, replace(detections, boxes=letterbox.boxes_to_camera(detections.boxes)), image
+            )
     source.close()
 
 
-def read_frames(source: PictureSource, first: int = 0) -> Iterator[tuple[int, Image | None]]:
+def read_frames(source: FrameSource, first: int = 0) -> Iterator[tuple[int, Image | None]]:
     """Yield the frames of a recording from `first` to its end; `None` where one has no picture."""
     for number in count(first):
         try:

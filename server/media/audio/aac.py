@@ -36,15 +36,15 @@ def silent_frame(channels: int) -> bytes:
 
 def adts(rate: int, channels: int, size: int) -> bytes:
     """Return the ADTS header of a frame of ``size`` bytes (1.A.2)."""
-    whole = size + 7
+    frame_bytes = size + 7
     return bytes(
         (
             0xFF,
             0xF1,  # MPEG-4, no checksum
             (_LOW_COMPLEXITY - 1) << 6 | RATES.index(rate) << 2 | channels >> 2,
-            (channels & 3) << 6 | whole >> 11,
-            whole >> 3 & 0xFF,
-            (whole & 7) << 5 | 0x1F,
+            (channels & 3) << 6 | frame_bytes >> 11,
+            frame_bytes >> 3 & 0xFF,
+            (frame_bytes & 7) << 5 | 0x1F,
             0xFC,
         )
     )

@@ -11,7 +11,7 @@ from server.media.containers.mp4_audio import audio_fragment
 
 @dataclass(frozen=True)
 class AudioChunk:
-    """Consecutive audio frames from number ``first`` on; missing ones are silent."""
+    """Consecutive audio frames, the first of which has number ``first``; missing ones are silent."""
 
     first: int
     frames: tuple[bytes, ...]
@@ -19,7 +19,7 @@ class AudioChunk:
 
     @property
     def silenced(self) -> AudioChunk:
-        """As many frames of silence."""
+        """The same number of silent frames."""
         return AudioChunk(self.first, (self.format.silence,) * len(self.frames), self.format)
 
     @cached_property

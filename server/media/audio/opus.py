@@ -1,4 +1,4 @@
-"""Parses the first bytes of Opus packets (RFC 6716, 3)."""
+"""Parses the header of Opus packets (RFC 6716, 3)."""
 
 from __future__ import annotations
 

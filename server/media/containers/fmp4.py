@@ -1,7 +1,7 @@
 """Fragmented MP4 muxer (ISO/IEC 14496-12 and -15): the init segment, and independent fragments of frames.
 
-A library's muxer holds a fragment back until the next packet, and muxes every stream again. Here a fragment
-is made once per camera and frame, and every stream is a list of references to such fragments.
+A muxer library would hold a fragment back until the next packet, and mux every stream again. Here a fragment
+is built once per camera and frame, and every stream is a list of references to such fragments.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def fragment(samples: Sequence[FragmentSample], first: int, fps: float) -> bytes
 def still_fragment(samples: Sequence[FragmentSample], first: int, until: int, fps: float) -> bytes:
     """Return a fragment that shows its last frame in ``first … until - 1``; the others last a tick each."""
     begin = ticks(first, fps)
-    return _fragment(samples, first, [*(begin + place for place in range(len(samples))), ticks(until, fps)])
+    return _fragment(samples, first, [*(begin + index for index in range(len(samples))), ticks(until, fps)])
 
 
 def _fragment(samples: Sequence[FragmentSample], first: int, edges: Sequence[int]) -> bytes:
@@ -87,7 +87,7 @@ def _fragment(samples: Sequence[FragmentSample], first: int, edges: Sequence[int
         for number, sample in enumerate(samples)
     )
     track_head = full_box("tfhd", 0, 0x020000, struct.pack(">I", _TRACK))
-    return moof_mdat(first, track_head, edges[0], 0x000701, entries, [it.data for it in samples])
+    return moof_mdat(first, track_head, edges[0], 0x000701, entries, [sample.data for sample in samples])
 
 
 def _entry(parameters: ParameterSets, width: int, height: int) -> bytes:
@@ -112,6 +112,6 @@ def shift_fragment(frame: bytes, by: int) -> bytes:
 
 
 def sample_of(frame: bytes) -> bytes:
-    """Return the sample of a fragment of :func:`fragment` with a single sample."""
+    """Return the sample of a single-sample fragment of :func:`fragment`."""
     (moof_bytes,) = struct.unpack_from(">I", frame)
     return frame[moof_bytes + 8 :]

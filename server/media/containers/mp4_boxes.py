@@ -27,7 +27,7 @@ def movie_head(last: int) -> bytes:
 
 
 def track_defaults(track: int) -> bytes:
-    """Return ``trex`` of a track whose fragments rely on no defaults."""
+    """Return ``trex`` of a track whose fragments use no defaults."""
     return full_box("trex", 0, 0, struct.pack(">5I", track, 1, 0, 0, 0))
 
 
@@ -80,9 +80,9 @@ def moof_mdat(
     ``first`` is the first sample's number, ``time`` its decode time; ``track_head`` is ``tfhd``. ``flags``
     and ``entries`` are those of ``trun``: the fields of each sample, and their values.
     """
-    # The sequence number only has to grow: taken from the sample's number, it fits into any stream.
+    # Sequence numbers need only ascend: derived from the sample's number, they do so in any stream.
     header = full_box("mfhd", 0, 0, struct.pack(">I", (first + 1) & 0xFFFFFFFF))
-    of_track = track_head + full_box("tfdt", 1, 0, struct.pack(">Q", time))
-    moof_bytes = 8 + len(header) + 8 + len(of_track) + 8 + 4 + 4 + 4 + len(entries)
+    track_boxes = track_head + full_box("tfdt", 1, 0, struct.pack(">Q", time))
+    moof_bytes = 8 + len(header) + 8 + len(track_boxes) + 8 + 4 + 4 + 4 + len(entries)
     run = full_box("trun", 0, flags, struct.pack(">Ii", len(samples), moof_bytes + 8) + entries)
-    return box("moof", header, box("traf", of_track, run)) + box("mdat", *samples)
+    return box("moof", header, box("traf", track_boxes, run)) + box("mdat", *samples)

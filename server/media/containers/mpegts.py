@@ -1,7 +1,7 @@
-"""MPEG transport stream muxer (ISO/IEC 13818-1): one program with video and perhaps audio, on one clock.
+"""MPEG transport stream muxer (ISO/IEC 13818-1): one program with video and optional audio.
 
-The packets of a PID are counted modulo 16 (continuity_counter). So that a GOP is packed once for all viewers,
-and any GOP can follow any other, each is stuffed to a multiple of 16 packets, so that all begin at 0. That
+The packets of a PID are counted modulo 16 (continuity_counter). A GOP is packed once for all viewers, and any
+GOP must be able to follow any other, so each is stuffed to a multiple of 16 packets: all begin at 0. That
 costs 7.5 packets per GOP on average.
 """
 
@@ -27,7 +27,7 @@ _H264, _AAC = 0x1B, 0x0F
 _CLOCK = 1 << 33
 """Time stamps are modulo this (2.4.3.7)."""
 _DELAY = TIMESCALE // 5
-"""How far the program clock reference is behind the presentation time: the decoder's buffering delay."""
+"""Ticks from the program clock reference to the presentation time: the decoder's buffering delay."""
 _PCR_EVERY = TIMESCALE // 10
 """The longest interval of the program clock reference (2.7.2)."""
 _PAYLOAD = PACKET_BYTES - 4
@@ -37,7 +37,7 @@ _AUD = b"\x00\x00\x00\x01\x09\xf0"
 """Access unit delimiter: begins every picture in a transport stream (2.14.1)."""
 _START_CODE = b"\x00\x00\x00\x01"
 _PES_HEAD = 14
-_FRAMES_AT_ONCE = 6
+_FRAMES_PER_PES = 6
 """Audio frames per PES packet, whose length field has 16 bits."""
 
 
@@ -48,17 +48,17 @@ class ContinuityCounters:
     tables: int = 0
     video: int = 0
     audio: int = 0
-    whole: bool = True
+    aligned: bool = True
     """Whether to stuff to a multiple of 16 packets, so that any GOP can follow."""
 
 
 def count_packets(picture: EncodedPicture) -> int:
-    """Return the number of packets of a picture, without those of stuffing alone; nothing is packed."""
+    """Return the number of packets of a picture, without packets that are only stuffing."""
     return _packets(_PES_HEAD + len(_AUD) + len(picture.sample))
 
 
 def count_audio_packets(audio: AudioChunk) -> int:
-    """Return the number of packets of some audio; 0 for Opus, which is left out."""
+    """Return the number of packets of some audio; 0 for Opus, which is not carried."""
     return sum(_plain_packets(len(content)) for content in _audio_pes(audio))
 
 
@@ -68,13 +68,13 @@ def pack(
     counters: ContinuityCounters,
     audio: AudioChunk | None = None,
 ) -> bytes:
-    """Return consecutive pictures as packets, behind their audio if that is AAC.
+    """Return consecutive pictures as packets, preceded by their audio if that is AAC.
 
-    The tables precede each whole GOP and each keyframe.
+    The tables precede each aligned GOP and each keyframe.
     """
     out: list[bytes] = []
     audio = audio if audio is not None and audio.format.coding == "aac" else None
-    if counters.whole or pictures[0].key:
+    if counters.aligned or pictures[0].key:
         out += [
             _table(_PAT_PID, _PAT, counters.tables),
             _table(_PMT_PID, _PMT if audio is None else _PMT_WITH_AUDIO, counters.tables),
@@ -82,36 +82,38 @@ def pack(
     if audio is not None:
         out += _pack_audio(audio, counters)
     counter = counters.video
-    for place, picture in enumerate(pictures):
+    for index, picture in enumerate(pictures):
         content = _pes(picture, fps)
         count = _packets(len(content))
-        if counters.whole and place == len(pictures) - 1:
+        if counters.aligned and index == len(pictures) - 1:
             count += -(counter + count) % COUNTERS
         time = ticks(picture.pulse, fps)
         out += _split(_VIDEO_PID, content, count, counter, _clock_reference(time, key=picture.key))
         counter = (counter + count) % COUNTERS
-        for later in range(time + _PCR_EVERY, ticks(picture.until, fps), _PCR_EVERY):
-            out.append(_packet(_VIDEO_PID, counter - 1, b"", _clock_reference(later)))
+        for reference_time in range(time + _PCR_EVERY, ticks(picture.until, fps), _PCR_EVERY):
+            out.append(_packet(_VIDEO_PID, counter - 1, b"", _clock_reference(reference_time)))
     return b"".join(out)
 
 
 def _pack_audio(audio: AudioChunk, counters: ContinuityCounters) -> Iterator[bytes]:
     counter, contents = counters.audio, _audio_pes(audio)
-    for place, content in enumerate(contents):
+    for index, content in enumerate(contents):
         count = _plain_packets(len(content))
-        if counters.whole and place == len(contents) - 1:
+        if counters.aligned and index == len(contents) - 1:
             count += -(counter + count) % COUNTERS
         yield from _split(_AUDIO_PID, content, count, counter, b"")
         counter = (counter + count) % COUNTERS
 
 
 def _audio_pes(audio: AudioChunk) -> list[bytes]:
-    """Return audio as PES packets, each frame behind its ADTS header."""
-    form, packets = audio.format, list[bytes]()
-    for place in range(0, len(audio.frames) if form.coding == "aac" else 0, _FRAMES_AT_ONCE):
-        stamp = _stamp(round((audio.first + place) * form.samples * TIMESCALE / form.rate) % _CLOCK)
-        frames = audio.frames[place : place + _FRAMES_AT_ONCE]
-        content = b"".join(form.adts(len(frame)) + frame for frame in frames)
+    """Return audio as PES packets; each frame has an ADTS header."""
+    audio_format, packets = audio.format, list[bytes]()
+    for start in range(0, len(audio.frames) if audio_format.coding == "aac" else 0, _FRAMES_PER_PES):
+        stamp = _stamp(
+            round((audio.first + start) * audio_format.samples * TIMESCALE / audio_format.rate) % _CLOCK
+        )
+        frames = audio.frames[start : start + _FRAMES_PER_PES]
+        content = b"".join(audio_format.adts(len(frame)) + frame for frame in frames)
         packets.append(
             struct.pack(">IHBBB", 0x1C0, 3 + len(stamp) + len(content), 0x84, 0x80, 5) + stamp + content
         )
@@ -156,11 +158,11 @@ def _clock_reference(time: int, *, key: bool = False) -> bytes:
 def _split(pid: int, content: bytes, count: int, counter: int, clock_reference: bytes) -> Iterator[bytes]:
     """Yield ``count`` packets of the content: full ones first, and at least one byte in each."""
     at = 0
-    for place in range(count):
-        field = clock_reference if place == 0 else b""
+    for index in range(count):
+        field = clock_reference if index == 0 else b""
         room = _PAYLOAD - (1 + len(field) if field else 0)
-        size = min(room, len(content) - at - (count - 1 - place))
-        yield _packet(pid, counter + place, content[at : at + size], field, begins=place == 0)
+        size = min(room, len(content) - at - (count - 1 - index))
+        yield _packet(pid, counter + index, content[at : at + size], field, begins=index == 0)
         at += size
 
 
@@ -181,7 +183,7 @@ def _table(pid: int, section: bytes, counter: int) -> bytes:
 
 
 def _section(table: int, number: int, body: bytes) -> bytes:
-    """Return a section of one part (2.4.4.3, 2.4.4.8), version 0, in force."""
+    """Return a table of a single section (2.4.4.3, 2.4.4.8), version 0, current."""
     content = struct.pack(">HBBB", number, 0xC1, 0, 0) + body
     head = struct.pack(">BH", table, 0xB000 | len(content) + 4) + content
     return head + struct.pack(">I", _crc(head))

@@ -1,6 +1,6 @@
 """WebM muxer (RFC 9559, in EBML, RFC 8794): a header of unknown length, and one cluster per frame.
 
-A cluster costs some twenty bytes. In return each frame carries its own time, as an MP4 fragment does, and can
+A cluster adds about twenty bytes. In return each frame carries its time, as an MP4 fragment does, and can
 follow any other.
 """
 
@@ -21,7 +21,7 @@ _BLOCK_DURATION, _REFERENCE = b"\x9b", b"\xfb"
 _TRACK = b"\x81"
 _KEY = 0x80
 _TIME_AT = len(CLUSTER) + 4 + len(_TIMESTAMP) + 1
-"""The offset of the time: behind the headers of the cluster and of the time itself."""
+"""The offset of the time, after the headers of the cluster and of the time element."""
 
 
 def ticks(pulse: int, fps: float) -> int:
@@ -60,7 +60,7 @@ def header(width: int, height: int, fps: float, frames: int | None = None) -> by
 def cluster(frame: bytes, pulse: int, fps: float, *, key: bool, duration: int = 1) -> bytes:
     """Return a frame as a cluster; ``duration`` in pulses is stated if it is more than one."""
     time = ticks(pulse, fps)
-    head = _TRACK + struct.pack(">h", 0)  # at the cluster's own time
+    head = _TRACK + struct.pack(">h", 0)  # relative to the cluster's time
     if duration == 1:
         block = _element(_SIMPLE_BLOCK, head + bytes([_KEY * key]) + frame)
     else:

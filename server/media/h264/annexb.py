@@ -21,12 +21,12 @@ _SET_MAX_BYTES = 0xFFFF
 
 @dataclass(frozen=True, slots=True)
 class ParameterSets:
-    """Sequence and picture parameter sets, which a decoder needs before the first picture."""
+    """Sequence and picture parameter sets (SPS, PPS), which a decoder needs before the first picture."""
 
     sps: bytes
     pps: bytes
     may_change: bool = False
-    """Whether the stream may change to others, which its keyframes carry."""
+    """Whether they may change in the stream; keyframes then carry the new ones."""
 
     @property
     def entry(self) -> str:

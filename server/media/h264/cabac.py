@@ -40,7 +40,7 @@ _RANGE_LPS = (
     (6, 8, 9, 11), (6, 7, 9, 10), (6, 7, 8, 9), (2, 2, 2, 2),
 )  # fmt: skip
 # transIdxLPS (table 9-45).
-_AFTER_UNLIKELY = (
+_NEXT_STATE_LPS = (
     0, 0, 1, 2, 2, 4, 4, 5, 6, 7, 8, 9, 9, 11, 11, 12, 13, 13, 15, 15, 16, 16, 18, 18, 19, 19, 21, 21, 22, 22,
     23, 24, 24, 25, 26, 26, 27, 27, 28, 29, 29, 30, 30, 30, 31, 32, 32, 33, 33, 33, 34, 34, 35, 35, 35, 36,
     36, 36, 37, 37, 37, 38, 38, 63,
@@ -104,7 +104,7 @@ class _Context:
 
 
 def _contexts(begin: Sequence[tuple[int, int]]) -> list[_Context]:
-    return [_Context(it) for it in begin]
+    return [_Context(slope_and_offset) for slope_and_offset in begin]
 
 
 class _Coder:
@@ -117,16 +117,16 @@ class _Coder:
 
     def put(self, bit: int, context: _Context) -> None:
         """Encode a bit, and update its context."""
-        unlikely = _RANGE_LPS[context.state][self._range >> 6 & 3]
-        self._range -= unlikely
+        lps_range = _RANGE_LPS[context.state][self._range >> 6 & 3]
+        self._range -= lps_range
         if bit == context.likely:
             context.state = min(context.state + 1, _LAST_STATE)
         else:
             self._low += self._range
-            self._range = unlikely
+            self._range = lps_range
             if context.state == 0:
                 context.likely = 1 - context.likely
-            context.state = _AFTER_UNLIKELY[context.state]
+            context.state = _NEXT_STATE_LPS[context.state]
         self._renormalize()
 
     def terminate(self, *, end: bool) -> None:

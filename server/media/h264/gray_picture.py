@@ -1,8 +1,8 @@
 """Writes a mid-gray H.264 keyframe, for viewers who may not see the cameras' pictures.
 
 Every macroblock has DC prediction and no residual (ITU-T H.264, 8.3.3.3), which is gray in all formats. The
-picture carries the parameter sets of its stream, so that a decoder takes it for a camera's keyframe. It is
-written once per parameter sets, and has a byte per macroblock at most.
+picture carries the parameter sets of its stream, so that a decoder accepts it like a camera's keyframe. It is
+written once per parameter sets, and has at most a byte per macroblock.
 """
 
 from __future__ import annotations

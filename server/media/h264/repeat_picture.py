@@ -1,7 +1,7 @@
-"""Writes an H.264 picture that repeats the one before it, to fill a gap in a stream.
+"""Writes an H.264 picture that repeats the previous one, to fill a gap in a stream.
 
-It is a P picture in which every macroblock is skipped (ITU-T H.264, 7.3.4): some ten bytes, pixel for pixel
-the picture before. The parameter sets determine the format of its slice header.
+It is a P picture in which every macroblock is skipped (ITU-T H.264, 7.3.4): about ten bytes, and pixel by
+pixel equal to the previous picture. The parameter sets determine the format of its slice header.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class SliceHeaderFormat:
                 head.ue(), head.ue(), head.ue()
                 return head.u(self.frame_num_bits)
             at += length
-        raise ValueError("a sample without a picture")
+        raise ValueError("the sample contains no picture")
 
     def next_num(self, frame_num: int) -> int:
         """Return the frame_num after this one."""
@@ -83,7 +83,7 @@ class SliceHeaderFormat:
     def repeat(self, frame_num: int, *, reference: bool) -> bytes:
         """Return a sample that shows the previous picture again, with this ``frame_num``.
 
-        A non-reference picture shares the number with the picture after it: one, but not two in a row, can be
+        A non-reference picture has the number of the picture after it: one, but not two in a row, can be
         inserted between two pictures of a camera (8.2.1.3).
         """
         bits = BitWriter()
@@ -121,7 +121,8 @@ def parse_repeatable(parameters: ParameterSets) -> SliceHeaderFormat:
     """Parse the slice header format of streams whose last picture can be repeated.
 
     Raises:
-        UnsupportedParametersError: they are damaged, or use features that x264 without B pictures does not.
+        UnsupportedParametersError: they are damaged, or use features that x264 does not use without B
+            pictures.
     """
     header_format = parse_slice_header_format(parameters)
     if header_format.order_bits:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from functools import lru_cache
 
-from server.media.vp8.repeat_frame import BLOCK, NO_TOKENS, SELDOM, frame_header
+from server.media.vp8.repeat_frame import BLOCK, NO_TOKENS, RARE, frame_header
 
 _HEADER_BITS = (
     (1, 0),  # color_space
@@ -36,9 +36,9 @@ _START = b"\x9d\x01\x2a"
 def gray_frame(width: int, height: int) -> bytes:
     """Return a gray keyframe of this size in pixels."""
     bits = frame_header(_HEADER_BITS)
-    bits.number(8, SELDOM)  # prob_skip_false
+    bits.number(8, RARE)  # prob_skip_false
     for _ in range(-(-width // BLOCK) * -(-height // BLOCK)):
-        bits.put(1, SELDOM)  # mb_skip_coeff
+        bits.put(1, RARE)  # mb_skip_coeff
         for bit, probability in _DC_LUMA:
             bits.put(bit, probability)
         bits.put(*_DC_CHROMA)

@@ -1,15 +1,13 @@
-"""Writes a VP8 frame that repeats the one before it, to fill a gap in a stream.
+"""Writes a VP8 frame that repeats the previous one, to fill a gap in a stream.
 
-It is an inter frame in which every macroblock is the last frame's at the same place, without residual
-(RFC 6386, 9 and 19). It leaves the decoder's state as it is.
+It is an inter frame in which every macroblock is copied from the same place of the previous frame, without
+residual (RFC 6386, 9 and 19). It leaves the decoder's state as it is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-
-from server.media.vp8.bool_writer import BoolWriter
 
 BLOCK = 16
 """The side of a macroblock in pixels."""
@@ -29,15 +27,15 @@ _HEADER_BITS = (
     (1, 0),  # refresh_last
 )
 """Number of bits and their value, up to the token probabilities (9.3 to 9.8)."""
-SELDOM, OFTEN = 1, 255
+RARE, OFTEN = 1, 255
 """Probabilities, out of 256, that a bit is 0."""
 _ZERO_MV = {0: 7, 2: 135, 5: 234}
 """The probability of a block without motion, by its still neighbors; near ones count twice (8.3.3)."""
 NO_TOKENS = bytes(4)
-"""The second partition, of which nothing is read; some decoders reject an empty one."""
+"""The second partition; decoders read nothing of it, but some reject an empty one."""
 
 # The probabilities that token probabilities are not updated (13.4): a line per plane and band, with the first
-# numbers of its three contexts; the rest, up to the eleventh, are 255.
+# numbers of its three contexts; the remaining ones, up to the eleventh, are 255.
 _COEFFICIENT_UPDATES = """
 ,,
 176 246,223 241 252,249 253 253
@@ -73,6 +71,7 @@ _COEFFICIENT_UPDATES = """
 ,254,
 """
 _PER_CONTEXT = 11
+_PADDING_BITS = 32
 _MOTION_UPDATES = (
     *(237, 246, 253, 253, 254, 254, 254, 254, 254, 254, 254, 254, 254, 254, 250, 250, 252, 254, 254),
     *(231, 243, 245, 253, 254, 254, 254, 254, 254, 254, 254, 254, 254, 254, 251, 251, 254, 254, 254),
@@ -84,15 +83,15 @@ _MOTION_UPDATES = (
 def repeat_frame(width: int, height: int) -> bytes:
     """Return a frame of this size in pixels that shows the previous one again."""
     bits = frame_header(_HEADER_BITS)
-    for probability in (SELDOM, SELDOM, OFTEN, OFTEN):  # prob_skip_false, _intra, _last, _gf
+    for probability in (RARE, RARE, OFTEN, OFTEN):  # prob_skip_false, _intra, _last, _gf
         bits.number(8, probability)
     bits.number(2, 0)  # the probabilities of intra modes stay
     for probability in _MOTION_UPDATES:
         bits.put(0, probability)
     for row in range(-(-height // BLOCK)):
         for column in range(-(-width // BLOCK)):
-            bits.put(1, SELDOM)  # mb_skip_coeff
-            bits.put(1, SELDOM)  # is_inter_mb
+            bits.put(1, RARE)  # mb_skip_coeff
+            bits.put(1, RARE)  # is_inter_mb
             bits.put(0, OFTEN)  # mb_ref_frame_sel1: the last frame
             near = 2 * (row > 0) + 2 * (column > 0) + (row > 0 and column > 0)
             bits.put(0, _ZERO_MV[near])
@@ -119,4 +118,38 @@ def _coefficient_updates() -> list[int]:
     """Return the probabilities that token probabilities are not updated, in order."""
     lines = _COEFFICIENT_UPDATES.strip().splitlines()
     contexts = [context.split() for line in lines for context in line.split(",")]
-    return [int(it) for some in contexts for it in (some + ["255"] * _PER_CONTEXT)[:_PER_CONTEXT]]
+    return [
+        int(number) for context in contexts for number in (context + ["255"] * _PER_CONTEXT)[:_PER_CONTEXT]
+    ]
+
+
+class BoolWriter:
+    """The boolean entropy encoder (RFC 6386, 7.3), on integers of any length."""
+
+    def __init__(self) -> None:
+        self._bottom, self._range, self._bits = 0, 255, 0
+
+    def put(self, bit: int, probability: int) -> None:
+        """Write a bit; ``probability``, out of 256, is that of 0."""
+        split = 1 + ((self._range - 1) * probability >> 8)
+        if bit:
+            self._bottom += split
+            self._range -= split
+        else:
+            self._range = split
+        shift = 8 - self._range.bit_length()
+        self._range <<= shift
+        self._bottom <<= shift
+        self._bits += shift
+
+    def number(self, bits: int, value: int) -> None:
+        """Write an unsigned number in ``bits`` bits, the highest first."""
+        for place in reversed(range(bits)):
+            self.put(value >> place & 1, 128)
+
+    def to_bytes(self) -> bytes:
+        """Return the bytes, padded: decoders read ahead, and some treat the end of the data as damage."""
+        self.number(_PADDING_BITS, 0)
+        bits = self._bits + 8
+        spare = -bits % 8
+        return (self._bottom << spare).to_bytes((bits + spare) // 8, "big")

@@ -41,7 +41,7 @@ class Vp8StreamFormat(StreamFormat):
             ParameterMismatchError: it is not VP8 of the site's size.
         """
         if keyframe_size(key) != self._size:
-            raise ParameterMismatchError("its pictures are not VP8 of the site's size")
+            raise ParameterMismatchError("its frames are not VP8 of the site's size")
 
     def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
         """Return a frame as a cluster, which can be spliced into any stream of the site."""
@@ -51,12 +51,12 @@ class Vp8StreamFormat(StreamFormat):
         self,
         size: tuple[int, int],
         fps: float,
-        sound: AudioFormat | None = None,
+        audio: AudioFormat | None = None,
         *,
         pulses: int | None = None,
     ) -> bytes:
         """Return the initialization segment, without audio."""
-        del sound
+        del audio
         return header(*size, fps, pulses)
 
     def rebase(self, origin: int, fragment: bytes, fps: float) -> bytes:
@@ -81,7 +81,7 @@ class Vp8StreamFormat(StreamFormat):
 
 @dataclass(frozen=True, slots=True)
 class Vp8GapFiller:
-    """Repeats the last picture; decoding is the same with and without the repetitions."""
+    """Repeats the last picture; the repetitions do not affect decoding."""
 
     data: bytes
     fps: float
@@ -97,12 +97,12 @@ class Vp8GapFiller:
         return [self._picture(span) for span in spans]
 
     def before(self, picture: EncodedPicture, span: Span) -> list[EncodedPicture]:
-        """Return one picture: it does not change how the next one is decoded."""
+        """Return one picture, which does not affect decoding of the next one."""
         del picture
         return [self._picture(span)]
 
     def is_lost_between(self, newest: EncodedPicture, picture: EncodedPicture, missing: int) -> bool:
-        """Return whether frames were lost between two, by the reference that the camera reports."""
+        """Return whether frames were lost between two pictures, by the reference that the camera reports."""
         return missing > 0 and picture.after != newest.pulse
 
     def _picture(self, span: Span) -> EncodedPicture:

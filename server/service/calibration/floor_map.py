@@ -39,7 +39,7 @@ def floor_coverage(own: Floats, size: tuple[int, int], site: tuple[int, int]) ->
     """
     letterbox = Letterbox(size, site)
     left, top = letterbox.to_site(np.zeros(2)).tolist()
-    to_own = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, letterbox.scale]]) / letterbox.scale
+    to_camera = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, letterbox.scale]]) / letterbox.scale
     width, height = (float(side) for side in size)
     # The floor lies below the horizon: where there is one, lower in the picture is nearer.
     corners = np.array([[0.0, height], [width, height], [width, 0.0], [0.0, 0.0]])
@@ -49,7 +49,7 @@ def floor_coverage(own: Floats, size: tuple[int, int], site: tuple[int, int]) ->
     outline = (
         np.empty((0, 2)) if near <= 0 else _mapped(matrix, _clip(corners, matrix[2], near / FARTHEST_RATIO))
     )
-    return FloorCoverage(np.asarray(matrix @ to_own), outline)
+    return FloorCoverage(np.asarray(matrix @ to_camera), outline)
 
 
 def _clip(corners: Floats, row: Floats, least: float) -> Floats:

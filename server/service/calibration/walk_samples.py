@@ -69,7 +69,7 @@ class CameraWalk:
             self._track_indices.setdefault((message.boot, it.id), len(self._track_indices))
             for it in message.tracks
         ]
-        own = Letterbox(message.size, self._site).boxes_to_own(boxes[track, frame])
+        own = Letterbox(message.size, self._site).boxes_to_camera(boxes[track, frame])
         self._frames.append(frame + first - start)
         self._track.append(np.array(indices, dtype=np.int64)[track])
         self._boxes.append(own)

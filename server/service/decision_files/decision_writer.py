@@ -96,7 +96,7 @@ class DecisionWriter:
         self._files.close()
 
     def _rows(self, camera: str, frame: int, boxes: Sequence[NumberedBox]) -> Iterator[str]:
-        own = self._fits[camera].boxes_to_own(np.array([box for _, *box in boxes], dtype=np.float64))
+        own = self._fits[camera].boxes_to_camera(np.array([box for _, *box in boxes], dtype=np.float64))
         for (number, *_), (left, top, right, bottom) in zip(boxes, own.tolist(), strict=True):
             yield format_row(MotRow(frame, number, left, top, right - left, bottom - top)) + "\n"
 

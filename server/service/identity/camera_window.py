@@ -27,7 +27,7 @@ class CameraWindow:
         message: the message itself.
         keys: the site-wide keys of the tracks; T of them.
         locals: (T,) the keys' local ids.
-        fit: the letterbox from the camera's own picture to the site's.
+        letterbox: the letterbox from the camera's own picture to the site's.
         boxes: (T, F, 4) pixels of the site's picture, NaN where hidden.
         fresh: the first frame that was not final before; later than `first` for a revision of the past.
     """
@@ -35,7 +35,7 @@ class CameraWindow:
     message: CameraTracks
     keys: tuple[TrackKey, ...]
     locals: NDArray[np.int64]
-    fit: Letterbox
+    letterbox: Letterbox
     boxes: Floats
     fresh: int
 
@@ -49,7 +49,7 @@ class CameraWindow:
         _, height = self.message.size
         known = slice(self.fresh - self.first, max(0, self.message.final_to - self.first + 1))
         hidden = np.isnan(self.boxes[:, known, 0])
-        own = self.fit.boxes_to_own(self.boxes[:, known])
+        own = self.letterbox.boxes_to_camera(self.boxes[:, known])
         return [
             TrackUpdate(
                 camera=key.camera,
@@ -111,9 +111,9 @@ class WindowReader:
             yield self._window(message)
 
     def _window(self, message: CameraTracks) -> CameraWindow:
-        fit = self.letterboxes.get(message.camera)
-        if fit is None or fit.own != message.size:
-            fit = self.letterboxes[message.camera] = Letterbox(message.size, self._site_size)
+        letterbox = self.letterboxes.get(message.camera)
+        if letterbox is None or letterbox.camera_size != message.size:
+            letterbox = self.letterboxes[message.camera] = Letterbox(message.size, self._site_size)
         keys = self.locals.of(message)
         frames = max(0, message.last - message.first + 1)
         boxes = boxes_array(track.boxes for track in message.tracks)
@@ -121,7 +121,7 @@ class WindowReader:
         fresh = message.first
         if message.revised_from is not None:
             fresh = max(fresh, min(self._final.get(message.camera, -1), message.final_to) + 1)
-        return CameraWindow(message, keys, locals_, fit, boxes.reshape(len(keys), frames, 4), fresh)
+        return CameraWindow(message, keys, locals_, letterbox, boxes.reshape(len(keys), frames, 4), fresh)
 
     def with_current_keys(self, window: CameraWindow) -> CameraWindow:
         """Return a window with its tracks' current keys."""

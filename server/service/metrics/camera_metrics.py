@@ -73,8 +73,8 @@ class StageTotals:
     def window(self, tracks: CameraTracks, due: float | None, *, certified: bool) -> None:
         """Count a window; ``due`` is when its last frame was due, None: unknown."""
         self.corrected += tracks.revised_from is not None
-        if tracks.search_s is not None:
-            self.search.observe(tracks.search_s)
+        if tracks.detection_s is not None:
+            self.search.observe(tracks.detection_s)
         if tracks.solve is not None:
             self.windows += 1
             self.certified += certified

@@ -80,7 +80,7 @@ class TsContinuity:
         self, pictures: Sequence[EncodedPicture], audio: AudioChunk | None, *, is_filler: bool = False
     ) -> MediaChunk:
         """Return the next pictures, at least one, with their audio as a chunk."""
-        counters = ContinuityCounters(self._tables, self._packets, self._audio_packets, whole=False)
+        counters = ContinuityCounters(self._tables, self._packets, self._audio_packets, aligned=False)
         self._audio_packets += 0 if audio is None else count_audio_packets(audio)
         self._tables += pictures[0].key
         self._packets += sum(count_packets(picture) for picture in pictures)

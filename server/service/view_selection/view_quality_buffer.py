@@ -120,8 +120,8 @@ class ViewQualityBuffer:
         if own is None or camera in self._overhead:
             return None
         (left, top), scale = self.letterboxes[camera].to_site(np.zeros(2)), self.letterboxes[camera].scale
-        to_own = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, scale]]) / scale
-        return np.asarray(own @ to_own)
+        to_camera = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, scale]]) / scale
+        return np.asarray(own @ to_camera)
 
 
 def _stacked_boxes(windows: Sequence[CameraWindow], start: int) -> Floats:

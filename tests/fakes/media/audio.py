@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fakes.service.scripted_cameras import GOP, FedService
 from server.camera.audio import EncodedAudioFrame, RecordedAudioSource, consecutive_runs
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.messaging.inbox import Message
 from server.messaging.messages import AudioHeader, ZenohKeys

@@ -6,7 +6,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.h264.annexb import nal_units, parameter_sets
 from server.media.h264.repeat_picture import SliceHeaderFormat, parse_repeatable

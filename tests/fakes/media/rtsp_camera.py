@@ -9,7 +9,7 @@ import struct
 import threading
 from collections.abc import Iterator, Sequence
 
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.media.h264.annexb import NAL_PPS, NAL_SPS, nal_type, nal_units
 
 _PAYLOAD_TYPE = 96

@@ -25,7 +25,7 @@ from fakes.service.scripted_cameras import (
     word,
 )
 from fakes.timeouts import PATIENCE
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
 from server.messaging.epochs import end_of_epoch

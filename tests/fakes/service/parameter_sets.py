@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fakes.service.fed_site import A, B
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, NO_REASON, WIDTH
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.view_selection.decider import GopDecision, ObjectChoice

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from bestview import IdentityUpdate, TrackletKey, TrackUpdate
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.loader import build_config
 from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config

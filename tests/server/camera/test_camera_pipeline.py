@@ -12,7 +12,7 @@ import pytest
 
 from bestview import QualitySettings
 from fakes.media.videos import HEIGHT, WIDTH, write_video
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEndedError
 from server.cli.render.camera_workers import EpochBatch, run_camera
@@ -119,7 +119,7 @@ def test_people_in_a_recording_are_looked_for_from_its_first_frame_on(
     searched = [pipeline.detect(pulse, pipeline.take(pulse)) for pulse in range(30)]
     words = [pipeline.track_detections(it) for it in searched]
     pipeline.close()
-    assert [it.is_searched for it in searched] == [pulse >= first for pulse in range(30)]
+    assert [it.has_detection for it in searched] == [pulse >= first for pulse in range(30)]
     assert [pulse for word in words if word for pulse in word.without_detection] == list(range(first))
 
 
@@ -220,9 +220,7 @@ def test_a_homography_that_has_no_floor_in_the_picture_is_refused(recording: Pat
     past_down = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 109.0]]  # the floor ends below the picture
     with pytest.raises(UserError) as caught:
         CameraPipeline(config_of(recording, ground=past_down), "c0")
-    assert str(caught.value).startswith(
-        "camera c0: ground: all of its picture, 192x108, lies above the horizon"
-    )
+    assert str(caught.value).startswith("camera c0: ground: its whole image, 192x108, lies above the horizon")
     assert "\n" not in str(caught.value)
     past_down[2][2] = 107.0
     CameraPipeline(config_of(recording, ground=past_down), "c0")

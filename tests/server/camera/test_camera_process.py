@@ -289,4 +289,4 @@ async def test_a_camera_on_the_topmost_rung_shows_every_gop_and_ends_every_windo
     assert b"not searched" in in_folder(tmp_path / "out")["late.csv"]
     statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in plain.of("c0/status")]
     assert statuses[-1].load_level == 4
-    assert "searching every 5th frame" in statuses[-1].load
+    assert "detecting in every 5th frame" in statuses[-1].load

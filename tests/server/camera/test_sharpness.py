@@ -47,19 +47,19 @@ def test_of_next_to_nothing_nothing_is_said(box: Box) -> None:
 
 def test_who_is_hidden_is_as_sharp_as_they_were_and_who_went_is_forgotten() -> None:
     it = SharpnessMemory()
-    [seen] = it.measured(word("c0", 0, {1: BOX}), picture()).tracks
+    [seen] = it.measure(word("c0", 0, {1: BOX}), picture()).tracks
     assert seen.sharpness == sharpness(picture(), BOX)
-    hidden = it.measured(word("c0", 1, {1: None, 2: None}), picture(blur=5.0)).tracks
+    hidden = it.measure(word("c0", 1, {1: None, 2: None}), picture(blur=5.0)).tracks
     assert [track.sharpness for track in hidden] == [seen.sharpness, None]
-    [ended] = it.measured(word("c0", 2, {1: BOX}), None).tracks
+    [ended] = it.measure(word("c0", 2, {1: BOX}), None).tracks
     assert ended.sharpness == seen.sharpness
-    it.measured(word("c0", 3, {}), picture())
-    [again] = it.measured(word("c0", 4, {1: None}), picture()).tracks
+    it.measure(word("c0", 3, {}), picture())
+    [again] = it.measure(word("c0", 4, {1: None}), picture()).tracks
     assert again.sharpness is None
 
 
 def test_the_rest_of_the_message_stays() -> None:
     message = word("c0", 0, {1: BOX})
-    measured = SharpnessMemory().measured(message, picture())
+    measured = SharpnessMemory().measure(message, picture())
     bare = [msgspec.structs.replace(track, sharpness=None) for track in measured.tracks]
     assert msgspec.structs.replace(measured, tracks=bare) == message

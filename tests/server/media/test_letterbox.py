@@ -20,7 +20,7 @@ def test_boxes_are_the_same_after_mapping_to_the_site_and_back(
 ) -> None:
     letterbox, own_boxes = Letterbox(own, site), np.array(boxes)
     np.testing.assert_allclose(
-        letterbox.boxes_to_own(letterbox.boxes_to_site(own_boxes)), own_boxes, atol=1e-6
+        letterbox.boxes_to_camera(letterbox.boxes_to_site(own_boxes)), own_boxes, atol=1e-6
     )
 
 

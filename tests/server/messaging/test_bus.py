@@ -147,7 +147,7 @@ async def test_two_clients_exchange_messages_through_the_router_until_one_unsubs
     settings: ZenohSettings,
 ) -> None:
     router = Bus.router(settings)
-    one, two = Bus.hearing(settings), Bus.hearing(settings)
+    one, two = Bus.listener(settings), Bus.listener(settings)
     heard, ended, there = Heard(), Heard(), Presence()
     two.subscribe("found/*", heard.queue.put_nowait)
     end = two.listen("found/one", ended.queue.put_nowait)
@@ -169,8 +169,8 @@ async def test_a_session_that_hears_other_clients_needs_the_router(
     settings: ZenohSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 100)
-    with pytest.raises(UserError, match=r"zenoh\.connect: no router answers at tcp/127"):
-        Bus.hearing(settings)
+    with pytest.raises(UserError, match=r"zenoh\.connect: no router responds at tcp/127"):
+        Bus.listener(settings)
 
 
 async def test_liveliness_tokens_of_present_and_closed_sessions_are_reported(

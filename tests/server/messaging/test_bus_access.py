@@ -156,8 +156,8 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
         assert alive == [SITE.camera("c1", "alive")]
         assert not [it for it in overheard.texts if it.startswith("c1")]  # they hear themselves
         for it in strangers:
-            with pytest.raises(UserError, match=r"zenoh\.connect: no router answers at"):
-                await asyncio.to_thread(Bus.hearing, it, "c0")
+            with pytest.raises(UserError, match=r"zenoh\.connect: no router responds at"):
+                await asyncio.to_thread(Bus.listener, it, "c0")
 
 
 def _all(buses: Sequence[Bus], number: int) -> None:
@@ -176,7 +176,7 @@ async def test_camera_commands_come_from_the_service_and_reach_that_camera_only(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
         lambda: Bus.client(settings, "c1"),
-        lambda: Bus.hearing(settings, "auditor"),
+        lambda: Bus.listener(settings, "auditor"),
     ) as (bestview, c0, c1, auditor):
         c0.subscribe(SITE.camera("c0", what), heard)
         c1.subscribe(SITE.camera("c0", what), overheard)
@@ -206,8 +206,8 @@ async def test_cameras_receive_peers_detections_but_not_their_video(settings: Ze
     with opened(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
-        lambda: Bus.hearing(settings, "c1"),
-        lambda: Bus.hearing(settings, "auditor"),
+        lambda: Bus.listener(settings, "c1"),
+        lambda: Bus.listener(settings, "auditor"),
     ) as (_, c0, c1, auditor):
         for key in (SITE.camera("c0", "*"), SITE.camera("c0", "detections"), SITE.camera("c1", "detections")):
             c1.subscribe(key, heard)
@@ -233,7 +233,7 @@ async def test_a_further_service_may_subscribe_and_publish_everything(settings: 
     with opened(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
-        lambda: Bus.second(settings, "bestview-1"),
+        lambda: Bus.further_service(settings, "bestview-1"),
     ) as (bestview, c0, second):
         second.subscribe(SITE.camera("*", "tracks"), heard)
         bestview.subscribe(SITE.bestview("choices", 1), told)

@@ -110,5 +110,5 @@ async def test_what_is_wrong_with_a_camera_that_was_waited_for_ends_no_others(
     site = begin(128, "pass")
     await site.told.until(lambda line: "Connection refused; retrying" in line)
     await site.answer()
-    with pytest.raises(UnavailableError, match=r"^camera c0: h264: pass: its pictures are 64x48"):
+    with pytest.raises(UnavailableError, match=r"^camera c0: h264: pass: its frames are 64x48"):
         await asyncio.wait_for(site.process, PATIENCE)

@@ -21,7 +21,7 @@ from server.camera.audio import LiveAudioSource, RecordedAudioSource, recorded_s
 from server.camera.peers.detection_exchange import PeerDetectionExchange
 from server.camera.process import CameraProcess
 from server.camera.sources import recording
-from server.camera.sources.frame_reader import read_pictures
+from server.camera.sources.frame_reader import read_frames
 from server.camera.sources.recording import Recording
 from server.config.sections import SoundSettings
 from server.media.rendering_messages import RenderRequest
@@ -48,7 +48,7 @@ async def test_words_that_come_too_late_again_and_again_are_told_of_seldom_and_w
     caplog.set_level("INFO")
     clock = [0.0]
     exchange = PeerDetectionExchange(small_config(), "c0", None, 10)
-    exchange._late["c1"] = LogThrottle(lambda: clock[0])
+    exchange._late_log["c1"] = LogThrottle(lambda: clock[0])
     for pulse in range(3):
         exchange._log_late("c1", pulse)
         exchange._log_in_time("c1")
@@ -59,7 +59,7 @@ async def test_words_that_come_too_late_again_and_again_are_told_of_seldom_and_w
     assert caplog.messages == [
         "camera c0: detections of camera c1 in frame 0 came too late",
         "camera c0: detections of camera c1 in frame 1500 came too late, and 2 times before",
-        "camera c0: detections of camera c1 come in time again",
+        "camera c0: detections of camera c1 arrive in time again",
     ]
 
 
@@ -70,10 +70,10 @@ async def test_a_camera_that_nobody_understands_is_told_of_once_and_not_by_frame
     clock = [0.0]
     exchange = PeerDetectionExchange(small_config(), "c0", None, 10)
     for camera in ("c1", "c2"):
-        exchange._bad[camera] = LogThrottle(lambda: clock[0])
+        exchange._bad_log[camera] = LogThrottle(lambda: clock[0])
 
     def hear(camera: str, payload: bytes) -> None:
-        exchange._read(Message(KEYS.camera(camera, "detections"), payload, b""))
+        exchange._decode(Message(KEYS.camera(camera, "detections"), payload, b""))
 
     for frame in range(250):
         clock[0] = frame / 25
@@ -95,7 +95,7 @@ async def test_what_a_camera_does_not_understand_is_in_its_status(monkeypatch: p
     camera = CameraProcess(config.model_copy(update={"cameras": cameras}), "c0")
     said: list[bytes] = []
     monkeypatch.setattr(camera, "_publish", lambda _, payload: said.append(payload))
-    camera._exchange._read(Message(KEYS.camera("c1", "detections"), b"{", b""))
+    camera._exchange._decode(Message(KEYS.camera("c1", "detections"), b"{", b""))
     for _ in range(2):
         camera._corrections.put(Message(KEYS.camera("c0", "position_corrections"), b"{", b""))
     camera._send_status()
@@ -120,9 +120,9 @@ def test_a_damaged_recording_that_repeats_is_told_of_once(caplog: pytest.LogCapt
 
     container = SimpleNamespace(name="hall.mp4", demux=demux)
     opened: Any = SimpleNamespace(container=container, stream=SimpleNamespace(time_base=None), fps=25.0)
-    assert not list(read_pictures(opened))
+    assert not list(read_frames(opened))
     for _ in range(5):
-        assert not list(read_pictures(opened, again=True))
+        assert not list(read_frames(opened, again=True))
     assert caplog.messages == ["hall.mp4: cannot be read any further: damaged"]
 
 
@@ -137,7 +137,7 @@ def test_damaged_sound_that_repeats_is_told_of_once(
     sound = RecordedAudioSource.__new__(RecordedAudioSource)
     sound._path, sound._has_warned = "hall.mp4", False
     for _ in range(5):
-        assert not list(sound._once())
+        assert not list(sound._one_pass())
     assert caplog.messages == ["hall.mp4: its audio cannot be read any further: damaged"]
 
 
@@ -146,9 +146,9 @@ def test_a_recording_that_repeats_is_read_again(tmp_path: Path, monkeypatch: pyt
 
     def noted(opened: Any, *, again: bool = False) -> Any:
         asked.append(again)
-        return read_pictures(opened, again=again)
+        return read_frames(opened, again=again)
 
-    monkeypatch.setattr(recording, "read_pictures", noted)
+    monkeypatch.setattr(recording, "read_frames", noted)
     repeated = Recording(str(write_video(tmp_path / "hall.avi", 3, codec="mjpeg")), 0, "loop")
     for pulse in range(9):
         repeated.take(pulse)

@@ -13,7 +13,7 @@ import numpy as np
 from av.video.codeccontext import VideoCodecContext
 from av.video.frame import VideoFrame
 
-from server.camera.encoding.encoder import Encoder
+from server.camera.encoder import Encoder
 from server.media.color_conversion import to_bgr
 from server.media.rendering_messages import (
     EncodedFrame,

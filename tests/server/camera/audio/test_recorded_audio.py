@@ -168,7 +168,7 @@ def test_sound_that_cannot_be_converted_is_silence_and_said_once(
     frames = all_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "stop"), FPS)
     assert beeps(as_adts(frames, FORM), "aac") == []
     (line,) = caplog.messages
-    assert line.startswith("sound of 9 channels at 48000 Hz cannot be converted: ")
+    assert line.startswith("audio of 9 channels at 48000 Hz cannot be converted: ")
 
 
 @pytest.mark.parametrize("fps", [12.5, 30.0])
@@ -195,13 +195,13 @@ def test_what_has_no_sound_is_refused(tmp_path: Path) -> None:
     assert opened("c0", "c0") is not None
     assert opened("c1", "c0") is None, "one process sends it"
     assert opened("c0", "own.mp4") is not None
-    with pytest.raises(UserError, match="sound: camera c1 has none: scene:room"):
+    with pytest.raises(UserError, match="sound: camera c1 has no audio: scene:room"):
         opened("c1", "c1")
     with pytest.raises(UserError, match=r"sound: .*none\.mp4: is neither a camera of this site nor a file"):
         opened("c0", "none.mp4")
     silent = tmp_path / "text.srt"
     silent.write_text("1\n00:00:00,000 --> 00:00:01,000\nno sound\n", encoding="utf-8")
-    with pytest.raises(UserError, match=r"sound: .*there is no sound in this file"):
+    with pytest.raises(UserError, match=r"sound: .*there is no audio in this file"):
         opened("c0", "text.srt")
 
 

@@ -36,13 +36,13 @@ def followed(current: ShedLevel) -> list[WindowResult]:
     steps = stepping(4)
     results = []
     for frame in range(FRAMES):
-        searched = current.searches(frame, WINDOW.stride)
+        searched = current.detects(frame, WINDOW.stride)
         results.append(steps.push(frame, walker(frame)) if searched else steps.skip(frame))
     return [it for it in (*results, steps.flush()) if it is not None]
 
 
 @pytest.mark.parametrize(
-    "current", shed_levels(WINDOW.stride, live=False), ids=lambda it: f"every {it.searched}"
+    "current", shed_levels(WINDOW.stride, live=False), ids=lambda it: f"every {it.detection_interval}"
 )
 def test_a_person_keeps_one_track_however_few_frames_are_searched(current: ShedLevel) -> None:
     results = followed(current)

@@ -27,7 +27,7 @@ def simulated(seconds: float, carried: Callable[[float], float], *, live: bool =
     free, levels = 0.0, []
     for pulse in range(round(seconds * FPS)):
         due, level = pulse / FPS, shedder.current
-        work = 0.75 * level.searches(pulse, STRIDE) + 0.25 * level.takes(pulse, STRIDE, GOP)
+        work = 0.75 * level.detects(pulse, STRIDE) + 0.25 * level.captures(pulse, STRIDE, GOP)
         start = max(due, free)
         free = min(start + work / FPS / carried(start), due + BACKLOG_S)
         shedder.measure_lag(free - due, free)
@@ -48,7 +48,8 @@ def test_whatever_the_machine_carries_the_camera_is_soon_where_it_keeps_up(share
     levels = simulated(600.0, lambda _: share)
     level = shed_levels(STRIDE, live=True)[max(levels)]
     work = sum(
-        0.75 * level.searches(it, STRIDE) + 0.25 * level.takes(it, STRIDE, GOP) for it in range(STRIDE * GOP)
+        0.75 * level.detects(it, STRIDE) + 0.25 * level.captures(it, STRIDE, GOP)
+        for it in range(STRIDE * GOP)
     )
     assert work / (STRIDE * GOP) < share  # so high as needed
     assert levels.index(max(levels)) < 10 * FPS
@@ -74,9 +75,9 @@ def test_no_level_skips_the_end_of_a_window_or_the_beginning_of_a_gop(
 ) -> None:
     for level in shed_levels(stride, live=live):
         end = (pulse + 1) * stride - 1
-        assert level.searches(end, stride)
-        assert level.takes(end, stride, gop)
-        assert level.takes(pulse * gop, stride, gop)
+        assert level.detects(end, stride)
+        assert level.captures(end, stride, gop)
+        assert level.captures(pulse * gop, stride, gop)
 
 
 @given(stride=st.integers(1, 20), live=st.booleans())
@@ -84,8 +85,8 @@ def test_every_rung_leaves_out_more_and_a_recording_is_always_shown_whole(stride
     levels = shed_levels(stride, live=live)
     assert levels[0] == ShedLevel()
     frames = range(stride * 60)
-    searched = [sum(it.searches(pulse, stride) for pulse in frames) for it in levels]
-    taken = [sum(it.takes(pulse, stride, 60) for pulse in frames) for it in levels]
+    searched = [sum(it.detects(pulse, stride) for pulse in frames) for it in levels]
+    taken = [sum(it.captures(pulse, stride, 60) for pulse in frames) for it in levels]
     assert all(one >= other for one, other in pairwise(searched))
     assert (
         len(set(zip(searched, taken, strict=True))) >= len(levels) - 1
@@ -105,8 +106,8 @@ def test_a_frame_may_take_all_the_time_that_it_has_at_any_rate(fps: float) -> No
 def test_the_rungs_are_told_in_words() -> None:
     assert [it.description for it in shed_levels(5, live=True)] == [
         "",
-        "searching every 2nd frame: the machine is too busy",
-        "searching every 3rd frame: the machine is too busy",
-        "searching every 5th frame: the machine is too busy",
-        "showing every 2nd and searching every 5th frame: the machine is too busy",
+        "detecting in every 2nd frame: the machine is too busy",
+        "detecting in every 3rd frame: the machine is too busy",
+        "detecting in every 5th frame: the machine is too busy",
+        "showing every 2nd and detecting in every 5th frame: the machine is too busy",
     ]

@@ -28,7 +28,7 @@ from fakes.programs import needs_ffmpeg
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH, encoded, small_config
 from fakes.timeouts import PATIENCE
 from server.camera.audio import LiveAudioSource
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.camera.passthrough.access_unit_queue import AccessUnitQueue
 from server.camera.passthrough.compatibility import required_format
 from server.camera.passthrough.encoder import PassthroughUnit
@@ -149,11 +149,14 @@ def test_what_the_manual_tells_to_do_fits(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"encode": {"crf": 30}}, "frame 0 has other parameter sets .* than this site encodes with"),
+        (
+            {"encode": {"crf": 30}},
+            "frame 0 has other parameter sets .* than those that this site encodes with",
+        ),
         ({"encode": {"gop": 4}}, r"frame 4 does not begin a GOP: they begin every 4 frames \(encode.gop\)"),
-        ({"site": {"width": 128}}, r"its pictures are 64x48, the site's 128x48"),
-        ({"site": {"fps": 30}}, r"it has 25 pictures a second, the site 30"),
-        ({"camera": {"offset": 1}}, "frame 0 begins a GOP, where none of the site does"),
+        ({"site": {"width": 128}}, r"its frames are 64x48, the site's 128x48"),
+        ({"site": {"fps": 30}}, r"it has 25 frames a second, the site 30"),
+        ({"camera": {"offset": 1}}, "frame 0 begins a GOP, but none of the site"),
     ],
 )
 def test_what_does_not_fit_is_encoded_or_refused_with_the_reason(
@@ -172,7 +175,7 @@ def test_what_does_not_fit_is_encoded_or_refused_with_the_reason(
 
 @pytest.mark.parametrize(
     ("codec", "b_frames", "reason"),
-    [("mpeg4", 0, "it is mpeg4, not H.264"), ("libx264", 2, "it has B pictures")],
+    [("mpeg4", 0, "it is mpeg4, not H.264"), ("libx264", 2, "it has B frames")],
 )
 def test_other_codecs_and_orders_do_not_fit(tmp_path: Path, codec: str, b_frames: int, reason: str) -> None:
     path = write_video(tmp_path / "other.mp4", 20, codec=codec, b_frames=b_frames)
@@ -184,7 +187,7 @@ def test_other_codecs_and_orders_do_not_fit(tmp_path: Path, codec: str, b_frames
 @pytest.mark.parametrize(
     ("h264", "gop", "said"),
     [
-        ("auto", GOP, "camera c0: its own H.264 passes through"),
+        ("auto", GOP, "camera c0: its own H.264 is passed through"),
         ("auto", 4, "camera c0 is re-encoded: its own H.264: frame 4 does not begin a GOP"),
         ("encode", GOP, ""),
     ],
@@ -224,7 +227,7 @@ def test_where_each_camera_may_have_its_own_parameter_sets_any_fit(tmp_path: Pat
 
 def test_images_do_not_fit_and_vp8_sites_have_no_such_thing(tmp_path: Path) -> None:
     pipeline = CameraPipeline(site("scene:room", "auto"), "c0")
-    assert "single images" in pipeline.why_encoded
+    assert "image files contain no H.264" in pipeline.why_encoded
     pipeline.close()
     with pytest.raises(UserError, match=r"c0: h264: auto: encode\.codec is vp8"):
         site(tmp_path / "own.mp4", "auto", encode={"codec": "vp8"})
@@ -401,7 +404,7 @@ def test_a_network_camera_that_falls_silent_while_it_is_looked_at_is_away(
     monkeypatch.setattr("server.camera.passthrough.stream_source.READ_S", 0.5)
     network.let = 2
     camera = {"options": {"probesize": "2000", "analyzeduration": "1000"}}
-    with pytest.raises(UnavailableError, match=r"stopped while it was checked: no answer within 0\.5 s$"):
+    with pytest.raises(UnavailableError, match=r"stopped during the check: no answer within 0\.5 s$"):
         CameraPipeline(site(network.url, h264, camera=camera), "c0")
 
 
@@ -414,9 +417,9 @@ def test_sound_beside_it_waits_as_long_as_the_pictures(network: NetworkCamera) -
     for pulse in range(300):
         until_some_wait(network, source)
         listener.at(pulse)
-        if source.take(pulse) is None or source.taken is None:
+        if source.take(pulse) is None or source.current is None:
             continue
-        before, waited = waited, pulse - numbers()[tuple(nals(source.taken.data))]
+        before, waited = waited, pulse - numbers()[tuple(nals(source.current.data))]
         in_a_row = in_a_row + 1 if waited == before else 0
         if in_a_row == 0:
             listener._shifts.clear()  # a GOP was left out: it is another time, of which there is no mean yet
@@ -446,7 +449,7 @@ def test_a_network_camera_that_comes_back_with_other_pictures_is_away(
         assert time.monotonic() < end
         time.sleep(0.02)
     source.close()
-    assert f"its pictures are {2 * WIDTH}x{2 * HEIGHT}, the site's {WIDTH}x{HEIGHT}" in caplog.text
+    assert f"its frames are {2 * WIDTH}x{2 * HEIGHT}, the site's {WIDTH}x{HEIGHT}" in caplog.text
     waiting = source._waiting._units
     assert waiting
     assert {unit.image.shape for unit in waiting} == {(HEIGHT, WIDTH, 3)}

@@ -205,7 +205,7 @@ async def test_a_camera_that_cannot_join_for_a_reason_nobody_foresaw_does_not_go
     def hearing(*_: object) -> Bus:
         raise MemoryError("no memory")
 
-    monkeypatch.setattr(Bus, "hearing", hearing)
+    monkeypatch.setattr(Bus, "listener", hearing)
     config = config_of(recording, wait=WAIT)
     alone = PeerDetectionExchange(config, "c0", CrossViewScorer(config, "c0", (192, 108), 1), 100)
     await alone.join()

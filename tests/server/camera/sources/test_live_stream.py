@@ -136,9 +136,9 @@ def test_a_camera_that_is_away_for_long_is_told_of_once_and_when_it_is_back(
     try:
         until(lambda: shown(source) == 0)
         camera.unplug()
-        until(lambda: source._away._count > 30)
+        until(lambda: source._away_log._count > 30)
         camera.plug_in(port)
-        until(lambda: not source._away._count)
+        until(lambda: not source._away_log._count)
     finally:
         source.close()
     *away, back = caplog.records
@@ -146,7 +146,7 @@ def test_a_camera_that_is_away_for_long_is_told_of_once_and_when_it_is_back(
     assert {it.levelname for it in away} == {"WARNING"}
     assert "Connection refused" in whys[-1]
     assert len(whys) == len(set(whys)) <= 3, "one for each reason, not for each attempt"
-    assert back.getMessage().startswith(f"http://127.0.0.1:{port}/...: pictures come again, after ")
+    assert back.getMessage().startswith(f"http://127.0.0.1:{port}/...: frames arrive again, after ")
     assert not [it for it in caplog.messages if "hunter2" in it]
 
 
@@ -232,7 +232,7 @@ def test_pictures_of_another_size_are_no_pictures_of_this_camera(
         camera.width = 2 * WIDTH
         if not connected:
             camera.plug_in(port)
-        with pytest.raises(UnavailableError, match=r"its pictures are 128x48 now, they were 64x48$"):
+        with pytest.raises(UnavailableError, match=r"its images are 128x48 now, they were 64x48$"):
             take_them_all()
     finally:
         source.close()

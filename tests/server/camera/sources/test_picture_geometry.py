@@ -113,9 +113,9 @@ def test_pixels_that_are_not_square_are_made_so(tmp_path: Path, aspect: str) -> 
 @pytest.mark.parametrize(
     ("turn", "aspect", "why"),
     [
-        (90, "1:1", "its pictures are shown turned or mirrored"),
-        (180, "1:1", "its pictures are shown turned or mirrored"),
-        (0, "4:3", r"its pictures are shown stretched \(its pixels are 1.33 times as wide as high\)"),
+        (90, "1:1", "it is shown rotated or mirrored"),
+        (180, "1:1", "it is shown rotated or mirrored"),
+        (0, "4:3", r"it is shown stretched \(its pixels are 1.33 times as wide as high\)"),
     ],
 )
 def test_what_is_turned_or_stretched_does_not_pass_through(
@@ -176,8 +176,8 @@ def test_a_size_that_changes_midway_is_fitted_into_the_first_and_said(
     assert upright is not None
     assert [round(float(upright[:, x].mean()), -2) for x in (2, WIDE // 2, -2)] == [0, 200, 0], "undistorted"
     assert caplog.messages[-1] == (
-        f"{path}: its pictures are {HIGH}x{WIDE} from frame 3 on, they were {WIDE}x{HIGH}: "
-        "they are fitted into that"
+        f"{path}: its images are {HIGH}x{WIDE} from frame 3 on, they were {WIDE}x{HIGH}: "
+        "letterboxed to that size"
     )
 
 
@@ -203,7 +203,7 @@ def test_a_cover_is_no_video_and_of_several_videos_the_first_is_taken(
     recording = Recording(str(path))
     recording.close()
     assert recording.size == ((64, 64) if covers else (32, 32))
-    assert caplog.messages == [f"{path}: there are {3 - covers} videos in it: the first is taken"]
+    assert caplog.messages == [f"{path} contains {3 - covers} video streams: the first is used"]
 
 
 def test_what_h264_crops_is_not_shown(tmp_path: Path) -> None:
@@ -266,8 +266,9 @@ def test_images_of_several_sizes_are_fitted_into_the_first_and_it_is_said(
     upright = images[1]
     assert upright is not None
     assert [int(upright[HIGH // 2, x, 0]) for x in (2, WIDE // 2, -2)] == [0, 200, 0]
+    first = tmp_path / "1.png"
     assert caplog.messages == [
-        f"{tmp_path / '1.png'}: is {HIGH}x{WIDE}, and the first image {WIDE}x{HIGH}: all are fitted into that"
+        f"{first} is {HIGH}x{WIDE}, the first image {WIDE}x{HIGH}: all images are letterboxed to that size"
     ]
 
 
@@ -283,7 +284,7 @@ def test_images_that_cannot_be_read_are_counted_and_named(
         folder.take(number)
     folder.close()
     assert caplog.messages == [
-        f"{tmp_path}: 3 damaged frames show as the picture before them: frames 2 to 3, 5"
+        f"{tmp_path}: 3 damaged frames are replaced by the previous one: frames 2 to 3, 5"
     ]
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from fakes.media.videos import HEIGHT, STEP, WIDTH, damage, frame_in, write_video
 from server.camera.sources import SourceEndedError, open_source
-from server.camera.sources.base import PictureSource
+from server.camera.sources.base import FrameSource
 from server.camera.sources.image_folder import ImageFolder
 from server.camera.sources.recording import Recording
 from server.config.sections import CameraSettings, SiteSettings
@@ -38,12 +38,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def shown(source: PictureSource, pulse: int) -> int | None:
+def shown(source: FrameSource, pulse: int) -> int | None:
     picture = source.take(pulse)
     return None if picture is None else frame_in(picture)
 
 
-def all_shown(source: PictureSource) -> list[int | None]:
+def all_shown(source: FrameSource) -> list[int | None]:
     frames: list[int | None] = []
     with suppress(SourceEndedError):
         while True:
@@ -159,7 +159,7 @@ def test_a_video_without_its_end_is_refused(tmp_path: Path) -> None:
 
 def test_a_video_of_which_no_picture_can_be_decoded_is_refused(tmp_path: Path) -> None:
     path = damage(write_video(tmp_path / "noise.mp4", 5), [0, 1, 2, 3, 4])
-    assert "not one picture" in refusal(str(path))
+    assert "has no frames" in refusal(str(path))
 
 
 def test_sound_alone_is_refused(tmp_path: Path) -> None:

@@ -96,9 +96,7 @@ def test_pictures_without_times_are_counted_also_where_some_cannot_be_decoded(
     path = write_video(tmp_path / f"raw.{suffix}", 25, b_frames=b_frames)
     assert shown(path) == list(range(25))
     if suffix == "h264":
-        assert caplog.messages == [
-            f"{path}: there are no times in this file: its pictures are counted, 25 a second"
-        ]
+        assert caplog.messages == [f"{path}: no time stamps in this file: frames are counted at 25 a second"]
     if suffix == "avi":
         frames = shown(damage(path, [10]))
         assert len(frames) == 25
@@ -135,7 +133,9 @@ def test_damaged_frames_are_counted_and_named_once(
     recording.close()
     expected = [2 if n in (3, 4) else 8 if n == 9 else n for n in range(25)]
     assert frames == 3 * expected
-    assert caplog.messages == [f"{path}: 3 damaged frames show as the picture before them: frames 4 to 5, 10"]
+    assert caplog.messages == [
+        f"{path}: 3 damaged frames are replaced by the previous one: frames 4 to 5, 10"
+    ]
 
 
 def test_another_rate_is_said_once_with_both(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -144,7 +144,7 @@ def test_another_rate_is_said_once_with_both(tmp_path: Path, caplog: pytest.LogC
     list(recording.ahead(range(5)))
     recording.close()
     assert caplog.messages == [
-        f"{path}: it has 30 pictures a second, 25 are taken: each is shown at its time, some are left out"
+        f"{path} has 30 frames a second, the site 25: frames keep their times, some are dropped"
     ]
 
 
@@ -152,7 +152,7 @@ def test_uneven_times_are_said(tmp_path: Path, caplog: pytest.LogCaptureFixture)
     path = write_timed(tmp_path / "phone.mp4", [0, 0.04, 0.2, 0.24, 0.4, 0.44, 0.6, 0.64])
     shown(path)
     (line,) = caplog.messages
-    assert "its pictures come at uneven times" in line
+    assert "its frame rate is uneven" in line
 
 
 def test_what_is_not_one_picture_a_pulse_does_not_pass_through(tmp_path: Path) -> None:

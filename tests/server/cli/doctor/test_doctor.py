@@ -216,7 +216,7 @@ def test_cameras_are_tried_at_once_and_a_dead_one_holds_nobody_up(tmp_path: Path
             CameraProbe(size=(640, 360), sent=StreamStats((640, 360), 25.0, 25, 3, 0.0)),
             "3 packets could not be decoded",
         ),
-        (CameraProbe(size=(640, 360), why_encoded="it has B pictures"), "is re-encoded: it has B pictures"),
+        (CameraProbe(size=(640, 360), why_encoded="it has B frames"), "is re-encoded: it has B frames"),
         (CameraProbe(size=(640, 360), recorded_fps=30.0), "was recorded at 30 pictures a second"),
         (CameraProbe(size=(320, 180)), "are smaller than the site's"),
     ],

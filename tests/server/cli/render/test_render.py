@@ -101,7 +101,7 @@ def test_an_error_on_the_way_leaves_nothing(tmp_path: Path) -> None:
     done = render(tmp_path / "c0.mp4", tmp_path / "c1.mp4", "--out", tmp_path / "out")
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
-    assert line.startswith(f"myview: camera c1: {tmp_path / 'c1.mp4'}: there is not one picture")
+    assert line.startswith(f"myview: camera c1: {tmp_path / 'c1.mp4'}: this video has no frames")
     assert sorted(tmp_path.iterdir()) == before
 
 

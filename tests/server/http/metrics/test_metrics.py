@@ -40,7 +40,7 @@ async def test_a_cameras_stages_are_measured_by_its_own_times(hall: Hall) -> Non
         Message(ZenohKeys("hall").camera(A, "video"), unit.data, msgspec.json.encode(head))
     )
     solve = SolverReport(objective=-4.0, bound=-4.2, gap=0.2, integral=False, rounds=3)
-    said = word(A, 3, {1: SMALL}, solve=solve, search_s=0.02, solve_s=0.2, solved_at=100.5)
+    said = word(A, 3, {1: SMALL}, solve=solve, detection_s=0.02, solve_s=0.2, solved_at=100.5)
     hall.service.ingest.tracks(tracks(msgspec.structs.replace(said, first=11, last=15, final_to=15)))
     hall.service.ingest.tracks(tracks(said))
     told = await samples(hall)

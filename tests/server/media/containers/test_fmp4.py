@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import FragmentSample, fragment, init_segment, shift_fragment, ticks
 from server.media.h264.annexb import NAL_AUD, join_sample, nal_type, nal_units, parameter_sets, split_sample

@@ -44,7 +44,7 @@ def test_packets_are_valid_and_contain_exactly_what_was_packed(
     data, sent, tables, video = b"", [], 0, 0
     for gop in gops:
         pictures = [picture(pulse + n, size, key=n == 0) for n, size in enumerate(gop)]
-        counters = ContinuityCounters(tables, video, whole=not live)
+        counters = ContinuityCounters(tables, video, aligned=not live)
         data += pack(pictures, FPS, counters)
         pulse, tables = pulse + len(gop), tables + 1
         video += sum(count_packets(it) for it in pictures) if live else 0

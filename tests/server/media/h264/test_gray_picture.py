@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fakes.media.h264 import PRESETS, decoded, encoded, how
 from fakes.service.parameter_sets import MAKES, sent
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH
-from server.camera.encoding.encoder import Encoder
+from server.camera.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment
 from server.media.h264.annexb import ParameterSets, join_sample, nal_units, parameter_sets

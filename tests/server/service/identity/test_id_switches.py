@@ -24,8 +24,8 @@ def window(boxes: NDArray[np.float64], first: int) -> CameraWindow:
     last = first + boxes.shape[1] - 1
     message = word("c0", 0, dict.fromkeys(tracks, (1.0, 1.0, 2.0, 2.0)), first=first, last=last)
     keys = tuple(TrackKey("c0", it) for it in tracks)
-    fit = Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT))
-    return CameraWindow(message, keys, np.array(list(tracks)), fit, boxes, first)
+    letterbox = Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT))
+    return CameraWindow(message, keys, np.array(list(tracks)), letterbox, boxes, first)
 
 
 def paths(tracks: int) -> NDArray[np.float64]:

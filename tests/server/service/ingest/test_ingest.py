@@ -92,7 +92,7 @@ def test_a_load_text_with_unprintable_characters_is_refused(words: str) -> None:
 
 def test_a_connected_cameras_load_text_is_its_message() -> None:
     hall = Hall()
-    words = "searching every 3rd frame: the machine is too busy"
+    words = "detecting in every 3rd frame: the machine is too busy"
     state = hall.ingest.states["c0"]
     hall.handle("status", status("c0", load_level=2, load=words))
     assert state.message == words

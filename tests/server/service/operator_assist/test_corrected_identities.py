@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bestview import IdentitySettings, Split
-from server.camera.corrected_windows import corrected_messages
+from server.camera.operator_corrections import merge_correction
 from server.camera.track_messages import TrackMessageBuilder
 from server.messaging.messages import CameraTracks
 from server.service.identity.people import PersonTracker
@@ -53,7 +53,7 @@ class Camera:
         if result is None:
             return None
         revised = self._tracker.apply_corrections(marked) if marked else None
-        return self._reporter.regular(result if revised is None else corrected_messages(result, revised))
+        return self._reporter.regular(result if revised is None else merge_correction(result, revised))
 
 
 def at(people: PersonTracker, pulse: int) -> dict[int, float]:

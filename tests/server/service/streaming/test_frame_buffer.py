@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fakes.service.scripted_cameras import FPS, encoded
-from server.camera.encoding.encoder import AccessUnit
+from server.camera.encoder import AccessUnit
 from server.media.stream_format import ParameterMismatchError, StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 

@@ -30,7 +30,7 @@ from server.service.streaming.subscriber_queue import Chunk
 async def spliced(config: Config) -> tuple[bytes, bytes]:
     """Return a stream that changes camera at every GOP, as MP4 and as MPEG-TS."""
     stream_format = stream_format_for(
-        config.encode.codec, config.site.size, own_parameters=config.encode.parameters == "own"
+        config.encode.codec, config.site.size, per_camera_parameters=config.encode.parameters == "own"
     )
     frame_buffers = {camera: FrameBuffer(FPS, GOPS * GOP, stream_format) for camera in MAKES}
     put(frame_buffers)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, HEIGHT, NO_REASON, WIDTH, small_config
 from fakes.timeouts import PATIENCE
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment
 from server.media.stream_format import StreamFormat

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.h264.annexb import nal_units, parameter_sets
 

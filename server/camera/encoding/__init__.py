@@ -1,1 +1,0 @@
-"""Encoding frames into closed GOPs."""
