@@ -276,7 +276,7 @@ def test_a_cluster_whose_time_is_no_number_has_none() -> None:
 def test_words_nested_without_end_are_counted_and_dropped() -> None:
     exchange = PeerDetectionExchange(site(), "c0", None, 50)
     payload = b'{"x":' * 100_000
-    exchange._read(Message(KEYS.camera("c1", "detections"), payload, b""))
+    exchange._decode(Message(KEYS.camera("c1", "detections"), payload, b""))
     service = FedService(site())
     service.handle(Message(KEYS.camera("c0", "status"), payload, b""))
     assert exchange.bad_messages == service.ingest.states["c0"].bad_messages == 1
