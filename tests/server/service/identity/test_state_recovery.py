@@ -69,7 +69,7 @@ class Site:
             for part in (it.ingest, it.state_replication):
                 part.alive(KEYS.camera(camera, "alive"), is_present=True)
             if camera != without_snapshot:
-                self.cameras[camera].service(is_present=True)
+                self.cameras[camera].on_service(is_present=True)
         return it
 
     def track_epochs(self, epochs: Iterable[int], seen: Seen = ALL, boot: int = 1) -> None:
@@ -223,7 +223,7 @@ def test_a_late_snapshot_prevents_numbers_from_being_used_twice() -> None:
     site.cameras[A] = RetainedState(lambda snapshot: site._receive(A, snapshot))
     site.start(without_snapshot=B)
     site.track_epochs(range(7, 8), {A: {}, B: {}})
-    site.cameras[B].service(is_present=True)
+    site.cameras[B].on_service(is_present=True)
     site.track_epochs(range(8, 10))
     assert min(site.service.decider.people.known) > used
 
@@ -234,7 +234,7 @@ def test_a_late_snapshot_is_used() -> None:
     site.start(without_snapshot=B)
     site.track_epochs(range(7, 8), {A: {2: LARGE}, B: {}})
     assert site.service.state_replication.may_recover(b), "camera B may still come"
-    site.cameras[B].service(is_present=True)
+    site.cameras[B].on_service(is_present=True)
     site.track_epochs(range(8, 12), {A: {2: LARGE, 9: SMALL}, B: {3: LARGE}})
     assert [site.person_of(A, 2, 11), site.person_of(B, 3, 11)] == [ann, b]
 
@@ -246,7 +246,7 @@ def test_numbers_of_a_late_snapshot_that_may_be_reassigned_are_ignored() -> None
     site.start(without_snapshot=B)
     site.track_epochs(range(7, 8), {A: {1: SMALL, 2: LARGE}, B: {}})
     assert site.person_of(A, 1, 7) in before, "nobody had said that it was taken"
-    site.cameras[B].service(is_present=True)
+    site.cameras[B].on_service(is_present=True)
     site.track_epochs(range(8, 12))
     assert site.person_of(B, 3, 11) > max(before)
     assert site.service.decider.people.registry.names == {}
@@ -363,8 +363,8 @@ def test_a_snapshot_is_limited_in_size() -> None:
     it = RetainedState(snapshot.append)
     it.put(Message("", b"one", b""))
     it.put(Message("", b"2" * (SNAPSHOT_BYTES_MAX + 1), b""))
-    it.service(is_present=False)
-    it.service(is_present=True)
+    it.on_service(is_present=False)
+    it.on_service(is_present=True)
     assert snapshot == [b"one"]
 
 
@@ -441,7 +441,7 @@ def test_no_single_camera_can_raise_the_next_number_far(lie: dict[str, object], 
     site.track_epochs(range(7, 9))
     lying(site, B, **lie)
     for _ in range(3):
-        site.cameras[B].service(is_present=True)
+        site.cameras[B].on_service(is_present=True)
     site.track_epochs(range(9, 12), {A: {1: SMALL, 2: LARGE, 9: SMALL}, B: {3: LARGE}})
     people = site.service.decider.people
     assert people.next_number <= SINGLE_CAMERA_NUMBER_MAX + 10
