@@ -4,22 +4,22 @@
     python -m benchmarks.faults --fault "kill camera" --fault "freeze camera"
 
 The site is `myview up` on three views of the synthetic room. Every picture carries the number of its camera
-and frame, and every box the frame in which it was detected. So pictures of the wrong camera or moment, and
-boxes on the wrong picture, are counted. Columns:
+and frame, and every box the frame in which it was detected, so that wrong pictures and boxes are counted.
+Columns:
 
 * *reconnects*: how often the viewers' streams broke and were opened again;
 * *gap, s*: the longest time without a fresh picture, minus the length of a GOP (a GOP arrives in one piece),
-  and in brackets the same over the seconds before the fault. Where the viewers' own server is killed: from
-  its readiness to the next picture, and in brackets the whole gap;
-* *wrong pictures*: of another camera than the events named, of another frame than the pulse, or illegible;
-  *unnamed* are those without an event, so that their camera is unchecked: allowed only where the server is
-  killed, and the events with it;
-* *wrong boxes*: drawn on a picture of another frame than they were detected in; *means* of several boxes,
+  and in brackets the same before the fault. If the viewers' server is killed: from its readiness to the next
+  picture, and in brackets the whole gap;
+* *wrong pictures*: of a camera other than that of the events, of a frame other than the pulse's, or
+illegible;
+  *unnamed* are those without an event, whose camera is unchecked: allowed only if the server is killed;
+* *wrong boxes*: drawn on a picture of a frame other than that of the detection; *means* of several boxes,
   which trackers interpolate, carry no frame number and are not checked;
-* *recorded*: GOPs that were shown but are not on the disk; files that do not play;
-* *exit*: of terminated processes, the slowest and its exit code.
+* *recorded*: GOPs that were shown but not recorded; files that do not play;
+* *exit*: time and exit code of the slowest terminated process.
 
-The picture of a network camera at a pulse is not known beforehand. In the faults of a source, a picture is
+The picture of a network camera at a pulse is not known in advance. In the faults of a source, a picture is
 wrong if it is older than the previous one, more than 2 s behind its pulse or half a second ahead, or not the
 one that was recorded at this pulse; the lag is printed below the table. Boxes are checked as for all cameras:
 the detector reads the number of the picture in which it detects them.

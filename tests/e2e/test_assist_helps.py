@@ -1,4 +1,4 @@
-"""Operator corrections help: two people are taken for each other, and pointing at them corrects it."""
+"""Operator corrections work: the tracker exchanges two people, and pointing at one of them corrects it."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ ALIKE = "crossing"
 
 
 def left_to_right(gop: Gop) -> list[int]:
-    """Return who is shown by the camera of the two; empty where they change within the GOP."""
+    """Return the ids of the two people from left to right; empty if the order changes within the GOP."""
     rows = {tuple(box.object for box in sorted(row, key=lambda box: box.left)) for row in gop.boxes[ALIKE]}
     return list(rows.pop()) if len(rows) == 1 else []
 
 
-async def test_who_is_pointed_at_has_their_number_again_and_the_stream_goes_on(tmp_path: Path) -> None:
-    """Who came from the left went back there; the tracker has the two pass each other."""
-    # One camera, whose boxes are given: also a machine with much to do sees how they meet.
+async def test_pointing_at_a_person_restores_their_id_without_interrupting_the_stream(tmp_path: Path) -> None:
+    """The person from the left turns back; the tracker assumes that the two pass each other."""
+    # One camera with given detections, so that a busy machine keeps up.
     cameras = [camera(ALIKE, tmp_path)]
     async with helped(tmp_path, cameras, memory_frames=FRAMES) as site, opened(site) as page:
         await point(site, page)
@@ -41,36 +41,38 @@ async def test_who_is_pointed_at_has_their_number_again_and_the_stream_goes_on(t
 async def point(site: RunningSite, page: Page) -> None:
     gops = site.gops
     await site.until(lambda: gops[-1].first > MET, "they have met")
-    came = [gop for gop in gops if gop.first + gop.frames <= MET and len(left_to_right(gop)) == len("LR")]
-    who, other = left_to_right(came[-1])
-    await site.until(lambda: left_to_right(gops[-1]) == [other, who], "their tracker exchanges them")
-    await page.goto(f"{site.url}?object={who}")
+    before = [gop for gop in gops if gop.first + gop.frames <= MET and len(left_to_right(gop)) == len("LR")]
+    first, second = left_to_right(before[-1])
+    await site.until(lambda: left_to_right(gops[-1]) == [second, first], "the tracker exchanges them")
+    await page.goto(f"{site.url}?object={first}")
     await page.wait_for_function(f"myview.state === 'playing' && myview.camera === '{ALIKE}'")
     await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
-    await page.wait_for_function(f"!document.querySelector('#point').hidden && ({PLACE})({other})")
-    # While they walk, a busy machine's hand is behind them, where nobody is.
+    await page.wait_for_function(f"!document.querySelector('#point').hidden && ({PLACE})({second})")
+    # While they walk, the pointer of a busy machine lags behind them.
     await page.wait_for_function(f"myview.pulse >= {STAND}")
     await page.keyboard.press("h")
-    await page.wait_for_function(f"myview.pointing.object === {who}")
-    # They stand: the hand, too, stays where the one who came from the left is, whatever number is there.
+    await page.wait_for_function(f"myview.pointing.object === {first}")
+    # They stand: the pointer stays on the person from the left, whose id is now the other one.
     taken = "myview.pointing.taken >= 1"
     while not await page.evaluate(taken):
         pulse = await page.evaluate("myview.pulse")
-        place = await page.evaluate(PLACE, other)
+        place = await page.evaluate(PLACE, second)
         if place is not None:
             await page.mouse.move(*place)
         await page.wait_for_function(f"myview.pulse !== {pulse} || {taken}")
-    exchanged = {Split(who, other, ALIKE), Split(other, who, ALIKE)}
+    exchanged = {Split(first, second, ALIKE), Split(second, first, ALIKE)}
     async with asyncio.timeout(PATIENCE_MS / 1000):
-        await site.until(lambda: any(exchanged <= {*gop.split} for gop in gops), "the camera solves anew")
-    place = next(n for n, gop in enumerate(gops) if exchanged <= {*gop.split})
-    assert left_to_right(gops[place - 1]) == [other, who], "what was told before stays"
-    assert left_to_right(gops[place]) == [who, other], "what is told next is as they were before they met"
-    assert gops[place].choices[who] == ALIKE
-    # The page shows it, in the film that it has played all the time.
-    left = f"myview.boxes.some(([it, left]) => it === {who} && left < myview.site.width / 2)"
-    await page.wait_for_function(f"myview.pulse >= {gops[place].first} && {left}")
-    await page.wait_for_function(f"myview.state === 'playing' && myview.pulse > {gops[place].first} + 10")
+        await site.until(
+            lambda: any(exchanged <= {*gop.split} for gop in gops), "the camera's solution is corrected"
+        )
+    corrected = next(index for index, gop in enumerate(gops) if exchanged <= {*gop.split})
+    assert left_to_right(gops[corrected - 1]) == [second, first], "published GOPs do not change"
+    assert left_to_right(gops[corrected]) == [first, second], "the ids are those before they met"
+    assert gops[corrected].choices[first] == ALIKE
+    # The page shows it, in the same player.
+    left = f"myview.boxes.some(([it, left]) => it === {first} && left < myview.site.width / 2)"
+    await page.wait_for_function(f"myview.pulse >= {gops[corrected].first} && {left}")
+    await page.wait_for_function(f"myview.state === 'playing' && myview.pulse > {gops[corrected].first} + 10")
     assert await page.evaluate(left)
     assert await page.evaluate("document.querySelector('video').dataset.same") == "yes"
     assert every_gop_once(site)

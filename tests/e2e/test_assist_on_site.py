@@ -1,4 +1,4 @@
-"""The operator helps on the running demo: a flag is raised, a pointer follows, the camera takes it."""
+"""Operator assistance on the running demo: a flag is raised, a pointer follows, the camera is corrected."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ async def page(site: RunningSite) -> AsyncIterator[Page]:
         yield page
 
 
-async def follow(page: Page, until: str) -> None:
-    """Keep the pointer on whom it is to point at, as a hand or an eye would; answer what comes next."""
+async def point_until(page: Page, condition: str) -> None:
+    """Keep the pointer on the flagged person, and answer further flags, until a condition holds."""
     async with asyncio.timeout(PATIENCE_MS / 1000):
-        while not await page.evaluate(until):
+        while not await page.evaluate(condition):
             if await page.evaluate("myview.pointing.object === null && myview.flags.length > 0"):
                 await page.keyboard.press("h")
             place = await page.evaluate(PLACE)
             if place is not None:
                 await page.mouse.move(*place)
             pulse = await page.evaluate("myview.pulse")
-            await page.wait_for_function(f"myview.pulse !== {pulse} || ({until})")
+            await page.wait_for_function(f"myview.pulse !== {pulse} || ({condition})")
 
 
 async def metric(site: RunningSite, name: str) -> float:
@@ -56,7 +56,7 @@ async def metric(site: RunningSite, name: str) -> float:
     return sum(float(line.split()[-1]) for line in lines if line.startswith(name))
 
 
-async def test_a_scripted_pointer_follows_a_flag_through_and_the_stream_goes_on(
+async def test_a_scripted_pointer_answers_a_flag_without_interrupting_the_stream(
     site: RunningSite, page: Page
 ) -> None:
     await page.wait_for_function("myview.state === 'playing'")
@@ -66,10 +66,10 @@ async def test_a_scripted_pointer_follows_a_flag_through_and_the_stream_goes_on(
     assert (await page.locator("#flag-words").inner_text()).strip()
     await point.click()
     await page.wait_for_function("myview.pointing.object !== null")
-    await follow(page, "myview.pointing.taken >= 20")
+    await point_until(page, "myview.pointing.taken >= 20")
     sent = await metric(site, "myview_position_corrections_total")
     assert sent >= 20
-    async with asyncio.timeout(PATIENCE_MS / 1000):  # the camera says so once a second
+    async with asyncio.timeout(PATIENCE_MS / 1000):  # the camera reports once a second
         while await metric(site, "myview_camera_position_corrections_total") < 1:
             await page.wait_for_function(f"myview.pulse > {await page.evaluate('myview.pulse')} + 5")
     async with aiohttp.ClientSession() as session, session.get(f"{site.url}api/flags") as answer:

@@ -1,4 +1,4 @@
-"""The best view is killed and begins anew: whoever a camera goes on following is who they were."""
+"""After a restart of the best view, people that cameras kept tracking have the same ids."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from server.service.identity.local_numbers import TrackName
 
 pytestmark = [
     pytest.mark.live,
-    pytest.mark.slow,  # tracks are kept for 30 s without a service; a busy machine starts none in that time
+    pytest.mark.slow,  # tracks are kept for 30 s, in which a busy machine cannot restart the service
     pytest.mark.asyncio,
 ]
 
 
-def whose(gops: Sequence[Gop], words: Sequence[CameraTracks]) -> dict[TrackName, set[int]]:
-    """Return the numbers under which each track's boxes were shown."""
+def ids_by_track(gops: Sequence[Gop], messages: Sequence[CameraTracks]) -> dict[TrackName, set[int]]:
+    """Return the ids with which each track's boxes were published."""
     numbers = {
         (camera, gop.first + at, (box.left, box.top, box.right, box.bottom)): box.object
         for gop in gops
@@ -41,16 +41,18 @@ def whose(gops: Sequence[Gop], words: Sequence[CameraTracks]) -> dict[TrackName,
         for box in row
     }
     found: dict[TrackName, set[int]] = defaultdict(set)
-    for word in words:
-        for track in word.tracks:
+    for message in messages:
+        for track in message.tracks:
             for at, place in enumerate(track.boxes):
-                number = None if place is None else numbers.get((word.camera, word.first + at, tuple(place)))
+                number = (
+                    None if place is None else numbers.get((message.camera, message.first + at, tuple(place)))
+                )
                 if number is not None:
-                    found[TrackName(word.camera, word.boot, track.id)].add(number)
+                    found[TrackName(message.camera, message.boot, track.id)].add(number)
     return found
 
 
-async def test_a_best_view_that_is_killed_shows_the_same_people_under_the_same_addresses(
+async def test_a_restarted_best_view_shows_the_same_people_under_the_same_addresses(
     tmp_path: Path,
 ) -> None:
     address = f"tcp/127.0.0.1:{free_port()}"
@@ -65,13 +67,15 @@ async def test_a_best_view_that_is_killed_shows_the_same_people_under_the_same_a
     config = tmp_path / "site.yaml"
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
     async with running(config) as site:
-        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
-        words: list[CameraTracks] = []
+        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "a person is shown")
+        messages: list[CameraTracks] = []
         bus = await asyncio.to_thread(Bus.listener, ZenohSettings(connect=site.config["zenoh"]["connect"]))
         try:
-            bus.subscribe(ZenohKeys("e2e").camera("*", "tracks"), lambda message: words.append(read(message)))
+            bus.subscribe(
+                ZenohKeys("e2e").camera("*", "tracks"), lambda message: messages.append(read(message))
+            )
             for _ in range(2):
-                await killed(site, words)
+                await kill_and_check(site, messages)
         finally:
             bus.close()
 
@@ -80,53 +84,53 @@ def read(message: Message) -> CameraTracks:
     return msgspec.json.decode(message.payload, type=CameraTracks)
 
 
-async def killed(site: RunningSite, words: list[CameraTracks]) -> None:
+async def kill_and_check(site: RunningSite, messages: list[CameraTracks]) -> None:
     since = site.pulse
     await site.until(
-        lambda: site.pulse > since + 50 and len(seen_now(site.gops[-1])) > 1, "people are followed"
+        lambda: site.pulse > since + 50 and len(ids_in_last_frame(site.gops[-1])) > 1, "people are tracked"
     )
-    numbers = seen_now(site.gops[-1])
+    numbers = ids_in_last_frame(site.gops[-1])
     count, before = len(site.gops), site.children()["bestview"]
     os.kill(before, signal.SIGKILL)
     died = site.pulse
     async with asyncio.timeout(PATIENCE), aiohttp.ClientSession() as session:
-        # Somebody may have left meanwhile.
-        while 200 not in (answers := [await asked(session, site.url, number) for number in numbers]):
+        # People may have left in the meantime.
+        while 200 not in (answers := [await request_status(session, site.url, number) for number in numbers]):
             lines = "\n".join(site.lines)
-            assert set(answers) <= {None, 503}, f"who may come again is said to be nobody: {numbers}\n{lines}"
+            assert set(answers) <= {None, 503}, f"an id that may return is unknown: {numbers}\n{lines}"
             await asyncio.sleep(0.05)
-    told = whose(site.gops[:count], words)
+    before_ids = ids_by_track(site.gops[:count], messages)
 
-    def again() -> dict[TrackName, set[int]]:
-        """Return the tracks that went on over the time without a service, as they are told now."""
-        on = {track for word in words if word.last > died for track in tracks_of(word)}
-        now = whose(site.gops[count:], words)
-        return {track: now[track] for track in told.keys() & now.keys() & on}
+    def surviving_tracks() -> dict[TrackName, set[int]]:
+        """Return the ids of the tracks that continued without the service."""
+        on = {track for message in messages if message.last > died for track in tracks_of(message)}
+        now = ids_by_track(site.gops[count:], messages)
+        return {track: now[track] for track in before_ids.keys() & now.keys() & on}
 
-    def goes_on() -> bool:
-        return site.pulse > died + 50 and len(site.gops) > count + 3 and len(again()) > 1
+    def resumed() -> bool:
+        return site.pulse > died + 50 and len(site.gops) > count + 3 and len(surviving_tracks()) > 1
 
-    await bounded(site.until(goes_on, "it goes on, and so do tracks"))
+    await bounded(site.until(resumed, "the site and tracks continue"))
     assert site.children()["bestview"] != before
-    for track, numbers_now in again().items():
-        assert numbers_now & told[track], f"{track}: {told[track]} {numbers_now}"
-    now = whose(site.gops[count:], words)
-    used = {number for numbers in told.values() for number in numbers}
-    new = {number for track, numbers in now.items() if track not in told for number in numbers} - used
-    assert all(number > max(used) for number in new), "numbers are not used twice"
+    for track, numbers_now in surviving_tracks().items():
+        assert numbers_now & before_ids[track], f"{track}: {before_ids[track]} {numbers_now}"
+    now = ids_by_track(site.gops[count:], messages)
+    used = {number for numbers in before_ids.values() for number in numbers}
+    new = {number for track, numbers in now.items() if track not in before_ids for number in numbers} - used
+    assert all(number > max(used) for number in new), "ids are not reused"
 
 
-def seen_now(gop: Gop) -> set[int]:
-    """Return who has a box in the last frame."""
+def ids_in_last_frame(gop: Gop) -> set[int]:
+    """Return the ids with a box in the last frame."""
     return {box.object for frames in gop.boxes.values() for box in frames[-1]}
 
 
-def tracks_of(word: CameraTracks) -> list[TrackName]:
-    return [TrackName(word.camera, word.boot, track.id) for track in word.tracks]
+def tracks_of(message: CameraTracks) -> list[TrackName]:
+    return [TrackName(message.camera, message.boot, track.id) for track in message.tracks]
 
 
-async def asked(session: aiohttp.ClientSession, url: str, number: int) -> int | None:
-    """Return the status of an answer about somebody's best view; None: there was none."""
+async def request_status(session: aiohttp.ClientSession, url: str, number: int) -> int | None:
+    """Request a person's best view; return the status, or None without an answer."""
     try:
         async with session.get(f"{url}objects/{number}/best.mp4") as answer:
             return answer.status

@@ -1,4 +1,4 @@
-"""docker-compose.secure.yml on a real engine: who has a token watches by HTTPS, and strangers get nowhere."""
+"""docker-compose.secure.yml on a real engine: tokens give access by HTTPS, and strangers have none."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from benchmarks.faults.site.compose_site import PLAIN, ComposeSite, missing_requ
 
 pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(1200)]
 
-SEEN_S = 180
-SPEAK = """
+VISIBLE_S = 180
+PUBLISH = """
 import json, pathlib, sys, time, zenoh
 config = zenoh.Config()
-said = {"mode": "client", "connect/endpoints": [sys.argv[1]], "connect/timeout_ms": 5000,
+settings = {"mode": "client", "connect/endpoints": [sys.argv[1]], "connect/timeout_ms": 5000,
         "scouting/multicast/enabled": False}
 if len(sys.argv) > 3:
-    said["transport/link/tls/root_ca_certificate"] = sys.argv[3]
+    settings["transport/link/tls/root_ca_certificate"] = sys.argv[3]
 if len(sys.argv) > 4:
-    said["transport/auth/usrpwd/user"] = sys.argv[4]
-    said["transport/auth/usrpwd/password"] = sys.argv[5]
-for key, value in said.items():
+    settings["transport/auth/usrpwd/user"] = sys.argv[4]
+    settings["transport/auth/usrpwd/password"] = sys.argv[5]
+for key, value in settings.items():
     config.insert_json5(key, json.dumps(value))
 try:
     with zenoh.open(config) as bus:
         for _ in range(30):
             bus.put(sys.argv[2], b"{}")
             time.sleep(0.1)
-    print("spoken")
+    print("published")
 except zenoh.ZError as error:
     print("refused", error)
 """
@@ -52,18 +52,18 @@ BUS = "tls/bestview:7447"
 
 @dataclass(frozen=True, slots=True)
 class Secure:
-    """A secure site, and what it was set up with."""
+    """A secure site, with its secrets, an operator token and its address."""
 
     site: ComposeSite
     secrets: Path
     token: str
     url: str
 
-    def stranger(self, *words: str, network: str) -> str:
-        """Run a container of our image that has nothing of the site's."""
+    def run_stranger(self, *arguments: str, network: str) -> str:
+        """Run a container of the image without any secrets of the site."""
         image = self.site.environment["MYVIEW_IMAGE"]
         mounted = f"{self.secrets / 'public'}:/run/public:ro"
-        words = (
+        command = (
             "--volume",
             mounted,
             "--network",
@@ -72,17 +72,17 @@ class Secure:
             "python",
             image,
             "-c",
-            SPEAK,
-            *words,
+            PUBLISH,
+            *arguments,
         )
-        return self.site.run("docker", "run", "--rm", *words, check=False)
+        return self.site.run("docker", "run", "--rm", *command, check=False)
 
 
 @pytest.fixture(scope="module")
 def secure(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secure]:
-    lacking = missing_requirement() or ("needs openssl" if shutil.which("openssl") is None else None)
-    if lacking is not None:
-        pytest.skip(lacking)
+    missing = missing_requirement() or ("needs openssl" if shutil.which("openssl") is None else None)
+    if missing is not None:
+        pytest.skip(missing)
     secrets = tmp_path_factory.mktemp("made") / "secrets"
     made = subprocess.run(
         ["sh", str(ROOT / "configs" / "secrets.sh"), "localhost", "c0", "c1", "c2"],
@@ -101,11 +101,11 @@ def secure(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secure]:
 
 @pytest.fixture
 async def viewer(secure: Secure) -> AsyncIterator[aiohttp.ClientSession]:
-    """Somebody with a token, who goes by our authority."""
+    """Return a session with a token that trusts the site's certificate authority."""
     trust = ssl.create_default_context(cafile=str(secure.secrets / "public" / "authority.pem"))
-    heads = {"Authorization": f"Bearer {secure.token}"}
+    headers = {"Authorization": f"Bearer {secure.token}"}
     connector = aiohttp.TCPConnector(ssl=trust)
-    async with aiohttp.ClientSession(secure.url, headers=heads, connector=connector) as session:
+    async with aiohttp.ClientSession(secure.url, headers=headers, connector=connector) as session:
         yield session
 
 
@@ -115,8 +115,8 @@ async def _json(viewer: aiohttp.ClientSession, path: str) -> Any:
         return await answer.json()
 
 
-async def _somebody(viewer: aiohttp.ClientSession) -> int:
-    async with asyncio.timeout(SEEN_S):
+async def _visible_person(viewer: aiohttp.ClientSession) -> int:
+    async with asyncio.timeout(VISIBLE_S):
         while True:
             for shown_object in (await _json(viewer, "/api/objects"))["objects"]:
                 if shown_object["visible"]:
@@ -137,13 +137,13 @@ def test_all_are_healthy_by_https_and_with_tokens(secure: Secure) -> None:
     assert {container["State"]["Health"]["Status"] for container in containers.values()} == {"healthy"}
 
 
-def test_each_has_its_own_secrets_and_they_are_in_no_variable(secure: Secure) -> None:
+def test_each_container_has_only_its_secrets_and_none_in_a_variable(secure: Secure) -> None:
     for camera in ("c0", "c1", "c2"):
-        there = secure.site.compose("exec", "-T", camera, "ls", "/run/secrets").split()
-        assert sorted(there) == ["bus", "pulses", "token"]
+        mounted = secure.site.compose("exec", "-T", camera, "ls", "/run/secrets").split()
+        assert sorted(mounted) == ["bus", "pulses", "token"]
         for secret in ("bus", "pulses"):
-            own = secure.site.compose("exec", "-T", camera, "cat", f"/run/secrets/{secret}")
-            assert own == (secure.secrets / "cameras" / camera / secret).read_text("ascii").strip()
+            content = secure.site.compose("exec", "-T", camera, "cat", f"/run/secrets/{secret}")
+            assert content == (secure.secrets / "cameras" / camera / secret).read_text("ascii").strip()
     hidden = [
         path.read_text("ascii").strip()
         for path in secure.secrets.rglob("*")
@@ -154,8 +154,8 @@ def test_each_has_its_own_secrets_and_they_are_in_no_variable(secure: Secure) ->
         assert not [secret for secret in hidden if secret in str(container["Config"])]
 
 
-async def test_who_has_a_token_watches_by_https(viewer: aiohttp.ClientSession, tmp_path: Path) -> None:
-    number = await _somebody(viewer)
+async def test_a_token_gives_access_by_https(viewer: aiohttp.ClientSession, tmp_path: Path) -> None:
+    number = await _visible_person(viewer)
     out = tmp_path / "best.mp4"
     async with viewer.get(f"/objects/{number}/best.mp4") as answer:
         assert answer.status == 200
@@ -166,8 +166,8 @@ async def test_who_has_a_token_watches_by_https(viewer: aiohttp.ClientSession, t
         assert page.status == 200
 
 
-async def test_who_has_none_sees_nobody(viewer: aiohttp.ClientSession) -> None:
-    number = await _somebody(viewer)
+async def test_without_a_token_access_is_refused(viewer: aiohttp.ClientSession) -> None:
+    number = await _visible_person(viewer)
     for path in ("/api/objects", "/api/cameras", "/metrics", f"/objects/{number}/best.mp4"):
         async with viewer.get(path, headers={"Authorization": ""}) as answer:
             assert answer.status == 401, path
@@ -175,47 +175,41 @@ async def test_who_has_none_sees_nobody(viewer: aiohttp.ClientSession) -> None:
             assert answer.status in {401, 429}, path
 
 
-async def test_a_camera_s_token_shows_that_camera_alone(
-    secure: Secure, viewer: aiohttp.ClientSession
-) -> None:
+async def test_a_cameras_token_shows_only_that_camera(secure: Secure, viewer: aiohttp.ClientSession) -> None:
     token = (secure.secrets / "cameras" / "c0" / "token").read_text("ascii").strip()
     async with viewer.get("/api/cameras", headers={"Authorization": f"Bearer {token}"}) as answer:
         assert [camera["camera"] for camera in (await answer.json())["cameras"]] == ["c0"]
 
 
-async def test_strangers_on_the_bus_are_heard_by_nobody(
-    secure: Secure, viewer: aiohttp.ClientSession
-) -> None:
-    """Even in the site's own network; a right password is heard, so the others could have been."""
+async def test_strangers_on_the_bus_are_ignored(secure: Secure, viewer: aiohttp.ClientSession) -> None:
+    """Even in the site's network; only a message with a valid password is received."""
     network, before = secure.site.network, await _bad_messages(viewer)
     authority = "/run/public/authority.pem"
 
-    async def said(*words: str, on: str = network) -> str:
-        return await asyncio.to_thread(secure.stranger, *words, network=on)
+    async def publish(*arguments: str, on: str = network) -> str:
+        return await asyncio.to_thread(secure.run_stranger, *arguments, network=on)
 
-    assert "refused" in await said(BUS, STATUS, on="bridge"), "who is on another network does not get there"
-    assert "refused" in await said("tcp/bestview:7447", STATUS), "who does not encrypt"
-    assert "refused" in await said(BUS, STATUS), "who knows no authority"
-    await said(BUS, STATUS, authority)
-    await said(BUS, STATUS, authority, "c1", "guessed")
-    await said(BUS, STATUS, authority, "somebody", "guessed")
+    assert "refused" in await publish(BUS, STATUS, on="bridge"), "another network"
+    assert "refused" in await publish("tcp/bestview:7447", STATUS), "no encryption"
+    assert "refused" in await publish(BUS, STATUS), "no certificate authority"
+    await publish(BUS, STATUS, authority)
+    await publish(BUS, STATUS, authority, "c1", "guessed")
+    await publish(BUS, STATUS, authority, "somebody", "guessed")
     name, password = (secure.secrets / "cameras" / "c0" / "bus").read_text("ascii").strip().split(":")
-    await said(BUS, STATUS, authority, name, password)  # c0 does not speak for c1
+    await publish(BUS, STATUS, authority, name, password)  # c0 may not publish for c1
     assert await _bad_messages(viewer) == before
-    assert "spoken" in await said(BUS, STATUS.replace("c1", "c0"), authority, name, password)
+    assert "published" in await publish(BUS, STATUS.replace("c1", "c0"), authority, name, password)
     assert await _bad_messages(viewer) > before
 
 
-async def test_a_token_that_is_taken_away_lets_nobody_in(
-    secure: Secure, viewer: aiohttp.ClientSession
-) -> None:
-    """By an editor that writes the file anew, without a restart."""
+async def test_a_revoked_token_is_refused(secure: Secure, viewer: aiohttp.ClientSession) -> None:
+    """The file is replaced, as editors do, without a restart."""
     tokens = secure.secrets / "web" / "tokens.yaml"
     lines = tokens.read_text("utf-8").splitlines(keepends=True)
     assert (await viewer.get("/api/site")).status == 200
-    anew = tokens.with_suffix(".new")
-    anew.write_text("".join(line for line in lines if "operator" not in line), encoding="utf-8")
-    anew.replace(tokens)
+    replacement = tokens.with_suffix(".new")
+    replacement.write_text("".join(line for line in lines if "operator" not in line), encoding="utf-8")
+    replacement.replace(tokens)
     async with asyncio.timeout(10):
         while (await viewer.get("/api/site")).status != 401:  # noqa: ASYNC110
             await asyncio.sleep(0.2)

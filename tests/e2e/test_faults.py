@@ -1,4 +1,4 @@
-"""Faults in a real site, as `python -m benchmarks.faults` injects them: what no busy machine changes."""
+"""Faults of `python -m benchmarks.faults` in a real site: the promises that do not depend on load."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Every process ends well when it is told to, at whatever moment that comes.
+"""Every process exits cleanly on SIGTERM, whatever it is waiting for.
 
-What is waited for here takes minutes by itself: none of it is waited for by who is told to end.
+The conditions that processes wait for here never occur.
 """
 
 from __future__ import annotations
@@ -27,28 +27,28 @@ from server.cli.generated_config import free_port
 pytestmark = [pytest.mark.live]
 
 WAITS_S = 3600.0
-"""What pulse 0 and the cameras wait for."""
+"""Time for which pulse 0 and the cameras wait."""
 SCENE = "scene:room?camera=0&cameras=3&objects=4&seed=1"
 
 
 @contextlib.asynccontextmanager
 async def silent_camera() -> AsyncIterator[tuple[str, asyncio.Event]]:
-    """Yield address of a camera that lets in whoever comes and says nothing, and whether somebody came."""
-    came = asyncio.Event()
+    """Run a camera that sends nothing; yield its address and the event of a connection."""
+    connected = asyncio.Event()
 
-    async def say_nothing(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        came.set()
+    async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        connected.set()
         with contextlib.suppress(ConnectionError):
             await reader.read()
         writer.close()
 
-    server = await asyncio.start_server(say_nothing, "127.0.0.1", 0)
+    server = await asyncio.start_server(accept, "127.0.0.1", 0)
     async with server:
-        yield f"rtsp://127.0.0.1:{server.sockets[0].getsockname()[1]}/live", came
+        yield f"rtsp://127.0.0.1:{server.sockets[0].getsockname()[1]}/live", connected
 
 
 def site(folder: Path, *sources: str) -> tuple[Path, dict[str, Any]]:
-    """Write a configuration in which everybody waits for somebody who never comes."""
+    """Write a configuration in which all processes wait for cameras that never connect."""
     bus = f"tcp/127.0.0.1:{free_port()}"
     content: dict[str, Any] = {
         "site": {"width": 160, "height": 90},
@@ -62,24 +62,28 @@ def site(folder: Path, *sources: str) -> tuple[Path, dict[str, Any]]:
     return path, content
 
 
-async def start(*words: str | Path, until: str) -> Process:
-    """Start a process, and wait until a line of its log has these words."""
+async def start(*arguments: str | Path, until: str) -> Process:
+    """Start a process, and wait until a line of its log contains `until`."""
     process = await asyncio.create_subprocess_exec(
-        *MYVIEW, *map(str, words), stderr=PIPE, stdout=DEVNULL, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+        *MYVIEW,
+        *map(str, arguments),
+        stderr=PIPE,
+        stdout=DEVNULL,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )
     assert process.stderr is not None
     async for line in process.stderr:
         if until in line.decode():
             return process
-    raise AssertionError(f"{words[0]} ended with {await process.wait()}")
+    raise AssertionError(f"{arguments[0]} ended with {await process.wait()}")
 
 
 async def end(*processes: Process) -> list[int]:
     """Send SIGTERM to processes; return their exit codes."""
     for process in processes:
         process.send_signal(signal.SIGTERM)
-    told = await asyncio.gather(*(process.communicate() for process in processes))
-    assert not any(b"Traceback" in said for _, said in told)
+    outputs = await asyncio.gather(*(process.communicate() for process in processes))
+    assert not any(b"Traceback" in log for _, log in outputs)
     return [process.returncode or 0 for process in processes]
 
 
@@ -92,14 +96,14 @@ def processes_of(config: Path) -> list[bytes]:
     return [command for command in found if os.fsencode(config) in command]
 
 
-async def answered(session: aiohttp.ClientSession, path: str) -> None:
+async def read_answer(session: aiohttp.ClientSession, path: str) -> None:
     """Read an answer until it ends or is broken off."""
     with contextlib.suppress(aiohttp.ClientError):
         async with session.get(path) as answer:
             await answer.read()
 
 
-async def test_who_waits_for_others_ends_when_told(tmp_path: Path) -> None:
+async def test_waiting_processes_exit_on_sigterm(tmp_path: Path) -> None:
     config, content = site(tmp_path, SCENE, SCENE)
     async with asyncio.timeout(PATIENCE):
         sync, bestview = await asyncio.gather(
@@ -107,7 +111,7 @@ async def test_who_waits_for_others_ends_when_told(tmp_path: Path) -> None:
         )
         async with aiohttp.ClientSession(f"http://127.0.0.1:{content['http']['port']}") as session:
             readers = [
-                asyncio.create_task(answered(session, path))
+                asyncio.create_task(read_answer(session, path))
                 for path in ("/api/events", "/cameras/c0/live.mp4", "/cameras/c0/hls/live.m3u8?_HLS_msn=1")
             ]
             await asyncio.sleep(0)
@@ -117,28 +121,28 @@ async def test_who_waits_for_others_ends_when_told(tmp_path: Path) -> None:
             await asyncio.gather(*readers)
 
 
-async def test_a_camera_that_is_being_opened_keeps_nobody_waiting(tmp_path: Path) -> None:
-    async with asyncio.timeout(PATIENCE), silent_camera() as (address, came):
+async def test_a_camera_exits_while_it_opens_its_source(tmp_path: Path) -> None:
+    async with asyncio.timeout(PATIENCE), silent_camera() as (address, connected):
         config, _ = site(tmp_path, address, SCENE)
         camera = await asyncio.create_subprocess_exec(*MYVIEW, "camera", config, "c0", stderr=PIPE)
-        await came.wait()
-        async with asyncio.timeout(OPEN_S):  # for so long it is given to say something
+        await connected.wait()
+        async with asyncio.timeout(OPEN_S):  # the time given to a silent camera
             assert await end(camera) == [0]
 
 
 @pytest.mark.slow
-async def test_a_whole_site_ends_while_it_starts_and_leaves_nothing_behind(tmp_path: Path) -> None:
-    async with asyncio.timeout(PATIENCE), silent_camera() as (address, came):
+async def test_a_starting_site_exits_without_leaving_processes(tmp_path: Path) -> None:
+    async with asyncio.timeout(PATIENCE), silent_camera() as (address, connected):
         config, _ = site(tmp_path, address, SCENE)
         up = await start("up", config, until="sync: pulses at")
-        await came.wait()
+        await connected.wait()
         assert len(processes_of(config)) > 1
         assert await end(up) == [0]
     assert not processes_of(config)
 
 
 @pytest.mark.slow
-async def test_the_demo_ends_while_it_starts(tmp_path: Path) -> None:
+async def test_the_demo_exits_while_it_starts(tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONUNBUFFERED": "1", "TMPDIR": str(tmp_path)}
     async with asyncio.timeout(PATIENCE):
         for number in (signal.SIGTERM, signal.SIGHUP):

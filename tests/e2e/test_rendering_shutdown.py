@@ -1,4 +1,4 @@
-"""A site that is told to end takes its drawing processes with it, whatever they are busy with."""
+"""A site's render workers exit with it, whatever they are doing."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from fakes.running.site import bounded, configuration, running
 
 pytestmark = [pytest.mark.live, pytest.mark.slow]
 
-WITHIN_S = 2.0
+EXIT_S = 2.0
 
 
-async def test_drawing_ends_within_two_seconds_of_sigterm(tmp_path: Path) -> None:
+async def test_render_workers_exit_within_two_seconds_of_sigterm(tmp_path: Path) -> None:
     cameras = [{"id": "c0", "source": "scene:room?camera=0&cameras=1&objects=2&seed=1"}]
     site = {"name": "drawn", "fps": 25, "width": 320, "height": 180}
     config = configuration(tmp_path, tmp_path, site=site, cameras=cameras, ground=None)
     async with running(config) as started:
-        await started.until(lambda: len(started.gops) > 2, "something is decided")
+        await started.until(lambda: len(started.gops) > 2, "decisions arrive")
         async with (
             aiohttp.ClientSession(started.url) as session,
             session.get("/cameras/c0/live.mjpeg") as plain,
@@ -31,13 +31,13 @@ async def test_drawing_ends_within_two_seconds_of_sigterm(tmp_path: Path) -> Non
             for answer in (plain, boxed):
                 assert answer.status == 200
                 await bounded(answer.content.readexactly(10_000))
-            drawing = processes("server.service.rendering.worker", started.children()["bestview"])
-            assert len(drawing) == 2
+            workers = processes("server.service.rendering.worker", started.children()["bestview"])
+            assert len(workers) == 2
             started.process.send_signal(signal.SIGTERM)
-            told = time.monotonic()
-            while any(Path(f"/proc/{pid}").exists() for pid in drawing):
+            terminated_at = time.monotonic()
+            while any(Path(f"/proc/{pid}").exists() for pid in workers):
                 await asyncio.sleep(0.01)
-                assert time.monotonic() < told + WITHIN_S
+                assert time.monotonic() < terminated_at + EXIT_S
             assert await started.ended() == 0
 
 

@@ -1,4 +1,4 @@
-"""A running site whose configuration is read again, while somebody watches."""
+"""Reload of a running site's configuration while a viewer watches."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from fakes.running.stream_frames import pictures, record
 pytestmark = [pytest.mark.live, pytest.mark.slow]
 
 
-async def said(site: RunningSite, text: str) -> None:
-    """Wait until a line of the log has it."""
+async def wait_for_log(site: RunningSite, text: str) -> None:
+    """Wait until a line of the log contains a text."""
 
     async def look() -> None:
         while not any(text in line for line in site.lines):  # noqa: ASYNC110 — another process: there is no event
@@ -29,13 +29,13 @@ async def said(site: RunningSite, text: str) -> None:
     await bounded(look())
 
 
-async def read_again(running_site: RunningSite, config: Path, **changes: Any) -> None:
-    """Change the file and have it read."""
+async def reload(running_site: RunningSite, config: Path, **changes: Any) -> None:
+    """Change the configuration file and reload it."""
     config.write_text(yaml.safe_dump({**running_site.config, **changes}), encoding="utf-8")
     running_site.process.send_signal(signal.SIGHUP)
 
 
-async def test_a_bad_file_changes_nothing_and_a_good_one_breaks_no_stream(
+async def test_an_invalid_file_changes_nothing_and_a_valid_one_interrupts_no_stream(
     recording: Path, tmp_path: Path
 ) -> None:
     config = configuration(tmp_path, recording, camera={"at_end": "loop"})
@@ -45,34 +45,34 @@ async def test_a_bad_file_changes_nothing_and_a_good_one_breaks_no_stream(
             async with session.get(path) as answer:
                 return await (answer.json() if path.startswith("api") else answer.text())
 
-        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
+        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "a person is shown")
         processes = site.children()
-        way = f"objects/{min(site.gops[-1].choices)}/best.mp4"
-        viewer = asyncio.create_task(record(session, way, site.pulse + 100, tmp_path / "viewer"))
+        path = f"objects/{min(site.gops[-1].choices)}/best.mp4"
+        viewer = asyncio.create_task(record(session, path, site.pulse + 100, tmp_path / "viewer"))
 
-        await read_again(site, config, site={"fps": "banana"})
-        await said(site, "site.fps: Input should be a valid number")
+        await reload(site, config, site={"fps": "banana"})
+        await wait_for_log(site, "site.fps: Input should be a valid number")
         assert "myview_config_differs 1.0" in await ask("metrics")
-        os.kill(processes["c2"], signal.SIGKILL)  # it is started again by what is in force
+        os.kill(processes["c2"], signal.SIGKILL)  # it is restarted with the configuration in force
         await site.until(lambda: site.state("c2") != "live", "c2 is lost")
         await site.until(lambda: site.state("c2") == "live", "c2 is back")
 
         cameras = [dict(camera) for camera in site.config["cameras"]]
         cameras[1]["offset"] = 5
-        await read_again(site, config, cameras=cameras, view={"switch_cost_s": 0.7}, encode={"crf": 30})
-        await said(site, "bestview: configuration reloaded: in force now: view.switch_cost_s")
-        await said(site, "c1: configuration reloaded, and changes this camera")
+        await reload(site, config, cameras=cameras, view={"switch_cost_s": 0.7}, encode={"crf": 30})
+        await wait_for_log(site, "bestview: configuration reloaded: in force now: view.switch_cost_s")
+        await wait_for_log(site, "c1: configuration reloaded, and changes this camera")
         assert (await ask("api/operator/view_selection"))["values"]["switch_cost_s"] == 0.7
         assert (await ask("api/operator/config"))["pending_restart"] == ["encode.crf"]
         await bounded(viewer)
-        await said(site, "waits for a restart of all processes: encode.crf")
+        await wait_for_log(site, "waits for a restart of all processes: encode.crf")
         now = site.children()
         assert {process: now[process] for process in processes if process != "c2"} == {
             process: pid for process, pid in processes.items() if process != "c2"
         }
-        await site.until(lambda: site.state("c1") == "live", "c1 has begun anew")
+        await site.until(lambda: site.state("c1") == "live", "c1 has restarted")
         site.process.send_signal(signal.SIGTERM)
         assert await site.ended() == 0
     shown = sorted(pictures(tmp_path / "viewer"))
     assert len(shown) > 80
-    assert all(after == before + 1 for before, after in pairwise(shown)), "the stream has no hole"
+    assert all(after == before + 1 for before, after in pairwise(shown)), "the stream has no gap"

@@ -47,12 +47,12 @@ PLAYED_ACROSS_A_CUT = f"""(() => {{
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def site(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RunningSite]:
-    """A site with sound whose recordings begin again at their end, with people in sight."""
+    """A site with sound and looped recordings, with people in view."""
     folder = tmp_path_factory.mktemp("site")
     sound = {"source": str(write_beeps(folder / "beeps.wav")), "at_end": "loop"}
     config = configuration(folder, recording, camera={"at_end": "loop"}, sound=sound)
     async with running(config) as site:
-        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
+        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "a person is shown")
         yield site
 
 
@@ -64,7 +64,7 @@ async def browser() -> AsyncIterator[Browser]:
 
 @pytest_asyncio.fixture(loop_scope="module")
 async def page(site: RunningSite, browser: Browser) -> AsyncIterator[Page]:
-    """The page, opened; an error in it fails the test."""
+    """Open the page; an error in it fails the test."""
     errors: list[str] = []
     # Waiting for a condition in the page evaluates it as a string, which the page's policy forbids.
     page = await browser.new_page(bypass_csp=True)
@@ -76,12 +76,12 @@ async def page(site: RunningSite, browser: Browser) -> AsyncIterator[Page]:
     assert errors == []
 
 
-async def test_it_is_five_processes(site: RunningSite) -> None:
+async def test_a_site_has_five_processes(site: RunningSite) -> None:
     assert sorted(site.children()) == ["bestview", *CAMERAS, "sync"]
 
 
 async def test_cameras_yield_to_the_best_view_and_the_pulses(site: RunningSite) -> None:
-    """Every thread of theirs, which begins as nice as the one that has begun it."""
+    """All their threads, which inherit the niceness of the thread that starts them."""
     niceness = {
         name: {
             os.getpriority(os.PRIO_PROCESS, int(task.name)) for task in Path(f"/proc/{pid}/task").iterdir()
@@ -104,7 +104,7 @@ async def test_pulses_are_readable_with_nc(site: RunningSite) -> None:
         lines = [(await bounded(listener.stdout.readline())).decode() for _ in range(6)]
         listener.kill()
         await listener.wait()
-    else:  # what nc does
+    else:  # as nc does
         reader, writer = await asyncio.open_connection("127.0.0.1", int(port))
         lines = [(await bounded(reader.readline())).decode() for _ in range(6)]
         writer.close()
@@ -138,11 +138,11 @@ async def test_metadata_is_readable_by_a_plain_zenoh_subscriber(site: RunningSit
     await asyncio.to_thread(session.close)
 
 
-async def test_every_panel_and_every_alert_is_about_something_that_the_site_prints(site: RunningSite) -> None:
+async def test_every_panel_and_every_alert_uses_metrics_of_the_site(site: RunningSite) -> None:
     async with aiohttp.ClientSession(site.url) as session:
-        while lacking := lacks(Printed.of(await text(session, "metrics"))):
+        while lacking := missing_metrics(Printed.of(await text(session, "metrics"))):
             now = site.pulse
-            await site.until(lambda: site.pulse > now, f"these print something: {lacking}")  # noqa: B023
+            await site.until(lambda: site.pulse > now, f"metrics for {lacking}")  # noqa: B023
 
 
 async def text(session: aiohttp.ClientSession, path: str) -> str:
@@ -150,8 +150,8 @@ async def text(session: aiohttp.ClientSession, path: str) -> str:
         return await answer.text()
 
 
-def lacks(printed: Printed) -> list[str]:
-    """List what asks for something that was not printed yet."""
+def missing_metrics(printed: Printed) -> list[str]:
+    """List the panels and alerts whose metrics are not exported yet."""
     lacking = []
     for asked in ASKED:
         if not {selector.name for selector in selectors(asked.expression)} <= OF_PROMETHEUS:
@@ -162,19 +162,17 @@ def lacks(printed: Printed) -> list[str]:
     return lacking
 
 
-async def test_every_frame_is_the_chosen_cameras_own_pixel_for_pixel_across_cuts(
-    site: RunningSite, tmp_path: Path
-) -> None:
-    await site.until(lambda: bool(site.gops[-1].choices), "somebody is shown")
+async def test_every_frame_equals_the_selected_cameras_across_cuts(site: RunningSite, tmp_path: Path) -> None:
+    await site.until(lambda: bool(site.gops[-1].choices), "a person is shown")
     begin = len(site.gops)
     numbers = sorted(site.gops[-1].choices)
     end = site.pulse + 200
-    ways = {f"object-{number}": f"objects/{number}/best.mp4" for number in numbers}
-    ways |= {camera: f"cameras/{camera}/live.mp4" for camera in CAMERAS}
+    paths = {f"object-{number}": f"objects/{number}/best.mp4" for number in numbers}
+    paths |= {camera: f"cameras/{camera}/live.mp4" for camera in CAMERAS}
     async with aiohttp.ClientSession() as session:
         files = await bounded(
             asyncio.gather(
-                *(record(session, site.url + way, end, tmp_path / name) for name, way in ways.items())
+                *(record(session, site.url + path, end, tmp_path / name) for name, path in paths.items())
             )
         )
     shown = {file.name: await asyncio.to_thread(pictures, file) for file in files}
@@ -189,7 +187,7 @@ async def test_every_frame_is_the_chosen_cameras_own_pixel_for_pixel_across_cuts
         before = None
         for pulse, picture in shown[f"object-{number}"].items():
             camera, last, before = chosen[number, pulse], before, picture
-            if camera is None:  # two numbers were one person, or no camera could be shown: it stands still
+            if camera is None:  # two ids were merged, or no camera shows the person: the picture freezes
                 possible = [last, *(shown[camera].get(pulse) for camera in CAMERAS)]
                 assert any(
                     candidate is not None and np.array_equal(picture, candidate) for candidate in possible
@@ -199,21 +197,21 @@ async def test_every_frame_is_the_chosen_cameras_own_pixel_for_pixel_across_cuts
                 np.testing.assert_array_equal(picture, shown[camera][pulse], f"{number} at {pulse}: {camera}")
                 compared += 1
     assert compared > 100
-    assert cuts > 0, "a cut is what this is about"
+    assert cuts > 0, "there were cuts"
 
 
-async def test_the_best_view_process_holds_no_codec(site: RunningSite) -> None:
+async def test_the_best_view_process_loads_no_codec(site: RunningSite) -> None:
     mapped = {
         name: Path(f"/proc/{pid}/maps").read_text(encoding="utf-8") for name, pid in site.children().items()
     }
-    assert "libx264" in mapped["c0"], "this is how an encoder would be seen"
+    assert "libx264" in mapped["c0"], "a loaded encoder is visible"
     assert "libx264" not in mapped["bestview"]
     assert "libavcodec" not in mapped["bestview"].replace("opencv_python_headless.libs/libavcodec", "")
 
 
 async def test_a_killed_camera_is_replaced_and_comes_back(site: RunningSite, tmp_path: Path) -> None:
     shown = lambda: [camera for camera in site.gops[-1].choices.values() if camera]  # noqa: E731
-    await site.until(lambda: bool(shown()), "somebody is shown")
+    await site.until(lambda: bool(shown()), "a person is shown")
     victim = shown()[0]
     number = next(number for number, camera in site.gops[-1].choices.items() if camera == victim)
     async with aiohttp.ClientSession() as session:
@@ -228,45 +226,49 @@ async def test_a_killed_camera_is_replaced_and_comes_back(site: RunningSite, tmp
         )
         decided = site.gops[known - 1].first
         first_without = next(gop.first for gop in site.gops[known:] if victim not in gop.choices.values())
-        await site.until(lambda: "gone" in site.states[victim][states:], "the loss is seen")
+        await site.until(lambda: "gone" in site.states[victim][states:], "the loss is noticed")
         await site.until(lambda: site.state(victim) == "live", "the camera is back")
         assert site.children()[victim] != before
         await site.until(
-            lambda: any(victim in gop.choices.values() for gop in site.gops[-3:]), "it takes part again"
+            lambda: any(victim in gop.choices.values() for gop in site.gops[-3:]), "it is selected again"
         )
         await bounded(viewer)
-    # The video that had come is shown first; a machine with much to do is late with the rest, by pulses too.
+    # Buffered video is shown first; a busy machine takes longer, also in pulses.
     assert first_without - decided < 10 * (LOOKAHEAD + GOP)
     pulses = sorted(pictures(tmp_path / "viewer"))
     gaps = [(a, b) for a, b in pairwise(pulses) if b != a + 1]
-    assert not gaps, f"the viewer's stream has holes: {gaps}"
+    assert not gaps, f"the viewer's stream has gaps: {gaps}"
 
 
 @pytest.mark.slow
-async def test_when_all_cameras_die_streams_stand_still_and_go_on(site: RunningSite, tmp_path: Path) -> None:
-    await site.until(lambda: any(site.gops[-1].choices.values()), "somebody is shown")
+async def test_streams_freeze_while_all_cameras_are_down_and_then_continue(
+    site: RunningSite, tmp_path: Path
+) -> None:
+    await site.until(lambda: any(site.gops[-1].choices.values()), "a person is shown")
     number = next(number for number, camera in site.gops[-1].choices.items() if camera)
-    ways, end = (f"objects/{number}/best.mp4", "cameras/c0/live.mp4"), site.pulse + 250
+    paths, end = (f"objects/{number}/best.mp4", "cameras/c0/live.mp4"), site.pulse + 250
     async with aiohttp.ClientSession() as session:
         viewers = [
-            asyncio.create_task(record(session, site.url + way, end, tmp_path / way.partition("/")[0]))
-            for way in ways
+            asyncio.create_task(record(session, site.url + path, end, tmp_path / path.partition("/")[0]))
+            for path in paths
         ]
         await asyncio.sleep(0.5)
         for camera in CAMERAS:
             os.kill(site.children()[camera], signal.SIGKILL)
-        await site.until(lambda: {site.state(camera) for camera in CAMERAS} == {"gone"}, "the loss is seen")
-        await site.until(lambda: site.gops[-1].choices.get(number) is None, "nobody can be shown")
+        await site.until(
+            lambda: {site.state(camera) for camera in CAMERAS} == {"gone"}, "the loss is noticed"
+        )
+        await site.until(lambda: site.gops[-1].choices.get(number) is None, "no person can be shown")
         files = [await bounded(viewer) for viewer in viewers]
         await site.until(lambda: {site.state(camera) for camera in CAMERAS} == {"live"}, "all are back")
     for file in files:
         moments = shown_from_to(file)
         assert len(moments) > 50
-        holes = [(a, b) for a, b in pairwise(moments) if round(b[0] - a[1])]
-        assert not holes, f"{file.name}: {holes}"
+        gaps = [(a, b) for a, b in pairwise(moments) if round(b[0] - a[1])]
+        assert not gaps, f"{file.name}: {gaps}"
 
 
-async def test_it_answers_where_machines_ask(site: RunningSite) -> None:
+async def test_the_monitoring_endpoints_answer(site: RunningSite) -> None:
     async with aiohttp.ClientSession() as session:
         for path in ("healthz", "readyz", "metrics", "api/openapi.json", "api", ""):
             async with session.get(site.url + path) as answer:
@@ -274,22 +276,24 @@ async def test_it_answers_where_machines_ask(site: RunningSite) -> None:
 
 
 @needs_chromium
-async def test_the_best_view_plays_across_a_cut_and_the_frames_go_on(page: Page) -> None:
+async def test_the_best_view_plays_across_a_cut_without_interruption(page: Page) -> None:
     await page.wait_for_function("myview.state === 'playing'")
-    # Whoever has left for good is never cut to again: then somebody in view is chosen.
-    somebody = "document.querySelector('#people button.person:not(.away)')?.click()"
-    # A slow core leaves frames out, and now and then the page jumps to live; it never stops at each cut.
-    await page.wait_for_function(f"{PLAYED_ACROSS_A_CUT} || (myview.state === 'away' && {somebody}, false)")
+    # There are no cuts for a person who has left: then select a visible one.
+    select_visible = "document.querySelector('#people button.person:not(.away)')?.click()"
+    # A slow machine drops frames, and the page may jump to live, but it does not stop at each cut.
+    await page.wait_for_function(
+        f"{PLAYED_ACROSS_A_CUT} || (myview.state === 'away' && {select_visible}, false)"
+    )
 
 
 @pytest.mark.slow
 @needs_chromium
-async def test_the_sound_goes_on_across_cuts_and_choices_in_step(
+async def test_sound_continues_in_sync_across_cuts_and_selections(
     page: Page, site: RunningSite, tmp_path: Path
 ) -> None:
     await page.wait_for_function("myview.state === 'playing'")
     video = "document.querySelector('video')"
-    assert await page.evaluate(f"{video}.muted"), "or it would not play by itself"
+    assert await page.evaluate(f"{video}.muted"), "else autoplay is blocked"
     await page.get_by_role("button", name="Sound").click()
     assert not await page.evaluate(f"{video}.muted")
     before = await page.evaluate(f"{video}.webkitAudioDecodedByteCount")
@@ -301,13 +305,13 @@ async def test_the_sound_goes_on_across_cuts_and_choices_in_step(
         url = f"{site.url}objects/{number}/best.mp4"
         film = await bounded(record(session, url, site.pulse + 4 * FPS, tmp_path / "film"))
     times, begins = await asyncio.to_thread(heard, film)
-    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a hole"
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a gap"
     assert len(begins) >= 3
     assert [begin - round(begin) for begin in begins] == pytest.approx([0] * len(begins), abs=0.04)
 
 
 @needs_chromium
-async def test_choosing_somebody_else_shows_them_without_another_player(page: Page) -> None:
+async def test_selecting_another_person_keeps_the_player(page: Page) -> None:
     await page.wait_for_function("myview.state === 'playing'")
     await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
     first = await page.evaluate("myview.object")

@@ -72,7 +72,7 @@ class ClockOffset:
             self._shared = mmap.mmap(file.fileno(), struct.calcsize("q"))
 
     def step(self, seconds: int) -> None:
-        """Step the clock by so many seconds."""
+        """Step the clock by some seconds; negative: back."""
         (ahead,) = struct.unpack("q", self._shared[:])
         self._shared[:] = struct.pack("q", ahead + seconds)
 
@@ -93,7 +93,7 @@ async def with_clock(views: StampedViews, folder: Path) -> AsyncIterator[FaultSi
         gcc, "-O2", "-shared", "-fPIC", "-o", str(shim), str(source)
     )
     if await compiling.wait():
-        raise CannotRunError("gcc could not compile what steps the clock")
+        raise CannotRunError("gcc could not compile the clock library")
     clock = await asyncio.to_thread(ClockOffset, shared)
     environment = {"LD_PRELOAD": str(shim), "FAULTS_CLOCK": str(shared)}
     async with with_up(views, folder, environment=environment) as fault_site:

@@ -12,13 +12,13 @@ import yaml
 from benchmarks.faults.site.fault_site import Fault, FaultSite, with_up
 from benchmarks.latency.running_site import CONFIG, LOG
 
-_MISTAKE = {"view": {"switch_cost_s": "banana"}}
+_INVALID = {"view": {"switch_cost_s": "banana"}}
 _ERROR = "view.switch_cost_s: Input should be a valid number"
-_WITHIN_S = 5.0
+_TIMEOUT_S = 5.0
 _POLL_S = 0.05
 
 
-async def reload_with_mistake(fault_site: FaultSite) -> None:
+async def reload_invalid_config(fault_site: FaultSite) -> None:
     """Write an invalid value, reload, wait until the error is logged, then restore the file.
 
     Raises:
@@ -27,11 +27,11 @@ async def reload_with_mistake(fault_site: FaultSite) -> None:
     path, log = fault_site.folder / CONFIG, fault_site.folder / LOG
     good = await asyncio.to_thread(path.read_text, encoding="utf-8")
     errors_before = await asyncio.to_thread(_count_errors, log)
-    bad = yaml.safe_dump({**yaml.safe_load(good), **_MISTAKE}, sort_keys=False)
+    bad = yaml.safe_dump({**yaml.safe_load(good), **_INVALID}, sort_keys=False)
     await asyncio.to_thread(path.write_text, bad, encoding="utf-8")
     try:
         os.kill(fault_site.supervisor_pid, signal.SIGHUP)
-        async with asyncio.timeout(_WITHIN_S):
+        async with asyncio.timeout(_TIMEOUT_S):
             while await asyncio.to_thread(_count_errors, log) == errors_before:  # noqa: ASYNC110 — a file of another process
                 await asyncio.sleep(_POLL_S)
     except TimeoutError:
@@ -45,4 +45,4 @@ def _count_errors(log: Path) -> int:
     return log.read_text(encoding="utf-8", errors="replace").count(_ERROR)
 
 
-FAULTS = (Fault("reload, one value wrong", with_up, reload_with_mistake),)
+FAULTS = (Fault("reload, one value wrong", with_up, reload_invalid_config),)

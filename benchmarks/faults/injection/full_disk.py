@@ -27,7 +27,7 @@ async def with_small_disk(views: StampedViews, folder: Path) -> AsyncIterator[Fa
     """Run `myview up` with recordings and decision files on a small disk.
 
     Raises:
-        CannotRunError: such a disk cannot be mounted here.
+        CannotRunError: a small disk cannot be mounted.
     """
     unshare = shutil.which("unshare")
     if unshare is None or os.geteuid():

@@ -26,7 +26,7 @@ from client import Gop
 from server.cli.generated_config import free_port
 from server.http.access.csrf import CSRF_HEADER
 
-_GONE_S = 30.0
+_ROUTER_DOWN_S = 30.0
 _FAULTY_S = 8.0
 _CORRECTIONS = "/api/operator/position_corrections"
 _KINDS = ("tracks", "status", FOUND, CORRECTIONS)
@@ -74,9 +74,9 @@ async def with_lossy_bus(views: StampedViews, folder: Path) -> AsyncIterator[Fau
         "zenoh": {"connect": far, "listen": far},
         "track": {"assist": {"enabled": True}},
     }
-    own = {camera: {"MYVIEW_ZENOH__CONNECT": address} for camera, address in near.items()}
+    environments = {camera: {"MYVIEW_ZENOH__CONNECT": address} for camera, address in near.items()}
     try:
-        async with run_separately(views, folder, settings, own) as fault_site:
+        async with run_separately(views, folder, settings, environments) as fault_site:
             fault_site.control = bus_process
             operator = asyncio.create_task(_operate(fault_site))
             try:
@@ -135,7 +135,7 @@ def distort_messages(mode: str) -> Inject:
 async def kill_router(fault_site: FaultSite) -> None:
     """Kill the router, and restart it after a while."""
     await fault_site.control.kill()
-    await asyncio.sleep(_GONE_S)
+    await asyncio.sleep(_ROUTER_DOWN_S)
     await fault_site.control.start()
 
 

@@ -1,4 +1,4 @@
-"""The page while its server is killed: how soon it plays again."""
+"""Recovery of the page after its server is killed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.faults.site.fault_site import Fault, FaultSite, with_up
 
 _PLAYING_MS = 90_000
 _POLL_S = 0.05
-_PATIENCE_S = 60.0
+_TIMEOUT_S = 60.0
 _END = """() => {
   const { buffered } = document.querySelector('video');
   return buffered.length ? buffered.end(buffered.length - 1) : 0;
@@ -28,16 +28,18 @@ async def kill_server_behind_page(fault_site: FaultSite) -> None:
     if chromium_path() is None:
         raise RuntimeError("Chromium is missing")
     async with chromium() as browser:
-        page = await browser.new_page(bypass_csp=True)  # the page's policy forbids eval, which asks it here
+        page = await browser.new_page(
+            bypass_csp=True
+        )  # the page's policy forbids eval, which this check uses
         await open_when_ready(page, f"{fault_site.url}?object={fault_site.viewers[0].number}")
         await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
-        fault_site.ready_times.clear()  # the start of the browser may have interrupted it
+        fault_site.ready_times.clear()  # the browser's start may have slowed the server down
         fault_site.send(signal.SIGKILL, "bestview")
         await asyncio.sleep(_POLL_S)
         before = await page.evaluate(_END)
-        give_up = time.monotonic() + _PATIENCE_S
+        deadline = time.monotonic() + _TIMEOUT_S
         while await page.evaluate(_END) <= before:
-            if time.monotonic() > give_up:
+            if time.monotonic() > deadline:
                 raise RuntimeError("the page did not recover")
             await asyncio.sleep(_POLL_S)
         fault_site.page_resumed_at = time.monotonic()

@@ -15,10 +15,10 @@ OTHER = "other"
 PROCESSES = (BESTVIEW, SYNC, SHOWN, OTHER, RENDERING)
 
 
-def process_sets(*left_out: str) -> Iterator[tuple[str, ...]]:
-    """Yield each process except `left_out`, then each pair; OTHER fails only together with SHOWN."""
-    there = [process for process in PROCESSES if process not in left_out]
-    for processes in (*combinations(there, 1), *combinations(there, 2)):
+def process_sets(*excluded: str) -> Iterator[tuple[str, ...]]:
+    """Yield each process except `excluded`, then each pair; OTHER fails only together with SHOWN."""
+    available = [process for process in PROCESSES if process not in excluded]
+    for processes in (*combinations(available, 1), *combinations(available, 2)):
         if OTHER not in processes or SHOWN in processes:
             yield processes
 

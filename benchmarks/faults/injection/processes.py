@@ -1,4 +1,4 @@
-"""Processes that are killed or frozen, one by one and in pairs."""
+"""Kills and freezes of processes, alone and in pairs."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from benchmarks.faults.injection.process_pairs import BESTVIEW, RENDERING, SHOWN
 from benchmarks.faults.site.fault_site import LEASE_S, Fault, FaultSite, Inject, with_up
 
 _FROZEN_S = 4.0
-_SOME_BYTES, _MORE_BYTES = 10_000, 100_000
-_AGAIN_S = 0.2
+_FIRST_BYTES, _LATER_BYTES = 10_000, 100_000
+_RETRY_S = 0.2
 
 
 def kill_processes(*processes: str) -> Inject:
@@ -40,23 +40,23 @@ def freeze_processes(*processes: str, seconds: float = _FROZEN_S) -> Inject:
     return inject
 
 
-def while_drawing(inject: Inject, *, kills_server: bool) -> Inject:
-    """Watch MJPEG meanwhile, so that there is a render worker.
+def while_rendering(inject: Inject, *, kills_server: bool) -> Inject:
+    """Watch an MJPEG stream during the fault, so that there is a render worker.
 
-    The stream must continue; where its server is killed, it is opened again.
+    The stream must continue; if its server is killed, it is opened again.
     """
 
     async def injected(fault_site: FaultSite) -> None:
         path = f"/objects/{fault_site.viewers[0].number}/best.mjpeg"
         async with aiohttp.ClientSession(fault_site.url, raise_for_status=True) as session:
             async with _pictures(session, path) as content:
-                await content.readexactly(_SOME_BYTES)
+                await content.readexactly(_FIRST_BYTES)
                 await inject(fault_site)
                 if not kills_server:
-                    await content.readexactly(_MORE_BYTES)
+                    await content.readexactly(_LATER_BYTES)
                     return
             async with _pictures(session, path) as content:
-                await content.readexactly(_MORE_BYTES)
+                await content.readexactly(_LATER_BYTES)
 
     return injected
 
@@ -69,7 +69,7 @@ async def _pictures(session: aiohttp.ClientSession, path: str) -> AsyncIterator[
             answer = await session.get(path)
             break
         except aiohttp.ClientError:
-            await asyncio.sleep(_AGAIN_S)
+            await asyncio.sleep(_RETRY_S)
     async with answer:
         yield answer.content
 
@@ -77,7 +77,7 @@ async def _pictures(session: aiohttp.ClientSession, path: str) -> AsyncIterator[
 def _kill(processes: tuple[str, ...]) -> Fault:
     name, inject, kills_server = f"kill {title(processes)}", kill_processes(*processes), BESTVIEW in processes
     if RENDERING in processes:
-        inject = while_drawing(inject, kills_server=kills_server)
+        inject = while_rendering(inject, kills_server=kills_server)
     return (
         Fault(name, with_up, inject, 15.0, None, kills_server=True)
         if kills_server
@@ -88,7 +88,7 @@ def _kill(processes: tuple[str, ...]) -> Fault:
 def _freeze(processes: tuple[str, ...]) -> Fault:
     inject = freeze_processes(*processes)
     if RENDERING in processes:
-        inject = while_drawing(inject, kills_server=False)
+        inject = while_rendering(inject, kills_server=False)
     max_gap_s = None if BESTVIEW in processes else LEASE_S + 1.0 if SHOWN in processes else 1.0
     return Fault(f"freeze {title(processes)}", with_up, inject, 9.0, max_gap_s)
 

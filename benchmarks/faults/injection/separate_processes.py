@@ -1,4 +1,4 @@
-"""Sites whose processes run separately, as in containers, and are restarted one by one."""
+"""Sites whose processes run separately, as in containers, and restarts of these processes."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ NAMES = ("bestview", "sync", *CAMERAS)
 
 
 class SeparateProcesses:
-    """Processes that are started one by one; ``own`` adds variables to the environment of each."""
+    """Processes that are started one by one; ``environments`` adds variables by process name."""
 
     def __init__(
-        self, config: Path, log: IO[str], own: Mapping[str, Mapping[str, str]] | None = None
+        self, config: Path, log: IO[str], environments: Mapping[str, Mapping[str, str]] | None = None
     ) -> None:
-        self._config, self._log, self._own = config, log, own or {}
+        self._config, self._log, self._environments = config, log, environments or {}
         self.processes: dict[str, asyncio.subprocess.Process] = {}
 
     async def start(self, name: str) -> None:
@@ -41,7 +41,7 @@ class SeparateProcesses:
         words = ["camera", str(self._config), name] if name in CAMERAS else [name, str(self._config)]
         self.processes[name] = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "server.cli.main", *words),
-            env={**one_thread_environment(), "MYVIEW_SUPERVISED": "1", **self._own.get(name, {})},
+            env={**one_thread_environment(), "MYVIEW_SUPERVISED": "1", **self._environments.get(name, {})},
             stdout=self._log,
             stderr=self._log,
         )
@@ -76,12 +76,12 @@ async def run_separately(
     views: StampedViews,
     folder: Path,
     settings: Mapping[str, Mapping[str, Any]] | None = None,
-    own: Mapping[str, Mapping[str, str]] | None = None,
+    environments: Mapping[str, Mapping[str, str]] | None = None,
 ) -> AsyncIterator[FaultSite]:
-    """Run a site's processes separately, each with its own environment; terminate them in the end."""
+    """Run a site's processes separately, with variables by process name; terminate them at the end."""
     config, url = write_config(views, folder, settings)
     with (folder / "site.log").open("w", encoding="utf-8") as log:
-        control = SeparateProcesses(config, log, own)
+        control = SeparateProcesses(config, log, environments)
         fault_site = FaultSite(url, folder, 0, control=control, recorded=folder / "kept")
         try:
             for name in NAMES:

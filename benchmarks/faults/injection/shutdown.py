@@ -18,7 +18,7 @@ from benchmarks.faults.video.stamped_views import StampedViews
 from benchmarks.faults.viewing.viewers import Viewer
 
 _MOMENTS_S = (0.0, 1.0, 3.0)
-"""Seconds after the process handles SIGTERM itself."""
+"""Seconds after the process has installed its SIGTERM handler."""
 _POLL_S = 0.005
 _WATCHED_S = 4.0
 _LINGER_S = 2.0
@@ -91,18 +91,18 @@ async def shut_down_while_watched(views: StampedViews, folder: Path) -> list[Pro
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-    left = await _left_behind(before)
-    return [*fault_site.exits, *(ProcessExit(f"{name} is left behind", 0.0, None) for name in left)]
+    left = await _still_running(before)
+    return [*fault_site.exits, *(ProcessExit(f"{name} is still running", 0.0, None) for name in left)]
 
 
 def _site_processes(fault_site: FaultSite) -> list[tuple[str, int]]:
     return [(name, pid) for name in (*NAMES, "rendering") for pid in fault_site.pids(name)]
 
 
-async def _left_behind(before: list[tuple[str, int]]) -> list[str]:
+async def _still_running(before: list[tuple[str, int]]) -> list[str]:
     """Return the processes that are still running a moment after their supervisor exited."""
-    give_up = time.monotonic() + _LINGER_S
-    while (left := [name for name, pid in before if pid in _running()]) and time.monotonic() < give_up:  # noqa: ASYNC110
+    deadline = time.monotonic() + _LINGER_S
+    while (left := [name for name, pid in before if pid in _running()]) and time.monotonic() < deadline:  # noqa: ASYNC110
         await asyncio.sleep(_POLL_S)
     return left
 

@@ -10,13 +10,18 @@ from pathlib import Path
 
 from benchmarks.faults.site.fault_site import LEASE_S, Fault, FaultSite, Inject, with_up
 from benchmarks.faults.video.network_camera import EncodedFilm, NetworkCamera
-from benchmarks.faults.video.stamp_detector import write_reader
-from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews, make_smaller, make_unattractive
+from benchmarks.faults.video.stamp_detector import write_stamp_detector
+from benchmarks.faults.video.stamped_views import (
+    CAMERAS,
+    StampedViews,
+    shrink_other_detections,
+    write_smaller_film,
+)
 from client import site
 from server.cli.generated_config import free_port
 
 NETWORK_CAMERA = CAMERAS[-1]
-_BROKEN_S = 4.0
+_FAULT_S = 4.0
 _LONG_S = 20.0
 _PULSES = 6000
 
@@ -28,19 +33,21 @@ async def with_network_camera(views: StampedViews, folder: Path) -> AsyncIterato
     Its picture at a pulse is not known beforehand, so its detector reads the number in the picture.
 
     Raises:
-        CannotRunError: the detector's ONNX network cannot be made or run here.
+        CannotRunError: the detector's ONNX network cannot be created or run.
     """
-    own = await asyncio.to_thread(make_unattractive, views, folder, NETWORK_CAMERA, _PULSES)
-    reader = await asyncio.to_thread(write_reader, own, NETWORK_CAMERA, folder / "reader.onnx")
-    source = Path(own.cameras[-1]["source"])
-    whole = await asyncio.to_thread(EncodedFilm.of, source)
-    smaller = await asyncio.to_thread(lambda: EncodedFilm.of(make_smaller(source, folder / "smaller.mp4")))
-    camera = NetworkCamera(whole, free_port())
+    adapted = await asyncio.to_thread(shrink_other_detections, views, folder, NETWORK_CAMERA, _PULSES)
+    reader = await asyncio.to_thread(write_stamp_detector, adapted, NETWORK_CAMERA, folder / "reader.onnx")
+    source = Path(adapted.cameras[-1]["source"])
+    full_size = await asyncio.to_thread(EncodedFilm.of, source)
+    smaller = await asyncio.to_thread(
+        lambda: EncodedFilm.of(write_smaller_film(source, folder / "smaller.mp4"))
+    )
+    camera = NetworkCamera(full_size, free_port())
     await camera.open()
-    live = {**own.cameras[-1], "source": camera.url}
-    for of_a_recording in ("at_end", "detections"):
-        live.pop(of_a_recording)
-    played = replace(own, cameras=[*own.cameras[:-1], live])
+    live = {**adapted.cameras[-1], "source": camera.url}
+    for key in ("at_end", "detections"):
+        live.pop(key)
+    played = replace(adapted, cameras=[*adapted.cameras[:-1], live])
     detect = {"kind": "onnx", "onnx": {"model": str(reader), "nms_iou": 1.0}}
     try:
         async with with_up(played, folder, {"detect": detect}) as fault_site:
@@ -49,7 +56,7 @@ async def with_network_camera(views: StampedViews, folder: Path) -> AsyncIterato
                 camera.began = site_state.pulse0
                 await fault_site.settle()
             fault_site.control, fault_site.live, fault_site.views = (
-                _CameraControl(camera, whole, smaller),
+                _CameraControl(camera, full_size, smaller),
                 (NETWORK_CAMERA,),
                 played,
             )
@@ -59,51 +66,51 @@ async def with_network_camera(views: StampedViews, folder: Path) -> AsyncIterato
 
 
 class _CameraControl:
-    """The camera that is broken in this site, and its two films."""
+    """The network camera of the site, and its two films."""
 
-    def __init__(self, camera: NetworkCamera, whole: EncodedFilm, smaller: EncodedFilm) -> None:
-        self.camera, self.whole, self.smaller = camera, whole, smaller
+    def __init__(self, camera: NetworkCamera, full_size: EncodedFilm, smaller: EncodedFilm) -> None:
+        self.camera, self.full_size, self.smaller = camera, full_size, smaller
 
 
-async def garbage(fault_site: FaultSite) -> None:
+async def send_garbage(fault_site: FaultSite) -> None:
     """Send random bytes for a while."""
     fault_site.control.camera.garbage = True
-    await asyncio.sleep(_BROKEN_S)
+    await asyncio.sleep(_FAULT_S)
     fault_site.control.camera.garbage = False
 
 
-async def frozen(fault_site: FaultSite) -> None:
-    """Send nothing for a while; the connection stays open."""
+async def freeze(fault_site: FaultSite) -> None:
+    """Stop sending for a while, with the connection open."""
     fault_site.control.camera.frozen = True
-    await asyncio.sleep(_BROKEN_S)
+    await asyncio.sleep(_FAULT_S)
     fault_site.control.camera.frozen = False
 
 
-async def frozen_for_good(fault_site: FaultSite) -> None:
-    """Send nothing for good."""
+async def freeze_forever(fault_site: FaultSite) -> None:
+    """Stop sending forever."""
     fault_site.control.camera.frozen = True
-    await asyncio.sleep(_BROKEN_S)
+    await asyncio.sleep(_FAULT_S)
 
 
-async def resized(fault_site: FaultSite) -> None:
+async def resize(fault_site: FaultSite) -> None:
     """Send pictures of another size for a while."""
     fault_site.control.camera.film = fault_site.control.smaller
-    await asyncio.sleep(_BROKEN_S)
-    fault_site.control.camera.film = fault_site.control.whole
+    await asyncio.sleep(_FAULT_S)
+    fault_site.control.camera.film = fault_site.control.full_size
 
 
-async def jumped(fault_site: FaultSite) -> None:
+async def jump_timestamps(fault_site: FaultSite) -> None:
     """Let timestamps jump ahead by an hour, and back again."""
     fault_site.control.camera.shift_s += 3600
-    await asyncio.sleep(_BROKEN_S)
+    await asyncio.sleep(_FAULT_S)
     fault_site.control.camera.shift_s -= 3600
 
 
-async def away(fault_site: FaultSite) -> None:
+async def disconnect(fault_site: FaultSite) -> None:
     """Disconnect; come back with timestamps an hour later.
 
-    Retries become rarer, but from 15.5 s on they come every 10 s, so 20 s stand for an hour. The site's own
-    clock is not moved: pulses go on without the camera.
+    Retries become rarer, but from 15.5 s on they come every 10 s, so 20 s stand for an hour. The site's clock
+    is not changed: pulses continue without the camera.
     """
     await fault_site.control.camera.close()
     await asyncio.sleep(_LONG_S)
@@ -125,10 +132,10 @@ def while_shown(inject: Inject) -> Inject:
 _FREEZE_S = LEASE_S + 1.0
 
 FAULTS = (
-    Fault("source: garbage", with_network_camera, while_shown(garbage), 9.0, _FREEZE_S),
-    Fault("source: freezes", with_network_camera, while_shown(frozen), 9.0, _FREEZE_S),
-    Fault("source: another size", with_network_camera, while_shown(resized), 9.0),
-    Fault("source: jumps an hour", with_network_camera, while_shown(jumped), 9.0),
-    Fault("source: away 20 s, stamps +1 h", with_network_camera, while_shown(away), 26.0, _FREEZE_S),
-    Fault("source: frozen at the end", with_network_camera, while_shown(frozen_for_good), 6.0, _FREEZE_S),
+    Fault("source: garbage", with_network_camera, while_shown(send_garbage), 9.0, _FREEZE_S),
+    Fault("source: freezes", with_network_camera, while_shown(freeze), 9.0, _FREEZE_S),
+    Fault("source: another size", with_network_camera, while_shown(resize), 9.0),
+    Fault("source: jumps an hour", with_network_camera, while_shown(jump_timestamps), 9.0),
+    Fault("source: away 20 s, stamps +1 h", with_network_camera, while_shown(disconnect), 26.0, _FREEZE_S),
+    Fault("source: frozen at the end", with_network_camera, while_shown(freeze_forever), 6.0, _FREEZE_S),
 )

@@ -1,4 +1,4 @@
-"""The run of one fault: the time before it, the fault, the time after it, and the outcome for viewers."""
+"""Runs one fault: the time before, the fault, the time after, and the outcome for viewers."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from dataclasses import dataclass, field
 
 from benchmarks.faults.site.fault_site import Fault, FaultSite, ProcessExit
 from benchmarks.faults.video.stamped_views import StampedViews
-from benchmarks.faults.viewing.picture_check import RHYTHM_S, PictureVerdict, judge
+from benchmarks.faults.viewing.picture_check import GOP_S, PictureVerdict, check_pictures
 from benchmarks.faults.viewing.viewers import Viewer
 
 _VIEWERS = 2
 _BEFORE_S = 4.0
 _JOIN_S = 20.0
 _BACK_S = 40.0
-_LONGEST_S = 150.0
-"""Seconds that a fault may take beyond its time: a browser starts, a process is slow to load."""
+_MAX_EXTRA_S = 150.0
+"""Seconds that a fault may take beyond its time, e.g. to start a browser or a slow process."""
 _POLL_S = 0.05
 
 
@@ -37,19 +37,19 @@ class FaultOutcome:
     gap_after: float = 0.0
     recovery_s: float | None = None
     page_recovery_s: float | None = None
-    """The same of the page, where it is open."""
+    """Likewise for the page, if it is open."""
     reconnections: int = 0
     received: list[PictureVerdict] = field(default_factory=list)
     gops: tuple[int, int] = (0, 0)
-    """The GOPs decided meanwhile, as a range of the event log."""
+    """Range of the event log with the GOPs decided during the fault."""
     lost: int | None = None
     """GOPs that were shown but not recorded; None: unknown."""
     broken_files: int | None = None
-    differing: list[str] = field(default_factory=list)
-    """Pictures of a network camera that were recorded differently from how they were shown, as text."""
+    mismatches: list[str] = field(default_factory=list)
+    """Pictures of a network camera whose recorded frame is not the shown one, as text."""
     exits: list[ProcessExit] = field(default_factory=list)
     failed: str = ""
-    """Why it could not be measured; empty: it was."""
+    """Why the measurement failed; empty if it succeeded."""
 
 
 async def run(fault: Fault, fault_site: FaultSite, views: StampedViews) -> FaultOutcome:
@@ -65,53 +65,55 @@ async def run(fault: Fault, fault_site: FaultSite, views: StampedViews) -> Fault
     tasks = [asyncio.create_task(viewer.run()) for viewer in fault_site.viewers]
     first = len(fault_site.events.gops)
     try:
-        await _all_watch(fault_site)
+        await _wait_for_viewers(fault_site)
         await asyncio.sleep(_BEFORE_S)
         before = [viewer.reconnections for viewer in fault_site.viewers]
         fault_site.ready_times.clear()
         fault_site.page_resumed_at = None
         outcome.began = time.monotonic()
-        await asyncio.gather(_injected(fault, fault_site, outcome), asyncio.sleep(fault.seconds))
+        await asyncio.gather(_inject(fault, fault_site, outcome), asyncio.sleep(fault.seconds))
         if fault.kills_server:
-            await _all_back(fault_site)
+            await _wait_for_recovery(fault_site)
         outcome.until = time.monotonic()
         outcome.reconnections = sum(viewer.reconnections for viewer in fault_site.viewers) - sum(before)
     finally:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-    await asyncio.sleep(RHYTHM_S)  # events of the last pictures
+    await asyncio.sleep(GOP_S)  # events of the last pictures
     outcome.gops = (first, len(fault_site.events.gops))
     outcome.exits = fault_site.exits[exits_before:]
     received = await asyncio.to_thread(_received, fault_site, views)
-    _sum_up(outcome, received, fault_site)
+    _summarize(outcome, received, fault_site)
     return outcome
 
 
-async def _injected(fault: Fault, fault_site: FaultSite, outcome: FaultOutcome) -> None:
+async def _inject(fault: Fault, fault_site: FaultSite, outcome: FaultOutcome) -> None:
     try:
-        async with asyncio.timeout(fault.seconds + _LONGEST_S):
+        async with asyncio.timeout(fault.seconds + _MAX_EXTRA_S):
             await fault.inject(fault_site)
-    except Exception as error:  # noqa: BLE001 — a browser, a stream, Docker: the next faults still run
+    except Exception as error:  # noqa: BLE001 — whatever fails, the next faults must run
         outcome.failed = f"{type(error).__name__}: {error}"
 
 
-async def _all_watch(fault_site: FaultSite) -> None:
+async def _wait_for_viewers(fault_site: FaultSite) -> None:
     """Wait, up to a limit, until all viewers receive video and one is shown the network camera, if any."""
-    give_up = time.monotonic() + _JOIN_S
-    while time.monotonic() < give_up:
+    deadline = time.monotonic() + _JOIN_S
+    while time.monotonic() < deadline:
         shown = {fault_site.events.shown(viewer.number) for viewer in fault_site.viewers}
-        if all(viewer.last_came for viewer in fault_site.viewers) and shown.issuperset(fault_site.live[:1]):
+        if all(viewer.last_arrival for viewer in fault_site.viewers) and shown.issuperset(
+            fault_site.live[:1]
+        ):
             return
         await asyncio.sleep(_POLL_S)
 
 
-async def _all_back(fault_site: FaultSite) -> None:
+async def _wait_for_recovery(fault_site: FaultSite) -> None:
     """Wait, up to a limit, until the server is ready again and all viewers receive video."""
-    give_up = time.monotonic() + _BACK_S
-    while time.monotonic() < give_up:
+    deadline = time.monotonic() + _BACK_S
+    while time.monotonic() < deadline:
         if fault_site.ready_times and all(
-            viewer.last_came > fault_site.ready_times[0] + RHYTHM_S for viewer in fault_site.viewers
+            viewer.last_arrival > fault_site.ready_times[0] + GOP_S for viewer in fault_site.viewers
         ):
             return
         await asyncio.sleep(_POLL_S)
@@ -120,23 +122,23 @@ async def _all_back(fault_site: FaultSite) -> None:
 def _received(fault_site: FaultSite, views: StampedViews) -> list[PictureVerdict]:
     events, live = fault_site.events, fault_site.live
     return [
-        judge(viewer.pictures(), events, viewer.number, fault_site.views or views, live)
+        check_pictures(viewer.pictures(), events, viewer.number, fault_site.views or views, live)
         for viewer in fault_site.viewers
     ]
 
 
-def _sum_up(outcome: FaultOutcome, received: Sequence[PictureVerdict], fault_site: FaultSite) -> None:
+def _summarize(outcome: FaultOutcome, received: Sequence[PictureVerdict], fault_site: FaultSite) -> None:
     outcome.received = list(received)
-    begun, until = outcome.began, outcome.until
-    spans = [viewer.longest_gap(begun - _BEFORE_S, begun) for viewer in received]
-    outcome.gap_before = max(0.0, max(spans, default=0.0) - RHYTHM_S)
+    began, until = outcome.began, outcome.until
+    spans = [viewer.longest_gap(began - _BEFORE_S, began) for viewer in received]
+    outcome.gap_before = max(0.0, max(spans, default=0.0) - GOP_S)
     outcome.gap_after = max(
-        0.0, max((viewer.longest_gap(begun, until) for viewer in received), default=0.0) - RHYTHM_S
+        0.0, max((viewer.longest_gap(began, until) for viewer in received), default=0.0) - GOP_S
     )
     if outcome.fault.kills_server and fault_site.ready_times:
         ready = fault_site.ready_times[0]
         first = [
-            min((at for at, _ in viewer.fresh if at > ready - RHYTHM_S), default=None) for viewer in received
+            min((at for at, _ in viewer.fresh if at > ready - GOP_S), default=None) for viewer in received
         ]
         if all(at is not None for at in first):
             outcome.page_recovery_s = (

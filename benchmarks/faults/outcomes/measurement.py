@@ -1,4 +1,4 @@
-"""Runs faults one after the other, each in its own kind of site."""
+"""Runs faults one after the other, each in its kind of site."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ async def measure(faults: list[Fault], folder: Path, report: Report) -> list[Fau
     views = await asyncio.to_thread(make, folder, _PULSES)
     outcomes: list[FaultOutcome] = []
     groups = itertools.groupby(faults, key=lambda fault: fault.standalone or fault.setup)
-    for number, (_, some) in enumerate(groups):
-        outcomes += await _group(list(some), views, folder / f"site-{number}", report)
+    for number, (_, group) in enumerate(groups):
+        outcomes += await _run_group(list(group), views, folder / f"site-{number}", report)
     return outcomes
 
 
-async def _group(
+async def _run_group(
     faults: list[Fault], views: StampedViews, folder: Path, report: Report
 ) -> list[FaultOutcome]:
     await asyncio.to_thread(folder.mkdir)
@@ -43,19 +43,19 @@ async def _group(
                 outcomes.append(await run(fault, fault_site, views))
                 print(f"{fault.name}: done", file=sys.stderr, flush=True)
             exits = len(fault_site.exits)
-        outcomes[-1].exits += fault_site.exits[exits:]  # with the site
+        outcomes[-1].exits += fault_site.exits[exits:]  # of the site
         files = await asyncio.to_thread(recording_check.read, fault_site.recorded, fault_site.live)
-        recording_check.note(outcomes, fault_site.events, files)
+        recording_check.add_recording_results(outcomes, fault_site.events, files)
     except CannotRunError as error:
         report.line(f"{faults[0].name}: skipped: {error}")
     except (ClientError, RuntimeError) as error:
-        report.line(f"{faults[0].name} and what follows it: {error}")
-        report.line(await asyncio.to_thread(_log_of, folder))
+        report.line(f"{faults[0].name} and the faults after it: {error}")
+        report.line(await asyncio.to_thread(_last_log_lines, folder))
         outcomes += [FaultOutcome(fault, failed="the site did not run") for fault in faults[len(outcomes) :]]
     return outcomes
 
 
-def _log_of(folder: Path) -> str:
+def _last_log_lines(folder: Path) -> str:
     """Return the last lines of the logs of a site's processes."""
-    said = [path.read_text(encoding="utf-8", errors="replace") for path in sorted(folder.glob("*.log"))]
-    return "\n".join("".join(said).splitlines()[-_LINES:])
+    logs = [path.read_text(encoding="utf-8", errors="replace") for path in sorted(folder.glob("*.log"))]
+    return "\n".join("".join(logs).splitlines()[-_LINES:])

@@ -24,7 +24,7 @@ def draw(outcomes: Sequence[FaultOutcome], path: Path) -> None:
     axes = figure.subplots()
     for row, (outcome, received) in enumerate(lines):
         for camera, color in zip(CAMERAS, _COLORS, strict=True):
-            moments = np.array([at for at, of in received.fresh if of == camera]) - outcome.began
+            moments = np.array([at for at, shown in received.fresh if shown == camera]) - outcome.began
             label = camera if row == 0 else None
             axes.scatter(moments, np.full(len(moments), row), s=8, color=color, label=label)
         axes.plot([outcome.until - outcome.began], [row], marker="|", color="gray")

@@ -14,7 +14,7 @@ _NOTES = 3
 
 
 def describe(report: Report, outcomes: Sequence[FaultOutcome]) -> None:
-    """Print what was measured."""
+    """Print the table of outcomes, and notes on errors."""
     columns = [
         "fault",
         "reconnects",
@@ -30,7 +30,7 @@ def describe(report: Report, outcomes: Sequence[FaultOutcome]) -> None:
         notes = [
             outcome.failed,
             *(note for viewer in outcome.received for note in viewer.notes),
-            *outcome.differing,
+            *outcome.mismatches,
         ]
         notes += [
             f"{process.name}: {process.seconds:.2f} s, {process.code}"
@@ -47,10 +47,10 @@ def describe(report: Report, outcomes: Sequence[FaultOutcome]) -> None:
             for late in order.behind
         ]
         if late:
-            said = f"{min(late)} to {max(late)} frames behind their pulses, half of them {median_low(late)}"
-            report.line(f"{outcome.fault.name}: pictures of the network camera are {said} at most")
+            lag = f"{min(late)} to {max(late)} frames behind their pulses, half of them {median_low(late)}"
+            report.line(f"{outcome.fault.name}: pictures of the network camera are {lag} at most")
     broken = [outcome.fault.name for outcome in outcomes if not keeps_promises(outcome)]
-    report.line(f"{len(outcomes) - len(broken)} of {len(outcomes)} keep all promises" + _list(broken))
+    report.line(f"{len(outcomes) - len(broken)} of {len(outcomes)} keep all promises" + _broken_list(broken))
 
 
 def keeps_promises(outcome: FaultOutcome) -> bool:
@@ -83,22 +83,26 @@ def _wrong(outcome: FaultOutcome) -> bool:
     unnamed = not outcome.fault.kills_server and any(viewer.unnamed for viewer in outcome.received)
     return (
         unnamed
-        or bool(outcome.differing)
+        or bool(outcome.mismatches)
         or any(viewer.wrong or viewer.wrong_boxes for viewer in outcome.received)
     )
 
 
 def _row(outcome: FaultOutcome) -> list[str]:
-    frames, boxes = sum(r.frames for r in outcome.received), sum(r.boxes for r in outcome.received)
-    wrong, wrong_boxes = sum(r.wrong for r in outcome.received), sum(r.wrong_boxes for r in outcome.received)
-    means = sum(r.averaged for r in outcome.received)
-    wrong, unnamed = wrong + len(outcome.differing), sum(r.unnamed for r in outcome.received)
-    slowest = max(outcome.exits, key=lambda one: one.seconds, default=None)
+    received = outcome.received
+    frames, boxes = sum(viewer.frames for viewer in received), sum(viewer.boxes for viewer in received)
+    wrong, wrong_boxes = (
+        sum(viewer.wrong for viewer in received),
+        sum(viewer.wrong_boxes for viewer in received),
+    )
+    means = sum(viewer.averaged for viewer in received)
+    wrong, unnamed = wrong + len(outcome.mismatches), sum(viewer.unnamed for viewer in received)
+    slowest = max(outcome.exits, key=lambda process: process.seconds, default=None)
     return [
         outcome.fault.name,
         str(outcome.reconnections) if outcome.received else "",
-        _fresh(outcome),
-        _promised(outcome),
+        _gap_cell(outcome),
+        _promise_cell(outcome),
         f"{wrong} of {frames}{f', {unnamed} unnamed' if unnamed else ''}" if outcome.received else "",
         f"{wrong_boxes} of {boxes - means}{f', {means} means' if means else ''}" if outcome.received else "",
         "" if outcome.lost is None else f"{outcome.lost} lost, {outcome.broken_files} broken",
@@ -107,7 +111,7 @@ def _row(outcome: FaultOutcome) -> list[str]:
     ]
 
 
-def _fresh(outcome: FaultOutcome) -> str:
+def _gap_cell(outcome: FaultOutcome) -> str:
     if not outcome.received:
         return ""
     if not outcome.fault.kills_server:
@@ -117,11 +121,11 @@ def _fresh(outcome: FaultOutcome) -> str:
     return f"{recovery}{page} ({outcome.gap_after:.2f})"
 
 
-def _promised(outcome: FaultOutcome) -> str:
+def _promise_cell(outcome: FaultOutcome) -> str:
     if outcome.fault.kills_server:
         return f"{_BACK_S:g}"
     return "" if outcome.fault.max_gap_s is None or not outcome.received else f"{outcome.fault.max_gap_s:g}"
 
 
-def _list(names: Sequence[str]) -> str:
+def _broken_list(names: Sequence[str]) -> str:
     return f"; not: {', '.join(names)}" if names else ""

@@ -11,10 +11,10 @@ import numpy as np
 
 from benchmarks.faults.outcomes.fault_run import FaultOutcome
 from benchmarks.faults.video.stamped_views import FPS, FRAMES, read_stamp
-from benchmarks.faults.viewing.live_pictures import LiveFrameOrder, differ
+from benchmarks.faults.viewing.live_pictures import LiveFrameOrder, find_differences
 from benchmarks.faults.viewing.viewers import EventLog
 
-_GOES_ON = 5
+_MIN_RESUMED_GOPS = 5
 """GOPs at the end of a fault that must be recorded in any case."""
 
 
@@ -55,26 +55,25 @@ def _read(path: Path, live: Collection[str]) -> RecordedFile:
                 elif order is None:
                     plays &= stamp.frame == pulse % FRAMES
                 else:
-                    plays &= not order.wrong(pulse, stamp.frame)
+                    plays &= not order.check(pulse, stamp.frame)
     except (av.error.FFmpegError, OSError):
         plays = False
     return RecordedFile(camera, int(path.stem), frames, plays)
 
 
-def note(outcomes: Sequence[FaultOutcome], events: EventLog, files: Sequence[RecordedFile]) -> None:
-    """Add to each outcome the lost GOPs and the broken files of its time.
-
-    Of a network camera also the pictures that were recorded differently from how they were shown.
-    """
-    there: dict[str, dict[int, int]] = {}
+def add_recording_results(
+    outcomes: Sequence[FaultOutcome], events: EventLog, files: Sequence[RecordedFile]
+) -> None:
+    """Add to each outcome its lost GOPs, broken files, and mismatches of a network camera."""
+    recorded: dict[str, dict[int, int]] = {}
     for file in files:
-        there.setdefault(file.camera, {}).update(file.frames)
+        recorded.setdefault(file.camera, {}).update(file.frames)
     for number, outcome in enumerate(outcomes):
-        outcome.differing = [
+        outcome.mismatches = [
             note
             for received in outcome.received
             for camera, order in received.live_orders.items()
-            for note in differ(order.frames, there.get(camera, {}))
+            for note in find_differences(order.frames, recorded.get(camera, {}))
         ]
         first, end = outcome.gops
         shown = [gop for _, gop in events.gops[first:end]]
@@ -84,13 +83,13 @@ def note(outcomes: Sequence[FaultOutcome], events: EventLog, files: Sequence[Rec
             gop.first
             for gop in shown
             for camera in sorted({camera for camera in gop.choices.values() if camera})
-            if not there.get(camera, {}).keys() >= set(range(gop.first, gop.first + gop.frames))
+            if not recorded.get(camera, {}).keys() >= set(range(gop.first, gop.first + gop.frames))
         ]
         outcome.lost = len(missing)
         if (
             outcome.fault.stops_recording
             and missing
-            and missing[-1] >= shown[-min(_GOES_ON, len(shown))].first
+            and missing[-1] >= shown[-min(_MIN_RESUMED_GOPS, len(shown))].first
         ):
             outcome.failed = "the recording did not resume"
         last = number == len(outcomes) - 1

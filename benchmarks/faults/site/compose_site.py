@@ -109,9 +109,9 @@ class ComposeSite:
 
 
 def missing_requirement() -> str | None:
-    """Return which requirement of running containers is missing here; None: none is."""
+    """Return the missing requirement for running containers; None if there is none."""
     if shutil.which("docker") is None:
-        return "needs Docker: there is no `docker` here"
+        return "needs Docker: `docker` was not found"
     for words in (["docker", "info"], ["docker", "compose", "version"]):
         try:
             answer = subprocess.run(words, capture_output=True, timeout=30, check=False).returncode
@@ -124,7 +124,7 @@ def missing_requirement() -> str | None:
 
 @contextlib.contextmanager
 def run_compose_site(files: Sequence[Path] = PLAIN, **variables: str) -> Iterator[ComposeSite]:
-    """Build and start a site, and remove it in the end.
+    """Build and start a site; remove it at the end.
 
     Raises:
         CannotRunError: there is no Docker Engine.
@@ -141,7 +141,7 @@ def run_compose_site(files: Sequence[Path] = PLAIN, **variables: str) -> Iterato
         **plain,
         "COMPOSE_PROJECT_NAME": project,
         "MYVIEW_IMAGE": project,
-        "MYVIEW_PUBLISH": f"127.0.0.1:{free_port()}",  # Docker's own choice would change with a restart
+        "MYVIEW_PUBLISH": f"127.0.0.1:{free_port()}",  # Docker would choose another port after a restart
         **variables,
     }
     site = ComposeSite(project, tuple(files), environment)

@@ -18,13 +18,13 @@ import aiohttp
 from benchmarks.common.process_load import running_pids
 from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews
 from benchmarks.faults.viewing.viewers import EventLog, Viewer
-from benchmarks.latency import running_site as delay_site
+from benchmarks.latency import running_site as latency_site
 
 LEASE_S = 1.0
 """`zenoh.lease_s` by default."""
 _SETTLE_S = 90.0
 _POLL_S = 0.05
-_SEEN_S = 1.5
+_HEALTHY_S = 1.5
 """Seconds for which the site must be healthy before a fault."""
 SETTINGS: Mapping[str, Mapping[str, Any]] = {
     "sync": {"start_timeout_s": 30.0},
@@ -39,7 +39,7 @@ class ProcessExit:
     name: str
     seconds: float
     code: int | None
-    """The exit code; None: it had to be killed."""
+    """The exit code; None if it had to be killed."""
 
     @property
     def clean(self) -> bool:
@@ -68,10 +68,10 @@ class FaultSite:
     page_resumed_at: float | None = None
     """When the page showed new video again."""
     views: StampedViews | None = None
-    """Its views, where they differ from those of other sites."""
+    """Its views, where they find_differences from those of other sites."""
 
     def pids(self, name: str) -> list[int]:
-        """Return the pids of a process: sync, bestview, drawing, or a camera's id; empty: it is down."""
+        """Return the pids of a process: sync, bestview, rendering, or a camera's id; empty if it is down."""
         return running_pids(f"camera {name}" if name in CAMERAS else name)
 
     def send(self, number: signal.Signals, *names: str) -> None:
@@ -85,7 +85,7 @@ class FaultSite:
             if not pids[name]:
                 raise RuntimeError(f"there is no process {name}")
         for pid in chain.from_iterable(pids.values()):
-            with contextlib.suppress(ProcessLookupError):  # it exited together with the one before it
+            with contextlib.suppress(ProcessLookupError):  # it exited with the previous process
                 os.kill(pid, number)
 
     def shown(self) -> list[str]:
@@ -99,15 +99,15 @@ class FaultSite:
         Raises:
             RuntimeError: the site does not become healthy in time.
         """
-        give_up = time.monotonic() + _SETTLE_S
-        well_since = None
-        while time.monotonic() < give_up:
+        deadline = time.monotonic() + _SETTLE_S
+        healthy_since = None
+        while time.monotonic() < deadline:
             now = time.monotonic()
             if not self._is_healthy(now):
-                well_since = None
-            elif well_since is None:
-                well_since = now
-            elif now - well_since > _SEEN_S:
+                healthy_since = None
+            elif healthy_since is None:
+                healthy_since = now
+            elif now - healthy_since > _HEALTHY_S:
                 return
             await asyncio.sleep(_POLL_S)
         states = {name: self.events.state(name) for name in CAMERAS}
@@ -117,12 +117,12 @@ class FaultSite:
         if not self.events.gops or any(self.events.state(name) != "live" for name in CAMERAS):
             return False
         at, gop = self.events.gops[-1]
-        return now - at < _SEEN_S and any(gop.choices.values())
+        return now - at < _HEALTHY_S and any(gop.choices.values())
 
-    def people(self, most: int) -> list[int]:
-        """Return the numbers of at most `most` people who are shown now."""
+    def people(self, count: int) -> list[int]:
+        """Return the numbers of at most `count` people who are shown now."""
         choices = self.events.gops[-1][1].choices
-        return sorted(number for number, camera in choices.items() if camera)[:most]
+        return sorted(number for number, camera in choices.items() if camera)[:count]
 
     async def watch_server(self) -> None:
         """Record when the server becomes ready again, until cancelled."""
@@ -172,7 +172,7 @@ async def with_up(
     content["record"]["folder"] = str(recorded)
     for name, values in (settings or {}).items():
         content[name] = {**content.get(name, {}), **values}
-    async with delay_site.running_site(views, folder, environment, content) as site:
+    async with latency_site.running_site(views, folder, environment, content) as site:
         fault_site = FaultSite(site.url, folder, site.process.pid, recorded=recorded)
         async with follow_events(fault_site):
             yield fault_site
@@ -197,7 +197,7 @@ Standalone = Callable[[StampedViews, Path], Awaitable[list[ProcessExit]]]
 Setup = Callable[[StampedViews, Path], contextlib.AbstractAsyncContextManager[FaultSite]]
 
 
-async def _nothing(fault_site: FaultSite) -> None:
+async def _no_fault(fault_site: FaultSite) -> None:
     """Inject nothing."""
     del fault_site
 
@@ -210,16 +210,16 @@ class Fault:
         name: on the command line and in the table.
         setup: the site that it is injected into; consecutive faults of one setup share a site.
         inject: injects the fault, and returns when it is over.
-        seconds: for how long viewers are observed from its beginning.
-        max_gap_s: promised: seconds at most without a fresh picture; None: no promise.
-        kills_server: the viewers' own server is killed.
-        standalone: runs with sites of its own, and returns the exits of its processes.
-        stops_recording: nothing can be recorded meanwhile.
+        seconds: time for which viewers are observed, from the start of the fault.
+        max_gap_s: promised maximum time without a fresh picture, seconds; None: no promise.
+        kills_server: whether the viewers' server is killed.
+        standalone: runs separate sites instead, and returns the exits of their processes.
+        stops_recording: whether nothing can be recorded during the fault.
     """
 
     name: str
     setup: Setup
-    inject: Inject = _nothing
+    inject: Inject = _no_fault
     seconds: float = 6.0
     max_gap_s: float | None = 1.0
     kills_server: bool = False

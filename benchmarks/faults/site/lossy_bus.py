@@ -31,8 +31,8 @@ PICTURES = "video"
 FOUND = "detections"
 CORRECTIONS = "position_corrections"
 _FROM_CAMERAS = (PICTURES, "tracks", "status", "thumbs/*", FOUND)
-_LATER = 2
-"""A delayed message is sent after so many others of its key."""
+_DELAY = 2
+"""Number of messages with the same key after which a delayed message is sent."""
 _KIND = 4
 
 
@@ -67,7 +67,7 @@ class LossyLink:
             (left - 1, delayed_message) for left, delayed_message in self._delayed.pop(message.key, ())
         ]
         if altered and self.mode == "disordered":
-            delayed.append((_LATER, message))
+            delayed.append((_DELAY, message))
         elif not (altered and self.mode == "lost"):
             self._forward(message)
         if altered and self.mode == "doubled":

@@ -1,4 +1,4 @@
-"""A fake network camera that can be broken on purpose: MPEG-TS over HTTP."""
+"""A fake network camera with injectable faults: MPEG-TS over HTTP."""
 
 from __future__ import annotations
 
@@ -67,9 +67,9 @@ class NetworkCamera:
         self.film = film
         self.frozen = self.garbage = False
         self.shift_s = 0
-        """Seconds by which its timestamps are ahead."""
+        """Offset of the timestamps, seconds."""
         self.began = time.time()
-        """When its frame 0 was, unix seconds."""
+        """Time of frame 0, Unix seconds."""
         self.url = f"http://127.0.0.1:{port}/live.ts"
         self._port = port
         self._server: asyncio.Server | None = None
@@ -104,12 +104,12 @@ class NetworkCamera:
     async def _send(self, writer: asyncio.StreamWriter) -> None:
         noise = random.Random(1)
         muxer: _Muxer | None = None
-        sent = self._sent()
-        number = self._now()
+        state = self._stream_state()
+        number = self._current_frame()
         while not writer.is_closing():
-            if sent != self._sent():
-                muxer, sent, number = None, self._sent(), self._now()
-            if number > self._now():
+            if state != self._stream_state():
+                muxer, state, number = None, self._stream_state(), self._current_frame()
+            if number > self._current_frame():
                 await asyncio.sleep(0.5 / FPS)
                 continue
             if self.frozen or self.garbage:
@@ -122,9 +122,9 @@ class NetworkCamera:
                 await writer.drain()
             number += 1  # no frame is skipped: the next ones depend on it
 
-    def _sent(self) -> tuple[EncodedFilm, int, float]:
-        """Return the state of an uninterrupted stream: where it changes, a new stream begins."""
+    def _stream_state(self) -> tuple[EncodedFilm, int, float]:
+        """Return the state whose change begins a new stream."""
         return self.film, self.shift_s, self.began
 
-    def _now(self) -> int:
+    def _current_frame(self) -> int:
         return int((time.time() - self.began) * FPS)

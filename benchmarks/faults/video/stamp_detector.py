@@ -1,7 +1,7 @@
 """A perfect detector for stamped pictures, as an ONNX network.
 
 For `detect.kind: onnx`: it reads the frame number from the strip in the picture and looks up the boxes of
-that frame. A network camera needs it, since the picture at a pulse is not known beforehand.
+that frame. A network camera needs it, since the picture at a pulse is not known in advance.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _HALF = 0.5
 _OPSET, _IR = 17, 8
 
 
-def write_reader(views: StampedViews, camera: str, path: Path) -> Path:
+def write_stamp_detector(views: StampedViews, camera: str, path: Path) -> Path:
     """Write the network for a camera's film.
 
     Raises:

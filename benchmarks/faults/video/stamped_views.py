@@ -29,7 +29,7 @@ FRAMES = 1000
 """Frames of a film, which is looped; frame numbers have three digits."""
 _PEOPLE, _SEED = 3, 1
 _START, _DRAWN = 300, 50
-"""All people are in view. The frames are played forwards and backwards, so that nobody jumps."""
+"""All people are in view. The frames are played forwards and backwards, so that motion is continuous."""
 BLOCK, EDGE = 8, 2
 """Pixels of one bit, and pixels at its edges that are not read."""
 BITS, NUMBER_BITS = 16, 12
@@ -37,7 +37,7 @@ BITS, NUMBER_BITS = 16, 12
 _TOPS, _WIDTHS = np.random.default_rng(1).permuted(np.tile(np.arange(FRAMES), (2, 1)), axis=1).tolist()
 """The thousandths of a box's top and width, by frame; interpolated boxes match no frame."""
 _DARK, _BRIGHT, _MIDDLE = 40, 215, 128
-_SHOWS = 0.3
+_MIN_VISIBLE = 0.3
 """Visible share of a person from which they are detected."""
 _TIME_BASE = Fraction(1, 90_000)
 
@@ -91,7 +91,7 @@ def read_stamp(gray: NDArray[np.uint8]) -> FrameStamp | None:
 
 
 def make(folder: Path, pulses: int) -> StampedViews:
-    """Write films, detections for so many pulses, and the homographies into a folder."""
+    """Write films, detections for a number of pulses, and homographies into a folder."""
     scene = Scene("room", len(CAMERAS), _PEOPLE, _SEED, WIDTH, HEIGHT, FPS)
     places = _places()
     truths = {place: scene.truth(place) for place in sorted(set(places))}
@@ -113,8 +113,8 @@ def make(folder: Path, pulses: int) -> StampedViews:
     return StampedViews(cameras, site, folder / "ground.json", found)
 
 
-def make_unattractive(views: StampedViews, folder: Path, best: str, pulses: int) -> StampedViews:
-    """Return views with smaller detections in all cameras but one, so that this one is selected."""
+def shrink_other_detections(views: StampedViews, folder: Path, best: str, pulses: int) -> StampedViews:
+    """Return views with smaller detections in all cameras but `best`, so that it is selected."""
     cameras, found = [], dict(views.found)
     for camera in views.cameras:
         name = camera["id"]
@@ -136,7 +136,7 @@ def make_unattractive(views: StampedViews, folder: Path, best: str, pulses: int)
     return replace(views, cameras=cameras, found=found)
 
 
-def make_smaller(path: Path, out: Path) -> Path:
+def write_smaller_film(path: Path, out: Path) -> Path:
     """Write a film again, at three quarters of its size."""
     with av.open(str(path)) as container:
         pictures = [
@@ -165,14 +165,14 @@ def write_film(pictures: Sequence[NDArray[np.uint8]], path: Path, fps: int = FPS
 
 def _places() -> list[int]:
     """Return the scene's frame that each frame of a film shows."""
-    there = list(range(_START, _START + _DRAWN))
-    both = [*there, *reversed(there)]
+    forwards = list(range(_START, _START + _DRAWN))
+    both = [*forwards, *reversed(forwards)]
     return [both[frame % len(both)] for frame in range(FRAMES)]
 
 
 def _boxes(truth: Any) -> NDArray[np.float64]:
     """Return the whole and visible boxes ``(N, 4)``: left, top, width, height in whole pixels."""
-    boxes = np.floor(truth.boxes[truth.visibility >= _SHOWS]).reshape(-1, 4)
+    boxes = np.floor(truth.boxes[truth.visibility >= _MIN_VISIBLE]).reshape(-1, 4)
     inside = (boxes[:, :2] >= 1).all(axis=1) & (boxes[:, 2] < WIDTH - 1) & (boxes[:, 3] < HEIGHT - 1)
     kept = boxes[inside]
     return np.hstack([kept[:, :2], kept[:, 2:] - kept[:, :2]])

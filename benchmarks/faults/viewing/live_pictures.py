@@ -1,7 +1,7 @@
-"""Checks of the pictures of a network camera, whose frame at a pulse is known within bounds only.
+"""Checks of the pictures of a network camera, whose frame at a pulse is known only within bounds.
 
-At each pulse the newest received picture is taken, which depends on its transfer time. But it is never older
-than the previous one, it is of some time around its pulse, and all viewers get the same picture at a pulse.
+A pulse shows the newest received picture, which depends on the transfer time. But it is never older than the
+previous one, its time is close to the pulse, and all viewers get the same picture.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from collections.abc import Mapping
 
 from benchmarks.faults.video.stamped_views import FPS, FRAMES
 
-_WAY_S = 0.5
-"""Seconds that a picture may take to arrive, and that a pulse may be handled late."""
+_TRANSFER_S = 0.5
+"""Maximum transfer time of a picture, and maximum delay of a pulse."""
 _STALE_S = 1.5
 """Age from which a picture is stale, and its camera counts as lost (`live_stream`)."""
-MOST_BEHIND = round((_WAY_S + _STALE_S) * FPS)
-MOST_AHEAD = round(_WAY_S * FPS)
+MAX_BEHIND = round((_TRANSFER_S + _STALE_S) * FPS)
+MAX_AHEAD = round(_TRANSFER_S * FPS)
 
 
 def behind(pulse: int, frame: int) -> int:
@@ -31,21 +31,21 @@ class LiveFrameOrder:
         self.frames: dict[int, int] = {}
         """The frame that was shown at a pulse."""
         self.behind: list[int] = []
-        """By how many frames each was behind its pulse."""
+        """Number of frames by which each picture was behind its pulse."""
 
-    def wrong(self, pulse: int, frame: int) -> str:
+    def check(self, pulse: int, frame: int) -> str:
         """Check the next picture; return what is wrong with it, or an empty text."""
         late = behind(pulse, frame)
         newest, self._newest = self._newest, pulse - late
         self.frames[pulse] = frame
         self.behind.append(late)
-        if not -MOST_AHEAD <= late <= MOST_BEHIND:
+        if not -MAX_AHEAD <= late <= MAX_BEHIND:
             return f", {late} frames behind its pulse"
         return "" if newest is None or newest <= pulse - late else f", {newest - pulse + late} frames back"
 
 
-def differ(shown: Mapping[int, int], recorded: Mapping[int, int]) -> list[str]:
-    """Describe the pulses whose shown and recorded frames differ."""
+def find_differences(shown: Mapping[int, int], recorded: Mapping[int, int]) -> list[str]:
+    """Describe the pulses whose shown and recorded frames find_differences."""
     return [
         f"pulse {pulse}: frame {frame} was shown, {recorded[pulse]} recorded"
         for pulse, frame in shown.items()

@@ -18,9 +18,9 @@ class PictureVerdict:
 
     Attributes:
         frames: received pictures.
-        wrong: of another camera than the events named, of another moment, or illegible.
-        unnamed: of pulses without an event, so that the camera is unchecked.
-        repeated: the previous picture again, for lack of a new one.
+        wrong: pictures of a camera or frame other than the expected one, or illegible.
+        unnamed: pictures of pulses without an event, whose camera is unchecked.
+        repeated: pictures equal to the previous one.
         boxes: drawn on these pictures.
         wrong_boxes: detected in another frame than the picture's.
         averaged: interpolated boxes, which carry no frame number.
@@ -36,7 +36,7 @@ class PictureVerdict:
     averaged: int
     fresh: tuple[tuple[float, str], ...]
     notes: tuple[str, ...]
-    """What was wrong, as text."""
+    """Descriptions of errors."""
     live_orders: Mapping[str, LiveFrameOrder]
     """The pictures of each network camera."""
 
@@ -51,14 +51,14 @@ class PictureVerdict:
         return max((b - a for a, b in pairwise([before, *inside, until])), default=0.0)
 
 
-def judge(
+def check_pictures(
     pictures: Sequence[ReceivedPicture],
     events: EventLog,
     number: int,
     views: StampedViews,
     live: Iterable[str] = (),
 ) -> PictureVerdict:
-    """Check every picture; the frames of ``live`` cameras are known within bounds only."""
+    """Check every picture; the frames of ``live`` cameras are known only within bounds."""
     expected = dict(_expected_pictures(events, number))
     live_orders = {camera: LiveFrameOrder() for camera in live}
     fresh, notes = [], []
@@ -93,10 +93,10 @@ def judge(
 
 
 def _moment_error(pulse: int, stamp: FrameStamp, live_orders: Mapping[str, LiveFrameOrder]) -> str:
-    """Return how a picture differs from the one of its pulse; empty: it is the right one."""
+    """Return how a picture differs from that of its pulse; empty if it is correct."""
     order = live_orders.get(stamp.camera)
     if order is not None:
-        return order.wrong(pulse, stamp.frame)
+        return order.check(pulse, stamp.frame)
     return "" if stamp.frame == pulse % FRAMES else ", another frame"
 
 
@@ -105,7 +105,7 @@ def _expected_pictures(
 ) -> Iterator[tuple[int, tuple[str | None, tuple[Box, ...]]]]:
     """Yield for every pulse the selected camera and the boxes in its picture.
 
-    Where no camera sees the person, a stream stays with the last one.
+    If no camera shows the person, the stream stays with the last one.
     """
     shown: str | None = None
     for _, gop in events.gops:
@@ -120,5 +120,5 @@ def _boxes(gop: Gop, camera: str | None, place: int) -> tuple[Box, ...]:
     return frames[place] if place < len(frames) else ()
 
 
-RHYTHM_S = 10 / FPS
+GOP_S = 10 / FPS
 """Seconds of a GOP, which arrives in one piece."""

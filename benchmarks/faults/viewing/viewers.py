@@ -1,4 +1,4 @@
-"""Viewers of a site under fault: the Python client's own player, with the arrival time of each picture."""
+"""Viewers of a site under fault: the Python client's player, with the arrival time of each picture."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from client.session import Session
 from client.stream_events import ViewHistory
 
 _TICKS = 90_000
-_AGAIN_S = 0.2
+_RETRY_S = 0.2
 _SETTINGS = HttpSettings()
 
 
@@ -41,20 +41,20 @@ class StreamRecorder:
     """A file-like sink of the player that records the arrival time of each write."""
 
     data: bytearray = field(default_factory=bytearray)
-    came: list[tuple[float, int]] = field(default_factory=list)
+    writes: list[tuple[float, int]] = field(default_factory=list)
     """Arrival time and end offset of each write."""
 
     def write(self, data: bytes) -> int:
         """Append a header or a fragment."""
         self.data += data
-        self.came.append((time.monotonic(), len(self.data)))
+        self.writes.append((time.monotonic(), len(self.data)))
         return len(data)
 
     def pictures(self) -> list[ReceivedPicture]:
         """Decode all pictures."""
         moments: dict[int, float] = {}
         at = 0
-        for moment, end in self.came:
+        for moment, end in self.writes:
             for box in BoxReader().feed(bytes(self.data[at:end])):
                 if box.kind == b"moof":
                     moments[round(decode_time(box) * FPS / _TICKS)] = moment
@@ -77,13 +77,13 @@ class Viewer:
         self.number = number
         self.recorders: list[StreamRecorder] = []
         self.restarts = 0
-        """How often the player gave up and was started again."""
+        """Number of restarts of the player."""
         self._sessions: list[Session] = []
         self._address = server_url(url) / f"objects/{number}/best.mp4"
 
     @property
     def reconnections(self) -> int:
-        """How often the stream was opened again."""
+        """Number of times that the stream was reopened."""
         return self.restarts + sum(session.reconnections for session in self._sessions)
 
     async def run(self) -> None:
@@ -95,12 +95,12 @@ class Viewer:
             with contextlib.suppress(ClientError):
                 await self._sessions[-1].run(self._address, _SETTINGS)
             self.restarts += 1
-            await asyncio.sleep(_AGAIN_S)
+            await asyncio.sleep(_RETRY_S)
 
     @property
-    def last_came(self) -> float:
-        """Time of the last arrival; 0: nothing has arrived."""
-        return max((recorder.came[-1][0] for recorder in self.recorders if recorder.came), default=0.0)
+    def last_arrival(self) -> float:
+        """Time of the last arrival; 0 if nothing has arrived."""
+        return max((recorder.writes[-1][0] for recorder in self.recorders if recorder.writes), default=0.0)
 
     def pictures(self) -> list[ReceivedPicture]:
         """Decode all received pictures, in order of arrival."""
@@ -115,7 +115,7 @@ class EventLog:
     cameras: Cameras | None = None
     merged: dict[int, int] = field(default_factory=dict)
 
-    def take(self, event: Event) -> None:
+    def add(self, event: Event) -> None:
         """Add an event; GOPs that are repeated after a reconnection are skipped."""
         match event:
             case Gop() if not self.gops or event.first > self.gops[-1][1].first:
@@ -129,13 +129,13 @@ class EventLog:
         while True:
             with contextlib.suppress(ClientError):
                 async for event in events(url, _SETTINGS):
-                    self.take(event)
-            await asyncio.sleep(_AGAIN_S)
+                    self.add(event)
+            await asyncio.sleep(_RETRY_S)
 
     def state(self, camera: str) -> str | None:
         """Return a camera's last reported state."""
-        known = self.cameras.cameras if self.cameras else ()
-        return next((camera_state.state for camera_state in known if camera_state.camera == camera), None)
+        cameras = self.cameras.cameras if self.cameras else ()
+        return next((camera_state.state for camera_state in cameras if camera_state.camera == camera), None)
 
     def shown(self, number: int) -> str | None:
         """Return the camera that shows an object now."""

@@ -13,7 +13,7 @@ from server.messaging.inbox import Message
 
 
 class RecordingSink:
-    """Notes what is published."""
+    """Records published messages."""
 
     def __init__(self) -> None:
         self.values: dict[str, list[int]] = {}
@@ -40,14 +40,14 @@ def test_messages_are_lost_doubled_or_disordered_and_pictures_are_not(mode: str)
         return
     assert 250 < altered < 350
     held_back = 1000 - len(tracks) if mode == "disordered" else 0
-    assert 0 <= held_back <= 2, "those that would still come"
+    assert 0 <= held_back <= 2, "messages still delayed"
     assert len(tracks) == 1000 + {"lost": -altered, "doubled": altered, "disordered": -held_back}[mode]
     later = sum(before > after for before, after in pairwise(tracks))
-    assert (later > 100) == (mode == "disordered"), "others of their kind go by, not only pictures"
+    assert (later > 100) == (mode == "disordered"), "tracks are reordered, not only pictures"
     assert len(set(tracks)) == 1000 - held_back - (altered if mode == "lost" else 0)
 
 
-def test_messages_go_to_whom_they_are_for() -> None:
+def test_messages_are_routed_to_their_receivers() -> None:
     cameras, bestview = {name: RecordingSink() for name in ("c0", "c1", "c2")}, RecordingSink()
     router = MessageRouter(cameras, bestview)
     for number, kind in enumerate(
@@ -62,11 +62,11 @@ def test_messages_go_to_whom_they_are_for() -> None:
     }
 
 
-def test_an_operator_points_at_the_middle_of_whom_they_watch() -> None:
+def test_an_operator_correction_is_at_the_center_of_the_watched_person() -> None:
     box = Box(1, 10.0, 20.0, 30.0, 60.0)
     gop = Gop(first=30, frames=2, choices={1: "c0", 2: "c0"}, boxes={"c0": ((), (box,))}, cuts=())
     correction = _correction(gop, 1)
     assert correction is not None
     assert correction == {"object": 1, "camera": "c0", "corrections": [{"pulse": 31, "x": 20.0, "y": 40.0}]}
-    assert _correction(gop, 2) is None, "they are in no box"
-    assert _correction(gop, 3) is None, "they are shown by no camera"
+    assert _correction(gop, 2) is None, "no box"
+    assert _correction(gop, 3) is None, "no camera"

@@ -19,7 +19,7 @@ from benchmarks.faults.viewing.viewers import Viewer
 from client import Gop
 
 
-def test_each_process_fails_and_any_two_of_them() -> None:
+def test_each_process_and_each_pair_of_processes_fails() -> None:
     assert [title(processes) for processes in process_sets()] == [
         *("bestview", "sync", "camera", "rendering"),
         *("bestview+sync", "bestview+camera", "bestview+rendering"),
@@ -28,13 +28,13 @@ def test_each_process_fails_and_any_two_of_them() -> None:
     assert all(BESTVIEW not in processes for processes in process_sets(BESTVIEW))
     named = [fault.name for fault in FAULTS]
     assert len(set(named)) == len(named)
-    for mode, left_out in (("kill", ()), ("freeze", ()), ("restart", (RENDERING,))):
-        assert {f"{mode} {title(processes)}" for processes in process_sets(*left_out)} <= set(named)
+    for mode, excluded in (("kill", ()), ("freeze", ()), ("restart", (RENDERING,))):
+        assert {f"{mode} {title(processes)}" for processes in process_sets(*excluded)} <= set(named)
 
 
-def test_the_cameras_that_fail_are_those_that_are_watched() -> None:
+def test_the_failing_cameras_are_the_watched_ones() -> None:
     fault_site = FaultSite("here", Path(), 0)
-    fault_site.events.take(Gop(first=0, frames=10, choices={1: "c2", 2: "c1", 3: "c2"}, boxes={}, cuts=()))
+    fault_site.events.add(Gop(first=0, frames=10, choices={1: "c2", 2: "c1", 3: "c2"}, boxes={}, cuts=()))
     assert names(fault_site, ("sync", SHOWN, OTHER)) == ["sync", "c0", "c1"]
     fault_site.viewers = [Viewer("http://localhost/", number) for number in (1, 2, 3)]
     assert names(fault_site, ("sync", SHOWN, OTHER)) == ["sync", "c2", "c1"]
