@@ -11,7 +11,7 @@ from playwright.async_api import Page
 from client import Gop
 from client.model import Split
 from fakes.programs import needs_chromium
-from fakes.running.assist_page import PLACE, every_gop_once, helped, opened
+from fakes.running.assist_page import PLACE, assisted_site, every_gop_once, open_page
 from fakes.running.lookalikes import FRAMES, MET, STAND, camera
 from fakes.running.site import RunningSite
 from fakes.timeouts import PATIENCE_MS
@@ -34,7 +34,7 @@ async def test_pointing_at_a_person_restores_their_id_without_interrupting_the_s
     """The person from the left turns back; the tracker assumes that the two pass each other."""
     # One camera with given detections, so that a busy machine keeps up.
     cameras = [camera(ALIKE, tmp_path)]
-    async with helped(tmp_path, cameras, memory_frames=FRAMES) as site, opened(site) as page:
+    async with assisted_site(tmp_path, cameras, memory_frames=FRAMES) as site, open_page(site) as page:
         await point(site, page)
 
 

@@ -11,7 +11,7 @@ import pytest_asyncio
 from playwright.async_api import Page
 
 from fakes.programs import needs_chromium
-from fakes.running.assist_page import PLACE, every_gop_once, helped, opened
+from fakes.running.assist_page import PLACE, assisted_site, every_gop_once, open_page
 from fakes.running.site import RunningSite
 from fakes.timeouts import PATIENCE_MS
 from server.cli.generated_config import DEMO
@@ -26,14 +26,14 @@ pytestmark = [
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def site(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RunningSite]:
     """The demo."""
-    async with helped(tmp_path_factory.mktemp("demo"), DEMO["cameras"]) as site:
+    async with assisted_site(tmp_path_factory.mktemp("demo"), DEMO["cameras"]) as site:
         yield site
 
 
 @pytest_asyncio.fixture(loop_scope="module")
 async def page(site: RunningSite) -> AsyncIterator[Page]:
-    """The page, opened."""
-    async with opened(site) as page:
+    """The page, open_page."""
+    async with open_page(site) as page:
         yield page
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from fakes.media.decoding import decodes_without_errors
-from fakes.running.beeps import heard, write_beeps
+from fakes.running.beeps import sample_and_beep_times, write_beeps
 from fakes.running.site import CAMERAS, RunningSite, bounded, configuration, running
 from fakes.running.stream_frames import FPS, pictures
 from fakes.timeouts import PATIENCE
@@ -80,7 +80,7 @@ async def by_its_address_it_is_what_the_cameras_showed(site: RunningSite, folder
 
 
 def it_beeps_every_second_without_a_hole(film: Path) -> None:
-    times, beeps = heard(film)
+    times, beeps = sample_and_beep_times(film)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
     assert len(beeps) >= 2
     assert [beep - round(beep) for beep in beeps] == pytest.approx([0] * len(beeps), abs=0.04)

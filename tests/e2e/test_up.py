@@ -23,7 +23,7 @@ from benchmarks.common.browser import chromium
 from fakes.programs import needs_chromium
 from fakes.prometheus.monitoring_files import ASKED, OF_PROMETHEUS
 from fakes.prometheus.promql_series import Printed, given, selectors
-from fakes.running.beeps import heard, write_beeps
+from fakes.running.beeps import sample_and_beep_times, write_beeps
 from fakes.running.site import CAMERAS, RunningSite, bounded, configuration, running
 from fakes.running.stream_frames import FPS, pictures, record, shown_from_to
 from fakes.timeouts import PATIENCE
@@ -304,7 +304,7 @@ async def test_sound_continues_in_sync_across_cuts_and_selections(
     async with aiohttp.ClientSession() as session:
         url = f"{site.url}objects/{number}/best.mp4"
         film = await bounded(record(session, url, site.pulse + 4 * FPS, tmp_path / "film"))
-    times, begins = await asyncio.to_thread(heard, film)
+    times, begins = await asyncio.to_thread(sample_and_beep_times, film)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a gap"
     assert len(begins) >= 3
     assert [begin - round(begin) for begin in begins] == pytest.approx([0] * len(begins), abs=0.04)

@@ -1,1 +1,1 @@
-"""What stands in for peers of the tested code, and helpers that several test files use."""
+"""Fakes of the peers of the tested code, and helpers of several test files."""

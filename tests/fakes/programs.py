@@ -1,4 +1,4 @@
-"""Marks for tests that need programs which our own files do not install: without them they are skipped."""
+"""Marks that skip tests whose external programs are missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""People who stand and walk before calibrated cameras, as tracks for the identity registry."""
+"""People who stand and walk in view of calibrated cameras, as tracks for the identity registry."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ FOCAL, EYE = 400.0, 3.0
 
 
 def camera_from(side: str) -> NDArray[np.float64]:
-    """Return the ground -> image homography of a level camera 10 m off the middle, looking at it; metres."""
+    """Return the ground-to-image homography of a level camera 10 m from the origin, looking at it; meters."""
     level = np.array([[FOCAL, 320.0, 0.0], [0.0, 240.0, FOCAL * EYE], [0.0, 1.0, 0.0]])
-    turned = {
+    rotations = {
         "south": [[1, 0, 0], [0, 1, 10], [0, 0, 1]],
         "west": [[0, -1, 0], [1, 0, 10], [0, 0, 1]],
         "north": [[-1, 0, 0], [0, -1, 10], [0, 0, 1]],
     }
-    return np.asarray(level @ np.array(turned[side], float))
+    return np.asarray(level @ np.array(rotations[side], float))
 
 
 VIEWS = {side: camera_from(side) for side in ("north", "south", "west")}
@@ -38,12 +38,12 @@ CALIBRATED: Mapping[str, NDArray[np.float64] | None] = {
 }
 BLIND: Mapping[str, NDArray[np.float64] | None] = dict.fromkeys(VIEWS)
 HOWEVER_MANY = pytest.mark.parametrize("most", [400, 0], ids=["few", "too many at once"])
-"""Who is surely somebody is settled at once where there are too many parts of tracks."""
+"""With more tracklets than this limit, certain identities are decided at once."""
 
 
 @dataclass(frozen=True)
 class Stay:
-    """A person under one local number in one camera, for some frames, along a line on the ground."""
+    """A person's track in one camera, for some frames, along a line on the ground."""
 
     camera: str
     local_id: int
@@ -56,22 +56,22 @@ class Stay:
     def box(self, frame: int) -> NDArray[np.float64]:
         x, y = (p + v * frame for p, v in zip(self.place, self.speed, strict=True))
         u, v, w = VIEWS[self.camera] @ (x, y, 1.0)
-        tall = FOCAL * 1.75 / w
-        return np.array([u / w - 0.2 * tall, v / w - tall, u / w + 0.2 * tall, v / w])
+        height = FOCAL * 1.75 / w
+        return np.array([u / w - 0.2 * height, v / w - height, u / w + 0.2 * height, v / w])
 
     def track(self, first: int, last: int) -> TrackUpdate:
         boxes = np.full((last - first + 1, 4), np.nan)
         seen = range(max(first, self.start), min(last, self.end) + 1)
         for frame in seen:
             boxes[frame - first] = self.box(frame)
-        looks = (AppearanceSample(seen[0], seen[-1], coat(self.coat)),) if seen and self.coat else ()
-        return TrackUpdate(self.camera, self.local_id, first, boxes, looks)
+        appearance = (AppearanceSample(seen[0], seen[-1], coat(self.coat)),) if seen and self.coat else ()
+        return TrackUpdate(self.camera, self.local_id, first, boxes, appearance)
 
 
 def coat(which: float) -> NDArray[np.float64]:
-    """Return a histogram with a hump of its own."""
-    hump = np.exp(-(((np.arange(64) - 8.0 * which) / 4.0) ** 2))
-    return np.asarray(hump / hump.sum())
+    """Return a color histogram with one peak, by coat."""
+    peak = np.exp(-(((np.arange(64) - 8.0 * which) / 4.0) ** 2))
+    return np.asarray(peak / peak.sum())
 
 
 def play(
@@ -116,13 +116,13 @@ def both(local: int, place: tuple[float, float], start: int = 0, end: int = 999)
 
 
 def known(seen: Sequence[IdentityUpdate]) -> dict[tuple[str, int], int]:
-    """Whose each track is after these updates, also where that was settled before."""
+    """Return the person of each track after these updates, by camera and local id."""
     every = {key: number for update in seen for key, number in update.person_ids.items()}
     newest = {key.track: number for key, number in sorted(every.items())}
     return {(key.camera, key.local_id): number for key, number in newest.items() if number}
 
 
 def numbers(update: IdentityUpdate) -> dict[tuple[str, int], int]:
-    """Whose each track is now: its newest episode's; without those that are nobody's yet."""
+    """Return the person of each track in one update, by its newest tracklet, without unassigned tracks."""
     newest = {key.track: number for key, number in update.person_ids.items()}
     return {(key.camera, key.local_id): number for key, number in newest.items() if number}

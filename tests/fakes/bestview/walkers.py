@@ -1,4 +1,4 @@
-"""People who walk about on a floor, and cameras over it, made up from a seed, to try calibration on."""
+"""Simulated people walking on a floor, and cameras above it, for calibration tests; all from a seed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ STEP = 0.032  # person heights a frame: 1.4 m/s at 25 frames a second
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations in box heights, as smooth in time as a tracker's errors are."""
+    """Standard deviations in box heights; the noise is smooth in time, like a tracker's errors."""
 
     sideways: float = 0.02
     upwards: float = 0.03
@@ -26,28 +26,28 @@ class Noise:
 def camera_at(
     east: float, north: float, towards: tuple[float, float] = (0.0, 0.0), focal: float = 0.8
 ) -> Pinhole:
-    """A camera 1.7 person heights above the floor that looks at a place there."""
+    """Return a camera 1.7 person heights above the floor that looks at a point on it."""
     parameters = np.zeros(8)
-    away = np.array(towards) - (east, north)
+    direction = np.array(towards) - (east, north)
     parameters[FOCAL] = np.log(focal)
     parameters[ASPECT] = parameters[ROLL] = 0.0
     parameters[CAMERA_HEIGHT] = np.log(1.7)
-    parameters[TILT] = np.arctan2(1.1, np.hypot(*away))
-    parameters[PAN] = np.arctan2(away[1], away[0])
+    parameters[TILT] = np.arctan2(1.1, np.hypot(*direction))
+    parameters[PAN] = np.arctan2(direction[1], direction[0])
     parameters[[EAST, NORTH]] = east, north
     return Pinhole(parameters, SIZE)
 
 
 def stroll(random: np.random.Generator, frames: int, wide: float = 2.0) -> Floats:
-    """Places of somebody who walks to one place after another, (frames, 2) person heights."""
+    """Return the path of a person who walks from point to point, `(frames, 2)` person heights."""
     places = [random.uniform(-wide, wide, 2)]
     goal = random.uniform(-wide, wide, 2)
     heading = np.zeros(2)
     for _ in range(frames - 1):
         if np.hypot(*(goal - places[-1])) < 0.3:
             goal = random.uniform(-wide, wide, 2)
-        way = goal - places[-1]
-        heading = 0.9 * heading + 0.1 * way / np.hypot(*way)
+        step = goal - places[-1]
+        heading = 0.9 * heading + 0.1 * step / np.hypot(*step)
         places.append(places[-1] + STEP * heading)
     return np.array(places)
 
@@ -60,7 +60,7 @@ def seen(
     offset: int = 0,
     noise: Noise | None = None,
 ) -> Walk:
-    """What a camera sees of people whose frame 0 is pulse `offset`, without who is out of its picture."""
+    """Return a camera's tracks of people in its picture; its frame 0 is pulse `offset`."""
     noise = noise or Noise()
     tracks = []
     for path in paths:
@@ -84,7 +84,7 @@ def seen(
 
 
 def error_on_floor(found: Sequence[Floats], truth: Sequence[Pinhole], place: Floats, person: float) -> Floats:
-    """How far off the found homographies put known places, the whole floor turned and shifted at will.
+    """Compute the errors of known points by the found homographies, after the best rotation and shift.
 
     Returns:
         Distances in person heights, (cameras, N).
@@ -98,11 +98,11 @@ def error_on_floor(found: Sequence[Floats], truth: Sequence[Pinhole], place: Flo
     x = where.reshape(-1, 2) @ np.array([1, 1j])
     y = np.tile(place @ np.array([1, 1j]), len(found))
     x, y = x - x.mean(), y - y.mean()
-    turned = x * np.exp(1j * np.angle((np.conj(x) * y).sum()))
-    return np.abs(turned - y).reshape(len(found), -1)
+    rotated = x * np.exp(1j * np.angle((np.conj(x) * y).sum()))
+    return np.abs(rotated - y).reshape(len(found), -1)
 
 
 def _smooth(random: np.random.Generator, count: int, spread: float) -> Floats:
-    """Noise that changes over half a second."""
+    """Return noise that is smooth over half a second."""
     rough = random.normal(0, 1, count + 12)
     return np.asarray(np.convolve(rough, np.ones(13) / np.sqrt(13), "valid") * spread)

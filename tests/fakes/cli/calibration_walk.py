@@ -1,4 +1,4 @@
-"""Somebody who walks about in the synthetic scene, as cameras tell of it; how far off a calibration is."""
+"""A person who walks through the synthetic room, as track messages, and the error of a calibration."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from synthetic.room.room_world import RoomWorld
 Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT = 320, 180
-TALL = 1.75  # metres
+PERSON_HEIGHT = 1.75  # meters
 SITE = {"site": {"name": "hall", "width": WIDTH, "height": HEIGHT}}
 
 
 def walk_config(**changes: Any) -> Config:
-    """Return a site of the scene's size."""
+    """Return a configuration with the scene's picture size."""
     return small_config(**{**SITE, **changes})
 
 
 def curved(frames: int, wide: float = 0.3) -> Floats:
-    """Places of somebody who walks in curves through the middle of the scene's floor, (frames, 2) metres."""
+    """Return a curved path through the middle of the scene's floor, `(frames, 2)` meters."""
     width, depth = Scene("room", 2, 1).floor
     time = np.arange(frames)
     return np.column_stack(
@@ -42,20 +42,20 @@ def curved(frames: int, wide: float = 0.3) -> Floats:
 
 
 def words(config: Config, places: Floats, epoch: int = 0, boot: int = 1) -> Iterator[Epoch]:
-    """Yield what the cameras say of somebody who walks, from an epoch on; whole windows alone."""
+    """Yield the cameras' track messages of a walking person, from an epoch on; only complete windows."""
     ids = config.camera_ids
     scene = Scene("room", len(ids), 1, width=WIDTH, height=HEIGHT)
     for number in range(epoch, epoch + len(places) // STRIDE):
         first = number * STRIDE
         part = places[first - epoch * STRIDE :][:STRIDE]
-        said = {
-            camera: _word(camera, [_box(scene, at, place) for place in part], number, boot)
+        messages = {
+            camera: _message(camera, [_box(scene, at, place) for place in part], number, boot)
             for at, camera in enumerate(ids)
         }
-        yield Epoch(number, first + STRIDE - 1, said)
+        yield Epoch(number, first + STRIDE - 1, messages)
 
 
-def _word(camera: str, boxes: list[Box | None], epoch: int, boot: int) -> CameraTracks:
+def _message(camera: str, boxes: list[Box | None], epoch: int, boot: int) -> CameraTracks:
     first, last = epoch * STRIDE, (epoch + 1) * STRIDE - 1
     track = TrackMessage(id=1, boxes=boxes, confidence=1.0)
     return CameraTracks(
@@ -79,8 +79,8 @@ def _view(scene: Scene, camera: int) -> PinholeCamera:
 
 
 def _box(scene: Scene, camera: int, place: Floats) -> Box | None:
-    """Return the box of somebody in the camera's picture; None: not all of them is in it."""
-    ends, depth = _view(scene, camera).project(np.array([[*place, 0.0], [*place, TALL]]))
+    """Return a person's box in a camera's picture; None if it is truncated."""
+    ends, depth = _view(scene, camera).project(np.array([[*place, 0.0], [*place, PERSON_HEIGHT]]))
     (x, bottom), (_, top) = ends.tolist()
     half = (bottom - top) / 5
     whole = depth.min() > 0.3 and x - half > 0 and x + half < WIDTH and top > 0 and bottom < HEIGHT
@@ -88,7 +88,7 @@ def _box(scene: Scene, camera: int, place: Floats) -> Box | None:
 
 
 def errors_on_floor(found: Sequence[Floats]) -> Floats:
-    """How far off the scene's cameras put known places, metres, the floor turned and shifted at will."""
+    """Compute the errors of known points, meters, after the best rotation and shift of the floor."""
     scene = Scene("room", len(found), 1, width=WIDTH, height=HEIGHT)
     width, depth = scene.floor
     random = np.random.default_rng(0)

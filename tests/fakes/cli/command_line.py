@@ -1,4 +1,4 @@
-"""Running `myview` in the tests' own process."""
+"""Runs `myview` in the process of the tests."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ BAD_INPUT = 2
 
 
 class Ended(NamedTuple):
-    """How a command ended."""
+    """The exit code and output of a command."""
 
     code: int
     out: str
@@ -23,7 +23,7 @@ class Ended(NamedTuple):
 
 
 def refusal(ended: Ended) -> str:
-    """Return the one line that says what is wrong with the input."""
+    """Return the single error line about the input."""
     assert (ended.code, ended.out) == (BAD_INPUT, ""), ended.err
     (line,) = ended.err.splitlines()
     assert line.startswith("myview: ")
@@ -46,8 +46,8 @@ def myview(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
             main()
         except SystemExit as end:
             code = int(end.code or 0)
-        told = capsys.readouterr()
-        return Ended(code, told.out, told.err)
+        output = capsys.readouterr()
+        return Ended(code, output.out, output.err)
 
     yield command
     for number, handler in before.items():

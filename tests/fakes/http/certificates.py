@@ -9,7 +9,7 @@ from server.config.sections import TlsSettings
 
 
 def make_certificate(folder: Path, name: str) -> TlsSettings:
-    """Make a certificate of this machine's own name, and its key."""
+    """Create a self-signed certificate for a host name, and its key."""
     folder.mkdir(exist_ok=True)
     tls = TlsSettings(certificate=folder / "certificate.pem", key=folder / "key.pem")
     request = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"]

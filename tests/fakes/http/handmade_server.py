@@ -1,4 +1,4 @@
-"""What the tests of the Python client share: a small server of the HTTP interface, and fMP4 made by hand."""
+"""A small server of the HTTP API with scripted answers, and minimal fMP4, for tests of the Python client."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ async def nothing_more(_: web.StreamResponse) -> None:
 
 @dataclass
 class HandMadeSite:
-    """Answers by the contract; ``plays`` and ``tells`` are used up, one per connection; then 503."""
+    """Answers as the API does; each connection consumes one script of ``plays`` or ``tells``; then 503."""
 
     plays: list[Play] = field(default_factory=list)
     tells: list[Play] = field(default_factory=list)

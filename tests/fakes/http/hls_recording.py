@@ -19,15 +19,17 @@ LENGTH = 2 * GOP
 
 
 def shows(hall: Hall, gops: range, choices: dict[int, str | None] | None = None) -> None:
-    """Decide some GOPs: person 1 is in either camera in turn, or as told; in None no pictures come."""
+    """Decide some GOPs of person 1, in alternating cameras or by `choices`; None: no pictures arrive."""
     service = hall.service
     for gop in gops:
         camera = CAMERAS[gop % 2] if choices is None else choices[gop]
-        for seed, own in enumerate(CAMERAS if camera is not None else ()):
+        for seed, source in enumerate(CAMERAS if camera is not None else ()):
             for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
-                service.ingest.video(video(own, unit))
-        told = {} if camera is None else {1: camera}
-        service.recorder.put(GopChoices(first=gop * GOP, frames=GOP, choices=told, boxes={}, cuts=[]), PULSE0)
+                service.ingest.video(video(source, unit))
+        shown = {} if camera is None else {1: camera}
+        service.recorder.put(
+            GopChoices(first=gop * GOP, frames=GOP, choices=shown, boxes={}, cuts=[]), PULSE0
+        )
         choice = ObjectChoice(1, camera, None, away=False)
         service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
@@ -38,7 +40,7 @@ async def until_written(hall: Hall, gops: int) -> None:
 
 
 def forget(hall: Hall) -> None:
-    """Let the disk alone know what was, but for the newest GOP."""
+    """Drop all GOPs but the newest from memory, so that they are read from the disk."""
     hall.service.recorder.recent._frames = GOP
     hall.service.recorder.recent._choices = type(hall.service.recorder.recent._choices)(
         [hall.service.recorder.recent._choices[-1]]

@@ -1,4 +1,4 @@
-"""Passwords as no one should write them into an address, and whether a text has any of one in it."""
+"""Addresses with embedded passwords, mistyped ones included, and a check whether a text leaks one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 HOST = "192.0.2.11"
 PASSWORDS = st.text("QXZJKVWqxzjkvw /@#?&=:;%+|\\'\"<>{}[]$!~^()*,", min_size=4, max_size=24)
-"""No letters that are in words of ours, and all that ends a part of an address too early."""
+"""Characters that occur in no message of MyView, and all delimiters of addresses."""
 PLACES = (
     "rtsp://user:{}@192.0.2.11/x",
     "rtsp://user:{}@192.0.2.11:554",
@@ -35,11 +35,11 @@ PLACES = (
     "/etc/myview/rtsp:/user:{}@192.0.2.11/x",
     "/etc/myview/rtps:/user:{}@192.0.2.11/x",
 )
-"""Where a password may stand in what is meant as an address, mistakes included."""
+"""Addresses with a place for a password, mistyped ones included."""
 _PIECE = 4
 
 
 def tells(text: str, password: str, without: str) -> bool:
-    """Return whether four characters of a password are in a text, that are not there without it."""
+    """Return whether a text contains four characters of a password that are not in the text without it."""
     pieces = {password[at : at + _PIECE] for at in range(len(password) - _PIECE + 1)}
     return any(piece in text and piece not in without for piece in pieces)

@@ -1,4 +1,4 @@
-"""A file of tokens, of which the test knows every one."""
+"""Token files with known tokens."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fakes.service.fed_site import Hall, opened
 from server.config.tokens_file import token_digest
 
 LATER = "2100-01-01T00:00:00Z"
-"""When a token may have been made that is younger than any service of a test."""
+"""Creation time of a token that is newer than any service of a test."""
 EVERYBODY: dict[str, dict[str, Any]] = {
     "lead": {"role": "operate"},
     "desk": {"role": "watch"},
@@ -27,12 +27,12 @@ def token_of(name: str) -> str:
 
 
 def bearer(name: str) -> dict[str, str]:
-    """Return the head that a token is sent in."""
+    """Return the HTTP header with a token."""
     return {"Authorization": f"Bearer {token_of(name)}"}
 
 
 def line_of(name: str, **what: Any) -> dict[str, Any]:
-    """Return a line of the file."""
+    """Return an entry of the token file."""
     return {"name": name, "sha256": token_digest(token_of(name)), **(what or EVERYBODY[name])}
 
 
@@ -43,7 +43,7 @@ def write_tokens(path: Path, *lines: dict[str, Any]) -> Path:
 
 @asynccontextmanager
 async def locked(folder: Path, *names: str, **changes: Any) -> AsyncIterator[Hall]:
-    """Serve a site that takes tokens: everybody's, or some; they are in `tokens.yaml` in the folder."""
+    """Serve a site that requires tokens; they are in `tokens.yaml` in the folder."""
     path = write_tokens(folder / "tokens.yaml", *map(line_of, names or EVERYBODY))
     access = {"tokens": str(path), **changes.pop("access", {})}
     async with aclosing(opened(access=access, **changes)) as halls:

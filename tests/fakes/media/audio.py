@@ -1,4 +1,4 @@
-"""Small recordings that flash and beep at known moments, and what is heard of them in a stream."""
+"""Small recordings that flash and beep at known times, and detection of these in streams."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from server.messaging.messages import AudioHeader, ZenohKeys
 WIDTH, HEIGHT, FPS = 64, 48, 25
 EVERY = 20
 """Pictures from one flash to the next: 0.8 s."""
-_LASTS = 2
-"""Pictures that a flash lasts."""
+_FLASH_FRAMES = 2
+"""Duration of a flash, frames."""
 
 GOPS = 24
 FRAMES = GOPS * GOP
 STEP = 0.04
-"""Seconds: sound that is so far from its picture is out of step."""
+"""Maximum offset between sound and picture, seconds."""
 BEEPS = [number / FPS for number in range(EVERY, FRAMES, EVERY)]
 
 
@@ -45,7 +45,7 @@ def write_flashes(
     pictures: bool = True,
     options: dict[str, str] | None = None,
 ) -> Path:
-    """Write a recording that flashes and beeps at its pictures EVERY, 2 · EVERY and so on."""
+    """Write a recording that flashes and beeps at frames EVERY, 2 · EVERY and so on."""
     with av.open(str(path), "w") as container:
         video = container.add_stream("libx264", rate=FPS) if pictures else None
         audio = container.add_stream(codec, rate=rate, options=options or {})
@@ -54,23 +54,23 @@ def write_flashes(
         if isinstance(video, VideoStream):
             video.width, video.height, video.pix_fmt = WIDTH, HEIGHT, "yuv420p"
             for number in range(frames):
-                grey = 255 * _is_flash(number)
-                picture = np.full((HEIGHT, WIDTH, 3), grey, dtype=np.uint8)
+                gray = 255 * _is_flash(number)
+                picture = np.full((HEIGHT, WIDTH, 3), gray, dtype=np.uint8)
                 frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
                 frame.pts, frame.time_base = number, Fraction(1, FPS)
                 container.mux(video.encode(frame))
             container.mux(video.encode(None))
         for number in range(frames):
-            container.mux(audio.encode(_some_sound(number, rate, audio.layout.name)))
+            container.mux(audio.encode(_audio_frame(number, rate, audio.layout.name)))
         container.mux(audio.encode(None))
     return path
 
 
 def _is_flash(number: int) -> bool:
-    return number >= EVERY and number % EVERY < _LASTS
+    return number >= EVERY and number % EVERY < _FLASH_FRAMES
 
 
-def _some_sound(number: int, rate: int, layout: str) -> av.AudioFrame:
+def _audio_frame(number: int, rate: int, layout: str) -> av.AudioFrame:
     samples = rate // FPS
     time = (number * samples + np.arange(samples)) / rate
     wave = 0.5 * np.sin(2 * np.pi * 1000 * time) * _is_flash(number)
@@ -83,7 +83,7 @@ def _some_sound(number: int, rate: int, layout: str) -> av.AudioFrame:
 
 @cache
 def flashing(recording: Path) -> tuple[AccessUnit, ...]:
-    """Return the recording's pictures as a camera of the hall sends them."""
+    """Return the recording's pictures as access units of a camera."""
     encoder = Encoder(SiteSettings(width=64, height=48, fps=FPS), EncodeSettings(gop=GOP))
     with av.open(str(recording)) as container:
         pictures = [frame.to_ndarray(format="bgr24") for frame in container.decode(video=0)]
@@ -91,7 +91,7 @@ def flashing(recording: Path) -> tuple[AccessUnit, ...]:
 
 
 def sends(service: FedService, recording: Path, silent: range = range(0)) -> list[bytes]:
-    """Send all of the recording's sound, but for some frames; give its frames."""
+    """Send the recording's audio frames except the `silent` ones; return all frames."""
     sound = RecordedAudioSource(str(recording), service.config.sound, FPS, 0, "stop")
     frames = [*sound.until(0), *sound.until(FRAMES)]
     for message in messages([frame for frame in frames if frame.number not in silent]):
@@ -100,7 +100,7 @@ def sends(service: FedService, recording: Path, silent: range = range(0)) -> lis
 
 
 def messages(frames: list[EncodedAudioFrame]) -> list[Message]:
-    """Return frames of sound as they come from the bus."""
+    """Return audio frames as received from the bus."""
     return [
         Message(
             ZenohKeys("hall").sound,
@@ -112,13 +112,13 @@ def messages(frames: list[EncodedAudioFrame]) -> list[Message]:
 
 
 def packets(stream: bytes) -> list[bytes]:
-    """Return the frames of sound in an MP4."""
+    """Return the encoded audio frames of an MP4."""
     with av.open(io.BytesIO(stream)) as container:
         return [bytes(packet) for packet in container.demux(audio=0) if packet.size]
 
 
 def heard(stream: bytes, kind: str | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what is heard of a stream: times of all samples (seconds), and the samples, in one channel."""
+    """Decode the audio of a stream: times of all samples (seconds), and the samples of one channel."""
     with av.open(io.BytesIO(stream), format=kind) as container:
         frames = list(container.decode(audio=0))
     times = [float(frame.time or 0) + np.arange(frame.samples) / frame.sample_rate for frame in frames]
@@ -126,21 +126,21 @@ def heard(stream: bytes, kind: str | None = None) -> tuple[NDArray[np.float64], 
 
 
 def beeps(stream: bytes, kind: str | None = None) -> list[float]:
-    """Return when beeps begin in a stream, seconds."""
+    """Return the start times of beeps in a stream, seconds."""
     times, samples = heard(stream, kind)
-    return _begins(times[np.abs(samples) > 0.1])
+    return _group_starts(times[np.abs(samples) > 0.1])
 
 
 def flashes(stream: bytes, kind: str | None = None) -> list[float]:
-    """Return when flashes begin in a stream, seconds."""
+    """Return the start times of flashes in a stream, seconds."""
     with av.open(io.BytesIO(stream), format=kind) as container:
         bright = [
             frame.time for frame in container.decode(video=0) if frame.to_ndarray(format="gray").mean() > 128
         ]
-    return _begins(np.array(bright, dtype=np.float64))
+    return _group_starts(np.array(bright, dtype=np.float64))
 
 
-def _begins(times: NDArray[np.float64]) -> list[float]:
-    """Return the first of each group of times that are close to each other."""
+def _group_starts(times: NDArray[np.float64]) -> list[float]:
+    """Return the first time of each group of close times."""
     earlier = [-1.0, *times]
     return [float(time) for before, time in pairwise(earlier) if time - before > 0.2]

@@ -1,4 +1,4 @@
-"""A stream that Chromium reads into one SourceBuffer and plays: what the page does, without the page."""
+"""Playback of a stream in Chromium through one SourceBuffer, as the page does."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ PLAY = (
     tracks: [video.webkitAudioDecodedByteCount > 0, video.webkitVideoDecodedByteCount > 0] };
 }"""
 )
-"""Plays it to the end: what was buffered, the frames' media times, the tracks of sound and pictures."""
+"""Plays a stream to the end; returns buffered ranges, media times of frames, and decoded tracks."""
 
 
 async def seen_in_chromium(
     port: int, splicer: Splicer, gops: int, show: Callable[[int], None], script: str, *arguments: Any
 ) -> dict[str, Any]:
-    """Return what a script says of a stream that it reads; all GOPs but the first follow once it watches."""
+    """Run a script that reads a stream, and publish GOPs once it is connected; return its result."""
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{port}/healthz")
         playing = asyncio.create_task(page.evaluate(script, list(arguments)))
-        while not splicer.viewers:  # noqa: ASYNC110 — the browser comes when it comes
+        while not splicer.viewers:  # noqa: ASYNC110 — the browser connects at any time
             await asyncio.sleep(0.01)
         for gop in range(1, gops):
             show(gop)
@@ -70,7 +70,7 @@ HLS_BY_ITSELF = """async (url) => {
     video.onerror = () => done(video.error.message);
   });
   video.muted = true;
-  video.src = url;  // at its own rate: what is live can be played at no other
+  video.src = url;  // at normal speed, the only one for live streams
   await video.play();
   return { end: await end, seconds: video.currentTime };
 }"""

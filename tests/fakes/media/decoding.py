@@ -1,4 +1,4 @@
-"""Decode a file as a player does, and listen to what FFmpeg says of it."""
+"""Decoding of files, with FFmpeg's error messages."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import av.logging
 
 
 def decodes_without_errors(path: Path) -> None:
-    """Decode every stream of a file or playlist to its end, without one error that FFmpeg reports."""
+    """Decode all streams of a file or playlist; fail if FFmpeg logs an error."""
     before = av.logging.get_level()
     av.logging.set_level(av.logging.ERROR)
     try:
-        with av.logging.Capture(local=False) as said, av.open(str(path)) as opened:
-            frames = sum(len(packet.decode()) for packet in opened.demux())
+        with av.logging.Capture(local=False) as log, av.open(str(path)) as container:
+            frames = sum(len(packet.decode()) for packet in container.demux())
     finally:
         av.logging.set_level(before)
-    assert not said, f"{path}: {said}"
+    assert not log, f"{path}: {log}"
     assert frames, f"{path}: no pictures"

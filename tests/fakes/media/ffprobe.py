@@ -1,4 +1,4 @@
-"""What ffprobe says about a file."""
+"""Stream properties by ffprobe."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fakes.timeouts import PATIENCE
 
 
 def probed(path: Path | str, entries: str) -> list[list[str]]:
-    """Return these ffprobe entries of each stream, all frames decoded; a warning fails the test."""
+    """Return ffprobe entries of each stream, after decoding all frames; a warning fails the test."""
     done = subprocess.run(
         ["ffprobe", "-v", "warning", "-count_frames", "-show_entries", f"stream={entries}",
          "-of", "csv=p=0", str(path)],

@@ -1,4 +1,4 @@
-"""H.264 streams of every kind that an encoder makes."""
+"""H.264 streams of various encoder settings."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def how(unit: AccessUnit) -> SliceHeaderFormat:
 
 
 def decoded(samples: list[bytes]) -> list[NDArray[np.uint8]]:
-    """Decode length-prefixed samples; damage is an error."""
+    """Decode length-prefixed samples; damaged data is an error."""
     decoder = av.CodecContext.create("h264", "r")
     decoder.options = {"err_detect": "explode"}
     pictures = []

@@ -9,7 +9,7 @@ from server.media.containers.mpegts import COUNTERS, PACKET_BYTES
 
 @dataclass(frozen=True)
 class Packet:
-    """A packet taken apart by the standard's own words (2.4.3.2)."""
+    """A parsed transport stream packet (ISO/IEC 13818-1, 2.4.3.2)."""
 
     pid: int
     begins: bool
@@ -49,7 +49,7 @@ def one(packet: bytes) -> Packet:
 
 
 def check_counters(found: list[Packet]) -> None:
-    """Check that nothing is missing anywhere: what a receiver does."""
+    """Check the continuity counters, as a receiver does."""
     last: dict[int, int] = {}
     for packet in found:
         if packet.pid in last:

@@ -1,4 +1,4 @@
-"""An RTSP server by hand (RFC 2326): H.264 over RTP (RFC 6184), interleaved with its answers."""
+"""A minimal RTSP server (RFC 2326): H.264 over RTP (RFC 6184), interleaved over TCP."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from server.camera.encoder import AccessUnit
 from server.media.h264.annexb import NAL_PPS, NAL_SPS, nal_type, nal_units
 
 _PAYLOAD_TYPE = 96
-_MOST = 200
-"""Bytes of a NAL unit in one packet: few, so that small pictures are taken apart, too."""
+_MAX_BYTES = 200
+"""Bytes of a NAL unit in one packet: few, so that small pictures are fragmented."""
 _FU_A = 28
 
 
 class RtspCamera:
-    """Serves access units of so many pulses a second, GOP by GOP, as far as it is let; not over UDP."""
+    """Serves access units at a frame rate over TCP, up to the GOP number `let`."""
 
     def __init__(self, gops: Sequence[Sequence[AccessUnit]], fps: float) -> None:
         self.gops, self.fps, self.let = gops, fps, 40
@@ -30,7 +30,7 @@ class RtspCamera:
         self.url = f"rtsp://127.0.0.1:{self._server.server_address[1]}/live"
 
     def close(self) -> None:
-        """Hang up."""
+        """Stop the server."""
         self.stop.set()
         if self._thread.is_alive():
             self._server.shutdown()
@@ -63,18 +63,18 @@ class _Handler(socketserver.StreamRequestHandler):
         return (name.lower(), value.strip()) if colon else None
 
     def _answer(self, method: str, address: str, headers: dict[str, str]) -> None:
-        status, told, body = "200 OK", [f"CSeq: {headers['cseq']}"], b""
+        status, headers_out, body = "200 OK", [f"CSeq: {headers['cseq']}"], b""
         if method == "OPTIONS":
-            told.append("Public: OPTIONS, DESCRIBE, SETUP, PLAY, TEARDOWN")
+            headers_out.append("Public: OPTIONS, DESCRIBE, SETUP, PLAY, TEARDOWN")
         elif method == "DESCRIBE":
-            body = _described(self.server.camera.gops[0][0])
-            told += [f"Content-Base: {address}/", "Content-Type: application/sdp"]
-            told.append(f"Content-Length: {len(body)}")
+            body = _describe(self.server.camera.gops[0][0])
+            headers_out += [f"Content-Base: {address}/", "Content-Type: application/sdp"]
+            headers_out.append(f"Content-Length: {len(body)}")
         elif "TCP" in headers.get("transport", "TCP"):
-            told += ["Session: 1", "Transport: RTP/AVP/TCP;unicast;interleaved=0-1"]
+            headers_out += ["Session: 1", "Transport: RTP/AVP/TCP;unicast;interleaved=0-1"]
         else:
             status = "461 Unsupported Transport"
-        self.wfile.write("\r\n".join([f"RTSP/1.0 {status}", *told, "", ""]).encode() + body)
+        self.wfile.write("\r\n".join([f"RTSP/1.0 {status}", *headers_out, "", ""]).encode() + body)
 
     def _play(self, camera: RtspCamera) -> None:
         number = 0
@@ -91,7 +91,7 @@ class _Handler(socketserver.StreamRequestHandler):
                     number += 1
 
 
-def _described(key: AccessUnit) -> bytes:
+def _describe(key: AccessUnit) -> bytes:
     sets = [unit for unit in nal_units(key.data) if nal_type(unit) in (NAL_SPS, NAL_PPS)]
     sprop = ",".join(base64.b64encode(parameter_set).decode() for parameter_set in sets)
     lines = [
@@ -108,15 +108,15 @@ def _described(key: AccessUnit) -> bytes:
 
 
 def _payloads(unit: AccessUnit) -> Iterator[tuple[bytes, bool]]:
-    """Yield what goes into packets, and whether it ends the picture."""
+    """Yield RTP payloads, and whether each is the last of the picture."""
     units = list(nal_units(unit.data))
-    for place, nal in enumerate(units):
-        ends = place == len(units) - 1
-        if len(nal) <= _MOST:
-            yield nal, ends
+    for index, nal in enumerate(units):
+        is_last_unit = index == len(units) - 1
+        if len(nal) <= _MAX_BYTES:
+            yield nal, is_last_unit
             continue
-        rest = range(1, len(nal), _MOST)
-        for at in rest:
-            begun, done = at == rest[0], at == rest[-1]
+        offsets = range(1, len(nal), _MAX_BYTES)
+        for at in offsets:
+            begun, done = at == offsets[0], at == offsets[-1]
             head = bytes([nal[0] & 0xE0 | _FU_A, begun << 7 | done << 6 | nal[0] & 0x1F])
-            yield head + nal[at : at + _MOST], ends and done
+            yield head + nal[at : at + _MAX_BYTES], is_last_unit and done

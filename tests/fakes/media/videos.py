@@ -1,4 +1,4 @@
-"""Small videos in which every frame can be told by its grey, whole and damaged."""
+"""Small videos, intact and damaged, in which each frame has its own gray level."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from av.video.stream import VideoStream
 
 WIDTH, HEIGHT = 64, 48
 STEP = 10
-"""Grey levels between two frames."""
+"""Difference in gray between two frames."""
 
 
 def write_video(path: Path, frames: int, *, codec: str = "libx264", b_frames: int = 0, fps: int = 25) -> Path:
-    """Write a video whose frame n has the grey STEP * n; a key frame every 10."""
+    """Write a video whose frame n has the gray STEP * n; a keyframe every 10 frames."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, rate=fps)
         assert isinstance(stream, VideoStream)
@@ -48,7 +48,7 @@ def write_timed(
     codec: str = "libx264",
     prepare: Callable[[VideoStream], None] = lambda _: None,
 ) -> Path:
-    """Write a video whose frame n has the grey STEP * (n % 25), or those pictures, at times in seconds."""
+    """Write a video at given times, seconds: frame n has the gray STEP * (n % 25), or is picture n."""
     unit = Fraction(1, 90_000)
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, rate=fps)
@@ -61,7 +61,7 @@ def write_timed(
             stream.options = {"preset": "veryfast", "crf": "8", "bf": "0"}
         prepare(stream)
         for number, time in enumerate(times):
-            picture = pictures[number] if pictures else _grey(number)
+            picture = pictures[number] if pictures else _gray_picture(number)
             frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
             frame.pts, frame.time_base = round(time / unit), unit
             container.mux(stream.encode(frame))
@@ -69,12 +69,12 @@ def write_timed(
     return path
 
 
-def _grey(number: int) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+def _gray_picture(number: int) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     return np.full((HEIGHT, WIDTH, 3), STEP * (number % 25), dtype=np.uint8)
 
 
 def damage(path: Path, packets: list[int]) -> Path:
-    """Overwrite some packets, counted in the order of decoding, with noise."""
+    """Overwrite packets, numbered in decoding order, with noise."""
     with av.open(str(path)) as container:
         places = [(packet.pos or 0, packet.size) for packet in container.demux(video=0) if packet.size]
     data = bytearray(path.read_bytes())
@@ -86,5 +86,5 @@ def damage(path: Path, packets: list[int]) -> Path:
 
 
 def frame_in(picture: np.ndarray[tuple[int, ...], np.dtype[np.uint8]]) -> int:
-    """Return which frame a picture is."""
+    """Return the frame number of a picture."""
     return round(float(picture.mean()) / STEP)

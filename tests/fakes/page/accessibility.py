@@ -1,4 +1,4 @@
-"""Accessibility faults of a page, found by axe-core."""
+"""Accessibility violations of a page, by axe-core."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SERIOUS = ("serious", "critical")
 
 
 async def faults(visit: Visit) -> list[Any]:
-    """Return what axe-core finds serious: rule, help, and the elements."""
+    """Return the serious violations: rule, help and elements."""
     await visit.page.add_script_tag(path=AXE)
     found = await visit.get("axe.run()")
     return [

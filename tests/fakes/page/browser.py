@@ -1,4 +1,4 @@
-"""Debian's Chromium, without a screen, opened on a fake site."""
+"""Headless Chromium with the page of a fake site."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ expect.set_options(timeout=PATIENCE_MS)
 
 @dataclass(frozen=True, slots=True)
 class Visit:
-    """A page that is open on a site."""
+    """An open page, and its site."""
 
     page: Page
     server: SiteServer
@@ -32,7 +32,7 @@ class Visit:
         await self.page.wait_for_function(condition, timeout=PATIENCE_MS)
 
     async def playing(self, person: int) -> None:
-        """Wait until frames of a person are being shown."""
+        """Wait until frames of a person are shown."""
         await self.until(
             f"myview.state === 'playing' && myview.object === {person} && myview.camera !== null"
             " && myview.switches.at(-1)?.shownAt !== null"
@@ -43,7 +43,7 @@ class Visit:
         return await self.page.evaluate(expression)
 
     async def screenshot(self) -> npt.NDArray[np.int16]:
-        """Return what is on the stage now, shape (height, width, 3), red, green, blue."""
+        """Return a screenshot of the stage, RGB `(height, width, 3)`."""
         image = await self.page.locator("#stage").screenshot()
         with av.open(io.BytesIO(image), "r") as container:
             return next(container.decode(video=0)).to_ndarray(format="rgb24").astype(np.int16)
@@ -58,10 +58,10 @@ async def visiting(
     height: int = 900,
     script: str = "",
 ) -> AsyncIterator[Visit]:
-    """Open the page on a site, after a script of its own; an exception in the page fails the test."""
+    """Open the page of a site, after an optional script; an exception in the page fails the test."""
     failures: list[str] = []
     async with serving(site or FakeSite()) as server:
-        # The site's policy forbids eval, which the conditions of these tests are evaluated with.
+        # The site's policy forbids eval, which evaluates the conditions of these tests.
         page = await browser.new_page(viewport={"width": width, "height": height}, bypass_csp=True)
         page.on("pageerror", lambda error: failures.append(str(error)))
         if script:
@@ -80,6 +80,6 @@ async def seconds_of_playing(visit: Visit, seconds: float) -> None:
 
 
 async def camera_on_the_stage(visit: Visit) -> str:
-    """Return the camera whose tint the picture has."""
+    """Return the shown camera, by the tint of the picture."""
     ground = np.median((await visit.screenshot()).reshape(-1, 3), axis=0)
     return CAMERAS[int(np.abs(np.array(GROUNDS) - ground).sum(axis=1).argmin())]

@@ -1,4 +1,4 @@
-"""A small site that speaks the HTTP contract, for the page to be tried against: three test patterns."""
+"""A small site with the HTTP API for tests of the page: three cameras with test patterns."""
 
 from __future__ import annotations
 
@@ -29,41 +29,41 @@ from fakes.page.video_pattern import (
 )
 from fakes.paths import PAGE
 
-LOOKAHEAD = 10  # frames between the pulse and what is served
+LOOKAHEAD = 10  # frames between the current pulse and the served one
 SEGMENT = 2 * GOP  # frames of a segment of HLS
 HOLD = 3 * GOP  # frames for which person 1 is shown by one camera
-STARTS_AT = 12_345_678  # the pulse of the site's first moment: far from zero, as on a site up for days
+STARTS_AT = 12_345_678  # first pulse: far from zero, as on a site that has run for days
 
 REASON = "Another camera sees this person a little better, but not by enough to be worth a cut so soon."
-# As strict as a server may be: nothing from elsewhere, no code or style inside the page.
+# As strict as a server may be: no foreign origins, no inline scripts or styles.
 POLICY = "default-src 'self'; media-src 'self' blob:; img-src 'self' data: blob:"
 
 
 @dataclass(slots=True)
 class FakeSite:
-    """What the site says, and switches for what may go wrong.
+    """The state of a fake site, with switches for faults.
 
     Args:
         bursts: Send whole GOPs at once instead of frame by frame.
-        people: Who is known, and whether they are in view.
-        aliases: Other numbers that somebody once had.
-        split: What every GOP says about numbers that turned out to be somebody else's.
-        first_pulse: Pulse of about the moment at which the site is made.
+        people: Known people, and whether they are in view.
+        aliases: Former ids of people.
+        split: The splits that every GOP reports.
+        first_pulse: Pulse at about the time when the site is created.
         skipped: Pulses whose frames are missing from every stream.
-        codec: What is in the streams; None: no key frame has come yet.
-        opened: Whose stream was asked for, in order.
-        listed: Playlists of HLS that were asked for, in order.
-        fetched: First pulses of the segments of HLS that were asked for, in order.
-        kept_from: The first pulse that can be seen again.
+        codec: Codec of the streams; None: no keyframe has arrived yet.
+        opened: People whose streams were requested, in order.
+        listed: Requested HLS playlists, in order.
+        fetched: First pulses of the requested HLS segments, in order.
+        kept_from: The first pulse that can be replayed.
         recorded: Seconds of the past that are recorded.
-        past_comes: Set when more of a past is to be sent than its first frame; None: all comes at once.
-        ahead: Seconds that the streams run ahead of the clock: minutes pass in no time.
-        blind: Pulses, from GOP to GOP, at which the first camera finds nobody.
-        undetected: Share of the look-ahead in which every camera does not find whom others know to be there.
-        operates: Whoever looks at the page may operate.
-        flags: What an operator is asked to look at.
+        past_comes: Set to send more of a replay than its first frame; None: all is sent at once.
+        ahead: Seconds by which the streams are ahead of the clock, to let time pass quickly.
+        blind: Pulses, in whole GOPs, at which the first camera detects nobody.
+        undetected: Share of the look-ahead in which no camera detects the person.
+        operates: Whether viewers may operate.
+        flags: Flags for the operator.
         pointed: Where the operator pointed, as it was sent.
-        busy: What cameras say that they leave out.
+        busy: Messages of cameras about shed load.
         pulse0: Unix seconds at which pulse 0 was due.
     """
 
@@ -101,7 +101,7 @@ class FakeSite:
         return (pulse // HOLD) % len(CAMERAS) if person == 1 else 2
 
     def shown(self, person: int, pulse: int, held: str | None, preferred: str | None) -> int:
-        """Return the camera of a pulse in a stream that may be held to one, or prefer one."""
+        """Return the camera of a pulse in a stream with an optional fixed or preferred camera."""
         if held is not None:
             return CAMERAS.index(held)
         if preferred is not None:
@@ -174,7 +174,7 @@ class FakeSite:
         ]
 
     def choice(self, person: int, first: int) -> dict[str, Any]:
-        """Return why a person is shown as they are in the GOP [first, first + GOP)."""
+        """Return the explanation of a person's view in the GOP [first, first + GOP)."""
         shown = self.camera(person, first)
         costs = {camera: 0.0 if n == shown else 0.25 * (n + 1) for n, camera in enumerate(CAMERAS)}
         return {
@@ -199,7 +199,7 @@ class FakeSite:
         }
 
     def past(self, person: int, since: int = 0) -> dict[str, Any]:
-        """Return what can be seen again of a person, by camera; from `since` on, which begins a view."""
+        """Return the recorded views of a person, from the pulse `since` on."""
         first = (self.edge - self.recorded * FPS) // HOLD * HOLD
         views = [
             {"camera": CAMERAS[self.camera(person, pulse)], "first": pulse, "frames": HOLD}
@@ -218,7 +218,7 @@ class FakeSite:
             pulse += 1
 
     def boundary(self) -> int:
-        """Return the first pulse of the newest whole GOP (in bursts) or of the present one."""
+        """Return the first pulse of the newest complete GOP (in bursts) or of the current one."""
         edge = self.edge - (GOP - 1 if self.bursts else 0)
         return edge - edge % GOP
 
@@ -239,7 +239,7 @@ def thumbnail(person: int) -> bytes:
 
 
 class SiteServer:
-    """Serves a FakeSite and the page on one port, and may go away and come back there."""
+    """Serves a FakeSite and the page on one port, where it can be stopped and restarted."""
 
     def __init__(self, site: FakeSite) -> None:
         self.site = site
@@ -281,13 +281,13 @@ class SiteServer:
             self._runner = None
 
     async def restart_as(self, site: FakeSite) -> None:
-        """Come back as another site on the same port: what a page sees of a server restart."""
+        """Restart as another site on the same port."""
         await self.stop()
         self.site = site
         await self.start()
 
     async def break_streams(self) -> None:
-        """Break the connections of all videos, as a bad network does."""
+        """Abort the connections of all videos, as a bad network does."""
         for transport in self._streams:
             transport.abort()
 
@@ -295,7 +295,7 @@ class SiteServer:
         return web.json_response(self.site.site())
 
     async def _session(self, _: web.Request) -> web.Response:
-        """Return that anybody may watch, and who looks at the page maybe operate."""
+        """Return a session that may watch, or operate."""
         role = "operate" if self.site.operates else "watch"
         return web.json_response(
             {"by_token": False, "name": None, "role": role, "object": None, "camera": None}

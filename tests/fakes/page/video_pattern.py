@@ -1,4 +1,4 @@
-"""Test pictures whose content says which frame of which camera they are, as fragments of MP4."""
+"""Test pictures that identify their camera and frame, as MP4 fragments."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ class Pattern:
 
 
 def square(camera: int, pulse: int) -> tuple[int, int]:
-    """Return the corner (left, top) of person 1's bright square: another one in every frame and camera."""
+    """Return the corner (left, top) of person 1's bright square, which depends on frame and camera."""
     step = (pulse + 37 * camera) % PERIOD
     return 4 + 14 * (step % COLUMNS), 20 + 40 * (step // COLUMNS)
 
 
 def second(camera: int, pulse: int) -> tuple[int, int]:
-    """Return the corner (left, top) of person 2's square, which walks the other way."""
+    """Return the corner (left, top) of person 2's square, which moves the other way."""
     left, top = square(camera, pulse)
     return WIDTH - SQUARE - left, HEIGHT - SQUARE - top
 

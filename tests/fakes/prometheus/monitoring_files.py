@@ -1,4 +1,4 @@
-"""What the files for Prometheus and Grafana ask for."""
+"""The expressions in the files for Prometheus and Grafana."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from fakes.paths import CONFIGS
-from fakes.prometheus.promql_series import GIVEN_BY_PROMETHEUS
+from fakes.prometheus.promql_series import ADDED_BY_PROMETHEUS
 
 RULES: Any = yaml.safe_load((CONFIGS / "prometheus" / "alerts.yml").read_text(encoding="utf-8"))
 SCRAPING: Any = yaml.safe_load((CONFIGS / "prometheus" / "prometheus.yml").read_text(encoding="utf-8"))
@@ -20,22 +20,22 @@ ALERTS: list[dict[str, Any]] = [rule for group in RULES["groups"] for rule in gr
 PANELS: list[dict[str, Any]] = [panel for panel in DASHBOARD["panels"] if panel["type"] != "row"]
 VARIABLES: list[dict[str, Any]] = DASHBOARD["templating"]["list"]
 OF_PROMETHEUS = {"up"}
-"""Metrics that are about a service, not of it."""
+"""Metrics that Prometheus itself adds."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """One expression."""
+    """An expression of the dashboard or of an alert."""
 
     place: str
     expression: str
-    """With the dashboard's variables filled in."""
+    """With the dashboard's variables replaced."""
     shown: frozenset[str]
-    """The labels that are put into words beside what it gives."""
+    """The labels shown in its legend or summary."""
 
 
 def filled(expression: str) -> str:
-    """Fill the dashboard's variables in."""
+    """Replace the dashboard's variables."""
     return expression.replace("$__rate_interval", "1m").replace("$job", "myview")
 
 
@@ -43,7 +43,7 @@ def _all() -> Iterator[Asked]:
     for alert in ALERTS:
         shown = set(re.findall(r"\$labels\.(\w+)", alert["annotations"]["summary"]))
         place = f"alert {alert['alert']}"
-        yield Asked(place, alert["expr"], frozenset(shown - GIVEN_BY_PROMETHEUS))
+        yield Asked(place, alert["expr"], frozenset(shown - ADDED_BY_PROMETHEUS))
     for panel in PANELS:
         for target in panel["targets"]:
             shown = set(re.findall(r"\{\{(\w+)\}\}", target["legendFormat"]))
@@ -56,4 +56,4 @@ def _all() -> Iterator[Asked]:
 
 
 ASKED = tuple(_all())
-"""Every expression of the dashboard and of the alerts."""
+"""All expressions of the dashboard and of the alerts."""

@@ -1,7 +1,7 @@
-"""Which series a PromQL expression gives from one answer of /metrics: their labels, never their values.
+"""The series that a PromQL expression selects from /metrics: their labels, without values.
 
-Prometheus says nothing where an expression fits no series: a panel stays empty and an alert never fires. Here
-that is an empty set, and what makes no sense for the kind of metric is an error.
+Prometheus reports no error if an expression matches no series: a panel stays empty, an alert never fires.
+Here the result is an empty set, and a function that does not fit the kind of metric is an error.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ Series = frozenset[tuple[str, str]]
 """The labels of one series, without its name."""
 GIVEN_BY_PROMETHEUS = {"job", "instance"}
 _KIND_OF = {"rate": "counter", "increase": "counter", "delta": "gauge"}
-"""What a function is for. A histogram's buckets are counters."""
+"""The kind of metric of each function; a histogram's buckets are counters."""
 
 
 @dataclass(frozen=True)
 class Printed:
-    """What /metrics printed."""
+    """The metrics of one answer of /metrics."""
 
     samples: dict[str, set[Series]]
-    """By their names."""
+    """By metric name."""
     kinds: dict[str, str]
-    """counter or gauge, by the same names."""
+    """Counter or gauge, by metric name."""
 
     @classmethod
     def of(cls, text: str) -> Printed:
@@ -39,7 +39,7 @@ class Printed:
 
 
 def selectors(expression: str) -> list[promql.VectorSelector]:
-    """List what an expression asks for, whatever it makes of it."""
+    """Return the selectors of an expression."""
     found: list[promql.VectorSelector] = []
     promql.walk(
         promql.parse(expression),
@@ -52,7 +52,7 @@ def given(expression: str, printed: Printed) -> set[Series]:
     """Return the series of an expression.
 
     Raises:
-        ValueError: it is no PromQL, or makes no sense for these metrics.
+        ValueError: it is not supported PromQL, or does not fit the kinds of metrics.
     """
     return _given(promql.parse(expression), printed)
 
@@ -72,9 +72,9 @@ def _given(node: promql.Expr, printed: Printed) -> set[Series]:
         case promql.BinaryExpr():
             sides = [side for side in (node.lhs, node.rhs) if not isinstance(side, promql.NumberLiteral)]
             if node.modifier is not None and node.modifier.matching is not None:
-                raise ValueError(f"not known here: {node.modifier}")
+                raise ValueError(f"not supported: {node.modifier}")
             return set.intersection(*(_given(side, printed) for side in sides))
-    raise ValueError(f"not known here: {type(node).__name__}")
+    raise ValueError(f"not supported: {type(node).__name__}")
 
 
 def _selected(node: promql.VectorSelector, printed: Printed) -> set[Series]:
@@ -84,7 +84,7 @@ def _selected(node: promql.VectorSelector, printed: Printed) -> set[Series]:
         if matcher.name not in GIVEN_BY_PROMETHEUS
     }
     if any(matcher.op != promql.MatchOp.Equal for matcher in node.matchers.matchers):
-        raise ValueError(f"not known here: {node.prettify()}")
+        raise ValueError(f"not supported: {node.prettify()}")
     return {
         label_set
         for label_set in printed.samples.get(node.name or "", ())
@@ -97,11 +97,11 @@ def _called(node: promql.Call, printed: Printed) -> set[Series]:
     if name == "histogram_quantile":
         buckets = _given(node.args[1], printed)
         if not all("le" in dict(bucket) for bucket in buckets):
-            raise ValueError(f"a quantile of what has no buckets: {node.prettify()}")
+            raise ValueError(f"quantile of a metric without buckets: {node.prettify()}")
         return {frozenset((label, value) for label, value in bucket if label != "le") for bucket in buckets}
     (over,) = node.args
     if not isinstance(over, promql.MatrixSelector) or name not in _KIND_OF:
-        raise ValueError(f"not known here: {name}")
+        raise ValueError(f"not supported: {name}")
     metric = over.vector_selector.name
     kind = printed.kinds.get(metric, _KIND_OF[name])
     if kind != _KIND_OF[name]:
@@ -113,7 +113,7 @@ def _summed(node: promql.AggregateExpr, printed: Printed) -> set[Series]:
     series = _given(node.expr, printed)
     by = set(node.modifier.labels) if node.modifier is not None else set()
     if node.modifier is not None and node.modifier.type != promql.AggModifierType.By:
-        raise ValueError(f"not known here: {node.modifier}")
+        raise ValueError(f"not supported: {node.modifier}")
     if not all(by <= dict(one_series).keys() for one_series in series):
-        raise ValueError(f"by labels that there are not: {node.prettify()}")
+        raise ValueError(f"by missing labels: {node.prettify()}")
     return {frozenset((label, value) for label, value in one_series if label in by) for one_series in series}

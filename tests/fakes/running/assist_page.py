@@ -1,4 +1,4 @@
-"""The page of a site on which an operator helps, and what a test of it asks for."""
+"""The page of a running site with operator assistance."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ PLACE = """(wanted) => {
   const scale = width / myview.site.width;
   return [left + scale * (box[1] + box[3]) / 2, top + scale * (box[2] + box[4]) / 2];
 }"""
-"""Where somebody is on the screen; without a number, who is pointed at."""
+"""Return a person's position on the screen; without an id, that of the person pointed at."""
 
 
 @contextlib.asynccontextmanager
-async def helped(
+async def assisted_site(
     folder: Path, cameras: Sequence[Mapping[str, Any]], **assist: Any
 ) -> AsyncIterator[RunningSite]:
-    """Run a site, at a rate that a busy machine can do; whoever come near each other is a trouble."""
+    """Run a site with operator assistance at a low frame rate; every crossing raises a flag."""
     bus = f"tcp/127.0.0.1:{free_port()}"
     content = {
         **DEMO,
@@ -49,12 +49,12 @@ async def helped(
     path = folder / "demo.yaml"
     path.write_text(yaml.safe_dump(content), encoding="utf-8")
     async with running(path) as site:
-        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
+        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "a person is shown")
         yield site
 
 
 @contextlib.asynccontextmanager
-async def opened(site: RunningSite) -> AsyncIterator[Page]:
+async def open_page(site: RunningSite) -> AsyncIterator[Page]:
     """Open the page; an error in it fails the test."""
     errors: list[str] = []
     async with chromium() as browser:
@@ -67,6 +67,6 @@ async def opened(site: RunningSite) -> AsyncIterator[Page]:
 
 
 def every_gop_once(site: RunningSite) -> bool:
-    """Return whether all that was decided was told, each GOP once."""
+    """Return whether each GOP was published exactly once."""
     firsts = [gop.first for gop in site.gops]
     return firsts == list(range(firsts[0], firsts[0] + GOP * len(firsts), GOP))

@@ -1,4 +1,4 @@
-"""A file that beeps at known moments, and what is heard of it in a stream."""
+"""A file that beeps at known times, and detection of the beeps in a stream."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 RATE = 44_100
-"""Another than the site's: it has to be encoded."""
+"""Not the site's sample rate, so that the audio must be resampled."""
 EVERY_S = 1.0
-_LASTS_S = 0.08
+_BEEP_S = 0.08
 
 
 def write_beeps(path: Path) -> Path:
-    """Write a file of two seconds that beeps at each of them."""
+    """Write a file of two seconds with a beep in each."""
     time = np.arange(2 * RATE) / RATE
-    samples = 0.5 * np.sin(2 * np.pi * 1000 * time) * (time % EVERY_S < _LASTS_S)
+    samples = 0.5 * np.sin(2 * np.pi * 1000 * time) * (time % EVERY_S < _BEEP_S)
     with wave.open(str(path), "wb") as file:
         file.setnchannels(1)
         file.setsampwidth(2)
@@ -29,8 +29,8 @@ def write_beeps(path: Path) -> Path:
     return path
 
 
-def heard(path: Path) -> tuple[NDArray[np.float64], list[float]]:
-    """Return the times of all samples of a stream, and of them when beeps begin (media time, seconds)."""
+def sample_and_beep_times(path: Path) -> tuple[NDArray[np.float64], list[float]]:
+    """Return the media times of all audio samples of a stream, and of the starts of beeps, seconds."""
     data = path.read_bytes()
     with av.open(io.BytesIO(data[: data.rfind(b"moof") - 4])) as container:
         frames = list(container.decode(audio=0))

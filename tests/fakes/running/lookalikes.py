@@ -1,7 +1,7 @@
-"""A film of two who are dressed alike: they meet, one is behind the other for a moment, and they turn back.
+"""A film of two people in the same clothes who meet, occlude each other briefly, and turn back.
 
-Who sees the film may know it; a tracker, which has everybody go on as they went, takes each for the other
-from then on. Afterwards they stand where they came from, so that it can be told at any time.
+A tracker, which expects people to keep walking, exchanges their ids. Afterwards they stand where they came
+from, so that the exchange can be corrected at any time.
 """
 
 from __future__ import annotations
@@ -16,43 +16,43 @@ from benchmarks.faults.video.stamped_views import write_film
 from fakes.running.stream_frames import FPS
 
 MET = 80
-"""The pulse in which they meet."""
+"""The pulse at which they meet."""
 FRAMES = 6000
-"""Ten minutes of pulses, as long as any test may take: a busy machine is minutes late."""
+"""Ten minutes, as long as a test may take on a busy machine."""
 _SIZE = 180, 320
-_WIDE, _TALL, _TOP = 20, 60, 60
+_WIDTH, _HEIGHT, _TOP = 20, 60, 60
 _FAR, _STEP = 100, 2
-"""Pixels from where they meet to where they stand, and that they walk a frame."""
+"""Pixels from the meeting point to where they stand, and per frame."""
 STAND = MET + _FAR // _STEP
-"""The pulse from which they stand."""
-_BEHIND = 6
-"""Frames before and after, in which one hides the other."""
-_GREY, _GREEN = 110, (60, 200, 60)
+"""The pulse from which they stand still."""
+_OCCLUDED = 6
+"""Frames before and after the meeting in which one occludes the other."""
+_GRAY, _GREEN = 110, (60, 200, 60)
 
 
 def camera(name: str, folder: Path) -> dict[str, Any]:
-    """Write the film and what is found in it, of 320 x 180 pixels; give the camera that shows it."""
+    """Write the film, 320x180 pixels, and its detections; return the camera's configuration."""
     film, found = folder / f"{name}.mp4", folder / f"{name}.txt"
     sides = [_sides(pulse) for pulse in range(FRAMES)]
     drawn = {side: _picture(side) for side in set(sides)}
     write_film([drawn[side] for side in sides], film, FPS)
     lines = [
-        f"{pulse + 1},-1,{left},{_TOP},{_WIDE},{_TALL},1,-1,-1,-1"
+        f"{pulse + 1},-1,{left},{_TOP},{_WIDTH},{_HEIGHT},1,-1,-1,-1"
         for pulse, both in enumerate(sides)
-        for left in both[: 1 if abs(pulse - MET) < _BEHIND else 2]
+        for left in both[: 1 if abs(pulse - MET) < _OCCLUDED else 2]
     ]
     found.write_text("\n".join(lines), encoding="ascii")
     return {"id": name, "source": str(film), "detections": str(found)}
 
 
 def _sides(pulse: int) -> tuple[int, int]:
-    """Return the left sides of their boxes."""
+    """Return the left edges of the two boxes."""
     off = min(_STEP * abs(pulse - MET), _FAR)
-    return (_SIZE[1] - _WIDE) // 2 - off, (_SIZE[1] - _WIDE) // 2 + off
+    return (_SIZE[1] - _WIDTH) // 2 - off, (_SIZE[1] - _WIDTH) // 2 + off
 
 
 def _picture(sides: tuple[int, int]) -> NDArray[np.uint8]:
-    picture = np.full((*_SIZE, 3), _GREY, dtype=np.uint8)
+    picture = np.full((*_SIZE, 3), _GRAY, dtype=np.uint8)
     for left in sides:
-        picture[_TOP : _TOP + _TALL, left : left + _WIDE] = _GREEN
+        picture[_TOP : _TOP + _HEIGHT, left : left + _WIDTH] = _GREEN
     return picture

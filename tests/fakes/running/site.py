@@ -1,4 +1,4 @@
-"""A whole site, started as an operator starts it: `myview up` with real processes on ports that are free."""
+"""A running site: `myview up` with real processes on free ports."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fakes.timeouts import PATIENCE
 from server.cli.generated_config import free_port
 
 PATIENT_CAMERAS = {"backlog_s": 60}
-"""For sites that leave nothing out, however late they are: how busy the machine is decides nothing."""
+"""Settings of sites that skip no frame, however busy the machine is."""
 MYVIEW = [sys.executable, "-m", "server.cli.main"]
 CAMERAS = ("c0", "c1", "c2")
 
@@ -31,13 +31,13 @@ def configuration(folder: Path, recording: Path, **sections: Any) -> Path:
     """Write the configuration of a site of three recorded views; ``sections`` are merged into it."""
     bus = f"tcp/127.0.0.1:{free_port()}"
     content: dict[str, Any] = {
-        # Cameras are hardly nicer than what else runs here: where that is much, they would wait for it.
+        # Cameras get almost normal priority, so that they are not starved on a busy machine.
         "site": {"name": "e2e", "fps": FPS, "width": 320, "height": 180, "niceness": 1},
         "sync": {"port": free_port(), "start_timeout_s": 60},
         "zenoh": {"connect": bus, "listen": bus},
         "http": {"port": free_port()},
         "track": PATIENT_CAMERAS,
-        "view": {"switch_cost_s": 0.1, "late_after_s": 10},  # a short recording has cuts enough
+        "view": {"switch_cost_s": 0.1, "late_after_s": 10},  # enough cuts in a short recording
         "ground": str(recording / "ground.json"),
         "cameras": [{"id": name, "source": str(recording / f"{name}.mp4")} for name in CAMERAS],
     }
@@ -53,16 +53,16 @@ def configuration(folder: Path, recording: Path, **sections: Any) -> Path:
 
 @dataclass(slots=True)
 class RunningSite:
-    """`myview up`, its output, and what its events said so far."""
+    """`myview up`, its output, and the events received so far."""
 
     process: asyncio.subprocess.Process
     config: dict[str, Any]
     lines: list[str] = field(default_factory=list)
     gops: list[Gop] = field(default_factory=list)
     states: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
-    """Of each camera, as the events said them, the newest last."""
+    """States of each camera by the events, the newest last."""
     objects: Objects | None = None
-    heard: asyncio.Condition = field(default_factory=asyncio.Condition)
+    received: asyncio.Condition = field(default_factory=asyncio.Condition)
 
     @property
     def url(self) -> str:
@@ -74,38 +74,38 @@ class RunningSite:
         return self.gops[-1].first + self.gops[-1].frames - 1 if self.gops else -1
 
     def children(self) -> dict[str, int]:
-        """Return the pid of every process of the site by what it does: sync, bestview, c0 …"""
+        """Return the pid of each process of the site, by name: sync, bestview, c0 …"""
         found = {}
         for folder in Path("/proc").iterdir():
             with contextlib.suppress(OSError, ValueError):
-                words = (folder / "cmdline").read_bytes().decode().split("\0")[:-1]
+                command_line = (folder / "cmdline").read_bytes().decode().split("\0")[:-1]
                 parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
-                if parent == self.process.pid and "server.cli.main" in words:
-                    command = words[words.index("server.cli.main") + 1 :]
+                if parent == self.process.pid and "server.cli.main" in command_line:
+                    command = command_line[command_line.index("server.cli.main") + 1 :]
                     found[command[2] if command[0] == "camera" else command[0]] = int(folder.name)
         return found
 
     def state(self, camera: str) -> str | None:
-        """Return a camera's state as the events said it last."""
+        """Return a camera's last state by the events."""
         return self.states[camera][-1] if self.states[camera] else None
 
     async def until(self, condition: Callable[[], bool], what: str) -> None:
-        """Wait until what the events say fulfils a condition."""
+        """Wait until the received events fulfill a condition."""
         try:
-            async with asyncio.timeout(PATIENCE), self.heard:
-                await self.heard.wait_for(condition)
+            async with asyncio.timeout(PATIENCE), self.received:
+                await self.received.wait_for(condition)
         except TimeoutError:
             raise AssertionError(f"{what}: not within {PATIENCE} s\n" + "\n".join(self.lines[-40:])) from None
 
     async def ended(self) -> int:
-        """Wait until everything has ended by itself; give the exit code."""
+        """Wait until `myview up` exits; return the exit code."""
         async with asyncio.timeout(PATIENCE):
             return await self.process.wait()
 
     async def listen(self) -> None:
-        """Take the events in, for as long as the site runs; a service that was killed comes back."""
+        """Collect events while the site runs, reconnecting after a restart of the service."""
         async for event in events(self.url, HttpSettings(retries=int(PATIENCE))):
-            async with self.heard:
+            async with self.received:
                 match event:
                     case Gop():
                         self.gops.append(event)
@@ -114,10 +114,10 @@ class RunningSite:
                             self.states[camera.camera].append(camera.state)
                     case Objects():
                         self.objects = event
-                self.heard.notify_all()
+                self.received.notify_all()
 
     async def read_log(self) -> None:
-        """Keep what the processes log."""
+        """Collect the log lines of all processes."""
         assert self.process.stderr is not None
         async for line in self.process.stderr:
             self.lines.append(line.decode().rstrip())
@@ -125,7 +125,7 @@ class RunningSite:
 
 @contextlib.asynccontextmanager
 async def running(config: Path, *arguments: str, listen: bool = True) -> AsyncIterator[RunningSite]:
-    """Run a site; in the end everything must end within 2 s of SIGTERM, with exit code 0."""
+    """Run a site, and terminate it at the end."""
     process = await asyncio.create_subprocess_exec(
         *MYVIEW,
         "up",
@@ -139,7 +139,7 @@ async def running(config: Path, *arguments: str, listen: bool = True) -> AsyncIt
     tasks = [asyncio.create_task(site.read_log())]
     try:
         if listen:
-            await until_it_answers(site)
+            await _wait_until_listening(site)
             tasks.append(asyncio.create_task(site.listen()))
         yield site
     finally:
@@ -155,8 +155,8 @@ async def running(config: Path, *arguments: str, listen: bool = True) -> AsyncIt
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def until_it_answers(site: RunningSite) -> None:
-    """Wait until the best-view service has said in its log that it listens."""
+async def _wait_until_listening(site: RunningSite) -> None:
+    """Wait until the best-view service logs that it listens."""
     async with asyncio.timeout(PATIENCE):
         while not any(re.search(r"page, streams and API on http", line) for line in site.lines):
             if site.process.returncode is not None:
@@ -165,6 +165,6 @@ async def until_it_answers(site: RunningSite) -> None:
 
 
 async def bounded(work: Awaitable[Any]) -> Any:
-    """Await something, but not for ever."""
+    """Await something with a timeout."""
     async with asyncio.timeout(PATIENCE):
         return await work

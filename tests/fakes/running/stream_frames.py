@@ -1,4 +1,4 @@
-"""What a stream shows, frame by frame: recorded from HTTP, decoded by PyAV."""
+"""The frames of a stream, recorded over HTTP and decoded by PyAV."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 FPS = 10
-"""Of the sites in these tests: also a machine with much else to do leaves no frame out."""
+"""Frame rate of the sites in these tests, low enough for a busy machine."""
 
 
 async def record(session: aiohttp.ClientSession, url: str, until_pulse: int, out: Path) -> Path:
-    """Save a stream until it has passed a pulse."""
+    """Save a stream up to a pulse."""
     data = bytearray()
     async with session.get(url) as answer:
         assert answer.status == 200, await answer.text()
@@ -47,7 +47,7 @@ def pictures(path: Path) -> dict[int, NDArray[np.uint8]]:
 
 
 def shown_from_to(path: Path) -> list[tuple[float, float]]:
-    """Return when each picture of a stream begins and ends, in pulses."""
+    """Return the start and end of each picture of a stream, in pulses."""
     data = path.read_bytes()
     with av.open(io.BytesIO(data[: data.rfind(b"moof") - 4])) as container:
         found = [

@@ -38,7 +38,7 @@ class Running:
         return task
 
     async def _run(self, camera: str) -> None:
-        # In a thread: it looks at its recording ahead, and here the pulses come from the same loop.
+        # In a thread: opening a recording takes time, and the pulses run in this loop.
         process = await asyncio.to_thread(CameraProcess, self.config, camera)
         await process.run()
 
@@ -58,6 +58,6 @@ class Running:
 
 
 def in_folder(folder: Path) -> dict[str, bytes]:
-    """Return what tracks and choices were written."""
+    """Return the written files of tracks and choices."""
     files = [*folder.rglob("*.txt"), *folder.rglob("*.csv")]
     return {str(file.relative_to(folder)): file.read_bytes() for file in files}

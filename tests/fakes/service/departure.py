@@ -24,7 +24,7 @@ Picture = NDArray[np.uint8]
 Codec = Literal["h264", "vp8"]
 
 EPOCHS, GONE = 24, range(4, 16)
-"""The number of epochs, and those in which object 1 is in no camera."""
+"""The number of epochs, and those in which no camera shows object 1."""
 UNSEEN = 2 * GOP
 """Frames after which object 1 is frozen."""
 ACCESS = {"hide_after_s": UNSEEN / FPS}
@@ -72,11 +72,11 @@ def expected(decisions: list[GopChoices], codec: Codec = "h264", *, holds: bool 
             if any(box[0] == 1 for box in boxes)
         ]
         seen_last = max([seen_last, *seen])
-        ago = gop.first - seen_last
+        age = gop.first - seen_last
         for pulse in range(gop.first, gop.first + gop.frames):
-            if ago <= UNSEEN:
+            if age <= UNSEEN:
                 shown[pulse] = own(camera, codec)[pulse]
-            elif holds and ago <= 2 * UNSEEN:
+            elif holds and age <= 2 * UNSEEN:
                 shown[pulse] = shown[pulse - 1]
             else:
                 shown[pulse] = np.full_like(own(camera)[pulse], GRAY)

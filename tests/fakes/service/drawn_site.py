@@ -1,4 +1,4 @@
-"""A site of the synthetic room with true boxes, fed by hand, and readers of its rendered streams."""
+"""A site of the synthetic room with true boxes, fed by a test, and readers of its rendered streams."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from synthetic import Scene
 SIZE = (320, 180)
 CAMERAS = ("c0", "c1")
 START = 200
-"""The scene's frame at pulse 0: people are in sight."""
+"""The scene's frame at pulse 0: people are in view."""
 
 MOST = 150
 """The number of frames."""

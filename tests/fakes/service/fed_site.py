@@ -1,4 +1,4 @@
-"""A served site that the test feeds by hand."""
+"""A served site that a test feeds with messages."""
 
 from __future__ import annotations
 

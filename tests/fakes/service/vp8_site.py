@@ -1,4 +1,4 @@
-"""A served site of VP8 that the test feeds by hand, with cuts."""
+"""A served VP8 site with cuts that a test feeds with messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A process of a site that may have few files open, and connections to it."""
+"""A process with a low limit of open files, and connections to it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import yaml
 from fakes.system.ports import free
 from fakes.timeouts import PATIENCE
 
-FEW = 64  # descriptors: hardly more than a process needs for itself
+FEW = 64  # descriptors: hardly more than a process needs
 MYVIEW = f"{shlex.quote(sys.executable)} -m server.cli.main"
 
 
@@ -35,7 +35,7 @@ def written(folder: Path, port: int) -> Path:
 
 @contextmanager
 def running(command: str, log: Path, descriptors: int = FEW) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a command with few descriptors until the block is over, its log in a file."""
+    """Run a command with few descriptors and its log in a file."""
     with (
         log.open("wb") as out,
         subprocess.Popen(f"ulimit -n {descriptors}; exec {command}", shell=True, stderr=out) as process,  # noqa: S602
@@ -48,13 +48,13 @@ def running(command: str, log: Path, descriptors: int = FEW) -> Iterator[subproc
 
 
 def connected(port: int) -> socket.socket:
-    """Connect as soon as somebody listens."""
+    """Connect as soon as the port is open."""
     end = time.monotonic() + PATIENCE
     while True:
         try:
             return socket.create_connection(("127.0.0.1", port), PATIENCE)
         except ConnectionRefusedError:
-            assert time.monotonic() < end, "nobody listens"
+            assert time.monotonic() < end, "the port is closed"
             time.sleep(0.02)
 
 

@@ -1,4 +1,4 @@
-"""A disk that takes no more: the system's own limit on the size of files stands for it."""
+"""A simulated full disk, by the system's limit of file sizes."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def files_of_at_most(size: int) -> Iterator[None]:
-    """Let this process write no file beyond so many bytes: it fails half written, as on a full disk."""
+    """Limit the size of written files, bytes: writing fails halfway, as on a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     dont_write_bytecode = sys.dont_write_bytecode
-    # Python 3.11 keeps a .pyc that was cut short, and fails at every later import of it.
+    # Python 3.11 keeps a truncated .pyc, and fails at each later import of it.
     sys.dont_write_bytecode, os.environ["PYTHONDONTWRITEBYTECODE"] = True, "1"
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:

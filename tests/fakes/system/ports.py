@@ -1,4 +1,4 @@
-"""A port that nobody listens on."""
+"""Free TCP ports."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import socket
 
 
 def free() -> int:
-    """Return one that the system has chosen, and has let go of again."""
+    """Return a free port chosen by the system."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -1,4 +1,4 @@
-"""Being somebody whom the rights of files bind, also where the tests run as root."""
+"""An unprivileged user, subject to file permissions, even if the tests run as root."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NOBODY = 65534
 
 @contextlib.contextmanager
 def nobodys_folder() -> Iterator[Path]:
-    """Yield a folder, and be its owner and not root meanwhile."""
+    """Yield a folder while running as its unprivileged owner."""
     folder = Path(tempfile.mkdtemp(prefix="myview-nobody-"))
     root = os.geteuid() == 0
     try:

@@ -1,4 +1,4 @@
-"""People in drawn pictures who are hidden by each other for a while."""
+"""Drawn people who occlude each other for a while."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FRAMES = 58
 _TALL, _WIDE = 44, 18
 
 Clothes = tuple[tuple[int, int, int], tuple[int, int, int]]
-"""Colours of the upper and the lower half."""
+"""Colors of the upper and the lower half."""
 
 RED: Clothes = ((40, 40, 220), (90, 40, 30))
 BLUE: Clothes = ((220, 60, 30), (40, 40, 160))
@@ -30,11 +30,11 @@ class Crossing:
     """The first person walks right, behind the second, who walks left."""
 
     clothes: tuple[Clothes, ...]
-    """Of everybody, from the back to the front."""
+    """Of each person, from back to front."""
     seed: int = 0
 
     def left(self, person: int, frame: int) -> float:
-        """Return where somebody's box begins, in pixels."""
+        """Return the left edge of a person's box, pixels."""
         return 20.0 + 2.5 * frame if person == 0 else 160.0 - 2.5 * frame
 
     def where(self, person: int, frame: int) -> Floats:
@@ -52,14 +52,14 @@ class Crossing:
         return image
 
     def furnish(self, image: Image, texture: Floats) -> None:
-        """Draw what stands around."""
+        """Draw objects of the background."""
 
 
 @dataclass(frozen=True)
 class WalkTogether(Crossing):
-    """The first one catches up with the second, goes on behind them and falls back, all to the right.
+    """The first person catches up with the second, walks behind them, and falls back.
 
-    Something of nearly the first one's colours stands where they are hidden.
+    An object in similar colors stands where the first is occluded.
     """
 
     def left(self, person: int, frame: int) -> float:
@@ -68,25 +68,25 @@ class WalkTogether(Crossing):
         return float(np.interp(frame, [0, 25, 40, 58], [20, 110, 140, 147]))
 
     def furnish(self, image: Image, texture: Floats) -> None:
-        dulled = 0.6 * np.array(self.clothes[0]) + 0.4 * 110
-        _dress(image, 125, 66, dulled, texture)
+        faded = 0.6 * np.array(self.clothes[0]) + 0.4 * 110
+        _dress(image, 125, 66, faded, texture)
 
 
 @dataclass(frozen=True)
 class ThreeMeet(Crossing):
-    """Two pass each other behind a third, who stands."""
+    """Two people pass each other behind a third, who stands."""
 
     def left(self, person: int, frame: int) -> float:
         return 90.0 if person == 2 else super().left(person, frame)
 
 
 def _dress(image: Image, left: int, top: int, clothes: Floats, texture: Floats) -> None:
-    colours = np.repeat(clothes, _TALL // 2, axis=0)[:, None]
-    image[top : top + _TALL, left : left + _WIDE] = np.clip(colours + texture, 0, 255)
+    colors = np.repeat(clothes, _TALL // 2, axis=0)[:, None]
+    image[top : top + _TALL, left : left + _WIDE] = np.clip(colors + texture, 0, 255)
 
 
 def followed(method: PredictionMethod[Any], scene: Crossing) -> list[bool]:
-    """Follow all from the first picture to the last; say of each whether they are found there."""
+    """Track all people from the first picture to the last; return whether each is found at the end."""
     image = scene.picture(0)
     people = [method.initialize(image, scene.where(person, 0)) for person in range(len(scene.clothes))]
     for frame in range(1, FRAMES):
@@ -98,5 +98,5 @@ def followed(method: PredictionMethod[Any], scene: Crossing) -> list[bool]:
 
 
 def times_kept(methods: Sequence[PredictionMethod[Any]], scenes: Sequence[Crossing]) -> int:
-    """Count the scenes after which all are found, each by a method of its own."""
+    """Count the scenes in which all people are found at the end, each with a new method."""
     return sum(all(followed(method, scene)) for method, scene in zip(methods, scenes, strict=True))

@@ -1,4 +1,4 @@
-"""Pictures with drawn people, for detector tests: figures on a noisy wall, all of it by seed."""
+"""Pictures with drawn people and noise for detector tests, all from a seed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Picture = npt.NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A person walking along a row of the picture; the height follows from the foot's row."""
+    """A person walking along a row of the picture; the height follows from the row of the feet."""
 
     left: float
     foot: float
@@ -46,9 +46,9 @@ NOISE = np.random.default_rng(0).normal(0.0, 3.0, SCENE.shape).astype(np.int16)
 
 
 def picture(figures: Sequence[Figure], frame: int, gain: float = 1.0) -> Picture:
-    """Draw the figures of a frame before a wall with a chequered floor."""
+    """Draw the figures of a frame before a wall with a checkered floor."""
     canvas = SCENE.copy()
-    for figure in sorted(figures, key=lambda one: one.foot):
+    for figure in sorted(figures, key=lambda figure: figure.foot):
         if figure.begin <= frame < figure.end:
             _draw(canvas, figure, frame)
     noise = np.roll(NOISE, (7 * frame, 13 * frame), axis=(0, 1))
@@ -58,7 +58,7 @@ def picture(figures: Sequence[Figure], frame: int, gain: float = 1.0) -> Picture
 def watched(
     detector: BackgroundDetector, figures: Sequence[Figure], frames: range, gain: float = 1.0
 ) -> list[Detections]:
-    """Show the frames to the detector."""
+    """Run the detector on the frames."""
     return [detector.detect(picture(figures, frame, gain)) for frame in frames]
 
 

@@ -1,4 +1,4 @@
-"""Random windows for the tests of the solvers, and the answer by trying everything."""
+"""Random windows for solver tests, and their optimum by exhaustive search."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tracking.types import Detections
 BINS = 4
 SETTINGS = PAPER_COSTS
 SPARSE = 0.3
-"""Share of windows and frames that are less than full, down to empty."""
+"""Share of windows and frames with fewer observations, down to none."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What a random window looks like."""
+    """The parameters of a random window."""
 
     objects: int
     frames: int
@@ -80,9 +80,9 @@ def network_of(case: Case) -> Network:
         )
 
     templates = []
-    for n in range(case.objects):
+    for index in range(case.objects):
         box = seen().boxes[:1].reshape(-1) if rng.uniform() < 0.8 else np.empty(0)
-        templates.append(Template(n + 1, looks(1)[0], box if box.size else None))
+        templates.append(Template(index + 1, looks(1)[0], box if box.size else None))
     if case.shared:
         return build_network(templates, [seen() for _ in range(case.frames)], case.settings)
     own = [[seen() for _ in range(case.frames)] for _ in range(case.objects)]
@@ -90,7 +90,7 @@ def network_of(case: Case) -> Network:
 
 
 def best_by_trying(network: Network) -> float:
-    """Return the cost of the optimum by trying all states of all objects."""
+    """Return the cost of the optimum by exhaustive search over all states."""
     states = range(network.places + 1)
     best = np.inf
     for flat in product(states, repeat=network.objects * network.frames):

@@ -1,4 +1,4 @@
-"""People as boxes that walk along lines, for the tests of the online tracker."""
+"""Boxes of people walking along lines, for tests of the online tracker."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WIDTH, HEIGHT = 30.0, 90.0
 
 @dataclass(frozen=True)
 class Stroll:
-    """One person: walks `speed` pixels a frame from `x`, `y`, in the frames of `seen`, clearly in `sure`."""
+    """A person walking at `speed` pixels per frame; detected in `seen`, with a high score in `sure`."""
 
     x: float
     y: float
@@ -41,14 +41,14 @@ def look(kind: int) -> np.ndarray:
 
 
 def seen_at(people: Iterable[Stroll], frame: int, jitter: float = 0.0, seed: int = 0) -> Detections:
-    """What a detector sees in a frame: all boxes, with noise of some pixels."""
-    there = [person for person in people if frame in person.seen]
-    if not there:
+    """Return the detections of a frame: all boxes, with noise of `jitter` pixels."""
+    present = [person for person in people if frame in person.seen]
+    if not present:
         return Detections.empty(BINS)
     rng = np.random.default_rng((seed, frame))
-    boxes = np.array([person.box(frame) for person in there]) + rng.normal(0.0, jitter, (len(there), 4))
-    looks = np.stack([look(person.look) for person in there])
-    scores = np.array([0.9 if frame in person.sure else 0.5 for person in there])
+    boxes = np.array([person.box(frame) for person in present]) + rng.normal(0.0, jitter, (len(present), 4))
+    looks = np.stack([look(person.look) for person in present])
+    scores = np.array([0.9 if frame in person.sure else 0.5 for person in present])
     return Detections(boxes, scores, looks)
 
 
@@ -57,7 +57,7 @@ def tracker(settings: WindowSettings | None = None) -> OnlineTracker:
 
 
 def follow(stream: Sequence[Detections], tracked: OnlineTracker, start: int = 0) -> list[WindowResult]:
-    """Push every frame and end the recording; give all results."""
+    """Push all frames and flush; return all results."""
     results = [tracked.push(start + n, seen) for n, seen in enumerate(stream)]
     return [result for result in [*results, tracked.flush()] if result is not None]
 

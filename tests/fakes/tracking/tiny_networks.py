@@ -1,4 +1,4 @@
-"""Tiny ONNX networks that write what they are told to, in the layouts of YOLO's family."""
+"""Tiny ONNX networks with given outputs, in the layouts of the YOLO family."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Table = npt.NDArray[np.float32]
 
 
 def save(path: Path, table: Table, size: tuple[int | str, int | str] = (64, 96), kind: str = "FLOAT") -> Path:
-    """Write a network that gives the table, scores multiplied by how bright the picture's first pixel is.
+    """Write a network that returns the table, with scores multiplied by the brightness of the first pixel.
 
-    The input is `(1, 3, h, w)`; the first pixel is at the letterbox's corner, so a network that sees the
-    grey bars there answers with 114/255 of the table.
+    The input is `(1, 3, h, w)`; the first pixel is at the letterbox's corner, so a network that gets the gray
+    bars there returns scores of 114/255 of the table.
     """
     helper, types = onnx.helper, onnx.TensorProto
     element = getattr(types, kind)
@@ -57,7 +57,7 @@ def _scores(table: Table) -> npt.NDArray[np.bool_]:
 
 
 def yolov5(rows: Sequence[Sequence[float]], boxes: int = 20) -> Table:
-    """Return `(1, boxes, 5 + C)`, rows first, the others nothing."""
+    """Return `(1, boxes, 5 + C)`: the rows, padded with zeros."""
     table = np.zeros((1, boxes, len(rows[0])), dtype=np.float32)
     table[0, : len(rows)] = rows
     return table
